@@ -1,0 +1,39 @@
+"""Array types, and the checks that every frozen record makes once, on construction."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rislam_rt.errors import GeometryError
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
+
+
+def frozen(value: ArrayLike, dtype: Any, shape: tuple[int | None, ...], name: str) -> NDArray[Any]:
+    """A read-only array of the given type and shape (`None` matches any length).
+
+    Raises
+    ------
+    GeometryError
+        The value has another shape, or holds a NaN.
+    """
+    array = np.array(value, dtype=dtype)
+    if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
+        wanted = ", ".join("any" if n is None else str(n) for n in shape)
+        raise GeometryError(f"{name}: shape {array.shape} received, ({wanted}) needed")
+    if array.dtype.kind in "fc" and np.isnan(array).any():
+        raise GeometryError(
+            f"{name}: NaN at index {tuple(int(i) for i in np.argwhere(np.isnan(array))[0])}; give finite numbers"
+        )
+    array.flags.writeable = False
+    return array
+
+
+def freeze(record: Any, name: str, dtype: Any, shape: tuple[int | None, ...]) -> None:
+    """Replace a field of a frozen dataclass by its checked, read-only array (for `__post_init__`)."""
+    label = f"{type(record).__name__}.{name}"
+    object.__setattr__(record, name, frozen(getattr(record, name), dtype, shape, label))

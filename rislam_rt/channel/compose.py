@@ -1,0 +1,166 @@
+"""From legs to paths: LOS and VT are single legs; PS, VS, RIS and VRIS join a Tx leg and an Rx leg at a landmark."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.walls import Walls
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.model import PathKind, Paths, RadioConfig, RisLegs, Scene
+from rislam_rt.ris import leg_response, rephase, zero_code
+
+
+def compose_paths(
+    scene: Scene,
+    radio: RadioConfig,
+    walls: Walls,
+    depth: int,
+    direct: Legs,
+    tx_legs: Sequence[Legs],
+    rx_legs: Sequence[Legs],
+    source: str,
+) -> Paths:
+    """All paths of up to `depth` wall bounces, both legs together; identities that no cycle has are left out.
+
+    Parameters
+    ----------
+    direct
+        Legs from the Tx (device) to the Rx (far end): LOS and VT.
+    tx_legs, rx_legs
+        For each landmark in the order of `scene.landmarks`, the legs from the Tx, and from the Rx, to it.
+    source
+        How the legs were found, kept in the result.
+    """
+    blocks = [_direct_block(direct, radio, depth)]
+    ris_legs: tuple[Complexes, Complexes] | None = None
+    for number, (tx, rx) in enumerate(zip(tx_legs, rx_legs, strict=True)):
+        is_ris = scene.ris is not None and number == len(scene.landmarks) - 1
+        point = scene.landmark_positions[number]
+        block = _join_block(tx, rx, point, number, is_ris, depth)
+        if is_ris:
+            assert scene.ris is not None
+            ris_legs = _panel_responses(scene, radio, tx, rx)
+        else:
+            join = np.sqrt(4.0 * np.pi * scene.scatterers[number].rcs) / radio.wavelength
+            gain_t = tx.gain(radio.wavelength)[:, block["tx_leg"]]
+            gain_r = rx.gain(radio.wavelength)[:, block["rx_leg"]]
+            block["gain"] = gain_t * gain_r * join * np.sqrt(radio.tx_gain * radio.rx_gain)
+            block["tx_leg"] = np.full(len(block["kind"]), -1)
+            block["rx_leg"] = np.full(len(block["kind"]), -1)
+        blocks.append(block)
+    merged = {
+        name: np.concatenate([block[name] for block in blocks], axis=0 if name in _PER_PATH else 1)
+        for name in blocks[0]
+        if name not in ("tx_leg", "rx_leg")
+    }
+    ris = None
+    if ris_legs is not None:
+        pick = {name: np.concatenate([block[name] for block in blocks]) for name in ("tx_leg", "rx_leg")}
+        keep = merged["valid"].any(axis=0)
+        ris = RisLegs(*ris_legs, pick["tx_leg"][keep], pick["rx_leg"][keep])
+    else:
+        keep = merged["valid"].any(axis=0)
+    fields: dict[str, Any] = {
+        name: value[keep] if name in _PER_PATH else value[:, keep] for name, value in merged.items()
+    }
+    for name in ("tau", "departure", "arrival", "gain", "vertices"):
+        mask = fields["valid"].reshape(fields["valid"].shape + (1,) * (fields[name].ndim - 2))
+        fields[name] = np.where(mask, fields[name], 0.0)
+    paths = Paths(**fields, walls=walls.names, landmarks=scene.landmarks, ris=ris, source=source)
+    return rephase(paths, zero_code(scene.ris.spec)) if scene.ris is not None else paths
+
+
+_PER_PATH = ("kind", "landmark", "tx_walls", "rx_walls", "num_vertices", "tx_leg", "rx_leg")
+
+
+def _direct_block(direct: Legs, radio: RadioConfig, depth: int) -> dict[str, Any]:
+    """LOS and VT columns."""
+    keep = np.flatnonzero(direct.num_bounces <= depth)
+    bounces = direct.num_bounces[keep]
+    paths = len(keep)
+    return {
+        "kind": np.where(bounces == 0, PathKind.LOS, PathKind.VT),
+        "landmark": np.full(paths, -1),
+        "tx_walls": _padded(direct.walls[keep], depth),
+        "rx_walls": np.full((paths, depth), -1),
+        "num_vertices": bounces,
+        "tx_leg": np.full(paths, -1),
+        "rx_leg": np.full(paths, -1),
+        "valid": direct.valid[:, keep],
+        "tau": direct.length[:, keep] / SPEED_OF_LIGHT,
+        "departure": direct.at_device[:, keep],
+        "arrival": direct.at_far_end[:, keep],
+        "gain": direct.gain(radio.wavelength)[:, keep] * np.sqrt(radio.tx_gain * radio.rx_gain),
+        "vertices": _padded_vertices(direct.vertices[:, keep], depth + 1),
+    }
+
+
+def _join_block(tx: Legs, rx: Legs, point: Floats, landmark: int, is_ris: bool, depth: int) -> dict[str, Any]:
+    """Columns of one landmark: every Tx leg with every Rx leg, up to `depth` bounces together."""
+    i, j = np.nonzero(tx.num_bounces[:, None] + rx.num_bounces[None, :] <= depth)
+    ever = tx.valid.any(axis=0)[i] & rx.valid.any(axis=0)[j]
+    i, j = i[ever], j[ever]
+    bare = (tx.num_bounces[i] == 0) & (rx.num_bounces[j] == 0)
+    plain, walled = (PathKind.RIS, PathKind.VRIS) if is_ris else (PathKind.PS, PathKind.VS)
+    return {
+        "kind": np.where(bare, plain, walled),
+        "landmark": np.full(len(i), landmark),
+        "tx_walls": _padded(tx.walls[i], depth),
+        "rx_walls": _padded(_reversed_rows(rx.walls, rx.num_bounces)[j], depth),
+        "num_vertices": tx.num_bounces[i] + rx.num_bounces[j] + 1,
+        "tx_leg": i,
+        "rx_leg": j,
+        "valid": tx.valid[:, i] & rx.valid[:, j],
+        "tau": (tx.length[:, i] + rx.length[:, j]) / SPEED_OF_LIGHT,
+        "departure": tx.at_device[:, i],
+        "arrival": rx.at_device[:, j],
+        "gain": np.zeros((tx.valid.shape[0], len(i)), dtype=np.complex128),
+        "vertices": _joined_vertices(tx, rx, i, j, point, depth + 1),
+    }
+
+
+def _panel_responses(scene: Scene, radio: RadioConfig, tx: Legs, rx: Legs) -> tuple[Complexes, Complexes]:
+    """Element responses (K, I, N, M) and (K, J, N, M) of the legs to the panel, from their mirrored devices."""
+    assert scene.ris is not None
+    spec, center = scene.ris.spec, scene.ris.center
+    responses = []
+    for legs, antenna_gain in ((tx, radio.tx_gain), (rx, radio.rx_gain)):
+        length = np.where(legs.valid, legs.length, 1.0)
+        direction = np.where(legs.valid[..., None], legs.at_far_end, spec.normal)
+        device = center + length[..., None] * direction
+        coefficient = np.where(legs.valid, legs.coefficient, 0.0) * np.sqrt(antenna_gain)
+        responses.append(leg_response(spec, center, device, coefficient, radio.wavelength))
+    return responses[0], responses[1]
+
+
+def _padded(walls: Integers, depth: int) -> Integers:
+    """Wall sequences brought to exactly `depth` columns."""
+    fill = np.full((len(walls), max(depth - walls.shape[1], 0)), -1)
+    return np.concatenate([walls, fill], axis=1)[:, :depth]
+
+
+def _padded_vertices(vertices: Floats, count: int) -> Floats:
+    """Vertices (K, S, D, 3) brought to exactly `count` points."""
+    cycles, paths, depth, _ = vertices.shape
+    fill = np.zeros((cycles, paths, max(count - depth, 0), 3))
+    return np.concatenate([vertices, fill], axis=2)[:, :, :count]
+
+
+def _reversed_rows(walls: Integers, bounces: Integers) -> Integers:
+    """Each row's first `bounces` entries in reverse order."""
+    index = bounces[:, None] - 1 - np.arange(walls.shape[1])
+    return np.where(index >= 0, np.take_along_axis(walls, np.maximum(index, 0), axis=1), -1)
+
+
+def _joined_vertices(tx: Legs, rx: Legs, i: Integers, j: Integers, point: Floats, count: int) -> Floats:
+    """Tx leg's bounce points, the landmark, the Rx leg's bounce points in the order of travel: (K, P, count, 3)."""
+    vertices = np.zeros((tx.valid.shape[0], len(i), count, 3))
+    for path, (a, b) in enumerate(zip(i, j, strict=True)):
+        first, last = int(tx.num_bounces[a]), int(rx.num_bounces[b])
+        vertices[:, path, :first] = tx.vertices[:, a, :first]
+        vertices[:, path, first] = point
+        vertices[:, path, first + 1 : first + 1 + last] = rx.vertices[:, b, :last][:, ::-1]
+    return vertices

@@ -1,0 +1,22 @@
+"""What a channel is."""
+
+from typing import Protocol
+
+from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
+
+
+class Channel(Protocol):
+    """All paths of a room over a trajectory. `TracedChannel` and `ImageSourceChannel` are drop-in for each other."""
+
+    scene: Scene
+    radio: RadioConfig
+    depth: int
+    """Largest number of wall bounces on a path, both legs together."""
+
+    def paths(self, trajectory: Trajectory) -> Paths:
+        """Every path of every cycle, with the panel at level 0."""
+        ...
+
+    def respond(self, paths: Paths, code: RisCode) -> Paths:
+        """The same paths under another code, without tracing again."""
+        ...

@@ -1,0 +1,13 @@
+"""Physical constants and the few numbers that several rooms of the house must agree on."""
+
+SPEED_OF_LIGHT = 299_792_458.0
+"""Speed of light in vacuum [m/s] (exact, SI)."""
+
+SURFACE_TOLERANCE = 1e-6
+"""Distance [m] below which a point counts as lying on a facet; coordinates are metres in float64."""
+
+COPLANAR_ANGLE = 1e-4
+"""Triangles of one reflector within this angle [rad] of each other (and `COPLANAR_OFFSET`) form one wall."""
+
+COPLANAR_OFFSET = 1e-4
+"""Distance [m] between two triangles' planes below which they are the same wall; PLY files hold float32."""

@@ -1,0 +1,46 @@
+"""What can go wrong, each with the exit code that the command line ends with.
+
+A message is one line: what was wrong, the value received, and what to do about it.
+"""
+
+
+class RislamError(Exception):
+    """Any failure that this package raises on purpose; exit code 1."""
+
+    exit_code = 1
+
+
+class ConfigError(RislamError):
+    """A pipeline, radio or command-line setting is unusable."""
+
+    exit_code = 2
+
+
+class SceneError(RislamError):
+    """A scene file or one of its meshes is unusable."""
+
+    exit_code = 2
+
+
+class GeometryError(RislamError):
+    """Points, directions or planes that have no answer (zero length, wrong shape)."""
+
+    exit_code = 2
+
+
+class TraceError(RislamError):
+    """The tracer failed on a valid scene."""
+
+    exit_code = 1
+
+
+class SetupError(RislamError):
+    """The machine lacks something: a library, a version, a device."""
+
+    exit_code = 3
+
+
+class StoreError(RislamError):
+    """A result could not be written or read back."""
+
+    exit_code = 4

@@ -1,0 +1,42 @@
+"""Spherical angles: theta is the zenith angle in [0, pi], phi the azimuth in (-pi, pi]."""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+
+
+def unit(vector: Floats) -> Floats:
+    """Vectors (..., 3) divided by their length; a zero vector stays zero."""
+    vector = np.asarray(vector, dtype=np.float64)
+    length = np.linalg.norm(vector, axis=-1, keepdims=True)
+    return vector / np.where(length > 0.0, length, 1.0)
+
+
+def angles_from_direction(direction: Floats) -> tuple[Floats, Floats]:
+    """Zenith and azimuth (...,) [rad] of directions (..., 3), which need not be unit vectors."""
+    x, y, z = np.moveaxis(np.asarray(direction, dtype=np.float64), -1, 0)
+    return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
+
+
+def direction_from_angles(theta: Floats, phi: Floats) -> Floats:
+    """Unit vectors (..., 3) of zenith and azimuth (...,) [rad]."""
+    theta, phi = np.broadcast_arrays(np.asarray(theta, dtype=np.float64), np.asarray(phi, dtype=np.float64))
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+
+
+def wrap(angle: Floats) -> Floats:
+    """Angles (...,) [rad] brought to (-pi, pi]."""
+    return -((-np.asarray(angle, dtype=np.float64) + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def angle_between(a: Floats, b: Floats) -> Floats:
+    """Angle (...,) [rad] between directions (..., 3), exact for small angles too (atan2 of cross and dot)."""
+    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(np.asarray(a) * np.asarray(b), axis=-1))
+
+
+def rotation_z(heading: Floats) -> Floats:
+    """Rotation matrices (..., 3, 3) about z: body frame (x forward) to room frame."""
+    heading = np.asarray(heading, dtype=np.float64)
+    c, s = np.cos(heading), np.sin(heading)
+    zero, one = np.zeros_like(c), np.ones_like(c)
+    return np.stack([np.stack([c, -s, zero], -1), np.stack([s, c, zero], -1), np.stack([zero, zero, one], -1)], -2)

@@ -1,0 +1,31 @@
+"""Floor 2: frozen data, checked once on construction. No behaviour beyond what a field's name promises."""
+
+from rislam_rt.model.estimate import MapEstimate, SlamEstimate, empty_map
+from rislam_rt.model.measurement import Measurement, PathTruth
+from rislam_rt.model.paths import Paths, PathKind, RisLegs
+from rislam_rt.model.radio import RadioConfig, RxArray
+from rislam_rt.model.ris import RisCode, RisPanel, RisSpec
+from rislam_rt.model.scene import Material, Reflector, Scatterer, Scene
+from rislam_rt.model.trajectory import Body, Trajectory
+
+__all__ = [
+    "Body",
+    "MapEstimate",
+    "Material",
+    "Measurement",
+    "PathKind",
+    "PathTruth",
+    "Paths",
+    "RadioConfig",
+    "Reflector",
+    "RisCode",
+    "RisLegs",
+    "RisPanel",
+    "RisSpec",
+    "RxArray",
+    "Scatterer",
+    "Scene",
+    "SlamEstimate",
+    "Trajectory",
+    "empty_map",
+]

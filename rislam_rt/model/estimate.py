@@ -1,0 +1,93 @@
+"""What the agent believes: its pose, and a map of landmarks and walls. Filters write it, phase design reads it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers, freeze
+from rislam_rt.model.trajectory import Body
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapEstimate:
+    """N landmarks and W walls.
+
+    A landmark without a parent is a point that scatters from where it is (a scatterer or the panel). One with a parent
+    is the parent's mirror image in a wall: its paths run Tx, parent, image, Rx, and the reciprocal.
+    """
+
+    ident: Integers
+    """(N,) number of the landmark, the same for all its life."""
+    position: Floats
+    """(N, 3) [m]."""
+    covariance: Floats
+    """(N, 3, 3) [m^2]."""
+    parent: Integers
+    """(N,) row of the parent, -1 for a point."""
+    ris_probability: Floats
+    """(N,) probability of being the panel; 0 for images."""
+    strength: Floats
+    """(N,) estimated square root of the cross-section [m]; for an image, the amplitude ratio to its parent's path law."""
+    wall_normal: Floats
+    """(W, 3) unit normals, from the room's inside outwards as seen by the agent."""
+    wall_offset: Floats
+    """(W,) [m]: `normal . x = offset`."""
+    wall_std: Floats
+    """(W, 2) standard deviations of angle [rad] and offset [m]."""
+
+    def __post_init__(self) -> None:
+        count, walls = len(np.asarray(self.ident)), len(np.asarray(self.wall_offset))
+        for name, dtype, shape in (
+            ("ident", np.int64, (count,)),
+            ("position", np.float64, (count, 3)),
+            ("covariance", np.float64, (count, 3, 3)),
+            ("parent", np.int64, (count,)),
+            ("ris_probability", np.float64, (count,)),
+            ("strength", np.float64, (count,)),
+            ("wall_normal", np.float64, (walls, 3)),
+            ("wall_offset", np.float64, (walls,)),
+            ("wall_std", np.float64, (walls, 2)),
+        ):
+            freeze(self, name, dtype, shape)
+
+    @property
+    def ris(self) -> int:
+        """Row of the landmark held for the panel (probability above one half), -1 if none is."""
+        if not len(self.ident):
+            return -1
+        best = int(np.argmax(self.ris_probability))
+        return best if self.ris_probability[best] > 0.5 else -1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlamEstimate:
+    """Pose and map after a cycle (or predicted for the next)."""
+
+    position: Floats
+    """(3,) [m]."""
+    velocity: Floats
+    """(3,) [m/s]."""
+    heading: float
+    """[rad]."""
+    covariance: Floats
+    """(6, 6) of position and velocity."""
+    samples: Floats
+    """(S, 3) positions drawn from the belief [m], equally likely; design averages over them."""
+    body: Body
+    map: MapEstimate
+
+    def __post_init__(self) -> None:
+        freeze(self, "position", np.float64, (3,))
+        freeze(self, "velocity", np.float64, (3,))
+        freeze(self, "covariance", np.float64, (6, 6))
+        freeze(self, "samples", np.float64, (None, 3))
+
+
+def empty_map() -> MapEstimate:
+    """A map of nothing."""
+    none: list[Any] = []
+    return MapEstimate(
+        np.array(none), np.zeros((0, 3)), np.zeros((0, 3, 3)), np.array(none), np.array(none), np.array(none),
+        np.zeros((0, 3)), np.array(none), np.zeros((0, 2)),
+    )  # fmt: skip

@@ -1,0 +1,67 @@
+"""What the receiver reports in one cycle, and, kept apart, what it was."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers, freeze
+from rislam_rt.geometry.angles import angles_from_direction
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measurement:
+    """M multipath components of one cycle, in no particular order. All that the agent gets to see.
+
+    The angle of arrival is held as direction cosines along the array's axes (body frame): the errors of a planar array
+    are Gaussian in them, the same at every angle, and do not wrap. The third cosine is not negative (array looks up).
+    """
+
+    tau: Floats
+    """(M,) delay [s]."""
+    cosines: Floats
+    """(M, 2) direction cosines of the arriving ray along body x and y."""
+    amplitude: Floats
+    """(M,) |alpha|."""
+    tau_std: Floats
+    """(M,) standard deviation [s], from the measured amplitude through the bound."""
+    cosines_std: Floats
+    """(M, 2) standard deviations, likewise."""
+    amplitude_std: Floats
+    """(M,)."""
+
+    def __post_init__(self) -> None:
+        count = len(np.asarray(self.tau))
+        for name, shape in (
+            ("tau", (count,)),
+            ("cosines", (count, 2)),
+            ("amplitude", (count,)),
+            ("tau_std", (count,)),
+            ("cosines_std", (count, 2)),
+            ("amplitude_std", (count,)),
+        ):
+            freeze(self, name, np.float64, shape)
+
+    def __len__(self) -> int:
+        return len(self.tau)
+
+    @property
+    def arrival(self) -> Floats:
+        """(M, 3) unit vectors in the body frame, from the Rx towards the arriving ray."""
+        z = np.sqrt(np.clip(1.0 - np.sum(self.cosines**2, axis=-1), 0.0, None))
+        vector = np.concatenate([self.cosines, z[:, None]], axis=-1)
+        return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+
+    @property
+    def aoa(self) -> tuple[Floats, Floats]:
+        """theta_r, phi_r (M,) [rad] in the body frame."""
+        return angles_from_direction(self.arrival)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathTruth:
+    """For scoring only: which path column each measurement came from (M,), -1 for clutter. Never shown to the agent."""
+
+    path: Integers
+
+    def __post_init__(self) -> None:
+        freeze(self, "path", np.int64, (None,))

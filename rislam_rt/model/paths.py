@@ -1,0 +1,136 @@
+"""Propagation paths over a trajectory: one column an identity, one row a cycle."""
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, freeze
+from rislam_rt.geometry.angles import angles_from_direction
+
+
+class PathKind(IntEnum):
+    """Path classes. VS and VRIS hold the reciprocal (walls on the Tx leg) and the class with walls on both legs."""
+
+    LOS = 0
+    VT = 1
+    PS = 2
+    VS = 3
+    RIS = 4
+    VRIS = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RisLegs:
+    """Per-element response of the legs between the agent's ends and the panel.
+
+    With the code's phases xi the gain of the path over Tx leg i and Rx leg j is
+    `sum_nm tx[k, i, n, m] exp(-j xi[n, m]) rx[k, j, n, m]`: linear in exp(-j xi), so a new code needs no new trace.
+    """
+
+    tx: Complexes
+    """(K, I, N, M)."""
+    rx: Complexes
+    """(K, J, N, M)."""
+    tx_leg: Integers
+    """(P,) Tx leg of each path, -1 where the path does not meet the panel."""
+    rx_leg: Integers
+    """(P,) Rx leg of each path, -1 where the path does not meet the panel."""
+
+    def __post_init__(self) -> None:
+        freeze(self, "tx", np.complex128, (None, None, None, None))
+        freeze(self, "rx", np.complex128, (None, None, None, None))
+        freeze(self, "tx_leg", np.int64, (None,))
+        freeze(self, "rx_leg", np.int64, (len(self.tx_leg),))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Paths:
+    """K cycles by P identities. Where `valid` is False the other entries are zero and mean nothing.
+
+    A path's identity is (kind, landmark, tx_walls, rx_walls), walls in the order of travel; no two columns share one.
+    """
+
+    kind: Integers
+    """(P,) values of `PathKind`."""
+    landmark: Integers
+    """(P,) index into `landmarks`, -1 for LOS and VT."""
+    tx_walls: Integers
+    """(P, D) walls between Tx and landmark (for VT: all walls), padded with -1."""
+    rx_walls: Integers
+    """(P, D) walls between landmark and Rx, padded with -1."""
+    valid: Booleans
+    """(K, P)."""
+    tau: Floats
+    """(K, P) delay [s]."""
+    departure: Floats
+    """(K, P, 3) unit vector away from the Tx (AoD)."""
+    arrival: Floats
+    """(K, P, 3) unit vector from the Rx towards the arriving ray (AoA)."""
+    gain: Complexes
+    """(K, P), carrier phase exp(-j 2 pi f tau) included; RIS columns under the code last applied (all zero at first)."""
+    vertices: Floats
+    """(K, P, V, 3) [m] interaction points in the order of travel; `num_vertices` of them count."""
+    num_vertices: Integers
+    """(P,) number of interaction points."""
+    walls: tuple[str, ...]
+    """Names of the walls; a wall is a reflector's plane, `name` or `name#facet`."""
+    landmarks: tuple[str, ...]
+    ris: RisLegs | None = None
+    source: str = ""
+    """How the set was found: `traced`, `traced, refined`, `image source`."""
+
+    def __post_init__(self) -> None:
+        cycles, paths = np.shape(self.valid)
+        for name, dtype, shape in (
+            ("kind", np.int64, (paths,)),
+            ("landmark", np.int64, (paths,)),
+            ("tx_walls", np.int64, (paths, None)),
+            ("rx_walls", np.int64, (paths, None)),
+            ("valid", np.bool_, (cycles, paths)),
+            ("tau", np.float64, (cycles, paths)),
+            ("departure", np.float64, (cycles, paths, 3)),
+            ("arrival", np.float64, (cycles, paths, 3)),
+            ("gain", np.complex128, (cycles, paths)),
+            ("vertices", np.float64, (cycles, paths, None, 3)),
+            ("num_vertices", np.int64, (paths,)),
+        ):
+            freeze(self, name, dtype, shape)
+
+    @property
+    def num_cycles(self) -> int:
+        """K."""
+        return self.valid.shape[0]
+
+    @property
+    def num_paths(self) -> int:
+        """P."""
+        return self.valid.shape[1]
+
+    @property
+    def aod(self) -> tuple[Floats, Floats]:
+        """theta_t, phi_t (K, P) [rad]."""
+        return angles_from_direction(self.departure)
+
+    @property
+    def aoa(self) -> tuple[Floats, Floats]:
+        """theta_r, phi_r (K, P) [rad]."""
+        return angles_from_direction(self.arrival)
+
+    def identity(self, path: int) -> tuple[int, int, tuple[int, ...], tuple[int, ...]]:
+        """(kind, landmark, tx_walls, rx_walls) of a column, without padding."""
+        tx = tuple(int(w) for w in self.tx_walls[path] if w >= 0)
+        rx = tuple(int(w) for w in self.rx_walls[path] if w >= 0)
+        return int(self.kind[path]), int(self.landmark[path]), tx, rx
+
+    def label(self, path: int) -> str:
+        """A column's identity for people: `VS sphere | wall_x0`, Tx walls before the landmark, Rx walls after the bar."""
+        kind, landmark, tx, rx = self.identity(path)
+        names = [self.walls[w] for w in tx] + ([self.landmarks[landmark]] if landmark >= 0 else [])
+        text = " ".join([PathKind(kind).name, *names])
+        return f"{text} | {' '.join(self.walls[w] for w in rx)}" if rx else text
+
+    def with_gain(self, gain: Any) -> "Paths":
+        """The same paths with other gains (K, P)."""
+        return replace(self, gain=gain)

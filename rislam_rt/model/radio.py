@@ -1,0 +1,83 @@
+"""The agent's radio: carrier, bandwidth, gains, noise and receive array."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.errors import ConfigError
+
+
+@dataclass(frozen=True, slots=True)
+class RxArray:
+    """Planar array in the body's x-y plane, boresight up, rows along body x and columns along body y.
+
+    Elements are isotropic over the upper hemisphere and blind below it (`upper`), or isotropic (`isotropic`).
+    A planar array cannot tell a direction from its mirror image in the array's plane; the blind side settles that.
+    """
+
+    rows: int = 4
+    cols: int = 4
+    spacing: float = 0.5
+    """Distance between neighbours, in wavelengths."""
+    pattern: str = "upper"
+
+    def __post_init__(self) -> None:
+        if self.rows < 1 or self.cols < 1:
+            raise ConfigError(f"array.rows, array.cols: {self.rows} x {self.cols} received; give at least 1 x 1")
+        if not self.spacing > 0.0:
+            raise ConfigError(f"array.spacing: {self.spacing} received; give a positive number of wavelengths")
+        if self.pattern not in ("upper", "isotropic"):
+            raise ConfigError(f"array.pattern: '{self.pattern}' received; give 'upper' or 'isotropic'")
+
+    @property
+    def num_antennas(self) -> int:
+        """L of the paper."""
+        return self.rows * self.cols
+
+    def positions(self, wavelength: float) -> Floats:
+        """Element positions (L, 3) [m] in the body frame, about the array's centre."""
+        x = (np.arange(self.rows) - (self.rows - 1) / 2.0) * self.spacing * wavelength
+        y = (np.arange(self.cols) - (self.cols - 1) / 2.0) * self.spacing * wavelength
+        xx, yy = np.meshgrid(x, y, indexing="ij")
+        return np.stack([xx.ravel(), yy.ravel(), np.zeros(xx.size)], axis=-1)
+
+
+@dataclass(frozen=True, slots=True)
+class RadioConfig:
+    """Everything that the radio, not the room, decides. SI units; gains and ratios are linear."""
+
+    carrier: float = 10e9
+    """Carrier frequency [Hz]."""
+    bandwidth: float = 1e9
+    """Bandwidth of the flat band [Hz]."""
+    tx_gain: float = 1.0
+    rx_gain: float = 1.0
+    energy: float = 1.0
+    """E: energy of one sounding signal [J]."""
+    noise_psd: float = 3.52e-11
+    """N0: noise power spectral density [W/Hz]; the default puts the paper's sphere, 3 m away, at 13 dB over 16 antennas."""
+    array: RxArray = field(default_factory=RxArray)
+
+    def __post_init__(self) -> None:
+        for name in ("carrier", "bandwidth", "tx_gain", "rx_gain", "energy", "noise_psd"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ConfigError(f"radio.{name}: {value} received; give a positive number")
+        if self.bandwidth >= 2.0 * self.carrier:
+            raise ConfigError(f"radio.bandwidth: {self.bandwidth:g} Hz received; keep it below twice the carrier")
+
+    @property
+    def wavelength(self) -> float:
+        """Carrier wavelength [m]."""
+        return SPEED_OF_LIGHT / self.carrier
+
+    @property
+    def effective_bandwidth_squared(self) -> float:
+        """zeta^2 [Hz^2] of a flat band: B^2 / 12."""
+        return self.bandwidth**2 / 12.0
+
+    def integrated_snr(self, gain: Floats) -> Floats:
+        """L E |alpha|^2 / N0 of path gains (...,): after integration over the signal and all L antennas, linear."""
+        return self.array.num_antennas * self.energy * np.abs(gain) ** 2 / self.noise_psd

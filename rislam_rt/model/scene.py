@@ -1,0 +1,106 @@
+"""A room: reflecting meshes, point scatterers, at most one panel, and the agent's true motion."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, freeze
+from rislam_rt.errors import SceneError
+from rislam_rt.model.ris import RisPanel
+from rislam_rt.model.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """Either a constant reflection coefficient at every angle, or a slab of an ITU-R P.2040 material."""
+
+    reflection: float | None = None
+    """R in (0, 1]: amplitude, the same for every angle and polarisation."""
+    itu: str | None = None
+    """Name in ITU-R P.2040, e.g. `concrete`."""
+    thickness: float = 0.1
+    """Thickness [m] of the slab; unused with a constant R."""
+
+    def __post_init__(self) -> None:
+        if (self.reflection is None) == (self.itu is None):
+            raise SceneError("material: give either 'reflection' or 'itu'")
+        if self.reflection is not None and not 0.0 < self.reflection <= 1.0:
+            raise SceneError(f"material.reflection: {self.reflection} received; give a number in (0, 1]")
+        if not self.thickness > 0.0:
+            raise SceneError(f"material.thickness_m: {self.thickness} received; give a positive length")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reflector:
+    """A smooth opaque mesh; it reflects on both sides. Each plane it has is a wall of its own."""
+
+    name: str
+    vertices: Floats
+    """(V, 3) [m]."""
+    faces: Any
+    """(F, 3) indices into `vertices`."""
+    material: Material
+
+    def __post_init__(self) -> None:
+        freeze(self, "vertices", np.float64, (None, 3))
+        freeze(self, "faces", np.int64, (None, 3))
+        if len(self.faces) == 0:
+            raise SceneError(f"reflector '{self.name}': the mesh has no faces")
+        if self.faces.min() < 0 or self.faces.max() >= len(self.vertices):
+            raise SceneError(
+                f"reflector '{self.name}': a face names vertex {int(self.faces.max())} of {len(self.vertices)}"
+            )
+
+    @property
+    def triangles(self) -> Floats:
+        """(F, 3, 3) [m]: face, corner, xyz."""
+        return self.vertices[self.faces]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scatterer:
+    """A small object that re-radiates in all directions. It shades nothing unless it has a mesh."""
+
+    name: str
+    position: Floats
+    """(3,) [m]."""
+    rcs: float
+    """Radar cross-section [m^2]."""
+    radius: float | None = None
+    """Radius [m] of a sphere, if it is one."""
+
+    def __post_init__(self) -> None:
+        freeze(self, "position", np.float64, (3,))
+        if not self.rcs > 0.0:
+            raise SceneError(f"scatterer '{self.name}': cross-section {self.rcs} m^2 received; give a positive one")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """The true room. Nothing in `slam/` or `design/` may see it."""
+
+    name: str
+    reflectors: tuple[Reflector, ...]
+    scatterers: tuple[Scatterer, ...]
+    ris: RisPanel | None
+    agent: Trajectory
+    digest: str = ""
+    """SHA-256 over the scene file and its meshes; empty for a scene built in memory."""
+
+    @property
+    def landmarks(self) -> tuple[str, ...]:
+        """Names in the order of landmark numbers: scatterers first, then the panel."""
+        return tuple(s.name for s in self.scatterers) + ((self.ris.name,) if self.ris else ())
+
+    @property
+    def landmark_positions(self) -> Floats:
+        """(num_landmarks, 3) [m], in the order of `landmarks`."""
+        points = [s.position for s in self.scatterers] + ([self.ris.center] if self.ris else [])
+        return np.array(points, dtype=np.float64).reshape(-1, 3)
+
+    @property
+    def bounds(self) -> Floats:
+        """(2, 3) [m]: lowest and highest corner of all reflectors."""
+        points = np.concatenate([r.vertices for r in self.reflectors]) if self.reflectors else np.zeros((1, 3))
+        return np.stack([points.min(axis=0), points.max(axis=0)])

@@ -1,0 +1,72 @@
+"""The agent's body (where Tx and Rx sit on it) and a motion of it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, freeze
+from rislam_rt.errors import GeometryError
+from rislam_rt.geometry.angles import rotation_z
+
+
+def _default_offset() -> Floats:
+    """Half the paper's 0.1 m baseline, turned 0.5 rad against the heading (a straight one makes paths hit edges)."""
+    return np.array([0.05 * np.cos(0.5), 0.05 * np.sin(0.5), 0.0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """Offsets (3,) [m] of Tx and Rx array centre from the agent's position, in the body frame (x forward)."""
+
+    tx_offset: Floats = field(default_factory=lambda: -_default_offset())
+    rx_offset: Floats = field(default_factory=_default_offset)
+
+    def __post_init__(self) -> None:
+        freeze(self, "tx_offset", np.float64, (3,))
+        freeze(self, "rx_offset", np.float64, (3,))
+        if np.linalg.norm(self.tx_offset - self.rx_offset) < 1e-6:
+            raise GeometryError("tx_offset_m, rx_offset_m: Tx and Rx coincide; keep them apart")
+
+    def ends(self, position: Floats, heading: Floats) -> tuple[Floats, Floats]:
+        """Tx and Rx positions (..., 3) [m] of agent positions (..., 3) and headings (...,) [rad]."""
+        rotation = rotation_z(heading)
+        return position + rotation @ self.tx_offset, position + rotation @ self.rx_offset
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Motion over K cycles; `position` is the midpoint of Tx and Rx when the offsets are opposite."""
+
+    time: Floats
+    """(K,) [s]."""
+    position: Floats
+    """(K, 3) [m]."""
+    velocity: Floats
+    """(K, 3) [m/s]."""
+    heading: Floats
+    """(K,) [rad], about z."""
+    body: Body = field(default_factory=Body)
+
+    def __post_init__(self) -> None:
+        freeze(self, "time", np.float64, (None,))
+        count = len(self.time)
+        for name, shape in (("position", (count, 3)), ("velocity", (count, 3)), ("heading", (count,))):
+            freeze(self, name, np.float64, shape)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __getitem__(self, cycles: slice) -> "Trajectory":
+        return Trajectory(
+            self.time[cycles], self.position[cycles], self.velocity[cycles], self.heading[cycles], self.body
+        )
+
+    @property
+    def tx(self) -> Floats:
+        """Tx positions (K, 3) [m]."""
+        return self.body.ends(self.position, self.heading)[0]
+
+    @property
+    def rx(self) -> Floats:
+        """Rx positions (K, 3) [m]."""
+        return self.body.ends(self.position, self.heading)[1]

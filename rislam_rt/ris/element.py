@@ -1,0 +1,27 @@
+"""One element of the panel: radiation pattern F and gain-area product G dx dy of eq. `single`."""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.model.ris import RisSpec
+
+TANG_GAIN = 8.0
+"""G of the cos^3 element (Tang et al., IEEE TWC 2021): 2 (q + 1) for F = cos^q, q = 3."""
+
+
+def element_pattern(spec: RisSpec, cos_theta: Floats) -> Floats:
+    """F(theta) for cosines (...,) of the angle to the panel's normal; 0 behind the panel.
+
+    `tang`: cos^3 theta. `energy`: cos theta, the projected area of the cell.
+    """
+    front = np.clip(cos_theta, 0.0, 1.0)
+    return front**3 if spec.element == "tang" else front
+
+
+def element_gain_area(spec: RisSpec, wavelength: float) -> float:
+    """G dx dy [m^2].
+
+    `tang`: 8 dx dy. `energy`: 4 pi (dx dy)^2 / lambda^2, what a perfectly conducting cell of that area re-radiates.
+    """
+    area = float(spec.spacing[0] * spec.spacing[1])
+    return TANG_GAIN * area if spec.element == "tang" else 4.0 * np.pi * area**2 / wavelength**2

@@ -1,0 +1,86 @@
+"""Gain of paths over the panel: element-wise (eq. `single`, the default) and far-field (eq. `a3`)."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.model.paths import Paths
+from rislam_rt.model.ris import RisCode, RisSpec
+from rislam_rt.ris.element import element_gain_area, element_pattern
+
+
+def leg_response(spec: RisSpec, center: Floats, device: Floats, coefficient: Complexes, wavelength: float) -> Complexes:
+    """Response (..., N, M) of every element to one leg: eq. `single` without its phase shift is the product of two.
+
+    Parameters
+    ----------
+    center
+        (..., 3) panel centre [m].
+    device
+        (..., 3) the device [m], mirrored in the walls of the leg, so that distance and direction are those in which
+        the ray meets the panel.
+    coefficient
+        (...,) reflection coefficients of the leg times the square root of the device's antenna gain.
+    wavelength
+        [m].
+
+    Each leg takes half (in dB) of the join's `sqrt(4 pi G dx dy) A / lambda`.
+    """
+    ray = (device - center)[..., None, None, :] - spec.offsets()
+    distance = np.sqrt(np.einsum("...i,...i->...", ray, ray))
+    pattern = element_pattern(spec, (ray @ spec.normal) / distance)
+    amplitude = _leg_share(spec, wavelength) * np.sqrt(pattern) * wavelength / (4.0 * np.pi * distance)
+    return np.asarray(coefficient)[..., None, None] * amplitude * np.exp(-2j * np.pi / wavelength * distance)
+
+
+def far_field_response(
+    spec: RisSpec, center: Floats, device: Floats, coefficient: Complexes, wavelength: float
+) -> Complexes:
+    """`leg_response` with the distances of Appendix A: plane waves, amplitude and pattern of the centre.
+
+    Valid for distances above `2 D^2 / lambda`, D the panel's diagonal.
+    """
+    ray = np.asarray(device - center)
+    distance = np.linalg.norm(ray, axis=-1)
+    direction = ray / distance[..., None]
+    amplitude = (
+        _leg_share(spec, wavelength)
+        * np.sqrt(element_pattern(spec, direction @ spec.normal))
+        * wavelength
+        / (4.0 * np.pi * distance)
+    )
+    along = np.einsum("nmi,...i->...nm", spec.offsets(), direction)
+    phase = np.exp(-2j * np.pi / wavelength * (distance[..., None, None] - along))
+    return (np.asarray(coefficient) * amplitude)[..., None, None] * phase
+
+
+def panel_gain(tx: Complexes, rx: Complexes, code: RisCode) -> Complexes:
+    """Gain (...,) of panel paths from the responses (..., N, M) of their two legs under a code (..., N, M)."""
+    return np.einsum("...nm,...nm,...nm->...", tx, rx, np.exp(-1j * code.xi))
+
+
+def rephase(paths: Paths, code: RisCode) -> Paths:
+    """The same paths under another code, (N, M) or one a cycle (K, N, M): no new trace."""
+    if paths.ris is None:
+        return paths
+    legs = paths.ris
+    columns = np.flatnonzero(legs.tx_leg >= 0)
+    cycles, num_tx = legs.tx.shape[:2]
+    weight = np.broadcast_to(np.exp(-1j * code.xi), (cycles, *legs.tx.shape[2:]))
+    weighted = (legs.tx * weight[:, None]).reshape(cycles, num_tx, -1)
+    pairs = weighted @ legs.rx.reshape(cycles, legs.rx.shape[1], -1).transpose(0, 2, 1)
+    gain = np.array(paths.gain)
+    gain[:, columns] = np.where(paths.valid[:, columns], pairs[:, legs.tx_leg[columns], legs.rx_leg[columns]], 0.0)
+    return replace(paths, gain=gain)
+
+
+def zero_code(spec: RisSpec) -> RisCode:
+    """The code with every element at level 0."""
+    return RisCode(np.zeros((spec.rows, spec.cols), dtype=np.int64), spec.levels)
+
+
+def _leg_share(spec: RisSpec, wavelength: float) -> float:
+    """Square root of the factor `sqrt(4 pi G dx dy) A / lambda` that joins two legs."""
+    join = np.sqrt(4.0 * np.pi * element_gain_area(spec, wavelength)) * spec.amplitude / wavelength
+    return float(np.sqrt(join))
