@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SPEED_OF_LIGHT
@@ -56,13 +56,11 @@ def compose_paths(
         for name in blocks[0]
         if name not in ("tx_leg", "rx_leg")
     }
+    keep: Booleans = np.asarray(merged["valid"]).any(axis=0)
     ris = None
     if ris_legs is not None:
-        pick = {name: np.concatenate([block[name] for block in blocks]) for name in ("tx_leg", "rx_leg")}
-        keep = merged["valid"].any(axis=0)
-        ris = RisLegs(*ris_legs, pick["tx_leg"][keep], pick["rx_leg"][keep])
-    else:
-        keep = merged["valid"].any(axis=0)
+        tx_leg, rx_leg = (np.concatenate([block[name] for block in blocks]) for name in ("tx_leg", "rx_leg"))
+        ris = RisLegs(*ris_legs, tx_leg[keep], rx_leg[keep])
     fields: dict[str, Any] = {
         name: value[keep] if name in _PER_PATH else value[:, keep] for name, value in merged.items()
     }

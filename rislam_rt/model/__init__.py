@@ -2,7 +2,7 @@
 
 from rislam_rt.model.estimate import MapEstimate, SlamEstimate, empty_map
 from rislam_rt.model.measurement import Measurement, PathTruth
-from rislam_rt.model.paths import Paths, PathKind, RisLegs
+from rislam_rt.model.paths import PathKind, Paths, RisLegs
 from rislam_rt.model.radio import RadioConfig, RxArray
 from rislam_rt.model.ris import RisCode, RisPanel, RisSpec
 from rislam_rt.model.scene import Material, Reflector, Scatterer, Scene

@@ -28,7 +28,7 @@ class MapEstimate:
     ris_probability: Floats
     """(N,) probability of being the panel; 0 for images."""
     strength: Floats
-    """(N,) estimated square root of the cross-section [m]; for an image, the amplitude ratio to its parent's path law."""
+    """(N,) estimated square root of the cross-section [m]; for an image, amplitude ratio to the parent's law."""
     wall_normal: Floats
     """(W, 3) unit normals, from the room's inside outwards as seen by the agent."""
     wall_offset: Floats

@@ -69,7 +69,7 @@ class Paths:
     arrival: Floats
     """(K, P, 3) unit vector from the Rx towards the arriving ray (AoA)."""
     gain: Complexes
-    """(K, P), carrier phase exp(-j 2 pi f tau) included; RIS columns under the code last applied (all zero at first)."""
+    """(K, P), carrier phase exp(-j 2 pi f tau) included; panel paths under the code last applied (zero at first)."""
     vertices: Floats
     """(K, P, V, 3) [m] interaction points in the order of travel; `num_vertices` of them count."""
     num_vertices: Integers
@@ -125,7 +125,7 @@ class Paths:
         return int(self.kind[path]), int(self.landmark[path]), tx, rx
 
     def label(self, path: int) -> str:
-        """A column's identity for people: `VS sphere | wall_x0`, Tx walls before the landmark, Rx walls after the bar."""
+        """A column's identity for people, e.g. `VS wall_y0 sphere | wall_x0`: Rx walls after the bar."""
         kind, landmark, tx, rx = self.identity(path)
         names = [self.walls[w] for w in tx] + ([self.landmarks[landmark]] if landmark >= 0 else [])
         text = " ".join([PathKind(kind).name, *names])

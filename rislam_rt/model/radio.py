@@ -57,7 +57,7 @@ class RadioConfig:
     energy: float = 1.0
     """E: energy of one sounding signal [J]."""
     noise_psd: float = 3.52e-11
-    """N0: noise power spectral density [W/Hz]; the default puts the paper's sphere, 3 m away, at 13 dB over 16 antennas."""
+    """N0: noise power spectral density [W/Hz]; by default the paper's sphere, 3 m away, has 13 dB over 16 antennas."""
     array: RxArray = field(default_factory=RxArray)
 
     def __post_init__(self) -> None:
