@@ -56,7 +56,7 @@ def compose_paths(
         for name in blocks[0]
         if name not in ("tx_leg", "rx_leg")
     }
-    keep: Booleans = np.asarray(merged["valid"]).any(axis=0)
+    keep: Booleans = np.logical_or.reduce(merged["valid"], axis=0)
     ris = None
     if ris_legs is not None:
         tx_leg, rx_leg = (np.concatenate([block[name] for block in blocks]) for name in ("tx_leg", "rx_leg"))
@@ -99,7 +99,7 @@ def _direct_block(direct: Legs, radio: RadioConfig, depth: int) -> dict[str, Any
 def _join_block(tx: Legs, rx: Legs, point: Floats, landmark: int, is_ris: bool, depth: int) -> dict[str, Any]:
     """Columns of one landmark: every Tx leg with every Rx leg, up to `depth` bounces together."""
     i, j = np.nonzero(tx.num_bounces[:, None] + rx.num_bounces[None, :] <= depth)
-    ever = tx.valid.any(axis=0)[i] & rx.valid.any(axis=0)[j]
+    ever = np.logical_or.reduce(tx.valid)[i] & np.logical_or.reduce(rx.valid)[j]
     i, j = i[ever], j[ever]
     bare = (tx.num_bounces[i] == 0) & (rx.num_bounces[j] == 0)
     plain, walled = (PathKind.RIS, PathKind.VRIS) if is_ris else (PathKind.PS, PathKind.VS)
