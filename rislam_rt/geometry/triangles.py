@@ -32,6 +32,18 @@ def planar_groups(triangles: Floats, angle: float, offset: float) -> Integers:
     return group
 
 
+def edge_planes(triangles: Floats) -> tuple[Floats, Floats]:
+    """In-plane unit normals (T, 3, 3) of the three edges, pointing inside, and their offsets (T, 3) [m].
+
+    `normal . x - offset` is the distance of a point x of the plane from an edge's line, positive inside. Where the
+    triangle is degenerate the normals are zero and the offset is infinite: nothing lies inside.
+    """
+    normal, _ = triangle_planes(triangles)
+    inward = unit(np.cross(normal[:, None, :], np.roll(triangles, -1, axis=1) - triangles))
+    solid = np.linalg.norm(inward, axis=-1) > 0.0
+    return inward, np.where(solid, np.einsum("tei,tei->te", inward, triangles), np.inf)
+
+
 def inside_triangles(points: Floats, triangles: Floats, margin: float = 0.0) -> Booleans:
     """Whether points (..., 1, 3), assumed in the plane, lie inside triangles (T, 3, 3): (..., T).
 
@@ -41,7 +53,7 @@ def inside_triangles(points: Floats, triangles: Floats, margin: float = 0.0) -> 
 
 
 def edge_distance(points: Floats, triangles: Floats) -> Floats:
-    """Distance [m] (..., T) of points (..., 1, 3) from the nearest edge line of triangles (T, 3, 3): positive inside."""
+    """Distance [m] (..., T) of points (..., 1, 3) from the nearest edge line of triangles (T, 3, 3), positive inside."""
     normal, _ = triangle_planes(triangles)
     edges = np.roll(triangles, -1, axis=1) - triangles
     inward = unit(np.cross(normal[:, None, :], edges))
@@ -68,7 +80,7 @@ def segment_hits(start: Floats, end: Floats, triangles: Floats, slack: float) ->
 
 
 def edge_distance_pairs(points: Floats, triangles: Floats) -> Floats:
-    """Distance [m] (S,) of points (S, 3) from the nearest edge line of their own triangle (S, 3, 3): positive inside."""
+    """Distance [m] (S,) of points (S, 3) from the nearest edge line of their triangle (S, 3, 3), positive inside."""
     normal, _ = triangle_planes(triangles)
     edges = np.roll(triangles, -1, axis=1) - triangles
     inward = unit(np.cross(normal[:, None, :], edges))

@@ -1,0 +1,64 @@
+"""The image-source channel behind the `Channel` protocol."""
+
+from dataclasses import dataclass, field
+
+from rislam_rt.arrays import Floats
+from rislam_rt.channel.compose import compose_paths
+from rislam_rt.channel.image_source.facets import Facets, build_facets
+from rislam_rt.channel.image_source.images import find_legs
+from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.walls import Walls, build_walls
+from rislam_rt.errors import ConfigError
+from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
+from rislam_rt.ris import rephase
+
+
+@dataclass(frozen=True, eq=False)
+class ImageSourceChannel:
+    """All paths of a room of planar facets, exact: wall sequences by pruned recursion, images, facets, occlusion.
+
+    Raises
+    ------
+    ConfigError
+        The depth is negative.
+    """
+
+    scene: Scene
+    radio: RadioConfig
+    depth: int = 2
+    walls: Walls = field(init=False)
+    facets: Facets = field(init=False)
+
+    def __post_init__(self) -> None:
+        if self.depth < 0:
+            raise ConfigError(f"depth: {self.depth} received; give 0 or more wall bounces")
+        object.__setattr__(self, "walls", build_walls(self.scene))
+        object.__setattr__(self, "facets", build_facets(self.walls, self.radio.carrier))
+
+    def paths(self, trajectory: Trajectory) -> Paths:
+        """Every path of every cycle, with the panel at level 0."""
+        tx, rx = trajectory.tx, trajectory.rx
+        direct = find_legs(self.facets, tx, rx, self.depth)
+        landmarks = range(len(self.scene.landmarks))
+        return compose_paths(
+            self.scene,
+            self.radio,
+            self.walls,
+            self.depth,
+            direct,
+            [self._landmark_legs(tx, number) for number in landmarks],
+            [self._landmark_legs(rx, number) for number in landmarks],
+            "image source",
+        )
+
+    def respond(self, paths: Paths, code: RisCode) -> Paths:
+        """The same paths under another code."""
+        return rephase(paths, code)
+
+    def _landmark_legs(self, device: Floats, number: int) -> Legs:
+        """Legs from device positions (K, 3) to a landmark; those to the panel arrive at its front."""
+        panel = self.scene.ris if number == len(self.scene.scatterers) else None
+        point = self.scene.landmark_positions[number : number + 1]
+        if panel is None:
+            return find_legs(self.facets, device, point, self.depth)
+        return find_legs(self.facets, device, point, self.depth, host=self.walls.host, front=panel.spec.normal)

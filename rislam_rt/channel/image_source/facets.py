@@ -1,0 +1,159 @@
+"""Walls as the image method needs them: which part of a plane is solid, who stands on which side, who hides whom."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.channel.image_source.fresnel import relative_permittivity
+from rislam_rt.channel.walls import Walls
+from rislam_rt.constants import SURFACE_TOLERANCE
+from rislam_rt.geometry.triangles import edge_planes
+
+SEAM = 1e-9
+"""[m] Triangles reach this far over their edges, so that no ray slips between two that share one (float64 rounding)."""
+
+_BLOCK = 2_000_000
+"""Numbers in the largest temporary array."""
+
+FRONT, BACK = 1, 2
+"""Side bits: in front of a wall (where its normal points), behind it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Facets:
+    """W walls, their T triangles sorted by wall."""
+
+    normal: Floats
+    """(W, 3)."""
+    offset: Floats
+    """(W,) [m]."""
+    first: Integers
+    """(W + 1,) triangles of wall w are first[w] : first[w + 1]."""
+    corners: Floats
+    """(T, 3, 3) [m]."""
+    edge_normal: Floats
+    """(T, 3, 3) in-plane unit normals of the edges, pointing inside."""
+    edge_offset: Floats
+    """(T, 3) [m]."""
+    box: Floats
+    """(2, W, 3) [m] lowest and highest corner of each wall."""
+    extent: Floats
+    """(2, W) [m] lowest and highest signed distance of all walls' corners from wall w's plane."""
+    reflection: Floats
+    """(W,) constant reflection coefficient, 0 for ITU materials."""
+    permittivity: Complexes
+    """(W,) complex relative permittivity at the carrier, 1 for a constant reflection coefficient."""
+    thickness: Floats
+    """(W,) [m] of the slab."""
+    carrier: float
+    """[Hz] at which the permittivity holds."""
+
+    def __len__(self) -> int:
+        return len(self.offset)
+
+    def distance(self, points: Floats) -> Floats:
+        """Signed distances (N, W) [m] of points (N, 3) from every wall's plane."""
+        return points @ self.normal.T - self.offset
+
+    def contains(self, points: Floats, wall: Integers) -> Booleans:
+        """Whether points (N, 3), each in the plane of its wall (N,), lie on one of the wall's triangles."""
+        box = self.box[:, wall]
+        inside = ((points >= box[0] - SURFACE_TOLERANCE) & (points <= box[1] + SURFACE_TOLERANCE)).all(axis=-1)
+        candidates = np.flatnonzero(inside)
+        order = candidates[np.argsort(wall[candidates], kind="stable")]
+        present, start = np.unique(wall[order], return_index=True)
+        for number, rows in zip(present, np.split(order, start[1:]), strict=True):
+            inside[rows] = self._on_wall(points[rows], int(number))
+        return inside
+
+    def _on_wall(self, points: Floats, wall: int) -> Booleans:
+        """Whether points (N, 3) of the plane of one wall lie on its triangles."""
+        span = slice(self.first[wall], self.first[wall + 1])
+        normals, offsets = self.edge_normal[span].reshape(-1, 3), self.edge_offset[span].reshape(-1)
+        inside = np.zeros(len(points), dtype=np.bool_)
+        for rows in blocks(len(points), len(offsets)):
+            depth = (points[rows] @ normals.T - offsets).reshape(-1, len(offsets) // 3, 3).min(axis=-1)
+            inside[rows] = (depth >= -SEAM).any(axis=-1)
+        return inside
+
+    def possible_blockers(self, points: Floats) -> Integers:
+        """Walls whose plane has wall corners or some of the points (N, 3) on both sides; no other can hide anything."""
+        distance = self.distance(points)
+        low, high = np.minimum(self.extent[0], distance.min(axis=0)), np.maximum(self.extent[1], distance.max(axis=0))
+        return np.flatnonzero((low < -SURFACE_TOLERANCE) & (high > SURFACE_TOLERANCE))
+
+    def hidden_by(self, start: Floats, end: Floats, walls: Integers, spared: Integers) -> Integers:
+        """One of `walls` that stands between the ends (N, 3) of each segment: (N,), -1 where none does.
+
+        A wall whose plane passes within `SURFACE_TOLERANCE` of an end is not in the way (ends are bounce points,
+        devices and landmarks), nor is a segment's `spared` wall (N,).
+        """
+        blocker = np.full(len(start), -1, dtype=np.int64)
+        normal, offset = self.normal[walls].T, self.offset[walls]
+        for rows in blocks(len(start), len(walls)) if len(walls) else []:
+            a, b = start[rows] @ normal - offset, end[rows] @ normal - offset
+            crossing = (a * b < 0.0) & (np.minimum(np.abs(a), np.abs(b)) > SURFACE_TOLERANCE)
+            segment, column = np.nonzero(crossing)
+            fraction = a[segment, column] / (a[segment, column] - b[segment, column])
+            segment, wall = segment + rows.start, walls[column]
+            point = start[segment] + fraction[:, None] * (end[segment] - start[segment])
+            hit = self.contains(point, wall) & (spared[segment] != wall)
+            blocker[segment[hit]] = wall[hit]
+        return blocker
+
+    def sides(self) -> Integers:
+        """Side bits (W, W): on which sides of wall i wall j has a part, 0 if it lies in the plane."""
+        bits = np.zeros((len(self), len(self)), dtype=np.int64)
+        points = self.corners.reshape(-1, 3)
+        for rows in blocks(len(self), len(points)):
+            distance = self.normal[rows] @ points.T - self.offset[rows, None]
+            starts = 3 * self.first[:-1]
+            front = np.maximum.reduceat(distance, starts, axis=1) > SEAM
+            back = np.minimum.reduceat(distance, starts, axis=1) < -SEAM
+            bits[rows] = FRONT * front + BACK * back
+        return bits
+
+    def point_sides(self, points: Floats) -> Integers:
+        """Side bits (W,): on which sides of each wall any of the points (N, 3) lies."""
+        distance = self.distance(points)
+        front, back = distance.max(axis=0) > SEAM, distance.min(axis=0) < -SEAM
+        bits: Integers = FRONT * front + BACK * back
+        return bits
+
+
+def build_facets(walls: Walls, carrier: float) -> Facets:
+    """Sort triangles by wall and look up the materials at the carrier [Hz]."""
+    order = np.argsort(walls.wall_of_triangle, kind="stable")
+    corners = walls.triangles[order]
+    first = np.searchsorted(walls.wall_of_triangle[order], np.arange(len(walls) + 1))
+    edge_normal, edge_offset = edge_planes(corners)
+    points = corners.reshape(-1, 3)
+    extent = np.zeros((2, len(walls)))
+    for rows in blocks(len(walls), len(points)):
+        distance = walls.normal[rows] @ points.T - walls.offset[rows, None]
+        extent[:, rows] = distance.min(axis=1), distance.max(axis=1)
+    starts = 3 * first[:-1]
+    box = [op.reduceat(points, starts, axis=0) if len(points) else points for op in (np.minimum, np.maximum)]
+    return Facets(
+        normal=walls.normal,
+        offset=walls.offset,
+        first=first,
+        corners=corners,
+        edge_normal=edge_normal,
+        edge_offset=edge_offset,
+        box=np.stack(box),
+        extent=extent,
+        reflection=np.array([m.reflection or 0.0 for m in walls.material]),
+        permittivity=np.array(
+            [relative_permittivity(m.itu, carrier) if m.itu else 1.0 for m in walls.material], dtype=np.complex128
+        ),
+        thickness=np.array([m.thickness for m in walls.material]),
+        carrier=carrier,
+    )
+
+
+def blocks(count: int, width: int) -> list[slice]:
+    """Slices of `count` rows of `width` numbers, each of about `_BLOCK` numbers."""
+    step = max(1, _BLOCK // max(width, 1))
+    return [slice(i, min(i + step, count)) for i in range(0, count, step)]

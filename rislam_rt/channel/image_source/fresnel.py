@@ -1,0 +1,125 @@
+"""Reflection on slabs of building materials: ITU-R P.2040 (permittivity, slab) and what it does to a polarised ray."""
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.errors import SceneError
+
+VACUUM_PERMITTIVITY = 8.8541878128e-12
+"""[F/m], CODATA 2018."""
+
+ITU_MATERIALS: dict[str, tuple[tuple[float, float, float, float, float, float], ...]] = {
+    "vacuum": ((0.001, 100.0, 1.0, 0.0, 0.0, 0.0),),
+    "concrete": ((1.0, 100.0, 5.24, 0.0, 0.0462, 0.7822), (110.0, 330.0, 5.17, 0.0, 0.0145, 1.09)),
+    "brick": ((1.0, 40.0, 3.91, 0.0, 0.0238, 0.16), (110.0, 330.0, 4.15, 0.0, 0.0006, 1.5712)),
+    "plasterboard": ((1.0, 100.0, 2.73, 0.0, 0.0085, 0.9395), (110.0, 330.0, 2.56, 0.0, 0.0001, 1.7799)),
+    "wood": ((0.001, 100.0, 1.99, 0.0, 0.0047, 1.0718), (110.0, 330.0, 1.82, 0.0, 0.004, 1.0761)),
+    "glass": ((0.1, 100.0, 6.31, 0.0, 0.0036, 1.3394), (220.0, 450.0, 5.79, 0.0, 0.0004, 1.658)),
+    "ceiling_board": ((1.0, 100.0, 1.48, 0.0, 0.0011, 1.075), (220.0, 450.0, 1.52, 0.0, 0.0029, 1.029)),
+    "chipboard": ((1.0, 100.0, 2.58, 0.0, 0.0217, 0.78),),
+    "plywood": ((1.0, 40.0, 2.71, 0.0, 0.33, 0.0),),
+    "marble": ((1.0, 60.0, 7.074, 0.0, 0.0055, 0.9262),),
+    "floorboard": ((50.0, 100.0, 3.66, 0.0, 0.0044, 1.3515),),
+    "metal": ((1.0, 100.0, 1.0, 0.0, 1e7, 0.0),),
+    "very_dry_ground": ((1.0, 10.0, 3.0, 0.0, 0.00015, 2.52),),
+    "medium_dry_ground": ((1.0, 10.0, 15.0, -0.1, 0.035, 1.63),),
+    "wet_ground": ((1.0, 10.0, 30.0, -0.4, 0.15, 1.3),),
+}
+"""ITU-R P.2040, table 3: lowest and highest frequency [GHz], a, b, c, d."""
+
+
+def relative_permittivity(name: str, carrier: float) -> complex:
+    """Complex relative permittivity `a f^b - j c f^d / (omega eps0)`, f in GHz, of a material at the carrier [Hz].
+
+    Raises
+    ------
+    SceneError
+        The material is unknown, or not specified at the carrier.
+    """
+    if name not in ITU_MATERIALS:
+        raise SceneError(f"material.itu: '{name}' received; give one of {', '.join(ITU_MATERIALS)}")
+    ghz = carrier / 1e9
+    for low, high, a, b, c, d in ITU_MATERIALS[name]:
+        if low <= ghz <= high:
+            return complex(a * ghz**b, -c * ghz**d / (2.0 * np.pi * carrier * VACUUM_PERMITTIVITY))
+    ranges = " or ".join(f"{row[0]:g} to {row[1]:g} GHz" for row in ITU_MATERIALS[name])
+    raise SceneError(f"material.itu: '{name}' at {ghz:g} GHz received; it is specified from {ranges}")
+
+
+def slab_coefficients(
+    cos_theta: Floats, permittivity: Complexes, thickness: Floats, carrier: float
+) -> tuple[Complexes, Complexes]:
+    """TE and TM reflection coefficients (...,) of a slab in air (ITU-R P.2040, single-layer slab).
+
+    Parameters
+    ----------
+    cos_theta
+        (...,) cosine of the angle of incidence, in [0, 1].
+    permittivity
+        (...,) complex relative permittivity, imaginary part not positive.
+    thickness
+        (...,) [m].
+    """
+    root = np.sqrt(permittivity - (1.0 - cos_theta**2))
+    te = (cos_theta - root) / (cos_theta + root)
+    tm = (permittivity * cos_theta - root) / (permittivity * cos_theta + root)
+    through = np.exp(-4j * np.pi * carrier / SPEED_OF_LIGHT * thickness * root)
+    return te * (1.0 - through) / (1.0 - te**2 * through), tm * (1.0 - through) / (1.0 - tm**2 * through)
+
+
+def polarisation_basis(direction: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors theta_hat and phi_hat (..., 3) of directions (..., 3); along the pole, those of azimuth 0."""
+    x, y, z = np.moveaxis(direction, -1, 0)
+    across = np.hypot(x, y)
+    at_pole = across < 1e-12
+    scale = np.where(at_pole, 1.0, across)
+    c, s = np.where(at_pole, 1.0, x / scale), np.where(at_pole, 0.0, y / scale)
+    zero = np.zeros_like(c)
+    return np.stack([z * c, z * s, -across], axis=-1), np.stack([-s, c, zero], axis=-1)
+
+
+def reflect_field(
+    field: Complexes,
+    incident: Floats,
+    normal: Floats,
+    constant: Floats,
+    permittivity: Complexes,
+    thickness: Floats,
+    carrier: float,
+) -> Complexes:
+    """Field vector (N, 3) after a bounce of rays with directions of travel `incident` (N, 3).
+
+    A slab acts on the components across (TE) and in (TM) the plane of incidence; a wall with a constant coefficient
+    keeps the vertical and horizontal components and scales both.
+    """
+    reflected = incident - 2.0 * np.sum(incident * normal, axis=-1, keepdims=True) * normal
+    is_constant = constant > 0.0
+    cos_theta = np.abs(np.sum(incident * normal, axis=-1))
+    te, tm = slab_coefficients(cos_theta, permittivity, thickness, carrier)
+    across, along_in, along_out = _incidence_basis(incident, reflected, normal)
+    vertical_in, horizontal_in = polarisation_basis(incident)
+    vertical_out, horizontal_out = polarisation_basis(reflected)
+    slab = _project(field, across, across, te) + _project(field, along_in, along_out, tm)
+    kept = _project(field, vertical_in, vertical_out, constant) + _project(
+        field, horizontal_in, horizontal_out, constant
+    )
+    result: Complexes = np.where(is_constant[:, None], kept, slab)
+    return result
+
+
+def _incidence_basis(incident: Floats, reflected: Floats, normal: Floats) -> tuple[Floats, Floats, Floats]:
+    """Unit vectors across the plane of incidence, and in it across the incident and the reflected ray."""
+    across = np.cross(incident, normal)
+    length = np.linalg.norm(across, axis=-1, keepdims=True)
+    level: Booleans = length < 1e-12  # normal incidence: any direction in the wall serves, TE and TM agree there
+    fallback = np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
+    across = np.where(level, fallback, across)
+    across = across / np.linalg.norm(across, axis=-1, keepdims=True)
+    return across, np.cross(across, incident), np.cross(across, reflected)
+
+
+def _project(field: Complexes, onto: Floats, out: Floats, coefficient: Floats | Complexes) -> Complexes:
+    """`coefficient (onto . field) out`."""
+    result: Complexes = (coefficient * np.sum(field * onto, axis=-1))[:, None] * out
+    return result

@@ -1,0 +1,163 @@
+"""From wall sequences to legs: mirror the far end, walk back from the device, test facets and occlusion."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.channel.image_source.facets import SEAM, Facets
+from rislam_rt.channel.image_source.fresnel import polarisation_basis, reflect_field
+from rislam_rt.channel.image_source.sequences import wall_sequences
+from rislam_rt.channel.legs import Legs
+from rislam_rt.constants import SURFACE_TOLERANCE
+from rislam_rt.geometry.angles import unit
+from rislam_rt.geometry.planes import mirror
+
+
+class Rays(NamedTuple):
+    """N legs found, one row each: cycle (N,), walls (N, d), bounce points (N, d, 3) and the far end's image (N, 3)."""
+
+    cycle: Integers
+    walls: Integers
+    bounces: Floats
+    image: Floats
+
+    def only(self, keep: Booleans) -> "Rays":
+        """The rows where `keep` (N,) holds."""
+        return Rays(self.cycle[keep], self.walls[keep], self.bounces[keep], self.image[keep])
+
+
+def find_legs(
+    facets: Facets, device: Floats, far: Floats, depth: int, *, host: int = -1, front: Floats | None = None
+) -> Legs:
+    """Every specular leg of up to `depth` bounces from device positions (K, 3) to far ends (K, 3) or (1, 3) [m].
+
+    Parameters
+    ----------
+    host
+        Wall behind a panel at the far end: no bounce on it next to the panel, and it does not hide the panel.
+    front
+        (3,) normal of the panel at the far end, which only sees what lies before it.
+    """
+    found = [_direct_rays(device, far)]
+    found += [_reflected_rays(facets, walls, device, far) for walls in wall_sequences(facets, device, far, depth, host)]
+    blockers = facets.possible_blockers(np.concatenate([device, far]))
+    visible = [_visible(facets, rays, device, far, blockers, host, front) for rays in found]
+    return _legs(facets, [rays for rays in visible if len(rays.cycle)], device, far, depth)
+
+
+def mirrored(facets: Facets, walls: Integers, far: Floats) -> list[Floats]:
+    """Images of far ends (K, 3) for sequences (S, d): item j (K, S, 3) [m] is mirrored in walls d-1, d-2, .. j."""
+    image = np.broadcast_to(far[:, None, :], (len(far), len(walls), 3))
+    images = []
+    for column in walls.T[::-1]:
+        image = mirror(image, facets.normal[column], facets.offset[column])
+        images.append(image)
+    return images[::-1]
+
+
+def _direct_rays(device: Floats, far: Floats) -> Rays:
+    """The legs without a bounce."""
+    cycles = len(device)
+    nothing = np.zeros((cycles, 0), dtype=np.int64)
+    return Rays(np.arange(cycles), nothing, np.zeros((cycles, 0, 3)), np.broadcast_to(far, device.shape))
+
+
+def _reflected_rays(facets: Facets, walls: Integers, device: Floats, far: Floats) -> Rays:
+    """The legs over sequences (S, d) whose every bounce lies on its wall; occlusion is not looked at."""
+    images = mirrored(facets, walls, far)
+    cycle, sequence = (index.ravel() for index in np.indices((len(device), len(walls))))
+    static = 0 if len(far) == 1 else 1
+    bounces = np.zeros((len(cycle), walls.shape[1], 3))
+    point = device[cycle]
+    for bounce, image in enumerate(images):
+        wall = walls[sequence, bounce]
+        target = image[cycle * static, sequence]
+        tolerance = (SURFACE_TOLERANCE if bounce == 0 else SEAM, SURFACE_TOLERANCE if image is images[-1] else SEAM)
+        crosses, hit = _plane_crossing(point, target, facets.normal[wall], facets.offset[wall], tolerance)
+        on_wall = facets.contains(hit, wall[crosses])
+        keep = np.flatnonzero(crosses)[on_wall]
+        cycle, sequence, bounces, point = cycle[keep], sequence[keep], bounces[keep], hit[on_wall]
+        bounces[:, bounce] = point
+    return Rays(cycle, walls[sequence], bounces, images[0][cycle * static, sequence])
+
+
+def _plane_crossing(
+    start: Floats, end: Floats, normal: Floats, offset: Floats, tolerance: tuple[float, float]
+) -> tuple[Booleans, Floats]:
+    """Which segments (N, 3) cross their plane, both ends farther from it than the tolerance [m], and where: (M, 3)."""
+    a = np.einsum("ni,ni->n", start, normal) - offset
+    b = np.einsum("ni,ni->n", end, normal) - offset
+    crosses = (a * b < 0.0) & (np.abs(a) > tolerance[0]) & (np.abs(b) > tolerance[1])
+    a, b = a[crosses], b[crosses]
+    return crosses, start[crosses] + (a / (a - b))[:, None] * (end[crosses] - start[crosses])
+
+
+def _visible(
+    facets: Facets, rays: Rays, device: Floats, far: Floats, blockers: Integers, host: int, front: Floats | None
+) -> Rays:
+    """The legs that nothing hides and that reach a panel at the far end from its front."""
+    count, bounces = rays.walls.shape
+    target = np.broadcast_to(far, device.shape)[rays.cycle]
+    points = np.concatenate([device[rays.cycle][:, None], rays.bounces, target[:, None]], axis=1)
+    keep = np.ones(count, dtype=np.bool_)
+    if front is not None:
+        keep = (points[:, -2] - points[:, -1]) @ front > SURFACE_TOLERANCE
+    for segment in range(bounces + 1):
+        rows = np.flatnonzero(keep)
+        spared = np.full(len(rows), host if segment == bounces else -1)
+        blocker = facets.hidden_by(points[rows, segment], points[rows, segment + 1], blockers, spared)
+        keep[rows[blocker >= 0]] = False
+    return rays.only(keep)
+
+
+def _legs(facets: Facets, found: list[Rays], device: Floats, far: Floats, depth: int) -> Legs:
+    """Rays scattered into dense arrays, one column a sequence that some cycle has."""
+    cycles = len(device)
+    columns: list[Integers] = []
+    parts: list[tuple[Integers, Integers, Rays]] = []
+    for rays in found:
+        unique, column = np.unique(rays.walls, axis=0, return_inverse=True)
+        parts.append((rays.cycle, column.ravel() + sum(len(c) for c in columns), rays))
+        columns.append(np.pad(unique, ((0, 0), (0, depth - unique.shape[1])), constant_values=-1))
+    walls = np.concatenate(columns) if columns else np.zeros((0, depth), dtype=np.int64)
+    count = len(walls)
+    valid = np.zeros((cycles, count), dtype=np.bool_)
+    length = np.zeros((cycles, count))
+    at_device, at_far_end = np.zeros((cycles, count, 3)), np.zeros((cycles, count, 3))
+    coefficient = np.zeros((cycles, count), dtype=np.complex128)
+    vertices = np.zeros((cycles, count, depth, 3))
+    for cycle, column, rays in parts:
+        place = cycle, column
+        ray = rays.image - device[cycle]
+        valid[place] = True
+        length[place] = np.linalg.norm(ray, axis=-1)
+        at_device[place] = unit(ray)
+        at_far_end[place], coefficient[place] = _arrive(facets, rays.walls, unit(ray))
+        vertices[cycle, column, : rays.walls.shape[1]] = rays.bounces
+    return Legs(walls, valid, length, at_device, at_far_end, coefficient, vertices)
+
+
+def _arrive(facets: Facets, walls: Integers, direction: Floats) -> tuple[Floats, Complexes]:
+    """Follow directions (N, 3) over walls (N, d): where the ray comes from at the far end, and the coefficient (N,).
+
+    Both ends are vertically polarised: the coefficient is the vertical part of what arrives of a vertical unit field.
+    """
+    coefficient = np.prod(facets.reflection[walls], axis=1).astype(np.complex128)
+    slabs = np.flatnonzero((facets.reflection[walls] == 0.0).any(axis=1))
+    field = polarisation_basis(direction[slabs])[0].astype(np.complex128)
+    for wall in walls.T:
+        hit = wall[slabs]
+        field = reflect_field(
+            field,
+            direction[slabs],
+            facets.normal[hit],
+            facets.reflection[hit],
+            facets.permittivity[hit],
+            facets.thickness[hit],
+            facets.carrier,
+        )
+        normal = facets.normal[wall]
+        direction = direction - 2.0 * np.sum(direction * normal, axis=-1, keepdims=True) * normal
+    coefficient[slabs] = np.sum(field * polarisation_basis(-direction[slabs])[0], axis=-1)
+    return -direction, coefficient
