@@ -1,0 +1,59 @@
+"""What is wrong with a scene: where, what, and how to mend it."""
+
+from dataclasses import dataclass
+
+from rislam_rt.errors import SceneError
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One remark on a scene. An `error` makes the scene unusable, a `warning` may be meant."""
+
+    severity: str
+    """`error` or `warning`."""
+    file: str
+    """Path of the file to edit."""
+    field: str
+    """Dotted path of the key in the scene file, or empty."""
+    message: str
+    """What was found, with the value received."""
+    mend: str
+    """What to do about it."""
+
+    @property
+    def line(self) -> str:
+        """The whole finding on one line."""
+        place = f"{self.file}: {self.field}" if self.field else self.file
+        return one_line(f"{place}: {self.message}; {self.mend}")
+
+
+class Fault(SceneError):
+    """Something wrong at a place that only the caller can name."""
+
+    def __init__(self, message: str, mend: str) -> None:
+        super().__init__(one_line(f"{message}; {mend}"))
+        self.message = message
+        self.mend = mend
+
+    def at(self, file: str, field: str) -> Finding:
+        """The finding at its place."""
+        return Finding("error", file, field, self.message, self.mend)
+
+
+def one_line(text: str) -> str:
+    """Text without line breaks and other control characters (names in hostile files may hold both)."""
+    return "".join(c if c.isprintable() else " " for c in " ".join(text.split()))
+
+
+def raise_errors(findings: list[Finding]) -> None:
+    """Raise the first error, saying how many more there are.
+
+    Raises
+    ------
+    SceneError
+        There is at least one error.
+    """
+    errors = [f for f in findings if f.severity == "error"]
+    if errors:
+        more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+        raise SceneError(errors[0].line + more)

@@ -1,0 +1,139 @@
+"""From a scene folder to a `Scene`."""
+
+import hashlib
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.geometry.angles import unit
+from rislam_rt.model import Material, Reflector, RisPanel, RisSpec, Scatterer, Scene
+from rislam_rt.scene.findings import Fault, Finding, raise_errors
+from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, parse_mesh, read_inside
+from rislam_rt.scene.motion import build_motion
+from rislam_rt.scene.schema import MaterialSection, ReflectorSection, RisSection, ScattererSection, SceneSpec, read_spec
+
+SCENE_FILE = "scene.toml"
+
+
+class Draft(NamedTuple):
+    """A scene as far as it could be read."""
+
+    file: str
+    scene: Scene | None
+    findings: list[Finding]
+
+
+def load_scene(path: str | Path) -> Scene:
+    """The scene of a folder, or of its `scene.toml`.
+
+    Raises
+    ------
+    SceneError
+        The scene file, a mesh or the trajectory is unusable; one line that says where, what and how to mend it.
+    """
+    draft = read_draft(path)
+    raise_errors(draft.findings)
+    assert draft.scene is not None
+    return draft.scene
+
+
+def read_draft(path: str | Path) -> Draft:
+    """Read a scene, collecting what is wrong with it instead of raising."""
+    file = scene_file(path)
+    try:
+        spec, content = read_spec(file)
+    except Fault as fault:
+        return Draft(str(file), None, [fault.at(str(file), "")])
+    return assemble(spec, file, content)
+
+
+def scene_file(path: str | Path) -> Path:
+    """The scene file of a scene folder; a file is taken as it is."""
+    path = Path(path)
+    return path if path.suffix == ".toml" and not path.is_dir() else path / SCENE_FILE
+
+
+def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
+    """Read what a specification names and put the scene together."""
+    folder, findings = file.parent, []
+    contents: dict[str, bytes] = {}
+    reflectors = []
+    for number, section in enumerate(spec.reflector):
+        try:
+            reflectors.append(_reflector(section, folder, contents))
+        except Fault as fault:
+            findings.append(fault.at(str(file), f"reflector[{number}].mesh ({section.name})"))
+    panel = None
+    try:
+        panel = _panel(spec.ris) if spec.ris else None
+    except Fault as fault:
+        findings.append(fault.at(str(file), "ris.up"))
+    try:
+        agent, contents["trajectory"] = build_motion(spec.agent, folder)
+    except Fault as fault:
+        findings.append(fault.at(str(file), "agent"))
+    if findings:
+        return Draft(str(file), None, findings)
+    scatterers = tuple(_scatterer(section) for section in spec.scatterer)
+    return Draft(
+        str(file), Scene(spec.name, tuple(reflectors), scatterers, panel, agent, _digest(content, contents)), []
+    )
+
+
+def _reflector(section: ReflectorSection, folder: Path, contents: dict[str, bytes]) -> Reflector:
+    name, _, node = section.mesh.partition("#")
+    if name not in contents:
+        contents[name] = read_inside(folder, name, MAX_MESH_BYTES)
+    mesh = parse_mesh(contents[name], name, node or None)
+    if section.up_axis == "y":
+        mesh = _z_up(mesh)
+    return Reflector(section.name, mesh.vertices, mesh.faces, _material(section.material))
+
+
+def _z_up(mesh: Mesh) -> Mesh:
+    """A quarter turn about x that brings the file's y axis up."""
+    x, y, z = mesh.vertices.T
+    return Mesh(np.stack([x, -z, y], axis=-1), mesh.faces)
+
+
+def _material(section: MaterialSection) -> Material:
+    if section.itu is None or section.thickness_m is None:
+        return Material(section.reflection, section.itu)
+    return Material(section.reflection, section.itu, section.thickness_m)
+
+
+def _scatterer(section: ScattererSection) -> Scatterer:
+    """The paper's sphere has the cross-section pi r^2, unless the file gives another one."""
+    rcs = section.rcs_m2 if section.rcs_m2 is not None else np.pi * (section.radius or 0.0) ** 2
+    return Scatterer(section.name, np.array(section.position), rcs, section.radius)
+
+
+def _panel(section: RisSection) -> RisPanel:
+    normal, up = unit(np.array(section.normal)), unit(np.array(section.up))
+    if not normal.any() or not up.any():
+        raise Fault("ris.normal or ris.up has no length", "give two directions")
+    if abs(normal @ up) > 1e-6:
+        angle = np.degrees(np.arccos(np.clip(normal @ up, -1.0, 1.0)))
+        raise Fault(f"{angle:.3f} degrees from ris.normal", "give a direction at right angles to it")
+    up = unit(up - (normal @ up) * normal)
+    spec = RisSpec(
+        section.rows,
+        section.cols,
+        np.array(section.spacing_m),
+        normal,
+        up,
+        section.levels,
+        section.element,
+        section.amplitude,
+    )
+    return RisPanel(spec, np.array(section.center), section.host, section.name)
+
+
+def _digest(content: bytes, contents: dict[str, bytes]) -> str:
+    """SHA-256 over the scene file and every file it names, each with its name and length before it."""
+    digest = hashlib.sha256()
+    for name, data in [("", content), *sorted(contents.items())]:
+        digest.update(f"{name}\0{len(data)}\0".encode())
+        digest.update(data)
+    return digest.hexdigest()

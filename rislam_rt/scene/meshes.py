@@ -1,0 +1,166 @@
+"""Meshes on disk: only from inside the scene's folder, checked before anything else sees them."""
+
+import io
+import re
+import warnings
+from pathlib import Path, PurePosixPath
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.scene.findings import Fault, one_line
+
+FORMATS = (".ply", ".obj", ".stl", ".glb")
+MAX_MESH_BYTES = 200_000_000
+MAX_FACES = 2_000_000
+"""More triangles than any channel of this package could serve."""
+
+_PLY_HEADER = re.compile(
+    rb"ply\nformat binary_little_endian 1\.0\n(?:comment [^\n]*\n)*"
+    rb"element vertex (\d{1,9})\nproperty (double|float) x\nproperty \2 y\nproperty \2 z\n"
+    rb"element face (\d{1,9})\nproperty list uchar int vertex_ind(?:ices|ex)\nend_header\n"
+)
+_PLY_FACE = np.dtype([("count", "u1"), ("corner", "<i4", 3)])
+
+
+class Mesh(NamedTuple):
+    """Triangles as they stand in the file: neither merged nor reordered."""
+
+    vertices: Floats
+    """(V, 3) [m]."""
+    faces: Integers
+    """(F, 3)."""
+
+
+def read_inside(folder: Path, name: str, limit: int) -> bytes:
+    """Content of a file that a scene names, which must lie inside the scene's folder, links followed.
+
+    Raises
+    ------
+    Fault
+        The name leaves the folder, or the file is missing, too large or unreadable.
+    """
+    relative = PurePosixPath(name)
+    if not name or relative.is_absolute() or ".." in relative.parts or "\\" in name or not name.isprintable():
+        raise Fault(f"'{one_line(name)[:80]}' does not stay inside the scene's folder", "give a relative path below it")
+    path = folder / relative
+    try:
+        if not path.resolve().is_relative_to(folder.resolve()):
+            raise Fault(f"'{name[:80]}' leads out of the scene's folder by a link", "copy the file into the folder")
+        if not path.is_file():
+            kind = "is not a file" if path.exists() else "does not exist"
+            raise Fault(f"'{name[:80]}' {kind}", "put the file there or mend the path")
+        with path.open("rb") as file:
+            content = file.read(limit + 1)
+    except (OSError, ValueError, RuntimeError) as error:
+        raise Fault(f"'{name[:80]}' cannot be read ({error})", "check the file and its permissions") from None
+    if len(content) > limit:
+        raise Fault(f"'{name[:80]}' is larger than {limit} bytes", "give a smaller file")
+    return content
+
+
+def parse_mesh(content: bytes, name: str, node: str | None = None) -> Mesh:
+    """Triangles of a file's content; `node` picks one named node of a GLB file.
+
+    Raises
+    ------
+    Fault
+        The content is not a mesh of that format, or it is damaged or empty.
+    """
+    suffix = PurePosixPath(name).suffix.lower()
+    if suffix not in FORMATS:
+        raise Fault(f"'{name[:80]}' is of no known mesh format", f"give one of {', '.join(FORMATS)}")
+    if node is not None and suffix != ".glb":
+        raise Fault(f"'{name[:80]}#{node[:40]}' picks a node, which only GLB files have", "leave the '#' part out")
+    mesh = _own_ply(content) if suffix == ".ply" else None
+    if mesh is None:
+        mesh = _by_trimesh(content, suffix[1:], node)
+    return _checked(mesh)
+
+
+def ply_bytes(vertices: Floats, faces: Integers) -> bytes:
+    """A binary PLY file in float64, the same bytes for the same mesh."""
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
+        "property double x\nproperty double y\nproperty double z\n"
+        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    rows = np.empty(len(faces), dtype=_PLY_FACE)
+    rows["count"] = 3
+    rows["corner"] = faces
+    return header.encode() + np.ascontiguousarray(vertices, dtype="<f8").tobytes() + rows.tobytes()
+
+
+def _own_ply(content: bytes) -> Mesh | None:
+    """The common layout of PLY without trimesh, whose import takes half a second; None for any other layout."""
+    header = _PLY_HEADER.match(content)
+    if header is None:
+        return None
+    num_vertices, num_faces = int(header[1]), int(header[3])
+    real = np.dtype("<f8" if header[2] == b"double" else "<f4")
+    body = header.end() + num_vertices * 3 * real.itemsize
+    if len(content) != body + num_faces * _PLY_FACE.itemsize:
+        return None
+    vertices = np.frombuffer(content, real, num_vertices * 3, header.end()).reshape(-1, 3)
+    rows = np.frombuffer(content, _PLY_FACE, num_faces, body)
+    if (rows["count"] != 3).any():
+        return None
+    return Mesh(vertices.astype(np.float64), rows["corner"].astype(np.int64))
+
+
+def _by_trimesh(content: bytes, file_type: str, node: str | None) -> Mesh:
+    """Any format trimesh reads. It gets bytes, not a path, so it can follow no reference to another file."""
+    import trimesh
+
+    # A damaged file makes trimesh raise nearly anything and numpy warn; here every cause has the same answer.
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            loaded = trimesh.load_scene(io.BytesIO(content), file_type=file_type, process=False)
+            return _flatten(loaded, node)
+    except Fault:
+        raise
+    except Exception as error:
+        cause = f"{type(error).__name__} {one_line(str(error))[:80]}".strip()
+        raise Fault(f"not a readable {file_type.upper()} mesh ({cause})", "export the mesh again") from None
+
+
+def _flatten(loaded: Any, node: str | None) -> Mesh:
+    """All nodes of a loaded file (or one and those below it) as one mesh, transforms applied."""
+    graph = loaded.graph
+    nodes = list(graph.nodes_geometry)
+    if node is not None:
+        if node not in graph.nodes:
+            known = ", ".join(sorted(str(n) for n in nodes)[:8])
+            raise Fault(f"no node '{one_line(node)[:40]}' in the file", f"give one of: {one_line(known)}")
+        below = graph.transforms.successors(node)
+        nodes = [n for n in nodes if n in below]
+    vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
+    for name in nodes:
+        matrix, geometry = graph[name]
+        mesh = loaded.geometry[geometry]
+        if getattr(mesh, "faces", None) is None or not len(mesh.faces):
+            continue
+        vertices.append(np.asarray(mesh.vertices, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3])
+        faces.append(np.asarray(mesh.faces, dtype=np.int64) + count)
+        count += len(vertices[-1])
+    return Mesh(np.concatenate(vertices), np.concatenate(faces))
+
+
+def _checked(mesh: Mesh) -> Mesh:
+    """The mesh, if its numbers make sense on their own."""
+    vertices, faces = mesh
+    if len(faces) == 0:
+        raise Fault("the mesh has no faces", "export a mesh with triangles")
+    if len(faces) > MAX_FACES:
+        raise Fault(f"the mesh has {len(faces)} faces", f"simplify it to {MAX_FACES} or fewer")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        worst = int(faces.min() if faces.min() < 0 else faces.max())
+        raise Fault(f"a face names vertex {worst} of {len(vertices)}", "export the mesh again")
+    bad = ~np.isfinite(vertices).all(axis=1)
+    if bad.any():
+        raise Fault(f"vertex {int(np.argmax(bad))} is not finite", "export the mesh again")
+    if np.abs(vertices).max() > 1e5:
+        raise Fault(f"a coordinate of {np.abs(vertices).max():.3g} m", "give metres, near the origin")
+    return mesh

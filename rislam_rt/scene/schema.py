@@ -1,0 +1,197 @@
+"""`scene.toml`: the keys, their types and ranges. Unknown keys are refused; all bad fields are found at once."""
+
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from rislam_rt.scene.findings import Fault, one_line
+
+MAX_SCENE_BYTES = 4_000_000
+"""A scene file is written by people; anything larger is another file by mistake."""
+
+Coordinate = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
+Length = Annotated[float, Field(gt=0.0, le=1e5, allow_inf_nan=False)]
+Vector = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=64)]
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
+
+ItuMaterial = Literal[
+    "brick", "ceiling_board", "chipboard", "concrete", "floorboard", "glass", "marble", "medium_dry_ground", "metal",
+    "plasterboard", "plywood", "very_dry_ground", "wet_ground", "wood",
+]  # fmt: skip
+
+
+class Section(BaseModel):
+    """A table of the scene file: no conversions, no unknown keys."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class MaterialSection(Section):
+    """Either `reflection` (the same at every angle) or `itu`, a slab of an ITU-R P.2040 material."""
+
+    reflection: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
+    itu: ItuMaterial | None = None
+    thickness_m: Length | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> "MaterialSection":
+        if (self.reflection is None) == (self.itu is None):
+            raise ValueError("give either 'reflection' or 'itu'")
+        if self.itu is None and self.thickness_m is not None:
+            raise ValueError("'thickness_m' has a meaning with 'itu' only")
+        return self
+
+
+class ReflectorSection(Section):
+    """A smooth mesh. `mesh = "room.glb#node"` takes one named node of a GLB file, with its transform applied.
+
+    `up_axis = "y"` turns a file whose y axis points up (as glTF's standard says) into the room's frame with z up.
+    """
+
+    name: Name
+    mesh: str
+    material: MaterialSection
+    up_axis: Literal["y", "z"] = "z"
+
+
+class ScattererSection(Section):
+    """A small object: a sphere by its `radius` (cross-section pi r^2) or a point by its `rcs_m2`."""
+
+    name: Name
+    position: Vector
+    radius: Length | None = None
+    rcs_m2: Length | None = None
+
+    @model_validator(mode="after")
+    def _one_size(self) -> "ScattererSection":
+        if self.radius is None and self.rcs_m2 is None:
+            raise ValueError("give 'radius' or 'rcs_m2'")
+        return self
+
+
+class RisSection(Section):
+    """The panel. `normal` and `up` need not have length 1."""
+
+    name: Name = "ris"
+    center: Vector
+    normal: Vector
+    up: Vector
+    rows: Annotated[int, Field(ge=1, le=1024)]
+    cols: Annotated[int, Field(ge=1, le=1024)]
+    spacing_m: Annotated[list[Length], Field(min_length=2, max_length=2)]
+    levels: Annotated[int, Field(ge=2, le=65536)] = 4
+    element: Literal["tang", "energy"] = "tang"
+    amplitude: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    host: Name | None = None
+
+
+class AgentSection(Section):
+    """The agent's true motion: straight from `start` with `velocity`, or along a TUM file `trajectory`."""
+
+    start: Vector | None = None
+    velocity: Vector | None = None
+    trajectory: str | None = None
+    cycles: Count | None = None
+    cycle_s: Length | None = None
+    tx_offset_m: Vector | None = None
+    rx_offset_m: Vector | None = None
+
+    @model_validator(mode="after")
+    def _one_motion(self) -> "AgentSection":
+        if (self.velocity is None) == (self.trajectory is None):
+            raise ValueError("give either 'velocity' or 'trajectory'")
+        straight = (self.start, self.cycles, self.cycle_s)
+        if self.velocity is not None and any(value is None for value in straight):
+            raise ValueError("'velocity' needs 'start', 'cycles' and 'cycle_s' beside it")
+        return self
+
+
+class SceneSpec(Section):
+    """A whole scene file."""
+
+    name: Name
+    reflector: Annotated[list[ReflectorSection], Field(min_length=1, max_length=10_000)]
+    scatterer: list[ScattererSection] = []
+    ris: RisSection | None = None
+    agent: AgentSection
+
+
+def parse_spec(content: bytes) -> SceneSpec:
+    """The validated content of a scene file.
+
+    Raises
+    ------
+    Fault
+        Not TOML, or fields are missing, unknown or out of range; all of them in one line.
+    """
+    if len(content) > MAX_SCENE_BYTES:
+        raise Fault(f"{len(content)} bytes are too many for a scene file", f"keep it below {MAX_SCENE_BYTES}")
+    try:
+        table = tomllib.loads(content.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        raise Fault(f"not text in UTF-8 (byte {error.start})", "give a TOML file") from None
+    except (ValueError, RecursionError) as error:
+        raise Fault(f"not valid TOML: {_short(str(error), 120)}", "mend that place") from None
+    return validate_spec(table)
+
+
+def validate_spec(table: dict[str, Any]) -> SceneSpec:
+    """The same from a table already read.
+
+    Raises
+    ------
+    Fault
+        Fields are missing, unknown or out of range; all of them in one line.
+    """
+    try:
+        return SceneSpec.model_validate(table)
+    except ValidationError as error:
+        remarks = [_remark(item) for item in error.errors(include_url=False, include_context=False)]
+    raise Fault("; ".join(remarks[:8]), f"mend these {len(remarks)} fields" if len(remarks) > 1 else "mend this field")
+
+
+def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
+    """Specification and bytes of a scene file.
+
+    Raises
+    ------
+    Fault
+        The file cannot be read or its content is not a scene.
+    """
+    if not path.is_file():
+        raise Fault("no such scene file", "give a scene folder or its scene.toml")
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_SCENE_BYTES + 1)
+    except OSError as error:
+        raise Fault(f"cannot be read ({error.strerror})", "check the file and its permissions") from None
+    return parse_spec(content), content
+
+
+def _remark(item: Any) -> str:
+    """One bad field: where, what was received, what is wanted."""
+    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"]).lstrip(".")
+    place = _short(place, 80)
+    if item["type"] == "missing":
+        return f"{place}: missing"
+    if item["type"] == "extra_forbidden":
+        near = get_close_matches(str(item["loc"][-1]), _known_keys(), n=1)
+        return f"{place}: unknown key" + (f" (did you mean '{near[0]}'?)" if near else "")
+    message = item["msg"].removeprefix("Value error, ")
+    if isinstance(item["input"], dict):
+        return f"{place}: {message}"
+    return f"{place}: {_short(repr(item['input']), 60)} received, {message[:1].lower()}{message[1:]}"
+
+
+def _known_keys() -> list[str]:
+    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, RisSection, AgentSection)
+    return [key for section in sections for key in section.model_fields]
+
+
+def _short(text: str, length: int) -> str:
+    text = one_line(text)
+    return text if len(text) <= length else text[: length - 3] + "..."

@@ -1,0 +1,164 @@
+"""From a `Scene` to a scene folder, whole or not at all."""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.errors import SceneError, StoreError
+from rislam_rt.model import Material, Scene, Trajectory
+from rislam_rt.scene.load import SCENE_FILE
+from rislam_rt.scene.meshes import ply_bytes
+
+TRAJECTORY_FILE = "path.tum"
+
+
+def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) -> Path:
+    """Write a scene as `scene.toml`, one PLY mesh a reflector and, unless it is straight, the agent's path.
+
+    Returns the folder.
+
+    Raises
+    ------
+    SceneError
+        The folder exists and `overwrite` is False.
+    StoreError
+        The disk refused.
+    """
+    files = {f"meshes/{r.name}.ply": ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
+    agent = _agent_table(scene.agent)
+    if "trajectory" in agent:
+        files[TRAJECTORY_FILE] = tum_bytes(scene.agent.time, scene.agent.position, scene.agent.heading)
+    files[SCENE_FILE] = toml_bytes(_scene_table(scene, agent))
+    return write_files(files, folder, overwrite=overwrite)
+
+
+def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bool = False) -> Path:
+    """Write files (relative name -> content) under a folder: a new folder appears complete, by one rename.
+
+    With `overwrite`, files of an existing folder are replaced one by one and others in it stay.
+
+    Raises
+    ------
+    SceneError
+        The folder exists and `overwrite` is False.
+    StoreError
+        The disk refused.
+    """
+    folder = Path(folder)
+    if folder.exists() and not overwrite:
+        raise SceneError(f"{folder}: exists already; give a folder that does not exist yet")
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        staged = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+        try:
+            _stage(files, staged)
+            _publish(staged, folder, files)
+        finally:
+            shutil.rmtree(staged, ignore_errors=True)
+    except OSError as error:
+        raise StoreError(f"{folder}: cannot be written ({error.strerror}); check permissions and free space") from None
+    return folder
+
+
+def toml_bytes(table: Mapping[str, Any]) -> bytes:
+    """A scene table as TOML: plain keys first, then (lists of) tables; numbers so that they read back equal."""
+    lines = [f"{key} = {_toml_value(value)}" for key, value in table.items() if not _is_table(value)]
+    for key, value in table.items():
+        for section in value if isinstance(value, list) and _is_table(value) else [value]:
+            if isinstance(section, Mapping):
+                lines += ["", f"[[{key}]]" if isinstance(value, list) else f"[{key}]"]
+                lines += [f"{name} = {_toml_value(item)}" for name, item in section.items()]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
+    """Poses as TUM lines `timestamp x y z qx qy qz qw`; the quaternion is the heading about z."""
+    lines = ["# timestamp x y z qx qy qz qw"]
+    for t, point, angle in zip(time, position, heading, strict=True):
+        row = [t, *point, 0.0, 0.0, np.sin(angle / 2.0), np.cos(angle / 2.0)]
+        lines.append(" ".join(f"{value:.9g}" for value in row))
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _stage(files: Mapping[str, bytes], staged: Path) -> None:
+    for name, content in files.items():
+        target = staged / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with target.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def _publish(staged: Path, folder: Path, files: Mapping[str, bytes]) -> None:
+    if not folder.exists():
+        staged.chmod(0o755)
+        staged.rename(folder)
+        return
+    for name in files:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (staged / name).replace(folder / name)
+
+
+def _is_table(value: Any) -> bool:
+    return isinstance(value, Mapping) or (isinstance(value, list) and bool(value) and isinstance(value[0], Mapping))
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, bool | int | np.integer):
+        return str(value).lower()
+    if isinstance(value, float):
+        return repr(float(value))
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_toml_value(item)}" for key, item in value.items()) + " }"
+    return "[" + ", ".join(_toml_value(item) for item in value) + "]"
+
+
+def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
+    table: dict[str, Any] = {"name": scene.name}
+    table["reflector"] = [
+        {"name": r.name, "mesh": f"meshes/{r.name}.ply", "material": _material_table(r.material)}
+        for r in scene.reflectors
+    ]
+    table["scatterer"] = [
+        {"name": s.name, "position": s.position.tolist()}
+        | ({"radius": s.radius} if s.radius is not None else {})
+        | ({"rcs_m2": s.rcs} if s.radius is None or s.rcs != np.pi * s.radius**2 else {})
+        for s in scene.scatterers
+    ]
+    if scene.ris is not None:
+        spec = scene.ris.spec
+        table["ris"] = {"name": scene.ris.name, "center": scene.ris.center.tolist()}
+        table["ris"] |= {"normal": spec.normal.tolist(), "up": spec.up.tolist()}
+        table["ris"] |= {"rows": spec.rows, "cols": spec.cols, "spacing_m": spec.spacing.tolist()}
+        table["ris"] |= {"levels": spec.levels, "element": spec.element, "amplitude": spec.amplitude}
+        table["ris"] |= {"host": scene.ris.host} if scene.ris.host else {}
+    table["agent"] = agent
+    return {key: value for key, value in table.items() if value != []}
+
+
+def _material_table(material: Material) -> dict[str, Any]:
+    if material.itu is None:
+        return {"reflection": material.reflection}
+    return {"itu": material.itu, "thickness_m": material.thickness}
+
+
+def _agent_table(agent: Trajectory) -> dict[str, Any]:
+    """A straight motion by its velocity, any other by its path file."""
+    offsets = {"tx_offset_m": agent.body.tx_offset.tolist(), "rx_offset_m": agent.body.rx_offset.tolist()}
+    cycles, velocity = len(agent), agent.velocity[0]
+    heading = float(np.arctan2(velocity[1], velocity[0])) if velocity[:2].any() else 0.0
+    line = agent.position[0] + agent.time[:, None] * velocity
+    steady = agent.time[0] == 0.0 and np.ptp(np.diff(agent.time)) < 1e-9 if cycles > 1 else False
+    if steady and np.abs(agent.position - line).max() < 1e-9 and np.abs(agent.heading - heading).max() < 1e-9:
+        motion = {"start": agent.position[0].tolist(), "velocity": velocity.tolist(), "cycles": cycles}
+        return motion | {"cycle_s": float(agent.time[1])} | offsets
+    return {"trajectory": TRAJECTORY_FILE} | offsets
