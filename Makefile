@@ -1,0 +1,47 @@
+# make demo   build .venv, run the paper's room end to end, write the report
+# make test   build .venv, run the tests
+# make check  linter and type checker
+# make lock   resolve the dependencies anew
+# make clean  remove .venv and caches (results under runs/ stay)
+
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: demo test check lock clean
+.DELETE_ON_ERROR:
+
+demo: $(READY)
+	@$(BIN)/rislam-rt run pipelines/trace_then_slam.toml --scene scenes/paper_room
+
+test: $(READY)
+	@$(BIN)/python -m pytest
+
+check: $(READY)
+	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy
+
+# Everything is pinned with hashes, the build back end too, so that no step resolves anything by itself.
+$(READY): requirements.lock pyproject.toml
+	@python=''; \
+	for candidate in $(PYTHON) python3 python3.13 python3.12 python3.11 python; do \
+	  if $$candidate -c 'import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \
+	    >/dev/null 2>&1; then python=$$candidate; break; fi; \
+	done; \
+	if [ -z "$$python" ]; then \
+	  echo 'error: no Python 3.11, 3.12 or 3.13 with its venv module found; install one, or name it: make PYTHON=/path/to/python3.12' >&2; \
+	  exit 3; \
+	fi; \
+	echo "building $(VENV) with $$($$python --version)"; \
+	$$python -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+lock:
+	@uv pip compile --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 --extra dev \
+	  --quiet --output-file requirements.lock pyproject.toml
+	@! grep -n '://' requirements.lock
+
+clean:
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
