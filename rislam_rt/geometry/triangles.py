@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import unit
 
 
@@ -42,46 +42,3 @@ def edge_planes(triangles: Floats) -> tuple[Floats, Floats]:
     inward = unit(np.cross(normal[:, None, :], np.roll(triangles, -1, axis=1) - triangles))
     solid = np.linalg.norm(inward, axis=-1) > 0.0
     return inward, np.where(solid, np.einsum("tei,tei->te", inward, triangles), np.inf)
-
-
-def inside_triangles(points: Floats, triangles: Floats, margin: float = 0.0) -> Booleans:
-    """Whether points (..., 1, 3), assumed in the plane, lie inside triangles (T, 3, 3): (..., T).
-
-    `margin` [m] widens (positive) or shrinks (negative) every triangle by that distance from its edges.
-    """
-    return edge_distance(points, triangles) >= -margin
-
-
-def edge_distance(points: Floats, triangles: Floats) -> Floats:
-    """Distance [m] (..., T) of points (..., 1, 3) from the nearest edge line of triangles (T, 3, 3), positive inside."""
-    normal, _ = triangle_planes(triangles)
-    edges = np.roll(triangles, -1, axis=1) - triangles
-    inward = unit(np.cross(normal[:, None, :], edges))
-    offset = np.einsum("tei,tei->te", inward, triangles)
-    return (np.einsum("...i,tei->...te", points[..., 0, :], inward) - offset).min(axis=-1)
-
-
-def segment_hits(start: Floats, end: Floats, triangles: Floats, slack: float) -> Booleans:
-    """Whether open segments (S, 3) to (S, 3) cross triangles (T, 3, 3): (S, T).
-
-    A crossing within `slack` [m] of either end does not count, so that a path's own bounce points do not shade it.
-    """
-    normal, offset = triangle_planes(triangles)
-    a = start @ normal.T - offset
-    b = end @ normal.T - offset
-    crossing = (a * b < 0.0) & (np.abs(a) > slack) & (np.abs(b) > slack)
-    hits = np.zeros(crossing.shape, dtype=np.bool_)
-    for s, t in [(i, np.flatnonzero(row)) for i, row in enumerate(crossing) if row.any()]:
-        fraction = a[s, t] / (a[s, t] - b[s, t])
-        point = start[s] + fraction[:, None] * (end[s] - start[s])
-        inward = edge_distance_pairs(point, triangles[t])
-        hits[s, t] = inward >= 0.0
-    return hits
-
-
-def edge_distance_pairs(points: Floats, triangles: Floats) -> Floats:
-    """Distance [m] (S,) of points (S, 3) from the nearest edge line of their triangle (S, 3, 3), positive inside."""
-    normal, _ = triangle_planes(triangles)
-    edges = np.roll(triangles, -1, axis=1) - triangles
-    inward = unit(np.cross(normal[:, None, :], edges))
-    return np.einsum("sei,sei->se", inward, points[:, None, :] - triangles).min(axis=-1)

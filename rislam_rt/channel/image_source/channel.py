@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.image_source.facets import Facets, build_facets
+from rislam_rt.channel.image_source.fresnel import Coatings, build_coatings
 from rislam_rt.channel.image_source.images import find_legs
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.walls import Walls, build_walls
@@ -21,6 +22,8 @@ class ImageSourceChannel:
     ------
     ConfigError
         The depth is negative.
+    SceneError
+        A wall's material is not specified at the carrier.
     """
 
     scene: Scene
@@ -28,17 +31,19 @@ class ImageSourceChannel:
     depth: int = 2
     walls: Walls = field(init=False)
     facets: Facets = field(init=False)
+    coatings: Coatings = field(init=False)
 
     def __post_init__(self) -> None:
         if self.depth < 0:
             raise ConfigError(f"depth: {self.depth} received; give 0 or more wall bounces")
         object.__setattr__(self, "walls", build_walls(self.scene))
-        object.__setattr__(self, "facets", build_facets(self.walls, self.radio.carrier))
+        object.__setattr__(self, "facets", build_facets(self.walls))
+        object.__setattr__(self, "coatings", build_coatings(self.walls.material, self.radio.carrier))
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Every path of every cycle, with the panel at level 0."""
         tx, rx = trajectory.tx, trajectory.rx
-        direct = find_legs(self.facets, tx, rx, self.depth)
+        direct = find_legs(self.facets, self.coatings, tx, rx, self.depth)
         landmarks = range(len(self.scene.landmarks))
         return compose_paths(
             self.scene,
@@ -60,5 +65,7 @@ class ImageSourceChannel:
         panel = self.scene.ris if number == len(self.scene.scatterers) else None
         point = self.scene.landmark_positions[number : number + 1]
         if panel is None:
-            return find_legs(self.facets, device, point, self.depth)
-        return find_legs(self.facets, device, point, self.depth, host=self.walls.host, front=panel.spec.normal)
+            return find_legs(self.facets, self.coatings, device, point, self.depth)
+        return find_legs(
+            self.facets, self.coatings, device, point, self.depth, host=self.walls.host, front=panel.spec.normal
+        )

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
-from rislam_rt.channel.image_source.fresnel import relative_permittivity
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.geometry.triangles import edge_planes
@@ -40,14 +39,6 @@ class Facets:
     """(2, W, 3) [m] lowest and highest corner of each wall."""
     extent: Floats
     """(2, W) [m] lowest and highest signed distance of all walls' corners from wall w's plane."""
-    reflection: Floats
-    """(W,) constant reflection coefficient, 0 for ITU materials."""
-    permittivity: Complexes
-    """(W,) complex relative permittivity at the carrier, 1 for a constant reflection coefficient."""
-    thickness: Floats
-    """(W,) [m] of the slab."""
-    carrier: float
-    """[Hz] at which the permittivity holds."""
 
     def __len__(self) -> int:
         return len(self.offset)
@@ -122,8 +113,8 @@ class Facets:
         return bits
 
 
-def build_facets(walls: Walls, carrier: float) -> Facets:
-    """Sort triangles by wall and look up the materials at the carrier [Hz]."""
+def build_facets(walls: Walls) -> Facets:
+    """Sort the triangles by wall."""
     order = np.argsort(walls.wall_of_triangle, kind="stable")
     corners = walls.triangles[order]
     first = np.searchsorted(walls.wall_of_triangle[order], np.arange(len(walls) + 1))
@@ -144,12 +135,6 @@ def build_facets(walls: Walls, carrier: float) -> Facets:
         edge_offset=edge_offset,
         box=np.stack(box),
         extent=extent,
-        reflection=np.array([m.reflection or 0.0 for m in walls.material]),
-        permittivity=np.array(
-            [relative_permittivity(m.itu, carrier) if m.itu else 1.0 for m in walls.material], dtype=np.complex128
-        ),
-        thickness=np.array([m.thickness for m in walls.material]),
-        carrier=carrier,
     )
 
 

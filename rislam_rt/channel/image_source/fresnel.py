@@ -1,10 +1,14 @@
 """Reflection on slabs of building materials: ITU-R P.2040 (permittivity, slab) and what it does to a polarised ray."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import SceneError
+from rislam_rt.geometry.planes import mirror_direction
+from rislam_rt.model import Material
 
 VACUUM_PERMITTIVITY = 8.8541878128e-12
 """[F/m], CODATA 2018."""
@@ -79,33 +83,69 @@ def polarisation_basis(direction: Floats) -> tuple[Floats, Floats]:
     return np.stack([z * c, z * s, -across], axis=-1), np.stack([-s, c, zero], axis=-1)
 
 
-def reflect_field(
-    field: Complexes,
-    incident: Floats,
-    normal: Floats,
-    constant: Floats,
-    permittivity: Complexes,
-    thickness: Floats,
-    carrier: float,
-) -> Complexes:
-    """Field vector (N, 3) after a bounce of rays with directions of travel `incident` (N, 3).
+@dataclass(frozen=True, slots=True, eq=False)
+class Coatings:
+    """What W walls do to a ray at one carrier."""
 
-    A slab acts on the components across (TE) and in (TM) the plane of incidence; a wall with a constant coefficient
-    keeps the vertical and horizontal components and scales both.
+    carrier: float
+    """[Hz]."""
+    reflection: Floats
+    """(W,) constant reflection coefficient, 0 for slabs."""
+    permittivity: Complexes
+    """(W,) complex relative permittivity, 1 for a constant reflection coefficient."""
+    thickness: Floats
+    """(W,) [m] of the slab."""
+
+    def coefficient(self, walls: Integers, normals: Floats, direction: Floats) -> Complexes:
+        """Reflection coefficients (N,) of rays that leave along `direction` (N, 3) and meet `walls` (N, d).
+
+        With slabs on the way, both ends are vertically polarised and the coefficient is the vertical part of what
+        arrives of a vertical unit field. `normals` (N, d, 3) are those of the walls.
+        """
+        constant: Complexes = np.prod(self.reflection[walls], axis=1).astype(np.complex128)
+        rows = np.flatnonzero((self.reflection[walls] == 0.0).any(axis=1))
+        incident = direction[rows]
+        field = polarisation_basis(incident)[0].astype(np.complex128)
+        for wall, normal in zip(walls[rows].T, normals[rows].swapaxes(0, 1), strict=True):
+            reflected = mirror_direction(incident, normal)
+            field = self._reflect(field, incident, reflected, normal, wall)
+            incident = reflected
+        constant[rows] = np.sum(field * polarisation_basis(-incident)[0], axis=-1)
+        return constant
+
+    def _reflect(
+        self, field: Complexes, incident: Floats, reflected: Floats, normal: Floats, wall: Integers
+    ) -> Complexes:
+        """Field vectors (N, 3) after a bounce on walls (N,).
+
+        A slab acts on the components across (TE) and in (TM) the plane of incidence; a wall with a constant
+        coefficient keeps the vertical and the horizontal component and scales both.
+        """
+        cos_theta = np.abs(np.sum(incident * normal, axis=-1))
+        te, tm = slab_coefficients(cos_theta, self.permittivity[wall], self.thickness[wall], self.carrier)
+        across, along_in, along_out = _incidence_basis(incident, reflected, normal)
+        slab = _turned(field, across, across, te) + _turned(field, along_in, along_out, tm)
+        before, after = polarisation_basis(incident), polarisation_basis(reflected)
+        constant = self.reflection[wall]
+        kept = _turned(field, before[0], after[0], constant) + _turned(field, before[1], after[1], constant)
+        result: Complexes = np.where(constant[:, None] > 0.0, kept, slab)
+        return result
+
+
+def build_coatings(materials: tuple[Material, ...], carrier: float) -> Coatings:
+    """Look up the walls' materials at the carrier [Hz].
+
+    Raises
+    ------
+    SceneError
+        A material is unknown, or not specified at the carrier.
     """
-    reflected = incident - 2.0 * np.sum(incident * normal, axis=-1, keepdims=True) * normal
-    is_constant = constant > 0.0
-    cos_theta = np.abs(np.sum(incident * normal, axis=-1))
-    te, tm = slab_coefficients(cos_theta, permittivity, thickness, carrier)
-    across, along_in, along_out = _incidence_basis(incident, reflected, normal)
-    vertical_in, horizontal_in = polarisation_basis(incident)
-    vertical_out, horizontal_out = polarisation_basis(reflected)
-    slab = _project(field, across, across, te) + _project(field, along_in, along_out, tm)
-    kept = _project(field, vertical_in, vertical_out, constant) + _project(
-        field, horizontal_in, horizontal_out, constant
+    return Coatings(
+        carrier,
+        np.array([m.reflection or 0.0 for m in materials], dtype=np.float64),
+        np.array([relative_permittivity(m.itu, carrier) if m.itu else 1.0 for m in materials], dtype=np.complex128),
+        np.array([m.thickness for m in materials], dtype=np.float64),
     )
-    result: Complexes = np.where(is_constant[:, None], kept, slab)
-    return result
 
 
 def _incidence_basis(incident: Floats, reflected: Floats, normal: Floats) -> tuple[Floats, Floats, Floats]:
@@ -119,7 +159,7 @@ def _incidence_basis(incident: Floats, reflected: Floats, normal: Floats) -> tup
     return across, np.cross(across, incident), np.cross(across, reflected)
 
 
-def _project(field: Complexes, onto: Floats, out: Floats, coefficient: Floats | Complexes) -> Complexes:
+def _turned(field: Complexes, onto: Floats, out: Floats, coefficient: Floats | Complexes) -> Complexes:
     """`coefficient (onto . field) out`."""
     result: Complexes = (coefficient * np.sum(field * onto, axis=-1))[:, None] * out
     return result

@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.image_source.facets import SEAM, Facets
-from rislam_rt.channel.image_source.fresnel import polarisation_basis, reflect_field
+from rislam_rt.channel.image_source.fresnel import Coatings
 from rislam_rt.channel.image_source.sequences import wall_sequences
 from rislam_rt.channel.legs import Legs
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.geometry.angles import unit
-from rislam_rt.geometry.planes import mirror
+from rislam_rt.geometry.planes import mirror, mirror_direction
 
 
 class Rays(NamedTuple):
@@ -28,7 +28,14 @@ class Rays(NamedTuple):
 
 
 def find_legs(
-    facets: Facets, device: Floats, far: Floats, depth: int, *, host: int = -1, front: Floats | None = None
+    facets: Facets,
+    coatings: Coatings,
+    device: Floats,
+    far: Floats,
+    depth: int,
+    *,
+    host: int = -1,
+    front: Floats | None = None,
 ) -> Legs:
     """Every specular leg of up to `depth` bounces from device positions (K, 3) to far ends (K, 3) or (1, 3) [m].
 
@@ -43,7 +50,7 @@ def find_legs(
     found += [_reflected_rays(facets, walls, device, far) for walls in wall_sequences(facets, device, far, depth, host)]
     blockers = facets.possible_blockers(np.concatenate([device, far]))
     visible = [_visible(facets, rays, device, far, blockers, host, front) for rays in found]
-    return _legs(facets, [rays for rays in visible if len(rays.cycle)], device, far, depth)
+    return _legs(facets, coatings, [rays for rays in visible if len(rays.cycle)], device, far, depth)
 
 
 def mirrored(facets: Facets, walls: Integers, far: Floats) -> list[Floats]:
@@ -111,7 +118,7 @@ def _visible(
     return rays.only(keep)
 
 
-def _legs(facets: Facets, found: list[Rays], device: Floats, far: Floats, depth: int) -> Legs:
+def _legs(facets: Facets, coatings: Coatings, found: list[Rays], device: Floats, far: Floats, depth: int) -> Legs:
     """Rays scattered into dense arrays, one column a sequence that some cycle has."""
     cycles = len(device)
     columns: list[Integers] = []
@@ -130,34 +137,18 @@ def _legs(facets: Facets, found: list[Rays], device: Floats, far: Floats, depth:
     for cycle, column, rays in parts:
         place = cycle, column
         ray = rays.image - device[cycle]
+        normals = facets.normal[rays.walls]
         valid[place] = True
         length[place] = np.linalg.norm(ray, axis=-1)
         at_device[place] = unit(ray)
-        at_far_end[place], coefficient[place] = _arrive(facets, rays.walls, unit(ray))
+        at_far_end[place] = -_followed(unit(ray), normals)
+        coefficient[place] = coatings.coefficient(rays.walls, normals, unit(ray))
         vertices[cycle, column, : rays.walls.shape[1]] = rays.bounces
     return Legs(walls, valid, length, at_device, at_far_end, coefficient, vertices)
 
 
-def _arrive(facets: Facets, walls: Integers, direction: Floats) -> tuple[Floats, Complexes]:
-    """Follow directions (N, 3) over walls (N, d): where the ray comes from at the far end, and the coefficient (N,).
-
-    Both ends are vertically polarised: the coefficient is the vertical part of what arrives of a vertical unit field.
-    """
-    coefficient = np.prod(facets.reflection[walls], axis=1).astype(np.complex128)
-    slabs = np.flatnonzero((facets.reflection[walls] == 0.0).any(axis=1))
-    field = polarisation_basis(direction[slabs])[0].astype(np.complex128)
-    for wall in walls.T:
-        hit = wall[slabs]
-        field = reflect_field(
-            field,
-            direction[slabs],
-            facets.normal[hit],
-            facets.reflection[hit],
-            facets.permittivity[hit],
-            facets.thickness[hit],
-            facets.carrier,
-        )
-        normal = facets.normal[wall]
-        direction = direction - 2.0 * np.sum(direction * normal, axis=-1, keepdims=True) * normal
-    coefficient[slabs] = np.sum(field * polarisation_basis(-direction[slabs])[0], axis=-1)
-    return -direction, coefficient
+def _followed(direction: Floats, normals: Floats) -> Floats:
+    """Directions (N, 3) after the bounces on walls with normals (N, d, 3)."""
+    for normal in normals.swapaxes(0, 1):
+        direction = mirror_direction(direction, normal)
+    return direction
