@@ -45,7 +45,7 @@ def build_motion(agent: AgentSection, folder: Path) -> tuple[Trajectory, bytes]:
 
 def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body: Body) -> Trajectory:
     """Constant velocity (3,) [m/s] from `start` (3,) [m]; heading along it, 0 if it has no horizontal part."""
-    time = np.arange(cycles) * cycle_s
+    time = np.arange(cycles, dtype=np.float64) * cycle_s
     speed = np.asarray(velocity, dtype=np.float64)
     heading = np.arctan2(speed[1], speed[0]) if np.hypot(speed[0], speed[1]) > 0.0 else 0.0
     position = np.asarray(start, dtype=np.float64) + time[:, None] * speed
