@@ -42,3 +42,39 @@ def edge_planes(triangles: Floats) -> tuple[Floats, Floats]:
     inward = unit(np.cross(normal[:, None, :], np.roll(triangles, -1, axis=1) - triangles))
     solid = np.linalg.norm(inward, axis=-1) > 0.0
     return inward, np.where(solid, np.einsum("tei,tei->te", inward, triangles), np.inf)
+
+
+def outline_edges(triangles: Floats) -> Floats:
+    """Edges (E, 2, 3) [m] that only one of the triangles (T, 3, 3) has: the outline of a planar group.
+
+    Corners count as the same when they agree to a nanometre.
+    """
+    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2, 3)
+    _, corner = np.unique(np.round(edges.reshape(-1, 3), 9), axis=0, return_inverse=True)
+    ends = np.sort(corner.reshape(-1, 2), axis=1)
+    _, index, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
+    return edges[index[count == 1]]
+
+
+def distance_to_edges(points: Floats, edges: Floats) -> Floats:
+    """Distance (N,) [m] of points (N, 3) from the nearest of the edges (E, 2, 3), infinite without any."""
+    start, along = edges[:, 0], edges[:, 1] - edges[:, 0]
+    square = np.einsum("ei,ei->e", along, along)
+    offset = points[:, None] - start
+    fraction = np.einsum("nei,ei->ne", offset, along) / np.where(square > 0.0, square, 1.0)
+    gap = offset - np.clip(fraction, 0.0, 1.0)[..., None] * along
+    return np.sqrt(np.einsum("nei,nei->ne", gap, gap).min(axis=1, initial=np.inf))
+
+
+def distance_to_triangles(points: Floats, triangles: Floats) -> Floats:
+    """Distance (N,) [m] of points (N, 3) from the nearest of the triangles (T, 3, 3)."""
+    normal, offset = triangle_planes(triangles)
+    edge_normal, edge_offset = edge_planes(triangles)
+    nearest = np.full(len(points), np.inf)
+    for rows in np.array_split(np.arange(len(points)), max(1, len(points) * len(triangles) // 200_000)):
+        height = np.abs(points[rows] @ normal.T - offset)
+        above = (np.einsum("ni,tei->nte", points[rows], edge_normal) >= edge_offset).all(axis=-1)
+        edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2, 3)
+        plane = np.where(above, height, np.inf).min(axis=1, initial=np.inf)
+        nearest[rows] = np.minimum(plane, distance_to_edges(points[rows], edges))
+    return nearest

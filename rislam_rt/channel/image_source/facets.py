@@ -54,7 +54,9 @@ class Facets:
         candidates = np.flatnonzero(inside)
         order = candidates[np.argsort(wall[candidates], kind="stable")]
         present, start = np.unique(wall[order], return_index=True)
-        for number, rows in zip(present, np.split(order, start[1:]), strict=True):
+        ends = np.append(start[1:], len(order))
+        for number, first, last in zip(present, start, ends, strict=False):  # of no points, `ends` has one too many
+            rows = order[first:last]
             inside[rows] = self._on_wall(points[rows], int(number))
         return inside
 
