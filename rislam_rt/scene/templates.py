@@ -1,6 +1,7 @@
 """New scene folders from the built-in rooms."""
 
 from pathlib import Path
+from textwrap import fill
 
 from rislam_rt.errors import SceneError
 from rislam_rt.scene.load import SCENE_FILE
@@ -28,5 +29,7 @@ def room_files(room: Room) -> dict[str, bytes]:
     """The files of a scene folder: relative name -> content."""
     files = {f"meshes/{name}.ply": ply_bytes(mesh.vertices, mesh.faces) for name, mesh in room.meshes.items()}
     name = room.table["name"]
-    readme = f"# {name}\n\n{room.readme}\n\nWritten by `python -m rislam_rt.scene.build {name} --out scenes`.\n"
+    readme = (
+        f"# {name}\n\n{fill(room.readme, 110)}\n\nWritten by `python -m rislam_rt.scene.build {name} --out scenes`.\n"
+    )
     return files | room.files | {SCENE_FILE: toml_bytes(room.table), "README.md": readme.encode()}

@@ -2,11 +2,25 @@
 
 from collections.abc import Callable
 
-from rislam_rt.scene.rooms.plain import paper_room
+from rislam_rt.scene.rooms.angled import l_room, tilted_room
+from rislam_rt.scene.rooms.furnished import imported_glb, office
+from rislam_rt.scene.rooms.hall import large_hall
+from rislam_rt.scene.rooms.plain import empty_box, itu_room, paper_room, two_scatterers
 from rislam_rt.scene.rooms.room import Room
 
 ROOMS: dict[str, Callable[[], Room]] = {
-    "paper_room": paper_room,
+    room.__name__: room
+    for room in (
+        paper_room,
+        empty_box,
+        l_room,
+        tilted_room,
+        office,
+        two_scatterers,
+        itu_room,
+        large_hall,
+        imported_glb,
+    )
 }
 """Name of the template -> its builder."""
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from rislam_rt.arrays import Floats
 from rislam_rt.scene.meshes import Mesh
 
 PAPER_MATERIAL = {"reflection": 0.85}
@@ -29,19 +28,21 @@ def reflector(name: str, material: dict[str, Any] | None = None) -> dict[str, An
     return {"name": name, "mesh": f"meshes/{name}.ply", "material": material or PAPER_MATERIAL}
 
 
-def sphere(name: str, position: Floats | list[float], radius: float = 0.05) -> dict[str, Any]:
+def sphere(name: str, position: list[float], radius: float = 0.05) -> dict[str, Any]:
     """The table of a spherical scatterer; the paper's radius by default."""
-    return {"name": name, "position": [float(x) for x in position], "radius": radius}
+    return {"name": name, "position": position, "radius": radius}
 
 
-def panel(center: list[float], normal: list[float], up: list[float], host: str) -> dict[str, Any]:
-    """The table of the paper's panel, anywhere."""
+def panel(
+    center: list[float], normal: list[float], up: list[float], host: str = "ceiling", size: int = 6
+) -> dict[str, Any]:
+    """The table of a panel like the paper's, anywhere."""
     return {
         "center": center,
         "normal": normal,
         "up": up,
-        "rows": 6,
-        "cols": 6,
+        "rows": size,
+        "cols": size,
         "spacing_m": [0.015, 0.015],
         "levels": 4,
         "element": "tang",
