@@ -8,10 +8,20 @@ from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
 class Channel(Protocol):
     """All paths of a room over a trajectory. `TracedChannel` and `ImageSourceChannel` are drop-in for each other."""
 
-    scene: Scene
-    radio: RadioConfig
-    depth: int
-    """Largest number of wall bounces on a path, both legs together."""
+    @property
+    def scene(self) -> Scene:
+        """The room."""
+        ...
+
+    @property
+    def radio(self) -> RadioConfig:
+        """The agent's radio."""
+        ...
+
+    @property
+    def depth(self) -> int:
+        """Largest number of wall bounces on a path, both legs together."""
+        ...
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Every path of every cycle, with the panel at level 0."""

@@ -4,11 +4,14 @@ from rislam_rt.model.estimate import MapEstimate, SlamEstimate, empty_map
 from rislam_rt.model.measurement import Measurement, PathTruth
 from rislam_rt.model.paths import PathKind, Paths, RisLegs
 from rislam_rt.model.radio import RadioConfig, RxArray
+from rislam_rt.model.result import NOTHING, STEPS, SchemeResult, SlamResult
 from rislam_rt.model.ris import RisCode, RisPanel, RisSpec
 from rislam_rt.model.scene import Material, Reflector, Scatterer, Scene
 from rislam_rt.model.trajectory import Body, Trajectory
 
 __all__ = [
+    "NOTHING",
+    "STEPS",
     "Body",
     "MapEstimate",
     "Material",
@@ -25,7 +28,9 @@ __all__ = [
     "RxArray",
     "Scatterer",
     "Scene",
+    "SchemeResult",
     "SlamEstimate",
+    "SlamResult",
     "Trajectory",
     "empty_map",
 ]

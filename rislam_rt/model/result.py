@@ -1,0 +1,103 @@
+"""What a run leaves behind: for each scheme, everything cycle by cycle, and all that is needed to repeat it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, freeze
+from rislam_rt.model.estimate import MapEstimate
+from rislam_rt.model.paths import Paths
+from rislam_rt.model.scene import Scene
+
+STEPS = ("optimise", "communicate", "measure", "localise")
+"""The four steps of a cycle, in their order."""
+
+NOTHING = -9
+"""In `SchemeResult.path` and `.associated`: no component in this column."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SchemeResult:
+    """One scheme over K cycles; P path identities, I landmarks ever held, up to M components a cycle."""
+
+    scheme: str
+    position: Floats
+    """(K, 3) estimated [m]."""
+    velocity: Floats
+    """(K, 3) estimated [m/s]."""
+    heading: Floats
+    """(K,) [rad]."""
+    covariance: Floats
+    """(K, 6, 6) of position and velocity, as the filter believes."""
+    sent: Integers
+    """(K, N, M) code that the agent sent; (K, 0, 0) without a panel."""
+    applied: Integers
+    """(K, N, M) code that the panel was set to while the signals were taken."""
+    levels: int
+    """H, the number of phase levels of both."""
+    gain: Complexes
+    """(K, P) true path gains under the applied code."""
+    path: Integers
+    """(K, M) truth, for scoring only: path column of each component, -1 for clutter, `NOTHING` beyond their number."""
+    associated: Integers
+    """(K, M) number of the landmark (or image) that the agent took each component for; -1 clutter or unused, -2 removed
+    as LOS or wall return, `NOTHING` beyond their number."""
+    ident: Integers
+    """(I,) numbers of all landmarks that were ever held."""
+    held: Booleans
+    """(K, I) whether the landmark was in the map."""
+    landmark: Floats
+    """(K, I, 3) its estimated position [m], zero where it was not held."""
+    ris_probability: Floats
+    """(K, I) probability of being the panel."""
+    seconds: Floats
+    """(K, 4) time [s] that each of `STEPS` took."""
+    info: Mapping[str, Floats]
+    """Diagnostics of the filter, (K,) each."""
+    outcome: tuple[str, ...]
+    """(K,) how each cycle went, in the filter's words."""
+    map: MapEstimate
+    """After the last cycle."""
+
+    def __post_init__(self) -> None:
+        cycles, held = np.shape(self.position)[0], len(np.asarray(self.ident))
+        for name, dtype, shape in (
+            ("position", np.float64, (cycles, 3)),
+            ("velocity", np.float64, (cycles, 3)),
+            ("heading", np.float64, (cycles,)),
+            ("covariance", np.float64, (cycles, 6, 6)),
+            ("sent", np.int64, (cycles, None, None)),
+            ("applied", np.int64, (cycles, None, None)),
+            ("gain", np.complex128, (cycles, None)),
+            ("path", np.int64, (cycles, None)),
+            ("associated", np.int64, (cycles, None)),
+            ("ident", np.int64, (held,)),
+            ("held", np.bool_, (cycles, held)),
+            ("landmark", np.float64, (cycles, held, 3)),
+            ("ris_probability", np.float64, (cycles, held)),
+            ("seconds", np.float64, (cycles, len(STEPS))),
+        ):
+            freeze(self, name, dtype, shape)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlamResult:
+    """A whole run."""
+
+    name: str
+    """Of the pipeline."""
+    scene: Scene
+    """The true room, with the trajectory cut to the cycles of the run."""
+    paths: Paths
+    """The true paths, panel at level 0; each scheme holds its own gains."""
+    schemes: Mapping[str, SchemeResult]
+    config: Mapping[str, Any]
+    """The whole specification, defaults filled in."""
+    seed: int | None
+    """None if the caller gave a generator of another origin."""
+    versions: Mapping[str, str]
+    """Of this package, of Python and of the libraries that numbers depend on."""
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    """Time [s] of tracing and of each scheme."""

@@ -1,0 +1,49 @@
+"""How each scheme chooses the panel's code: from the predicted belief, or, for the reference, from the truth."""
+
+import numpy as np
+
+from rislam_rt.design import design_code, designer, problem_from_paths
+from rislam_rt.errors import ConfigError
+from rislam_rt.information import prior_from_covariance
+from rislam_rt.model import RisCode, RisSpec, SlamEstimate
+from rislam_rt.pipeline.cycle import Designer, Room
+from rislam_rt.pipeline.schemes import Scheme
+from rislam_rt.pipeline.spec import PipelineSpec, Settings
+
+
+def build_designer(scheme: Scheme, panel: RisSpec, room: Room, spec: PipelineSpec, settings: Settings) -> Designer:
+    """The designer of a scheme that has a panel."""
+    method = spec.design.method if scheme.method == "spec" else str(scheme.method)
+    return (
+        _on_truth(method, panel, room, spec, settings) if scheme.on_truth else _on_belief(method, panel, spec, settings)
+    )
+
+
+def _on_belief(method: str, panel: RisSpec, spec: PipelineSpec, settings: Settings) -> Designer:
+    section = spec.design
+
+    def choose(belief: SlamEstimate, cycle: int, rng: np.random.Generator) -> RisCode:
+        design = design_code(
+            belief, panel, settings.radio, method=method, rng=rng, samples=section.samples, config=settings.design,
+            landmark_uncertainty=section.landmark_uncertainty,
+        )  # fmt: skip
+        return design.code
+
+    return choose
+
+
+def _on_truth(method: str, panel: RisSpec, room: Room, spec: PipelineSpec, settings: Settings) -> Designer:
+    """The genie: true paths of the cycle in which the code will take effect, and the belief's own prior."""
+    last = len(room.trajectory) - 1
+
+    def choose(belief: SlamEstimate, cycle: int, rng: np.random.Generator) -> RisCode:
+        due = min(cycle + spec.control.delay_cycles, last)
+        prior = prior_from_covariance(belief.covariance[:2, :2])
+        tx, rx = room.trajectory.tx[due], room.trajectory.rx[due]
+        try:
+            problem = problem_from_paths(room.at(due), tx, rx, settings.radio, panel.levels, prior=prior)
+        except ConfigError:  # the panel is out of sight: any code will do
+            return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)
+        return designer(method)(problem, rng=rng, config=settings.design).code
+
+    return choose

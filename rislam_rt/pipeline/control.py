@@ -1,0 +1,65 @@
+"""The control channel between agent and panel: a code travels as a message that can be late or lost."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.errors import ConfigError
+from rislam_rt.model import RisCode, RisSpec
+from rislam_rt.pipeline.spec import ControlSection
+from rislam_rt.ris import zero_code
+
+
+class Link(NamedTuple):
+    """State of the control channel."""
+
+    applied: RisCode
+    """What the panel is set to."""
+    believed: RisCode
+    """What the agent holds it to be: it knows the delay, but not that a message was lost."""
+    waiting: tuple[tuple[RisCode, bool], ...] = ()
+    """Codes on their way, oldest first, and whether each will arrive."""
+
+
+def open_link(spec: RisSpec) -> Link:
+    """A panel at level 0, nothing on its way."""
+    start = zero_code(spec)
+    return Link(start, start)
+
+
+def send_code(link: Link, code: RisCode, control: ControlSection, *, rng: np.random.Generator) -> Link:
+    """The link one cycle later, after `code` was sent."""
+    arrives = bool(rng.random() >= control.loss_probability)
+    waiting = (*link.waiting, (quantise(code, control.levels), arrives))
+    if len(waiting) <= control.delay_cycles:
+        return link._replace(waiting=waiting)
+    (due, came), *rest = waiting
+    return Link(due if came else link.applied, due, tuple(rest))
+
+
+def quantise(code: RisCode, levels: int | None) -> RisCode:
+    """The nearest code that a message of `levels` phase levels can name, in the panel's own levels."""
+    if levels is None:
+        return code
+    step = code.levels // levels
+    return RisCode((np.rint(code.index / step).astype(np.int64) % levels) * step, code.levels)
+
+
+def message_seconds(spec: RisSpec, control: ControlSection) -> float:
+    """Air time [s] of one message: so many bits an element as its levels need."""
+    bits = spec.num_elements * int(np.ceil(np.log2(control.levels or spec.levels)))
+    return bits / control.rate_bits_s
+
+
+def check_control(spec: RisSpec, control: ControlSection) -> None:
+    """Check the message against the panel.
+
+    Raises
+    ------
+    ConfigError
+        The message's levels do not divide the panel's.
+    """
+    if control.levels is not None and spec.levels % control.levels:
+        raise ConfigError(
+            f"control.levels: {control.levels} received; give a divisor of the panel's {spec.levels} levels"
+        )

@@ -1,0 +1,125 @@
+"""One cycle of the protocol: optimise, communicate, measure, localise and map.
+
+The agent's side of it (design and filter) gets the measurement, the code that it holds to be applied, the time step and
+its heading; paths and poses stay on the room's side.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.measurement import measure
+from rislam_rt.model import Measurement, Paths, PathTruth, RisCode, RisLegs, RisSpec, SlamEstimate, Trajectory
+from rislam_rt.pipeline.control import Link, message_seconds, send_code
+from rislam_rt.pipeline.spec import ControlSection, Settings
+from rislam_rt.ris import rephase
+from rislam_rt.slam import estimate, predict, step
+
+
+class Rng(NamedTuple):
+    """Generators of one cycle."""
+
+    design: np.random.Generator
+    control: np.random.Generator
+    noise: np.random.Generator
+    filter: np.random.Generator
+
+
+class Room(NamedTuple):
+    """The true side of a run."""
+
+    paths: Paths
+    trajectory: Trajectory
+
+    def at(self, cycle: int) -> Paths:
+        """The paths of one cycle alone."""
+        one = slice(cycle, cycle + 1)
+        ris = self.paths.ris
+        per_cycle = ("valid", "tau", "departure", "arrival", "gain", "vertices")
+        fields: dict[str, Any] = {name: getattr(self.paths, name)[one] for name in per_cycle}
+        if ris is not None:
+            fields["ris"] = RisLegs(ris.tx[one], ris.rx[one], ris.tx_leg, ris.rx_leg)
+        return replace(self.paths, **fields)
+
+
+class Agent(NamedTuple):
+    """What the agent carries from cycle to cycle, with its control channel."""
+
+    state: Any
+    link: Link | None
+    """None without a panel."""
+
+
+class Cycle(NamedTuple):
+    """What one cycle left behind."""
+
+    estimate: SlamEstimate
+    info: Any
+    measurement: Measurement
+    truth: PathTruth
+    gain: Any
+    """(P,) true path gains under the applied code."""
+    sent: RisCode | None
+    applied: RisCode | None
+    seconds: tuple[float, float, float, float]
+
+
+Designer = Callable[[SlamEstimate, int, np.random.Generator], RisCode]
+"""Chooses a code from the predicted belief; the number of the cycle is for the reference that knows the truth."""
+
+
+def run_cycle(
+    agent: Agent,
+    room: Room,
+    cycle: int,
+    panel: RisSpec | None,
+    designer: Designer | None,
+    settings: Settings,
+    control: ControlSection,
+    *,
+    rng: Rng,
+) -> tuple[Agent, Cycle]:
+    """One cycle of one scheme."""
+    motion = room.trajectory
+    dt = float(motion.time[cycle] - motion.time[cycle - 1]) if cycle else 0.0
+    heading = float(motion.heading[cycle])
+    clock = [perf_counter()]
+
+    link, sent = agent.link, None
+    if link is not None and designer is not None:
+        ahead = dt + control.delay_cycles * _nominal_step(motion)
+        sent = designer(predict(agent.state, ahead, settings.slam), cycle, rng.design)
+    clock.append(perf_counter())
+
+    air = 0.0
+    if link is not None and sent is not None and panel is not None:
+        link = send_code(link, sent, control, rng=rng.control)
+        air = message_seconds(panel, control)
+    clock.append(perf_counter())
+
+    paths = room.at(cycle)
+    if link is not None:
+        paths = rephase(paths, link.applied)
+    measurement, truth = measure(paths, 0, heading, settings.radio, settings.receiver, rng=rng.noise)
+    clock.append(perf_counter())
+
+    believed = link.believed if link is not None else None
+    state, info = step(agent.state, measurement, believed, dt, heading, settings.slam, rng=rng.filter)
+    belief = estimate(state, settings.slam)
+    clock.append(perf_counter())
+
+    optimise, communicate, acquire, localise = np.diff(clock)
+    applied = link.applied if link is not None else None
+    outcome = Cycle(
+        belief, info, measurement, truth, paths.gain[0], sent, applied,
+        (optimise, communicate + air, acquire, localise),
+    )  # fmt: skip
+    return Agent(state, link), outcome
+
+
+def _nominal_step(motion: Trajectory) -> float:
+    """Cycle time [s] of a trajectory."""
+    return float(motion.time[1] - motion.time[0]) if len(motion) > 1 else 0.0

@@ -1,0 +1,111 @@
+"""Read a pipeline file, with settings of the command line put over it."""
+
+import tomllib
+from collections.abc import Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from rislam_rt.errors import ConfigError
+from rislam_rt.pipeline.spec import PipelineSpec, build_settings
+
+MAX_BYTES = 1_000_000
+"""A pipeline file is written by people; anything larger is another file by mistake."""
+
+
+def load_spec(path: str | Path, overrides: Sequence[str] = ()) -> PipelineSpec:
+    """The specification of a file, `key=value` settings (dotted keys) put over it first.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read or is not TOML; a key is unknown, a value of the wrong type or out of range. One line.
+    """
+    path = Path(path)
+    table = _read_table(path)
+    changed = [_override(table, setting) for setting in overrides]
+    try:
+        spec = PipelineSpec.model_validate(table)
+    except ValidationError as error:
+        items = error.errors(include_url=False, include_context=False)
+        more = f" (and {len(items) - 1} more)" if len(items) > 1 else ""
+        raise ConfigError(f"{_source(path, _place(items[0]), changed)}: {_remark(items[0])}{more}") from None
+    try:
+        build_settings(spec)
+    except ConfigError as error:
+        raise ConfigError(f"{_source(path, str(error).partition(':')[0], changed)}: {error}") from None
+    return spec
+
+
+def _read_table(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: no such pipeline file; give one, e.g. pipelines/trace_then_slam.toml") from None
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}); give a pipeline file in TOML") from None
+    if len(content) > MAX_BYTES:
+        raise ConfigError(f"{path}: more than {MAX_BYTES} bytes; give a pipeline file in TOML")
+    try:
+        return tomllib.loads(content.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
+        cause = " ".join(str(error).split())[:120]
+        raise ConfigError(f"{path}: not valid TOML ({cause}); mend that place") from None
+
+
+def _override(table: dict[str, Any], setting: str) -> str:
+    """Put one `key=value` into the table; returns the key."""
+    key, equals, text = setting.partition("=")
+    parts = key.strip().split(".")
+    if not equals or not all(part.isidentifier() for part in parts):
+        raise ConfigError(f"--set {setting[:80]!r}: not of the form key=value; give e.g. --set radio.bandwidth_ghz=0.5")
+    for part in parts[:-1]:
+        table = table.setdefault(part, {})
+        if not isinstance(table, dict):
+            raise ConfigError(f"--set {setting[:80]!r}: '{part}' is not a section; mend the key")
+    table[parts[-1]] = _value(text.strip())
+    return ".".join(parts)
+
+
+def _value(text: str) -> Any:
+    """A TOML value, or the text itself (so that strings need no quotes)."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, KeyError):
+        return text
+
+
+def _source(path: Path, place: str, changed: Sequence[str]) -> str:
+    """The command line if it set the field at fault, else the file."""
+    return "--set" if any(place == key or place.startswith((f"{key}.", f"{key}[")) for key in changed) else str(path)
+
+
+def _place(item: Any) -> str:
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"]).lstrip(".")[:100]
+
+
+def _remark(item: Any) -> str:
+    """One bad field: where, what was received, how to mend it."""
+    place = _place(item)
+    if item["type"] == "missing":
+        return f"{place}: missing; add it"
+    if item["type"] == "extra_forbidden":
+        near = get_close_matches(str(item["loc"][-1]), _keys(PipelineSpec), n=1)
+        return f"{place}: unknown key; " + (f"did you mean '{near[0]}'?" if near else "remove it or mend its name")
+    message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
+    if isinstance(item["input"], dict):
+        return f"{place}: {message}" if place else message
+    return f"{place}: {str(item['input'])[:60]!r} received; {message[:1].lower()}{message[1:]}"
+
+
+def _keys(section: type[BaseModel]) -> list[str]:
+    """Every key of a section and of those below it."""
+    keys = []
+    for name, field in section.model_fields.items():
+        keys.append(name)
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            keys += _keys(field.annotation)
+    return keys

@@ -1,0 +1,66 @@
+"""From a list of cycles to arrays over all cycles."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Integers
+from rislam_rt.model import NOTHING, RisCode, SchemeResult
+from rislam_rt.pipeline.cycle import Cycle
+
+
+def gather(scheme: str, cycles: Sequence[Cycle], levels: int) -> SchemeResult:
+    """All cycles of a scheme as one record."""
+    estimates = [cycle.estimate for cycle in cycles]
+    maps = [estimate.map for estimate in estimates]
+    ident = np.unique(np.concatenate([m.ident for m in maps]))
+    held = np.zeros((len(cycles), len(ident)), dtype=np.bool_)
+    landmark = np.zeros((len(cycles), len(ident), 3))
+    ris_probability = np.zeros((len(cycles), len(ident)))
+    for row, m in enumerate(maps):
+        column = np.searchsorted(ident, m.ident)
+        held[row, column], landmark[row, column] = True, m.position
+        ris_probability[row, column] = m.ris_probability
+    return SchemeResult(
+        scheme=scheme,
+        position=np.array([estimate.position for estimate in estimates]),
+        velocity=np.array([estimate.velocity for estimate in estimates]),
+        heading=np.array([estimate.heading for estimate in estimates]),
+        covariance=np.array([estimate.covariance for estimate in estimates]),
+        sent=_codes([cycle.sent for cycle in cycles]),
+        applied=_codes([cycle.applied for cycle in cycles]),
+        levels=levels,
+        gain=np.array([cycle.gain for cycle in cycles]),
+        path=_padded([cycle.truth.path for cycle in cycles]),
+        associated=_padded([cycle.info.landmark for cycle in cycles]),
+        ident=ident,
+        held=held,
+        landmark=landmark,
+        ris_probability=ris_probability,
+        seconds=np.array([cycle.seconds for cycle in cycles]),
+        info=_diagnostics([cycle.info for cycle in cycles]),
+        outcome=tuple(str(cycle.info.outcome) for cycle in cycles),
+        map=maps[-1],
+    )
+
+
+def _codes(codes: Sequence[RisCode | None]) -> Integers:
+    """(K, N, M) level indices; (K, 0, 0) without a panel."""
+    if any(code is None for code in codes):
+        return np.zeros((len(codes), 0, 0), dtype=np.int64)
+    return np.array([code.index for code in codes if code is not None], dtype=np.int64)
+
+
+def _padded(rows: Sequence[Integers]) -> Integers:
+    """(K, M) rows of different length, filled up with `NOTHING`."""
+    table = np.full((len(rows), max(map(len, rows), default=0)), NOTHING, dtype=np.int64)
+    for number, row in enumerate(rows):
+        table[number, : len(row)] = row
+    return table
+
+
+def _diagnostics(infos: Sequence[Any]) -> dict[str, Any]:
+    """The scalar numbers among the fields of the filter's infos, (K,) each."""
+    names = [name for name, value in infos[0]._asdict().items() if isinstance(value, bool | int | float | np.number)]
+    return {name: np.array([float(getattr(info, name)) for info in infos]) for name in names}

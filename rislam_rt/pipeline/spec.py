@@ -1,0 +1,184 @@
+"""Experiment specifications: what a pipeline file may say, and the settings that it becomes."""
+
+from dataclasses import fields
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
+
+from rislam_rt.design import DESIGNERS, DesignConfig
+from rislam_rt.measurement import ReceiverConfig, with_reference_snr
+from rislam_rt.model import RadioConfig, RxArray
+from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.slam import SlamConfig
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=64)]
+Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, le=1e12, allow_inf_nan=False)]
+Decibel = Annotated[float, Field(ge=-300.0, le=300.0, allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+class Section(BaseModel):
+    """A table of the file: no conversions, no unknown keys."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()) -> Any:
+    """A section with the fields, types and defaults of a frozen record of scalars, which checks its own ranges."""
+    kinds: dict[str, Any] = {f.name: (f.type, f.default) for f in fields(record) if f.name not in without}
+    return create_model(name, __base__=Section, __doc__=doc, **kinds)
+
+
+_Filter = _section("_Filter", SlamConfig, "Fields of `SlamConfig`.")
+_Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.")
+_Designers = _section("_Designers", DesignConfig, "Fields of `DesignConfig`.", without=("certify",))
+
+
+class SlamSection(_Filter):  # type: ignore[misc]
+    """The filter's settings, SI units."""
+
+
+class ReceiverSection(_Receiver):  # type: ignore[misc]
+    """The receiver's settings, SI units."""
+
+
+class ArraySection(Section):
+    """The Rx array."""
+
+    rows: Count = 4
+    cols: Count = 4
+    spacing_wavelengths: Positive = 0.5
+    pattern: Literal["upper", "isotropic"] = "upper"
+
+
+class RadioSection(Section):
+    """The radio. The noise is given by what it does to the paper's sphere at 3 m, or by its density."""
+
+    carrier_ghz: Positive = 10.0
+    bandwidth_ghz: Positive = 1.0
+    tx_gain_db: Decibel = 0.0
+    rx_gain_db: Decibel = 0.0
+    energy_j: Positive = 1.0
+    reference_snr_db: Decibel | None = None
+    """SNR of the paper's sphere 3 m away, integrated over the signal and over all antennas; 13 if nothing is given."""
+    noise_psd: Positive | None = None
+    """N0 [W/Hz], instead."""
+    array: ArraySection = ArraySection()
+
+    @model_validator(mode="after")
+    def _one_noise(self) -> "RadioSection":
+        if self.reference_snr_db is not None and self.noise_psd is not None:
+            raise ValueError("give 'reference_snr_db' or 'noise_psd', not both")
+        return self
+
+
+class DesignSection(_Designers):  # type: ignore[misc]
+    """How the scheme `optimized` chooses codes."""
+
+    method: Literal[tuple(DESIGNERS)] = "genetic"  # type: ignore[valid-type]
+    samples: Annotated[int, Field(ge=1, le=10_000)] = 4
+    """Positions of the belief over which the objective is averaged; 1 designs on the mean."""
+    landmark_uncertainty: bool = False
+    """Whether each landmark's covariance discounts its path."""
+
+
+class BudgetSection(Section):
+    """Time [s] of the cycle's four steps; together they are the scene's cycle."""
+
+    optimise_s: NotNegative = 0.04
+    communicate_s: NotNegative = 0.01
+    measure_s: NotNegative = 0.01
+    localise_s: NotNegative = 0.04
+
+
+class ControlSection(Section):
+    """The message that carries a code to the panel's controller."""
+
+    levels: Annotated[int, Field(ge=2, le=65536)] | None = None
+    """Phase levels that the message can name, a divisor of the panel's; all of them by default."""
+    rate_bits_s: Positive = 1e6
+    loss_probability: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """Probability that a message is lost; the panel then keeps its code and the agent does not know."""
+    delay_cycles: Annotated[int, Field(ge=0, le=1000)] = 0
+    """Cycles from sending to effect, known to the agent."""
+
+
+class StartSection(Section):
+    """What the agent is told of its start: the truth plus one draw of these errors."""
+
+    position_std_m: NotNegative = 0.01
+    velocity_std_m_s: NotNegative = 0.01
+
+
+class PipelineSpec(Section):
+    """A whole pipeline file."""
+
+    name: Name
+    description: str = ""
+    scene: str | None = None
+    """Scene folder, relative to the pipeline file; `--scene` comes first."""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 7
+    cycles: Count | None = None
+    """Only the first so many cycles of the scene's trajectory; all of them by default."""
+    channel: Literal["traced", "image_source"] = "traced"
+    depth: Annotated[int, Field(ge=0, le=4)] = 2
+    """Largest number of wall bounces on a path, both legs together."""
+    schemes: Annotated[list[Literal[tuple(SCHEMES)]], Field(min_length=1)] = ["optimized", "random"]  # type: ignore[valid-type]
+    radio: RadioSection = RadioSection()
+    receiver: ReceiverSection = ReceiverSection()
+    design: DesignSection = DesignSection()
+    budget: BudgetSection = BudgetSection()
+    control: ControlSection = ControlSection()
+    start: StartSection = StartSection()
+    slam: SlamSection = SlamSection()
+
+    @model_validator(mode="after")
+    def _each_scheme_once(self) -> "PipelineSpec":
+        if len(set(self.schemes)) < len(self.schemes):
+            raise ValueError("schemes: each at most once")
+        return self
+
+
+class Settings(NamedTuple):
+    """The records that the parts of a run take, made from a specification."""
+
+    radio: RadioConfig
+    receiver: ReceiverConfig
+    slam: SlamConfig
+    design: DesignConfig
+
+
+def build_settings(spec: PipelineSpec) -> Settings:
+    """Radio, receiver and filter settings in SI units and linear ratios.
+
+    Raises
+    ------
+    ConfigError
+        A value is out of the range that the record itself checks.
+    """
+    section = spec.radio
+    array = RxArray(section.array.rows, section.array.cols, section.array.spacing_wavelengths, section.array.pattern)
+    radio = RadioConfig(
+        carrier=section.carrier_ghz * 1e9,
+        bandwidth=section.bandwidth_ghz * 1e9,
+        tx_gain=_linear(section.tx_gain_db),
+        rx_gain=_linear(section.rx_gain_db),
+        energy=section.energy_j,
+        array=array,
+        **({} if section.noise_psd is None else {"noise_psd": section.noise_psd}),
+    )
+    if section.noise_psd is None:
+        radio = with_reference_snr(radio, 13.0 if section.reference_snr_db is None else section.reference_snr_db)
+    designers = {name: getattr(spec.design, name) for name in _Designers.model_fields}
+    return Settings(
+        radio,
+        ReceiverConfig(**spec.receiver.model_dump()),
+        SlamConfig(**spec.slam.model_dump()),
+        DesignConfig(**designers, certify=False),
+    )
+
+
+def _linear(decibel: float) -> float:
+    return float(np.power(10.0, decibel / 10.0))
