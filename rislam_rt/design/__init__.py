@@ -1,1 +1,30 @@
+"""Floor 5: which code to set the panel to. Designers, their bound, and the problem as the agent believes it."""
 
+from rislam_rt.design.belief import design_code, problem_from_belief
+from rislam_rt.design.bound import best_magnitudes, relaxation_bound
+from rislam_rt.design.designers import DESIGNERS, designer
+from rislam_rt.design.objective import Objective, build_objective
+from rislam_rt.design.problem import DesignProblem
+from rislam_rt.design.result import Design, DesignConfig, Designer
+from rislam_rt.design.single import continuous_phases, exact_code, nearest_code
+from rislam_rt.design.truth import problem_from_arrays, problem_from_paths
+
+__all__ = [
+    "DESIGNERS",
+    "Design",
+    "DesignConfig",
+    "DesignProblem",
+    "Designer",
+    "Objective",
+    "best_magnitudes",
+    "build_objective",
+    "continuous_phases",
+    "design_code",
+    "designer",
+    "exact_code",
+    "nearest_code",
+    "problem_from_arrays",
+    "problem_from_belief",
+    "problem_from_paths",
+    "relaxation_bound",
+]

@@ -1,1 +1,52 @@
+"""Floor 4: Fisher information of delays, gains and angles; what it says about positions; bounds over a trajectory."""
 
+from rislam_rt.information.accuracy import MeasurementStd, amplitude_std, cosine_information, measurement_std
+from rislam_rt.information.delay_gain import (
+    Equivalent,
+    delay_gain_information,
+    delay_information,
+    eliminate_gains,
+    map_to_position,
+    steering,
+)
+from rislam_rt.information.equivalent import EquivalentPosition, equivalent_information, uncertain_range_information
+from rislam_rt.information.gradient import (
+    GradientMode,
+    cosine_gradient,
+    heading_gradient,
+    landmark_gradient,
+    path_gradient,
+    vertex_gradient,
+)
+from rislam_rt.information.outcome import Outcome
+from rislam_rt.information.position import Bound, position_bound, position_information, range_information
+from rislam_rt.information.prior import prior_from_covariance, prior_from_particles
+
+__all__ = [
+    "Bound",
+    "Equivalent",
+    "EquivalentPosition",
+    "GradientMode",
+    "MeasurementStd",
+    "Outcome",
+    "amplitude_std",
+    "cosine_gradient",
+    "cosine_information",
+    "delay_gain_information",
+    "delay_information",
+    "eliminate_gains",
+    "equivalent_information",
+    "heading_gradient",
+    "landmark_gradient",
+    "map_to_position",
+    "measurement_std",
+    "path_gradient",
+    "position_bound",
+    "position_information",
+    "prior_from_covariance",
+    "prior_from_particles",
+    "range_information",
+    "steering",
+    "uncertain_range_information",
+    "vertex_gradient",
+]

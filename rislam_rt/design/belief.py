@@ -1,0 +1,140 @@
+"""Design on the belief: the problem as the agent sees it, from its own pose, map and the panel's data sheet."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.design.designers import designer, random_design
+from rislam_rt.design.problem import DesignProblem
+from rislam_rt.design.result import Design, DesignConfig
+from rislam_rt.geometry.angles import unit
+from rislam_rt.geometry.planes import mirror, plane_between
+from rislam_rt.information import path_gradient, prior_from_covariance, range_information
+from rislam_rt.model import MapEstimate, RadioConfig, RisSpec, SlamEstimate
+from rislam_rt.ris import leg_response
+
+_DEFAULT = DesignConfig()
+
+
+def design_code(
+    belief: SlamEstimate,
+    ris: RisSpec,
+    radio: RadioConfig,
+    *,
+    method: str,
+    rng: np.random.Generator,
+    samples: int = 4,
+    config: DesignConfig = _DEFAULT,
+    landmark_uncertainty: bool = False,
+) -> Design:
+    """A code for the next cycle from the belief predicted to it; truth is not looked at.
+
+    Parameters
+    ----------
+    method
+        A key of `DESIGNERS`.
+    samples
+        Over how many positions the expected CRLB is taken: the mean, then the first of `belief.samples`.
+    landmark_uncertainty
+        Whether each landmark's own covariance discounts its path, as if unrelated to the agent's.
+
+    If no landmark is held for the panel yet, the outcome is `NO_PATHS` and the code is a random one.
+    """
+    chosen = designer(method)
+    problem = problem_from_belief(belief, ris, radio, samples=samples, landmark_uncertainty=landmark_uncertainty)
+    if problem is None:
+        return random_design(method, ris, rng=rng)
+    return chosen(problem, rng=rng, config=config)
+
+
+def problem_from_belief(
+    belief: SlamEstimate, ris: RisSpec, radio: RadioConfig, *, samples: int = 4, landmark_uncertainty: bool = False
+) -> DesignProblem | None:
+    """The design problem of a belief; None if its map holds no panel.
+
+    A point landmark gives one path; an image gives two, with its wall on the Rx leg and on the Tx leg. Paths of the
+    panel and its images depend on the code, the others do not. The wall between the panel and its image mirrors the
+    device, as the panel sees it. Predicted gains follow from the geometry and the landmarks' strengths.
+    """
+    if belief.map.ris < 0:
+        return None
+    position = np.concatenate([belief.position[None], belief.samples[: max(samples - 1, 0)]])
+    tx, rx = (end[:, None, :] for end in belief.body.ends(position, np.array(belief.heading, dtype=np.float64)))
+    panel, static = _believed_paths(belief.map)
+    both = _Believed(*(np.concatenate(pair) for pair in zip(panel, static, strict=True)))
+    points = belief.map.position
+    return DesignProblem(
+        response=_panel_responses(belief.map, panel, tx, rx, ris, radio),
+        static_gain=_point_gains(belief.map, static, tx, rx, radio),
+        gradient=path_gradient(tx, rx, points[both.tx_point], points[both.rx_point])[..., :2],
+        prior=prior_from_covariance(belief.covariance[:2, :2]),
+        scale=float(range_information(radio.integrated_snr(np.ones(())), radio)),
+        levels=ris.levels,
+        variance=_length_variance(belief.map, both, tx, rx) if landmark_uncertainty else None,
+    )
+
+
+class _Believed(NamedTuple):
+    """Q paths of a map: rows of the point that scatters, and of the points that Tx and Rx see."""
+
+    source: Integers
+    tx_point: Integers
+    rx_point: Integers
+
+
+def _believed_paths(landmarks: MapEstimate) -> tuple[_Believed, _Believed]:
+    """Paths over the panel, the direct one first, and the others. Images of images are too weak to matter."""
+    rows = np.arange(len(landmarks.parent))
+    points = rows[landmarks.parent < 0]
+    points = np.concatenate([[landmarks.ris], points[points != landmarks.ris]])
+    images = rows[(landmarks.parent >= 0) & np.isin(landmarks.parent, points)]
+    parents = landmarks.parent[images]
+    paths = _Believed(
+        np.concatenate([points, parents, parents]),
+        np.concatenate([points, parents, images]),
+        np.concatenate([points, images, parents]),
+    )
+    over_panel = paths.source == landmarks.ris
+    return _Believed(*(field[over_panel] for field in paths)), _Believed(*(field[~over_panel] for field in paths))
+
+
+def _ratio(landmarks: MapEstimate, paths: _Believed) -> Floats:
+    """Amplitude (Q,) that the wall of an image leaves; 1 without a wall."""
+    image = np.where(paths.tx_point != paths.source, paths.tx_point, paths.rx_point)
+    return np.where(image != paths.source, landmarks.strength[image], 1.0)
+
+
+def _panel_responses(
+    landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, ris: RisSpec, radio: RadioConfig
+) -> Complexes:
+    """(B, Q, N, M) element responses of the panel's paths."""
+    center = landmarks.position[landmarks.ris]
+    legs = []
+    for end, seen, antenna_gain in ((tx, paths.tx_point, radio.tx_gain), (rx, paths.rx_point, radio.rx_gain)):
+        # a point that is the panel itself has no plane: its zero normal mirrors nothing
+        device = mirror(end, *plane_between(center, landmarks.position[seen]))
+        coefficient = np.full(device.shape[:-1], np.sqrt(antenna_gain), dtype=np.complex128)
+        legs.append(leg_response(ris, center, device, coefficient, radio.wavelength))
+    return _ratio(landmarks, paths)[:, None, None] * legs[0] * legs[1]
+
+
+def _point_gains(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, radio: RadioConfig) -> Complexes:
+    """(B, Q) gains by eq. `a2`, two legs joined by the landmark's strength (root of its cross-section)."""
+    first = np.linalg.norm(landmarks.position[paths.tx_point] - tx, axis=-1)
+    second = np.linalg.norm(landmarks.position[paths.rx_point] - rx, axis=-1)
+    strength = landmarks.strength[paths.source] * _ratio(landmarks, paths)
+    amplitude = radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi) ** 1.5
+    phase = np.exp(-2j * np.pi / radio.wavelength * (first + second))
+    return amplitude * strength / (first * second) * phase
+
+
+def _length_variance(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats) -> Floats:
+    """(B, Q) variance [m^2] of the path lengths that comes with the landmarks' covariances."""
+    first = unit(landmarks.position[paths.tx_point] - tx)
+    second = unit(landmarks.position[paths.rx_point] - rx)
+    tx_spread, rx_spread = landmarks.covariance[paths.tx_point], landmarks.covariance[paths.rx_point]
+    variance = np.einsum("bqi,qij,bqj->bq", first, tx_spread, first)
+    variance += np.einsum("bqi,qij,bqj->bq", second, rx_spread, second)
+    same = (paths.tx_point == paths.rx_point).astype(np.float64)
+    return variance + 2.0 * same * np.einsum("bqi,qij,bqj->bq", first, tx_spread, second)

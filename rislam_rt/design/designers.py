@@ -1,0 +1,137 @@
+"""All designers behind one interface, in one list."""
+
+import time
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.design.bound import best_magnitudes, relaxation_bound
+from rislam_rt.design.coordinate import coordinate_search
+from rislam_rt.design.genetic import genetic_search
+from rislam_rt.design.objective import Objective, build_objective
+from rislam_rt.design.problem import DesignProblem
+from rislam_rt.design.result import Design, DesignConfig, Designer
+from rislam_rt.design.single import continuous_phases, exact_code, nearest_code
+from rislam_rt.errors import ConfigError
+from rislam_rt.information import Outcome
+from rislam_rt.model import RisCode, RisSpec
+
+_Search = Callable[[DesignProblem, Objective, np.random.Generator, DesignConfig], tuple[Integers | Floats, Floats]]
+"""Levels, or for continuous methods phases [rad], (N M,), and the history of the objective (may be empty)."""
+
+_NO_HISTORY = np.zeros(0)
+_DEFAULT = DesignConfig()
+
+
+def _genetic(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
+    return genetic_search(o, p.target.size, p.levels, rng=rng, config=c)
+
+
+def _exact(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
+    return exact_code(p.target, p.levels)[0], _NO_HISTORY
+
+
+def _coordinate(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
+    return coordinate_search(p, o, c.starts, c.max_steps)
+
+
+def _random(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
+    return rng.integers(p.levels, size=p.target.size), _NO_HISTORY
+
+
+def _zero(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
+    return np.zeros(p.target.size, dtype=np.int64), _NO_HISTORY
+
+
+def _nearest(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
+    return nearest_code(p.target, p.levels), _NO_HISTORY
+
+
+def _continuous(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Floats, Floats]:
+    return continuous_phases(p.target), _NO_HISTORY
+
+
+def _designer(name: str, search: _Search) -> Designer:
+    def design(problem: DesignProblem, *, rng: np.random.Generator, config: DesignConfig = _DEFAULT) -> Design:
+        begin = time.perf_counter()
+        objective = build_objective(problem)
+        found, history = search(problem, objective, rng, config)
+        seconds = time.perf_counter() - begin
+        return _describe(name, problem, objective, found, history, seconds, config.certify)
+
+    return design
+
+
+def _describe(
+    name: str, problem: DesignProblem, objective: Objective, found: Integers | Floats, history: Floats,
+    seconds: float, certify: bool,
+) -> Design:  # fmt: skip
+    """Value what a search found, and set it beside the optimum of the direct path and the relaxation bound."""
+    step = 2.0 * np.pi / problem.levels
+    discrete = np.issubdtype(found.dtype, np.integer)
+    xi = np.asarray(found * step if discrete else found, dtype=np.float64)
+    index = found if discrete else np.floor(xi / step + 0.5).astype(np.int64) % problem.levels
+    gain = objective.gains(np.exp(-1j * xi))
+    value = float(objective.value(gain))
+    observable = objective.outcome is Outcome.OK
+    bound = gap_db = 0.0
+    if certify:
+        best = best_magnitudes(problem)
+        bound = relaxation_bound(objective, best) if observable else 0.0
+        gap_db = float(_db(best[0, 0]) - _db(np.abs(gain[0])))
+    return Design(
+        method=name,
+        code=RisCode(index.reshape(problem.shape), problem.levels),
+        xi=xi.reshape(problem.shape),
+        crlb=value if observable else float("inf"),
+        gain_db=float(_db(np.abs(gain[0]))),
+        bound=bound,
+        gap_db=gap_db,
+        history=history if len(history) else np.array([value]),
+        seconds=seconds,
+        outcome=objective.outcome,
+    )
+
+
+def _db(magnitude: Floats) -> Floats:
+    """20 log10 (...,), a gain of zero as -400 dB."""
+    return 20.0 * np.log10(np.maximum(magnitude, 1e-20))
+
+
+DESIGNERS: Mapping[str, Designer] = MappingProxyType(
+    {
+        name: _designer(name, search)
+        for name, search in (
+            ("genetic", _genetic),
+            ("exact", _exact),
+            ("coordinate", _coordinate),
+            ("random", _random),
+            ("zero", _zero),
+            ("nearest", _nearest),
+            ("continuous", _continuous),
+        )
+    }
+)
+"""Every designer by name. `continuous` breaks the panel's levels and is a reference only."""
+
+
+def designer(method: str) -> Designer:
+    """The designer of a name.
+
+    Raises
+    ------
+    ConfigError
+        There is none.
+    """
+    if method not in DESIGNERS:
+        raise ConfigError(f"design.method: '{method}' received; give one of {', '.join(DESIGNERS)}")
+    return DESIGNERS[method]
+
+
+def random_design(method: str, ris: RisSpec, *, rng: np.random.Generator) -> Design:
+    """A random code in place of a design: nothing is known of the panel yet (outcome `NO_PATHS`)."""
+    code = RisCode(rng.integers(ris.levels, size=(ris.rows, ris.cols)), ris.levels)
+    infinite = float("inf")
+    return Design(method, code, code.xi, infinite, -infinite, 0.0, 0.0, np.array([infinite]), 0.0, Outcome.NO_PATHS)

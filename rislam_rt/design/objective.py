@@ -1,0 +1,99 @@
+"""The objective, laid out for speed: one matrix product takes a batch of codes to all gains of all samples."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.design.problem import DesignProblem
+from rislam_rt.information import Outcome
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Objective:
+    """A `DesignProblem` with everything that no code changes worked out."""
+
+    matrix: Complexes
+    """(N M, B P): element weights to gains."""
+    outer: Floats
+    """(B, P, 3) xx, xy, yy of scale g g^T."""
+    fixed: Floats
+    """(B, 3) xx, xy, yy of prior and static paths."""
+    spread: Floats | None
+    """(B P,) scale times variance of the panel paths; None where all are zero."""
+    table: Complexes
+    """(H,) exp(-j xi) of the levels."""
+    outcome: Outcome
+    """`UNOBSERVABLE` if no code makes the information regular: then the value is `1 / tr J`, the part that is seen."""
+
+    def gains(self, weight: Complexes) -> Complexes:
+        """Gains (..., B P) under element weights (..., N M)."""
+        return weight @ self.matrix
+
+    def value(self, gain: Complexes) -> Floats:
+        """Expected CRLB (...,) [m^2] of gains (..., B P)."""
+        power = gain.real**2 + gain.imag**2
+        if self.spread is not None:
+            power = power / (1.0 + power * self.spread)
+        return self.value_of_power(power)
+
+    def value_of_power(self, power: Floats) -> Floats:
+        """Expected CRLB (...,) of (discounted) powers (..., B P)."""
+        samples, paths, _ = self.outer.shape
+        if samples == 1:
+            information = power @ self.outer[0] + self.fixed[0]
+            return self._inverse_trace(information)
+        information = np.swapaxes(power.reshape(*power.shape[:-1], samples, 1, paths) @ self.outer, -1, -2)[..., 0]
+        return self._inverse_trace(information + self.fixed).mean(axis=-1)
+
+    def of_index(self, index: Integers) -> Floats:
+        """Expected CRLB (...,) of codes (..., N M)."""
+        return self.value(self.gains(self.table[index]))
+
+    def _inverse_trace(self, information: Floats) -> Floats:
+        """Trace (...,) of the inverse of 2 x 2 matrices (..., 3)."""
+        xx, xy, yy = information[..., 0], information[..., 1], information[..., 2]
+        trace = xx + yy
+        if self.outcome is Outcome.UNOBSERVABLE:
+            return 1.0 / np.maximum(trace, _TINY)
+        # rounding may push the determinant of a nearly singular matrix below zero
+        return trace / np.maximum(xx * yy - xy * xy, _RELATIVE * trace * trace + _TINY)
+
+
+_TINY = 1e-280
+_RELATIVE = 1e-14
+SINGULAR = 1e-12
+"""det / tr^2 below which the best reachable information still counts as singular."""
+
+
+def build_objective(problem: DesignProblem) -> Objective:
+    """Precompute; decides whether the problem is observable at all, from what every path can reach at most."""
+    samples, panel = problem.response.shape[:2]
+    matrix = np.ascontiguousarray(problem.response.reshape(samples * panel, -1).T)
+    x, y = problem.gradient[..., 0], problem.gradient[..., 1]
+    outer = problem.scale * np.stack([x * x, x * y, y * y], axis=-1)
+    power = np.abs(problem.static_gain) ** 2
+    spread = None
+    if problem.variance is not None and np.any(problem.variance > 0.0):
+        spread = problem.scale * problem.variance
+        power = power / (1.0 + power * spread[:, panel:])
+        spread = np.ascontiguousarray(spread[:, :panel].reshape(-1))
+    prior = problem.prior[[0, 0, 1], [0, 1, 1]]
+    fixed = prior + np.einsum("bs,bsk->bk", power, outer[:, panel:])
+    most = np.abs(problem.response).sum(axis=(2, 3)) ** 2
+    best = fixed + np.einsum("bp,bpk->bk", most, outer[:, :panel])
+    determinant = best[:, 0] * best[:, 2] - best[:, 1] ** 2
+    regular = determinant > SINGULAR * (best[:, 0] + best[:, 2]) ** 2
+    return Objective(
+        matrix,
+        np.ascontiguousarray(outer[:, :panel]),
+        fixed,
+        spread,
+        level_table(problem.levels),
+        Outcome.OK if regular.all() else Outcome.UNOBSERVABLE,
+    )
+
+
+def level_table(levels: int) -> Complexes:
+    """exp(-j xi) (H,) of the levels 0..H-1."""
+    return np.exp(-2j * np.pi / levels * np.arange(levels))

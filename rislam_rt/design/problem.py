@@ -1,0 +1,58 @@
+"""What a designer is given: the paths that meet the panel, the others, and what is known of the agent beforehand."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Complexes, Floats, freeze
+from rislam_rt.errors import ConfigError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DesignProblem:
+    """Minimise the mean over B samples of the belief of `tr((J_prior + sum_p w_p g_p g_p^T)^-1)`.
+
+    `w_p = scale |alpha_p|^2 / (1 + scale |alpha_p|^2 variance_p)`: the information on the length of path p, where what
+    the path's landmark and walls are not known to (`variance`) is added to its own error. With zero variances this is
+    Proposition 1. Path 0 of the panel paths is the direct one; it is the target of the single-target designers.
+    """
+
+    response: Complexes
+    """(B, P, N, M) gain of panel path p over element (n, m) at level 0: `alpha = sum response exp(-j xi)`."""
+    static_gain: Complexes
+    """(B, S) gains of the landmark paths that do not meet the panel."""
+    gradient: Floats
+    """(B, P + S, 2) horizontal gradients of the path lengths, panel paths first."""
+    prior: Floats
+    """(2, 2) prior information [1/m^2]."""
+    scale: float
+    """Information on a path's length per |alpha|^2 [1/m^2]: `8 pi^2 zeta^2 L E / (c^2 N0)`."""
+    levels: int
+    """H."""
+    variance: Any = None
+    """(B, P + S) variance [m^2] of a path's predicted length; None is zero."""
+
+    def __post_init__(self) -> None:
+        freeze(self, "response", np.complex128, (None, None, None, None))
+        samples, panel = self.response.shape[:2]
+        freeze(self, "static_gain", np.complex128, (samples, None))
+        count = panel + self.static_gain.shape[1]
+        freeze(self, "gradient", np.float64, (samples, count, 2))
+        freeze(self, "prior", np.float64, (2, 2))
+        if self.variance is not None:
+            freeze(self, "variance", np.float64, (samples, count))
+        if samples < 1 or panel < 1:
+            raise ConfigError(f"design: {samples} belief samples and {panel} panel paths received; give at least one")
+        if self.levels < 2:
+            raise ConfigError(f"design: {self.levels} levels received; give at least 2")
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the panel."""
+        return self.response.shape[2], self.response.shape[3]
+
+    @property
+    def target(self) -> Complexes:
+        """(N M,) response of the direct panel path at the first sample of the belief (its mean)."""
+        return self.response[0, 0].ravel()

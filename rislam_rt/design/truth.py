@@ -1,0 +1,57 @@
+"""Design with the paths themselves at hand: the genie, and the command line's `design`. The caller traces."""
+
+import numpy as np
+
+from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.design.problem import DesignProblem
+from rislam_rt.errors import ConfigError
+from rislam_rt.information import range_information, vertex_gradient
+from rislam_rt.model import PathKind, Paths, RadioConfig
+
+
+def problem_from_arrays(
+    response: Complexes, static_gain: Complexes, gradient: Floats, radio: RadioConfig, levels: int,
+    prior: Floats | None = None,
+) -> DesignProblem:  # fmt: skip
+    """A problem of one position from plain arrays.
+
+    Parameters
+    ----------
+    response
+        (P, N, M) element responses of the panel paths, the direct one first.
+    static_gain
+        (S,) gains of the landmark paths that do not meet the panel.
+    gradient
+        (P + S, 2) horizontal gradients of the path lengths, panel paths first.
+    prior
+        (2, 2) information [1/m^2] beforehand; none by default.
+    """
+    scale = float(range_information(radio.integrated_snr(np.ones(())), radio))
+    prior = np.zeros((2, 2)) if prior is None else prior
+    return DesignProblem(response[None], static_gain[None], gradient[None], prior, scale, levels)
+
+
+def problem_from_paths(
+    paths: Paths, tx: Floats, rx: Floats, radio: RadioConfig, levels: int, *, cycle: int = 0,
+    prior: Floats | None = None,
+) -> DesignProblem:  # fmt: skip
+    """The genie's problem at one cycle of traced or analytic paths: landmark paths only (no LOS, no VT).
+
+    `tx`, `rx` (3,) [m] are the agent's ends at that cycle.
+
+    Raises
+    ------
+    ConfigError
+        No path meets the panel at that cycle.
+    """
+    here = paths.valid[cycle]
+    over_panel = np.flatnonzero(here & np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS)))
+    static = np.flatnonzero(here & np.isin(paths.kind, (PathKind.PS, PathKind.VS)))
+    if paths.ris is None or not len(over_panel):
+        raise ConfigError("design: no path meets the panel from this position; choose one that the panel sees")
+    over_panel = over_panel[np.argsort(paths.kind[over_panel] != PathKind.RIS, kind="stable")]
+    order = np.concatenate([over_panel, static])
+    gradient = vertex_gradient(tx, rx, paths.vertices[cycle, order], paths.num_vertices[order])[:, :2]
+    legs = paths.ris
+    response = legs.tx[cycle, legs.tx_leg[over_panel]] * legs.rx[cycle, legs.rx_leg[over_panel]]
+    return problem_from_arrays(response, paths.gain[cycle, static], gradient, radio, levels, prior)

@@ -1,0 +1,63 @@
+"""Position information of resolved paths (Proposition 1) and the bound that follows from it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.information.outcome import Outcome
+from rislam_rt.model import RadioConfig
+
+SINGULAR = 1e-13
+"""Ratio of smallest to largest eigenvalue below which float64 cannot tell an information matrix from a singular one."""
+
+
+class Bound(NamedTuple):
+    """Cramer-Rao bound of a position."""
+
+    variance: Floats
+    """(...,) trace of the inverse information [m^2]; infinite where it does not exist."""
+    outcome: Integers
+    """(...,) values of `Outcome`."""
+
+    @property
+    def rms(self) -> Floats:
+        """(...,) position error bound [m]."""
+        return np.sqrt(self.variance)
+
+
+def range_information(snr: Floats, radio: RadioConfig) -> Floats:
+    """Information (...,) [1/m^2] on a resolved path's length from its SNR (...,) over all antennas, linear.
+
+    `8 pi^2 zeta^2 / c^2 SNR`, the factor before `g g^T` in eq. `derived`.
+    """
+    return 8.0 * np.pi**2 * radio.effective_bandwidth_squared / SPEED_OF_LIGHT**2 * np.asarray(snr)
+
+
+def position_information(gradient: Floats, snr: Floats, radio: RadioConfig) -> Floats:
+    """`J_p` (..., D, D) [1/m^2] of eq. `derived`, for paths that do not overlap.
+
+    Parameters
+    ----------
+    gradient
+        (..., P, D) of the path lengths; D = 2 for the paper's horizontal position.
+    snr
+        (..., P) `L E |alpha|^2 / N0`, linear; 0 for a path that is not there.
+    """
+    weighted = gradient * range_information(snr, radio)[..., None]
+    return np.swapaxes(weighted, -1, -2) @ gradient
+
+
+def position_bound(information: Floats, prior: Floats | float = 0.0) -> Bound:
+    """`tr((J + J_prior)^-1)` of information matrices (..., D, D) [1/m^2] with prior information likewise.
+
+    Outcomes: `NO_PATHS` where there is no information at all, `UNOBSERVABLE` where it is singular.
+    """
+    value = np.linalg.eigvalsh(information + np.asarray(prior))
+    largest, smallest = value[..., -1], value[..., 0]
+    outcome = np.where(smallest > SINGULAR * largest, int(Outcome.OK), int(Outcome.UNOBSERVABLE))
+    outcome = np.where(largest > 0.0, outcome, int(Outcome.NO_PATHS))
+    usable = (outcome == Outcome.OK)[..., None]
+    variance = np.where(usable[..., 0], (1.0 / np.where(usable, value, 1.0)).sum(axis=-1), np.inf)
+    return Bound(variance, outcome)

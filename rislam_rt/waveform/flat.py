@@ -1,0 +1,53 @@
+"""The flat-band pulse `s(t) = sqrt(E B) sinc(B t)`: all of |f| < B/2 at equal power, nothing outside."""
+
+import numpy as np
+from scipy.special import spherical_jn
+
+from rislam_rt.arrays import Floats
+
+
+def effective_bandwidth(bandwidth: float) -> float:
+    """Root of zeta^2 [Hz] of Proposition 1, the second moment of the power spectrum: B / sqrt(12)."""
+    return bandwidth / np.sqrt(12.0)
+
+
+def autocorrelation(tau: Floats, bandwidth: float, energy: float = 1.0, *, derivative: int = 0) -> Floats:
+    """`R_s(tau) = int s(t) s(t - tau) dt` of Appendix B, or its first or second derivative.
+
+    Parameters
+    ----------
+    tau
+        Delay differences (...,) [s].
+    bandwidth
+        B [Hz].
+    energy
+        R_s(0) [J].
+    derivative
+        0, 1 or 2: the result is in J, J/s or J/s^2.
+
+    With x = pi B tau, R_s = E j0(x), R_s' = -E pi B j1(x) and R_s'' = E (pi B)^2 (2 j2(x) - j0(x)) / 3: spherical
+    Bessel functions, so that nothing cancels near 0.
+    """
+    scale = np.pi * bandwidth
+    x = scale * np.asarray(tau, dtype=np.float64)
+    if derivative == 0:
+        return energy * spherical_jn(0, x)
+    if derivative == 1:
+        return -energy * scale * spherical_jn(1, x)
+    if derivative == 2:
+        return energy * scale**2 * (2.0 * spherical_jn(2, x) - spherical_jn(0, x)) / 3.0
+    raise ValueError(f"derivative: {derivative} received; give 0, 1 or 2")
+
+
+def flat_pulse(time: Floats, bandwidth: float, energy: float = 1.0, *, derivative: int = 0) -> Floats:
+    """Values (...,) of the pulse, or of its first derivative, at times (...,) [s]; real, centred on 0.
+
+    Samples at any rate of at least B carry its whole energy: `sum s^2 / rate = E`.
+    """
+    return np.sqrt(bandwidth / energy) * autocorrelation(time, bandwidth, energy, derivative=derivative)
+
+
+def pulse_spectrum(frequency: Floats, bandwidth: float, energy: float = 1.0) -> Floats:
+    """Fourier transform (...,) [sqrt(J/Hz)] of the pulse at baseband frequencies (...,) [Hz]."""
+    inside = np.abs(np.asarray(frequency, dtype=np.float64)) <= bandwidth / 2.0
+    return np.where(inside, np.sqrt(energy / bandwidth), 0.0)

@@ -1,0 +1,85 @@
+"""Design on the belief: geometry of the believed paths against an independent image-source sum, and its outcomes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rislam_rt.design import DESIGNERS, design_code, problem_from_belief
+from rislam_rt.information import Outcome
+from rislam_rt.model import empty_map
+
+POSITION = np.array([1.2, 2.1, 0.5])
+
+
+def test_every_landmark_gives_its_paths(make_belief, make_spec, radio, rng):
+    problem = problem_from_belief(make_belief(POSITION, rng), make_spec(), radio, samples=3)
+    # panel and sphere, five images each: 1 + 2 * 5 paths
+    assert problem.response.shape == (3, 11, 6, 6)
+    assert problem.static_gain.shape == (3, 11)
+    assert problem.gradient.shape == (3, 22, 2)
+
+
+def test_gradients_equal_differences_of_path_lengths(make_belief, make_spec, radio, rng):
+    """Phase of the believed static gains is 2 pi / lambda times the length: its slope is the gradient."""
+    belief, step = make_belief(POSITION, rng), 1e-6
+    problem = problem_from_belief(belief, make_spec(), radio, samples=1)
+    for axis in (0, 1):
+        shift = step * np.eye(3)[axis]
+        upper, lower = (
+            problem_from_belief(replace(belief, position=POSITION + s * shift), make_spec(), radio, samples=1)
+            for s in (1.0, -1.0)
+        )
+        turn = np.angle(lower.static_gain * upper.static_gain.conj()) * radio.wavelength / (2 * np.pi)
+        panel = problem.response.shape[1]
+        np.testing.assert_allclose(turn[0] / (2 * step), problem.gradient[0, panel:, axis], atol=1e-6)
+
+
+def test_wall_mirrors_the_device_for_the_panel_image(make_belief, make_spec, radio, rng):
+    """Path over the wall x = 0: element by element, length over the mirrored Rx, and the sphere's law for amplitude."""
+    belief, spec = make_belief(POSITION, rng), make_spec()
+    problem = problem_from_belief(belief, spec, radio, samples=1)
+    tx, rx = belief.body.ends(POSITION, np.array(belief.heading))
+    mirrored = rx * [-1, 1, 1]
+    elements = np.array([3.0, 3.0, 3.0]) + spec.offsets()
+    length = np.linalg.norm(elements - tx, axis=-1) + np.linalg.norm(elements - mirrored, axis=-1)
+    ratio = problem.response[0, 1] * np.exp(2j * np.pi / radio.wavelength * length)
+    np.testing.assert_allclose(np.angle(ratio), 0.0, atol=1e-9)
+    cos_t = 3.0 - tx[2], 3.0 - mirrored[2]
+    d_t, d_r = np.linalg.norm(elements - tx, axis=-1), np.linalg.norm(elements - mirrored, axis=-1)
+    pattern = (cos_t[0] / d_t) ** 3 * (cos_t[1] / d_r) ** 3
+    sigma = 8.0 * 0.015**2 * pattern
+    expected = 0.85 * radio.wavelength / (4 * np.pi) ** 1.5 * np.sqrt(sigma) / (d_t * d_r) / np.sqrt(1.0)
+    # eq. `single`: lambda sqrt(G F F dx dy) / (8 pi^1.5 d d), and sqrt(sigma) carries both patterns
+    np.testing.assert_allclose(np.abs(ratio), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", DESIGNERS)
+def test_every_method_designs_on_the_belief(method, make_belief, make_spec, radio, rng):
+    design = design_code(make_belief(POSITION, rng), make_spec(), radio, method=method, rng=rng)
+    assert design.outcome is Outcome.OK
+    assert design.bound > 0.0
+    if method != "continuous":
+        assert design.bound <= design.crlb < 2 * 0.05**2  # never worse than what is known beforehand
+
+
+def test_without_a_panel_in_the_map_the_code_is_random(make_belief, make_spec, radio, rng):
+    belief = make_belief(POSITION, rng)
+    unsure = replace(belief, map=replace(belief.map, ris_probability=np.full(12, 0.2)))
+    for blind in (unsure, replace(belief, map=empty_map())):
+        designs = [design_code(blind, make_spec(), radio, method="exact", rng=rng) for _ in range(2)]
+        assert all(d.outcome is Outcome.NO_PATHS for d in designs)
+        assert (designs[0].code.index != designs[1].code.index).any()
+        assert not any(np.isnan([d.crlb, d.bound, d.gap_db]).any() for d in designs)
+
+
+def test_uncertain_landmarks_are_worth_less(make_belief, make_spec, radio, rng):
+    belief = make_belief(POSITION, rng)
+    certain, uncertain = (
+        design_code(
+            belief, make_spec(), radio, method="exact", rng=rng, samples=1, landmark_uncertainty=flag
+        )
+        for flag in (False, True)
+    )  # fmt: skip
+    assert uncertain.crlb > certain.crlb
+    np.testing.assert_array_equal(uncertain.code.index, certain.code.index)

@@ -1,0 +1,95 @@
+"""The exact single-target optimum against brute force, and against the reference figures."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from rislam_rt.design import continuous_phases, exact_code, nearest_code
+from rislam_rt.model import RadioConfig
+from rislam_rt.ris import leg_response
+
+
+def all_gains(response, levels, direct):
+    """Magnitudes of the gain under every code: (B, levels ** N), built up element by element."""
+    total = direct[:, None]
+    for n in range(response.shape[1]):
+        turned = response[:, n, None] * np.exp(-2j * np.pi / levels * np.arange(levels))
+        total = (total[:, :, None] + turned[:, None, :]).reshape(len(response), -1)
+    return np.abs(total)
+
+
+@pytest.mark.parametrize("with_direct", [False, True])
+@pytest.mark.parametrize("levels", [2, 4])
+@pytest.mark.parametrize("elements", [4, 6, 9])
+def test_exact_equals_brute_force(elements, levels, with_direct):
+    rng = np.random.default_rng(elements * 10 + levels)
+    channels = 500
+    response = rng.normal(size=(channels, elements)) + 1j * rng.normal(size=(channels, elements))
+    direct = (rng.normal(size=channels) + 1j * rng.normal(size=channels)) * (2.0 if with_direct else 0.0)
+    index, gain = exact_code(response, levels, direct)
+    for block in np.array_split(np.arange(channels), 20):  # 4^9 codes a channel: 25 channels at a time
+        best = all_gains(response[block], levels, direct[block]).max(axis=1)
+        np.testing.assert_allclose(gain[block], best, rtol=1e-12)
+    reached = np.abs(direct + np.sum(response * np.exp(-2j * np.pi / levels * index), axis=1))
+    np.testing.assert_allclose(gain, reached, rtol=1e-12)
+
+
+def test_exact_is_unaffected_by_a_common_turn_and_by_zero_elements():
+    rng = np.random.default_rng(1)
+    response = rng.normal(size=36) + 1j * rng.normal(size=36)
+    _, gain = exact_code(response, 4)
+    _, turned = exact_code(response * np.exp(0.3j), 4)
+    _, padded = exact_code(np.concatenate([response, np.zeros(5)]), 4)
+    assert turned == pytest.approx(float(gain), rel=1e-12)
+    assert padded == pytest.approx(float(gain), rel=1e-12)
+    assert exact_code(np.zeros(4), 4)[1] == 0.0
+
+
+def test_order_of_the_references():
+    rng = np.random.default_rng(2)
+    response = rng.normal(size=(50, 64)) + 1j * rng.normal(size=(50, 64))
+    for levels in (2, 3, 4, 8, 16):
+        _, exact = exact_code(response, levels)
+        step = 2 * np.pi / levels
+        nearest = np.abs(np.sum(response * np.exp(-1j * step * nearest_code(response, levels)), axis=1))
+        continuous = np.abs(np.sum(response * np.exp(-1j * continuous_phases(response)), axis=1))
+        np.testing.assert_allclose(continuous, np.abs(response).sum(axis=1), rtol=1e-12)
+        assert (nearest <= exact * (1 + 1e-12)).all()
+        assert (exact <= continuous * (1 + 1e-12)).all()
+        # rounding to the nearest of H levels costs at most cos(pi / H) and on average sinc(1 / H)
+        assert (exact >= np.cos(np.pi / levels) * continuous).all()
+        assert np.mean(exact / continuous) == pytest.approx(np.sinc(1 / levels), abs=0.08)
+
+
+@pytest.mark.parametrize(
+    ("x", "exact", "continuous", "random", "zero"),
+    [
+        (0.5, -98.63, -97.76, -113.32, -135.44),
+        (1.5, -88.51, -87.65, -103.21, -118.25),
+        (3.0, -78.87, -78.86, -94.42, -78.87),
+    ],
+)
+def test_reference_gains_of_the_direct_path(make_spec, x, exact, continuous, random, zero):
+    wavelength, center = RadioConfig().wavelength, np.array([3.0, 3.0, 3.0])
+    ends = (np.array([x - 0.05, x, 0.0]), np.array([x + 0.05, x, 0.0]))
+    legs = [leg_response(make_spec(), center, end, np.complex128(1.0), wavelength) for end in ends]
+    response = (legs[0] * legs[1]).ravel()
+
+    def db(value):
+        return 20 * np.log10(value)
+
+    # the published figures have two decimals
+    assert db(exact_code(response, 4)[1]) == pytest.approx(exact, abs=0.006)
+    assert db(np.abs(response).sum()) == pytest.approx(continuous, abs=0.006)
+    assert db(np.sqrt(np.sum(np.abs(response) ** 2))) == pytest.approx(random, abs=0.006)
+    assert db(np.abs(response.sum())) == pytest.approx(zero, abs=0.006)
+
+
+def test_brute_force_helper_lists_every_code():
+    response = np.array([[1.0 + 0j, 2.0, 4.0]])
+    listed = {
+        round(float(abs(sum(h * (-1) ** k for h, k in zip(response[0], ks, strict=True)))), 9)
+        for ks in itertools.product((0, 1), repeat=3)
+    }
+    assert {round(float(v), 9) for v in all_gains(response, 2, np.zeros(1))[0]} == listed

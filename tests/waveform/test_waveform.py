@@ -1,0 +1,93 @@
+"""The flat-band pulse: closed forms against samples, differences and the spectrum."""
+
+import numpy as np
+import pytest
+
+from rislam_rt.waveform import (
+    autocorrelation,
+    delay_response,
+    effective_bandwidth,
+    flat_pulse,
+    multicarrier_autocorrelation,
+    multicarrier_bandwidth,
+    pulse_spectrum,
+    subcarrier_frequencies,
+)
+
+BANDWIDTH, ENERGY = 1e9, 2.5
+
+
+def test_effective_bandwidth_is_the_second_moment_of_the_spectrum():
+    frequency = (np.arange(200_001) + 0.5) / 200_001 * BANDWIDTH - BANDWIDTH / 2
+    power = pulse_spectrum(frequency, BANDWIDTH, ENERGY) ** 2
+    moment = np.sum(frequency**2 * power) / np.sum(power)
+    # midpoint rule with 2e5 points: relative error 1 / n^2
+    assert effective_bandwidth(BANDWIDTH) ** 2 == pytest.approx(moment, rel=1e-9)
+    assert -autocorrelation(0.0, BANDWIDTH, ENERGY, derivative=2) == pytest.approx(
+        ENERGY * (2 * np.pi * effective_bandwidth(BANDWIDTH)) ** 2, rel=1e-14
+    )
+
+
+def test_sampled_pulse_has_its_energy_and_its_autocorrelation():
+    rate = 2.0 * BANDWIDTH
+    time = np.arange(-400_000, 400_001) / rate
+    for tau in (0.0, 0.3e-9, 1.7e-9):
+        product = flat_pulse(time, BANDWIDTH, ENERGY) * flat_pulse(time - tau, BANDWIDTH, ENERGY)
+        # what lies beyond 400 000 samples of a sinc^2 tail is below 1 / (pi^2 n)
+        assert product.sum() / rate == pytest.approx(autocorrelation(tau, BANDWIDTH, ENERGY), abs=ENERGY * 1e-6)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_derivatives_equal_differences(order):
+    tau = np.array([-3.1e-9, -1e-10, 0.0, 2e-12, 0.7e-9, 4e-9])
+    step = 1e-13
+    lower = autocorrelation(tau - step, BANDWIDTH, ENERGY, derivative=order - 1)
+    upper = autocorrelation(tau + step, BANDWIDTH, ENERGY, derivative=order - 1)
+    scale = ENERGY * (np.pi * BANDWIDTH) ** order
+    difference = (upper - lower) / (2 * step)
+    # rounding 1e-16 / (pi B step = 3e-4), truncation (3e-4)^2 / 6
+    np.testing.assert_allclose(
+        autocorrelation(tau, BANDWIDTH, ENERGY, derivative=order), difference, rtol=0, atol=3e-8 * scale
+    )
+
+
+def test_nothing_cancels_near_zero():
+    tau = np.array([1e-30, 1e-20, 1e-15, 1e-13])
+    x = np.pi * BANDWIDTH * tau
+    second = autocorrelation(tau, BANDWIDTH, derivative=2) / (np.pi * BANDWIDTH) ** 2
+    np.testing.assert_allclose(second, -1 / 3 + x**2 / 10, rtol=1e-13)
+    np.testing.assert_allclose(
+        autocorrelation(tau, BANDWIDTH, derivative=1) / (np.pi * BANDWIDTH), -x / 3 + x**3 / 30, rtol=1e-13
+    )
+
+
+def test_pulse_derivative_equals_differences():
+    time, step = np.linspace(-5e-9, 5e-9, 41), 1e-13
+    difference = (flat_pulse(time + step, BANDWIDTH) - flat_pulse(time - step, BANDWIDTH)) / (2 * step)
+    scale = np.abs(difference).max()
+    np.testing.assert_allclose(flat_pulse(time, BANDWIDTH, derivative=1), difference, rtol=0, atol=1e-7 * scale)
+
+
+def test_unknown_derivative_is_refused():
+    with pytest.raises(ValueError, match="derivative: 3"):
+        autocorrelation(0.0, BANDWIDTH, derivative=3)
+
+
+def test_multicarrier_tends_to_the_flat_band():
+    tau = np.linspace(-3e-9, 3e-9, 13)
+    for order in (0, 1, 2):
+        many = multicarrier_autocorrelation(tau, 4096, BANDWIDTH, ENERGY, derivative=order)
+        flat = autocorrelation(tau, BANDWIDTH, ENERGY, derivative=order)
+        # a sum of M tones is the midpoint rule for the band: relative error of order (pi B tau / M)^2
+        np.testing.assert_allclose(many, flat, rtol=0, atol=1e-5 * ENERGY * (np.pi * BANDWIDTH) ** order)
+    assert multicarrier_bandwidth(64, BANDWIDTH) == pytest.approx(
+        effective_bandwidth(BANDWIDTH) * np.sqrt(1 - 1 / 64**2), rel=1e-12
+    )
+
+
+def test_multicarrier_autocorrelation_is_the_inner_product_of_delayed_tones():
+    frequency = subcarrier_frequencies(64, BANDWIDTH)
+    response = delay_response(np.array([1.0e-9, 3.5e-9]), frequency)
+    inner = ENERGY * np.mean(response[0] * response[1].conj())
+    assert inner.real == pytest.approx(float(multicarrier_autocorrelation(2.5e-9, 64, BANDWIDTH, ENERGY)), rel=1e-12)
+    assert abs(inner.imag) < 1e-13 * ENERGY
