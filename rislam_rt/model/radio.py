@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 
@@ -78,6 +78,6 @@ class RadioConfig:
         """zeta^2 [Hz^2] of a flat band: B^2 / 12."""
         return self.bandwidth**2 / 12.0
 
-    def integrated_snr(self, gain: Floats) -> Floats:
+    def integrated_snr(self, gain: Floats | Complexes) -> Floats:
         """L E |alpha|^2 / N0 of path gains (...,): after integration over the signal and all L antennas, linear."""
         return self.array.num_antennas * self.energy * np.abs(gain) ** 2 / self.noise_psd

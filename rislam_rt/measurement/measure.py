@@ -1,0 +1,27 @@
+"""From the channel of a cycle to what the receiver reports."""
+
+import numpy as np
+
+from rislam_rt.measurement.bound import measure_bound
+from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.received import receive
+from rislam_rt.model import Measurement, Paths, PathTruth, RadioConfig
+
+
+def measure(
+    paths: Paths, cycle: int, heading: float, radio: RadioConfig, config: ReceiverConfig, *, rng: np.random.Generator
+) -> tuple[Measurement, PathTruth]:
+    """Multipath components of one cycle, in the order of their delays, and which path each of them was.
+
+    Parameters
+    ----------
+    paths
+        Under the code that the panel is set to. With `config.alternation` the twin's paths follow from it: those over
+        the panel change their sign.
+    cycle
+        Row of `paths`.
+    heading
+        Of the body about z [rad].
+    """
+    received = receive(paths, cycle, heading, radio, config)
+    return measure_bound(received, radio, config, paths.num_paths, rng=rng)

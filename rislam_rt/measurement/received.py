@@ -1,0 +1,62 @@
+"""What reaches the receiver in one cycle: the audible paths, in the body frame, with the leakage cancelled."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.errors import ConfigError
+from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode
+
+HORIZON_MARGIN = 1e-3
+"""An `upper` array hears rays whose third cosine exceeds minus this: leakage and level wall returns come in level."""
+
+
+class Received(NamedTuple):
+    """N paths at the receive array in one cycle."""
+
+    path: Integers
+    """(N,) columns of `Paths`."""
+    tau: Floats
+    """(N,) delay [s]."""
+    direction: Floats
+    """(N, 3) unit vectors towards the arriving rays, body frame."""
+    gain: Complexes
+    """(N,)."""
+    from_panel: Booleans
+    """(N,) whether the path meets the panel: its gain changes sign under the phase-reversed code."""
+
+
+def receive(paths: Paths, cycle: int, heading: float, radio: RadioConfig, config: ReceiverConfig) -> Received:
+    """The paths of a cycle that the array hears.
+
+    Parameters
+    ----------
+    heading
+        Of the body about z [rad]; the body frame is the room's, turned back by it.
+    """
+    arrival = paths.arrival[cycle] @ rotation_z(np.array(heading))
+    heard = paths.valid[cycle] & (paths.gain[cycle] != 0.0)
+    if radio.array.pattern == "upper":
+        heard &= arrival[:, 2] >= -HORIZON_MARGIN
+    path = np.flatnonzero(heard)
+    kind = paths.kind[path]
+    leakage = 10.0 ** (-config.leakage_cancellation_db / 20.0)
+    gain = paths.gain[cycle, path] * np.where(kind == PathKind.LOS, leakage, 1.0)
+    from_panel = (kind == PathKind.RIS) | (kind == PathKind.VRIS)
+    return Received(path, paths.tau[cycle, path], arrival[path], gain, from_panel)
+
+
+def twin(code: RisCode) -> RisCode:
+    """The phase-reversed code: every path over the panel changes its sign, and nothing else does.
+
+    Raises
+    ------
+    ConfigError
+        The panel has an odd number of levels, none of which is half a turn.
+    """
+    if code.levels % 2:
+        raise ConfigError(f"ris.levels: {code.levels} received; alternation needs an even number of phase levels")
+    return RisCode((code.index + code.levels // 2) % code.levels, code.levels)
