@@ -1,0 +1,133 @@
+"""The book of landmarks: who they are, how often they were seen, how strong they are, and which one is the panel."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.identity import STRENGTHS, panel_probabilities, strength_moments
+
+UNSEEN_RATIO = -0.3
+"""Log amplitude ratio expected of a wall before its returns were seen (0.74)."""
+RATIO_SPREAD = 0.5
+"""Standard deviation of that guess."""
+RATIO_NOISE = 0.3
+"""Standard deviation of one return's log ratio about the wall's own: angle, estimate of the strength, noise."""
+
+
+class Book(NamedTuple):
+    """F features of the map, and the images among them."""
+
+    ident: Integers
+    """(F,) number for life."""
+    is_wall: Booleans
+    """(F,)."""
+    anchor: Floats
+    """(F, 3) [m] fixed point whose mirror image a wall's three numbers are; unused for points."""
+    hits: Integers
+    """(F,) cycles with a measurement of it."""
+    misses: Floats
+    """(F,) cycles in which it should have shown and did not, forgotten as it shows again."""
+    log_grid: Floats
+    """(F, G) log posterior of the strength on the grid; unused for walls."""
+    log_ris: Floats
+    """(F,) log odds of panel against scatterer, from amplitudes."""
+    ratio: Floats
+    """(F,) log amplitude ratio of a wall's reflection."""
+    ratio_variance: Floats
+    """(F,)."""
+    images: Integers
+    """(Q, 3) ident of the point, of the wall, and the image's own."""
+    image_hits: Integers
+    """(Q,)."""
+    next_ident: int
+
+    @property
+    def points(self) -> Integers:
+        """Rows of the points."""
+        return np.flatnonzero(~self.is_wall)
+
+    @property
+    def walls(self) -> Integers:
+        """Rows of the walls."""
+        return np.flatnonzero(self.is_wall)
+
+    @property
+    def ris_probability(self) -> Floats:
+        """(F,) 0 for walls."""
+        probability = np.zeros(len(self.ident))
+        probability[self.points] = panel_probabilities(self.log_ris[self.points])
+        return probability
+
+    @property
+    def log_strength(self) -> tuple[Floats, Floats]:
+        """Mean and standard deviation (F,) of the log strength."""
+        return strength_moments(self.log_grid)
+
+
+def empty_book() -> Book:
+    """No landmarks yet."""
+    return Book(
+        np.zeros(0, dtype=np.int64),
+        np.zeros(0, dtype=np.bool_),
+        np.zeros((0, 3)),
+        np.zeros(0, dtype=np.int64),
+        np.zeros(0),
+        np.zeros((0, len(STRENGTHS))),
+        np.zeros(0),
+        np.zeros(0),
+        np.zeros(0),
+        np.zeros((0, 3), dtype=np.int64),
+        np.zeros(0, dtype=np.int64),
+        0,
+    )
+
+
+def enter(book: Book, is_wall: bool, anchor: Floats, panel_possible: bool) -> Book:
+    """The book with one more feature, in the last row."""
+    flat = np.full((1, len(STRENGTHS)), -np.log(len(STRENGTHS)))
+    return book._replace(
+        ident=np.append(book.ident, book.next_ident),
+        is_wall=np.append(book.is_wall, is_wall),
+        anchor=np.concatenate([book.anchor, anchor[None]]),
+        hits=np.append(book.hits, 0),
+        misses=np.append(book.misses, 0.0),
+        log_grid=np.concatenate([book.log_grid, flat]),
+        log_ris=np.append(book.log_ris, 0.0 if panel_possible else -np.inf),
+        ratio=np.append(book.ratio, UNSEEN_RATIO),
+        ratio_variance=np.append(book.ratio_variance, RATIO_SPREAD**2),
+        next_ident=book.next_ident + 1,
+    )
+
+
+def strike(book: Book, keep: Booleans) -> Book:
+    """The book without some of its features, and without their images."""
+    gone = book.ident[~keep]
+    stay = ~np.isin(book.images[:, :2], gone).any(axis=1)
+    fields = {
+        name: getattr(book, name)[keep]
+        for name in ("ident", "is_wall", "anchor", "hits", "misses", "log_grid", "log_ris", "ratio", "ratio_variance")
+    }
+    return book._replace(**fields, images=book.images[stay], image_hits=book.image_hits[stay])
+
+
+def image_ident(book: Book, point: int, wall: int) -> tuple[Book, int]:
+    """The number of the image of a point row in a wall row, entered if it is new; its hit is counted."""
+    pair = np.array([book.ident[point], book.ident[wall]])
+    rows = np.flatnonzero((book.images[:, :2] == pair).all(axis=1))
+    if len(rows):
+        hits = book.image_hits.copy()
+        hits[rows[0]] += 1
+        return book._replace(image_hits=hits), int(book.images[rows[0], 2])
+    images = np.concatenate([book.images, [[*pair, book.next_ident]]])
+    hits = np.append(book.image_hits, 1)
+    return book._replace(images=images, image_hits=hits, next_ident=book.next_ident + 1), book.next_ident
+
+
+def learn_ratio(book: Book, wall: int, log_ratio: float) -> Book:
+    """A wall's log amplitude ratio after one more return."""
+    gain = book.ratio_variance[wall] / (book.ratio_variance[wall] + RATIO_NOISE**2)
+    ratio, variance = book.ratio.copy(), book.ratio_variance.copy()
+    ratio[wall] += gain * (np.clip(log_ratio, -3.0, 0.5) - ratio[wall])
+    variance[wall] *= 1.0 - gain
+    return book._replace(ratio=ratio, ratio_variance=variance)

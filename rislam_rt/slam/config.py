@@ -1,0 +1,99 @@
+"""Settings of the filter, and what the agent is told about its start."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, freeze
+from rislam_rt.errors import ConfigError
+
+FILTERS = ("rao_blackwellised",)
+"""Filters with the same inputs and outputs."""
+
+
+@dataclass(frozen=True, slots=True)
+class SlamConfig:
+    """Everything that the filter is free to choose. SI units."""
+
+    filter: str = "rao_blackwellised"
+    num_particles: int = 500
+    sigma_a: float = 0.01
+    """Standard deviation of the white acceleration [m/s^2]."""
+    use_vt: bool = False
+    """Whether wall returns (virtual transmitters) join the map as planes, or are thrown away as in the paper."""
+    heading: str = "known"
+    height: str = "known"
+    """`known` keeps the height and the vertical velocity of the start, `estimated` filters them."""
+    max_bounces: int = 2
+    """Largest number of wall bounces, both legs together, of a landmark path that the agent looks for."""
+    gate: float = 16.3
+    """Largest squared Mahalanobis distance of delay and two cosines that still associates (chi^2, 3 dof: 0.999)."""
+    clutter_density: float = 0.016
+    """Expected new or false components per metre of length, unit of each cosine, and e-fold of amplitude."""
+    detection_snr: float = 10.0
+    """Integrated SNR (linear, all antennas) above which the agent expects to see a path."""
+    specular_ratio: float = 0.35
+    """Amplitude over that of free space of the same length, above which a component is a wall return."""
+    birth_cycles: int = 12
+    """Cycles of history that a track needs before a landmark can come of it."""
+    window: int = 40
+    """Cycles of history that are kept."""
+    birth_margin: float = 9.0
+    """By how much chi^2 a hypothesis must win over the next one."""
+    max_misses: int = 4
+    """Cycles without a component after which a track dies."""
+    prune_misses: float = 40.0
+    """Cycles in which an expected landmark may fail to show before it is removed."""
+    merge_distance: float = 9.0
+    """Squared Mahalanobis distance below which two landmarks are one."""
+    resample_below: float = 0.5
+    """Fraction of the particles that the effective sample size must not fall below."""
+    num_samples: int = 32
+    """Positions handed to the phase design."""
+
+    def __post_init__(self) -> None:
+        for name, value, allowed in (
+            ("filter", self.filter, FILTERS),
+            ("heading", self.heading, ("known",)),
+            ("height", self.height, ("known", "estimated")),
+        ):
+            if value not in allowed:
+                raise ConfigError(f"slam.{name}: '{value}' received; give one of {', '.join(allowed)}")
+        for name in ("num_particles", "birth_cycles", "window", "num_samples"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"slam.{name}: {getattr(self, name)} received; give at least 1")
+        if self.window < self.birth_cycles:
+            raise ConfigError(f"slam.window: {self.window} received; give at least birth_cycles, {self.birth_cycles}")
+        for name in ("sigma_a", "gate", "clutter_density", "detection_snr", "specular_ratio"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ConfigError(f"slam.{name}: {value} received; give a positive number")
+        if not 0.0 < self.resample_below <= 1.0:
+            raise ConfigError(f"slam.resample_below: {self.resample_below} received; give a number in (0, 1]")
+        if not 0 <= self.max_bounces <= 2:
+            raise ConfigError(f"slam.max_bounces: {self.max_bounces} received; give 0, 1 or 2")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StartPrior:
+    """What the agent is told about its first pose: a Gaussian about it."""
+
+    position: Floats
+    """(3,) [m]."""
+    velocity: Floats
+    """(3,) [m/s]."""
+    heading: float
+    """[rad]."""
+    position_std: float = 0.01
+    """[m], each axis; the height is exact when it is known."""
+    velocity_std: float = 0.01
+    """[m/s], each axis."""
+
+    def __post_init__(self) -> None:
+        freeze(self, "position", np.float64, (3,))
+        freeze(self, "velocity", np.float64, (3,))
+        if not (self.position_std >= 0.0 and self.velocity_std >= 0.0):
+            raise ConfigError(
+                f"start.position_std, start.velocity_std: {self.position_std}, {self.velocity_std} received; "
+                "give numbers that are not negative"
+            )

@@ -1,0 +1,82 @@
+"""Which landmark is the panel? Bayes over landmarks, from amplitudes under the codes that were applied.
+
+"Is the panel" predicts the amplitude with no free parameter (Rician about the panel's gain under the code, averaged
+over the belief); "is a scatterer" predicts one unknown cross-section for all cycles, integrated out on a grid.
+"""
+
+import numpy as np
+from scipy.special import ive, logsumexp
+
+from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.model import RadioConfig, RisCode, RisSpec
+from rislam_rt.ris import leg_response, panel_gain
+
+STRENGTHS = np.linspace(np.log(1e-3), np.log(3.0), 81)
+"""Grid of log sqrt(cross-section / m^2): 1 mm to 3 m in steps of 10 %."""
+MODEL_ERROR = 0.05
+"""Relative error of predicted amplitudes: geometry, and what the amplitude law leaves out."""
+DOUBT = 4.0
+"""Largest log-likelihood ratio that one cycle may add, so that one freak amplitude decides nothing."""
+
+
+def log_rice(amplitude: Floats, mean: Floats, std: Floats) -> Floats:
+    """Log density of the amplitude of a constant `mean` in complex noise of `std` a real dimension."""
+    variance = std**2
+    product = amplitude * mean / variance
+    bessel = np.log(ive(0, product))
+    return np.log(amplitude / variance) - 0.5 * (amplitude - mean) ** 2 / variance + bessel
+
+
+def point_amplitude(strength: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig) -> Floats:
+    """|alpha| of eq. `a2` for `strength`, the square root of a cross-section [m]."""
+    scale = radio.wavelength * np.sqrt(4.0 * np.pi * radio.tx_gain * radio.rx_gain) / (4.0 * np.pi) ** 2
+    return scale * strength / (tx_length * rx_length)
+
+
+def predicted_panel_gain(
+    spec: RisSpec, code: RisCode, center: Floats, tx: Floats, rx: Floats, ratio: Floats, radio: RadioConfig
+) -> Complexes:
+    """Gain (...,) of a panel at `center` (..., 3) between (unfolded) ends (..., 3); `ratio` (...,) of the walls."""
+    legs = [
+        leg_response(spec, center, end, np.sqrt(ratio * gain), radio.wavelength)
+        for end, gain in ((tx, radio.tx_gain), (rx, radio.rx_gain))
+    ]
+    return panel_gain(legs[0], legs[1], code)
+
+
+def log_panel(amplitude: Floats, std: Floats, gain: Complexes) -> Floats:
+    """Log likelihood (P,) of amplitudes (P,) under "is the panel", averaged over belief samples of gain (P, S)."""
+    mean = np.abs(gain)
+    spread = np.hypot(std[:, None], MODEL_ERROR * mean)
+    each = log_rice(amplitude[:, None], mean, spread)
+    return logsumexp(each, axis=1) - np.log(gain.shape[1])
+
+
+def log_scatterer(amplitude: Floats, std: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig) -> Floats:
+    """Log likelihood (P, G) of amplitudes (P,) for every strength of the grid."""
+    mean = point_amplitude(np.exp(STRENGTHS), tx_length[:, None], rx_length[:, None], radio)
+    return log_rice(amplitude[:, None], mean, np.hypot(std[:, None], MODEL_ERROR * mean))
+
+
+def strength_moments(log_grid: Floats) -> tuple[Floats, Floats]:
+    """Mean and standard deviation (P,) of the log strength from grids (P, G) of log likelihoods."""
+    weight = np.exp(log_grid - logsumexp(log_grid, axis=1, keepdims=True))
+    mean = weight @ STRENGTHS
+    step = STRENGTHS[1] - STRENGTHS[0]
+    return mean, np.sqrt(weight @ STRENGTHS**2 - mean**2 + step**2 / 12.0)
+
+
+def add_evidence(log_grid: Floats, log_ris: Floats, scatterer: Floats, panel: Floats) -> tuple[Floats, Floats]:
+    """One cycle's amplitudes for P points: new grids (P, G), and new log odds (P,) of panel against scatterer."""
+    before = logsumexp(log_grid, axis=1)
+    grid = log_grid + scatterer
+    after = logsumexp(grid, axis=1)
+    ratio = np.clip(panel - (after - before), -DOUBT, DOUBT)
+    return grid - after[:, None], log_ris + ratio
+
+
+def panel_probabilities(log_ris: Floats) -> Floats:
+    """Probability (P,) of each point of being the one panel; "none of these" competes with prior one point's worth."""
+    if not len(log_ris):
+        return np.zeros(0)
+    return np.exp(log_ris - np.logaddexp(logsumexp(log_ris), 0.0))

@@ -1,0 +1,147 @@
+"""What a return of the map looks like to the agent: length and direction cosines, and how they move with the map.
+
+The map is a list of features of three numbers each. A point is its position. A wall is the mirror image of a fixed
+anchor (a point of the agent's own choosing, off the wall): as smooth and as Gaussian as a point landmark, and never
+singular. A leg is an image of a point in up to two walls; a return joins a Tx leg and an Rx leg, so that
+`length = |Tx - image_tx| + |Rx - image_rx|` and the ray arrives from `image_rx`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.geometry.angles import rotation_z
+
+TX = -1
+"""In the first column of `Returns.legs`: the base of the leg is the transmitter itself."""
+NONE = -1
+"""In the wall columns of `Returns.legs`: no wall."""
+
+
+class Returns(NamedTuple):
+    """R returns over G legs."""
+
+    legs: Integers
+    """(G, 3) feature row of the point (or `TX`), of the wall next to it, and of the wall next to the device."""
+    tx: Integers
+    """(R,) row of the Tx leg."""
+    rx: Integers
+    """(R,) row of the Rx leg."""
+
+    @property
+    def point(self) -> Integers:
+        """(R,) feature row of the point."""
+        return self.legs[self.rx, 0]
+
+
+class Sight(NamedTuple):
+    """Returns as seen from a pose."""
+
+    seen: Floats
+    """(..., R, 3) length [m] and the two direction cosines in the body frame."""
+    tx_length: Floats
+    """(..., R) unfolded length of the Tx leg [m]."""
+    rx_length: Floats
+    """(..., R)."""
+    up: Floats
+    """(..., R) third direction cosine; the array is blind where it is negative."""
+
+
+class Poses(NamedTuple):
+    """Where the agent's ends are."""
+
+    tx: Floats
+    """(..., 3) [m]."""
+    rx: Floats
+    """(..., 3) [m]."""
+    heading: Floats
+    """Broadcasts against the leading axes [rad]."""
+
+
+def reflect(point: Floats, wall: Floats, anchor: Floats) -> Floats:
+    """Mirror images (..., 3) of points in walls given as images (..., 3) of anchors (..., 3)."""
+    span = wall - anchor
+    depth = np.sum(span * (point - 0.5 * (wall + anchor)), axis=-1) / np.sum(span * span, axis=-1)
+    return point - 2.0 * depth[..., None] * span
+
+
+def leg_images(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -> Floats:
+    """Apparent positions (..., G, 3) of the legs' far ends, from features (..., F, 3) and Tx positions (..., 3)."""
+    legs = returns.legs
+    base = np.where((legs[:, 0] == TX)[:, None], tx[..., None, :], features[..., legs[:, 0], :])
+    for column in (1, 2):
+        rows = np.flatnonzero(legs[:, column] != NONE)
+        if len(rows):
+            walls = legs[rows, column]
+            base[..., rows, :] = reflect(base[..., rows, :], features[..., walls, :], anchor[walls])
+    return base
+
+
+def observe(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Sight:
+    """Predict every return from features (..., F, 3)."""
+    image = leg_images(returns, features, anchor, poses.tx)
+    to_tx = image[..., returns.tx, :] - poses.tx[..., None, :]
+    to_rx = image[..., returns.rx, :] - poses.rx[..., None, :]
+    tx_length, rx_length = _norm(to_tx), np.maximum(_norm(to_rx), 1e-9)
+    arrival = to_rx / rx_length[..., None]
+    cos, sin = np.cos(poses.heading)[..., None], np.sin(poses.heading)[..., None]
+    seen = np.stack(
+        [
+            tx_length + rx_length,
+            arrival[..., 0] * cos + arrival[..., 1] * sin,
+            arrival[..., 1] * cos - arrival[..., 0] * sin,
+        ],
+        axis=-1,
+    )
+    return Sight(seen, tx_length, rx_length, arrival[..., 2])
+
+
+def feature_jacobian(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Floats:
+    """Derivatives (..., R, 3, F, 3) of `observe(...).seen` with respect to the features (..., F, 3)."""
+    image = leg_images(returns, features, anchor, poses.tx)
+    moved = _leg_jacobian(returns, features, anchor, poses.tx)
+    by_tx, by_rx = sight_jacobians(image, returns, poses)
+    jacobian = np.einsum("...ria,...rafb->...rifb", by_rx, moved[..., returns.rx, :, :, :])
+    jacobian[..., 0, :, :] += np.einsum("...ra,...rafb->...rfb", by_tx, moved[..., returns.tx, :, :, :])
+    return jacobian
+
+
+def sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Floats, Floats]:
+    """Derivatives of the length by the Tx leg's image (..., R, 3), and of all three by the Rx leg's (..., R, 3, 3)."""
+    to_tx = image[..., returns.tx, :] - poses.tx[..., None, :]
+    to_rx = image[..., returns.rx, :] - poses.rx[..., None, :]
+    tx_length, rx_length = _norm(to_tx)[..., None], np.maximum(_norm(to_rx), 1e-9)[..., None]
+    by_tx = to_tx / np.maximum(tx_length, 1e-9)
+    arrival = to_rx / rx_length
+    body = np.swapaxes(rotation_z(poses.heading), -1, -2)[..., None, :2, :]
+    cosines = np.sum(body * arrival[..., None, :], axis=-1, keepdims=True)
+    turn = (body - cosines * arrival[..., None, :]) / rx_length[..., None]
+    return by_tx, np.concatenate([arrival[..., None, :], turn], axis=-2)
+
+
+def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -> Floats:
+    """Derivatives (..., G, 3, F, 3) of the legs' images with respect to the features."""
+    legs = returns.legs
+    point = np.where((legs[:, 0] == TX)[:, None], tx[..., None, :], features[..., legs[:, 0], :])
+    jacobian = np.zeros((*point.shape, features.shape[-2], 3))
+    for leg in np.flatnonzero(legs[:, 0] != TX):
+        jacobian[..., leg, :, legs[leg, 0], :] = np.eye(3)
+    for column in (1, 2):
+        for leg in np.flatnonzero(legs[:, column] != NONE):
+            row = legs[leg, column]
+            wall, start = features[..., row, :], point[..., leg, :]
+            span = wall - anchor[row]
+            square = np.sum(span * span, axis=-1)[..., None, None]
+            image = reflect(start, wall, anchor[row])
+            depth = np.sum(span * (start - 0.5 * (wall + anchor[row])), axis=-1)[..., None, None] / square
+            householder = np.eye(3) - 2.0 * span[..., :, None] * span[..., None, :] / square
+            jacobian[..., leg, :, :, :] = np.einsum("...ab,...bfc->...afc", householder, jacobian[..., leg, :, :, :])
+            by_wall = -2.0 * (depth * np.eye(3) + span[..., :, None] * (image - wall)[..., None, :] / square)
+            jacobian[..., leg, :, row, :] += by_wall
+            point[..., leg, :] = image
+    return jacobian
+
+
+def _norm(vector: Floats) -> Floats:
+    return np.sqrt(np.einsum("...i,...i->...", vector, vector))

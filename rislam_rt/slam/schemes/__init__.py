@@ -1,0 +1,1 @@
+"""Comparison schemes: BP-SLAM and Channel-SLAM."""

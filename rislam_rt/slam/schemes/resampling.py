@@ -1,0 +1,86 @@
+"""Resampling of clouds of equal size, with a kernel that keeps mean and covariance of every part of a cloud."""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+
+
+def systematic_rows(weight: Floats, *, rng: np.random.Generator) -> Integers:
+    """Ancestors (K, N) for weights (K, N): row by row, each particle is drawn `N w` times on average, unbiased."""
+    count = weight.shape[1]
+    edges = np.cumsum(weight, axis=1)
+    comb = (np.arange(count) + rng.random((len(weight), 1))) / count * edges[:, -1:]
+    rows = [np.searchsorted(edge, tooth, side="right") for edge, tooth in zip(edges, comb, strict=True)]
+    return np.minimum(np.array(rows, dtype=np.int64).reshape(weight.shape), count - 1)
+
+
+def effective_fraction(weight: Floats) -> Floats:
+    """Effective sample size over N (K,) of normalised weights (K, N)."""
+    return 1.0 / (np.sum(weight**2, axis=1) * weight.shape[1])
+
+
+def normalised_rows(log_weight: Floats) -> Floats:
+    """Weights (K, N) that sum to one in every row; a hopeless row becomes a uniform one."""
+    top = log_weight.max(axis=1, keepdims=True)
+    weight = np.exp(log_weight - np.where(np.isfinite(top), top, 0.0))
+    total = weight.sum(axis=1, keepdims=True)
+    return np.where(total > 0.0, weight / np.where(total > 0.0, total, 1.0), 1.0 / weight.shape[1])
+
+
+def cell_order(clouds: Floats, levels: int) -> Integers:
+    """Order (K, N) of clouds (K, N, D) in which each of `2^levels` runs of particles is a compact cell.
+
+    A k-d split: every part is halved at the median of its widest axis. N must be a multiple of `2^levels`.
+    """
+    batch, count, dims = clouds.shape
+    order = np.broadcast_to(np.arange(count), (batch, count)).copy()
+    for level in range(levels):
+        size = count >> level
+        parts = np.take_along_axis(clouds, order[..., None], axis=1).reshape(-1, size, dims)
+        axis = np.argmax(parts.max(axis=1) - parts.min(axis=1), axis=1)
+        along = np.take_along_axis(parts, axis[:, None, None], axis=2)[..., 0]
+        split = np.argpartition(along, size // 2, axis=1)
+        order = np.take_along_axis(order.reshape(-1, size), split, axis=1).reshape(batch, count)
+    return order
+
+
+def smooth(clouds: Floats, bandwidth: Floats, levels: int, *, rng: np.random.Generator) -> Floats:
+    """Clouds (K, N, D) with every particle moved by a kernel of its cell, in the order of the cells.
+
+    Each cell is shrunk towards its mean and widened by differences of its own members, so that mean and covariance of
+    every cell stay (Liu and West, 2001, cell by cell). A ring stays a ring: one kernel for the whole cloud would fill it.
+
+    Parameters
+    ----------
+    bandwidth
+        (K,) kernel width in standard deviations of a cell, 0 to 1.
+    """
+    batch, count, dims = clouds.shape
+    cells = 1 << levels
+    ordered = np.take_along_axis(clouds, cell_order(clouds, levels)[..., None], axis=1)
+    parts = ordered.reshape(batch, cells, count // cells, dims)
+    size = parts.shape[2]
+    mean = parts.mean(axis=2, keepdims=True)
+    first, second = rng.permutation(size), rng.permutation(size)
+    width = bandwidth[:, None, None, None]
+    change = (parts[:, :, first] - parts[:, :, second]) * (width / np.sqrt(2.0))
+    moved = mean + np.sqrt(1.0 - width**2) * (parts - mean) + change
+    return moved.reshape(batch, count, dims)
+
+
+def cell_levels(count: int) -> int:
+    """Levels of the k-d split that leave at least 32 particles in a cell and split evenly, five at most."""
+    levels = 0
+    while levels < 5 and count % 2 == 0 and count >= 64:
+        count //= 2
+        levels += 1
+    return levels
+
+
+def kernel_width(count: int, dims: int, effective: Floats) -> Floats:
+    """Kernel widths (K,): Silverman's for `count` particles in `dims` dimensions, less as fewer ancestors were lost.
+
+    `effective` (K,) is the effective sample size over N: a step that told nothing moves nothing.
+    """
+    silverman = (4.0 / (dims + 2.0)) ** (1.0 / (dims + 4.0)) * count ** (-1.0 / (dims + 4.0))
+    return min(silverman, 0.9) * np.sqrt(np.clip(1.0 - effective, 0.0, 1.0))

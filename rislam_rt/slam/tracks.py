@@ -1,0 +1,123 @@
+"""Tracks: measurements that no landmark explains, followed over cycles until one can be made of them."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+
+AMPLITUDE_WANDER = 1.0
+"""Standard deviation of an unexplained track's log amplitude from cycle to cycle: a panel's code may change."""
+
+
+class Glance(NamedTuple):
+    """One cycle's measurement in the units of the filter."""
+
+    seen: Floats
+    """(M, 3) length [m] and two cosines."""
+    std: Floats
+    """(M, 3)."""
+    log_amplitude: Floats
+    """(M,)."""
+    log_amplitude_std: Floats
+    """(M,)."""
+    ratio: Floats
+    """(M,) amplitude over that of free space of the same length."""
+
+
+class Tracks(NamedTuple):
+    """T tracks, each a Kalman filter of constant rate in length and either cosine, and its last W measurements."""
+
+    mean: Floats
+    """(T, 3, 2) value and rate of length [m] and cosines."""
+    covariance: Floats
+    """(T, 3, 2, 2)."""
+    log_amplitude: Floats
+    """(T,) of the last measurement."""
+    specular: Booleans
+    """(T,) whether it is a wall return."""
+    misses: Integers
+    """(T,) cycles since the last measurement."""
+    seen: Floats
+    """(T, W, 3), cycle k at row k % W."""
+    std: Floats
+    """(T, W, 3)."""
+    cycle: Integers
+    """(T, W) cycle of each row, -1 where empty."""
+
+    @property
+    def length(self) -> Integers:
+        """(T,) measurements held."""
+        return np.sum(self.cycle >= 0, axis=1)
+
+    def keep(self, rows: Booleans) -> "Tracks":
+        """Only some of the tracks."""
+        return Tracks._make(field[rows] for field in self)
+
+
+def no_tracks(window: int) -> Tracks:
+    """Nothing seen yet."""
+    return Tracks(
+        np.zeros((0, 3, 2)),
+        np.zeros((0, 3, 2, 2)),
+        np.zeros(0),
+        np.zeros(0, dtype=np.bool_),
+        np.zeros(0, dtype=np.int64),
+        np.zeros((0, window, 3)),
+        np.zeros((0, window, 3)),
+        np.full((0, window), -1),
+    )
+
+
+def advance(tracks: Tracks, dt: float, cycle: int, bend: Floats) -> Tracks:
+    """Predict every track over `dt` and forget what lies more than a window back; `bend` (3,) is the rate's drift."""
+    transition = np.array([[1.0, dt], [0.0, 1.0]])
+    noise = np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]]) * (bend**2)[:, None, None]
+    covariance = transition @ tracks.covariance @ transition.T + noise
+    kept = np.where(tracks.cycle > cycle - tracks.cycle.shape[1], tracks.cycle, -1)
+    return tracks._replace(mean=tracks.mean @ transition.T, covariance=covariance, misses=tracks.misses + 1, cycle=kept)
+
+
+def extend(tracks: Tracks, rows: Integers, glance: Glance, picks: Integers, cycle: int) -> Tracks:
+    """Tracks `rows` (A,) updated by measurements `picks` (A,)."""
+    if not len(rows):
+        return tracks
+    mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
+    prior, spread = mean[rows], covariance[rows]
+    gain = spread[..., 0] / (spread[..., 0, 0] + glance.std[picks] ** 2)[..., None]
+    mean[rows] = prior + gain * (glance.seen[picks] - prior[..., 0])[..., None]
+    covariance[rows] = spread - gain[..., :, None] * spread[..., None, 0, :]
+    log_amplitude, misses = tracks.log_amplitude.copy(), tracks.misses.copy()
+    log_amplitude[rows], misses[rows] = glance.log_amplitude[picks], 0
+    seen, std, cycles = tracks.seen.copy(), tracks.std.copy(), tracks.cycle.copy()
+    slot = cycle % cycles.shape[1]
+    seen[rows, slot], std[rows, slot], cycles[rows, slot] = glance.seen[picks], glance.std[picks], cycle
+    return tracks._replace(
+        mean=mean,
+        covariance=covariance,
+        log_amplitude=log_amplitude,
+        misses=misses,
+        seen=seen,
+        std=std,
+        cycle=cycles,
+    )
+
+
+def begin(tracks: Tracks, glance: Glance, picks: Integers, specular: Booleans, rate: Floats, cycle: int) -> Tracks:
+    """One new track for each of the measurements `picks` (A,); `rate` (3,) is the spread of rates to expect."""
+    if not len(picks):
+        return tracks
+    window, count = tracks.cycle.shape[1], len(picks)
+    fresh = no_tracks(window)
+    mean = np.stack([glance.seen[picks], np.zeros((count, 3))], axis=-1)
+    covariance = np.zeros((count, 3, 2, 2))
+    covariance[..., 0, 0] = glance.std[picks] ** 2
+    covariance[..., 1, 1] = rate**2
+    seen, std = np.zeros((count, window, 3)), np.zeros((count, window, 3))
+    cycles = np.full((count, window), -1)
+    slot = cycle % window
+    seen[:, slot], std[:, slot], cycles[:, slot] = glance.seen[picks], glance.std[picks], cycle
+    fresh = Tracks(
+        mean, covariance, glance.log_amplitude[picks], specular, np.zeros(count, dtype=np.int64), seen, std, cycles
+    )
+    return Tracks._make(np.concatenate([old, new]) for old, new in zip(tracks, fresh, strict=True))
