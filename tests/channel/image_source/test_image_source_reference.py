@@ -1,6 +1,6 @@
 """Image-source channel against two independent constructions: the lattice of a box, and brute force in any room."""
 
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -65,7 +65,7 @@ def brute_force(walls, device, far, depth, host=-1):
     found = {}
     for bounces in range(depth + 1):
         for sequence in product(range(len(walls)), repeat=bounces):
-            if any(a == b for a, b in zip(sequence, sequence[1:], strict=False)) or sequence[-1:] == (host,):
+            if any(a == b for a, b in pairwise(sequence)) or sequence[-1:] == (host,):
                 continue
             points = trace(walls, sequence, device, far)
             if points is not None:
@@ -87,7 +87,7 @@ def trace(walls, sequence, device, far):
             return None
         points.insert(0, points[0] + hits[0] * (image - points[0]))
     points.insert(0, device)
-    for start, end in zip(points, points[1:], strict=False):
+    for start, end in pairwise(points):
         if any(ray_hits(start, end, t) is not None for t in walls.triangles):
             return None
     return points[1:-1]
