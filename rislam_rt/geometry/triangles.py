@@ -78,3 +78,9 @@ def distance_to_triangles(points: Floats, triangles: Floats) -> Floats:
         plane = np.where(above, height, np.inf).min(axis=1, initial=np.inf)
         nearest[rows] = np.minimum(plane, distance_to_edges(points[rows], edges))
     return nearest
+
+
+def edge_distance_pairs(points: Floats, triangles: Floats) -> Floats:
+    """Distance [m] (S,) of points (S, 3) from the nearest edge line of their triangle (S, 3, 3), positive inside."""
+    inward, offset = edge_planes(triangles)
+    return (np.einsum("sei,si->se", inward, points) - offset).min(axis=-1)
