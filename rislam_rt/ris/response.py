@@ -66,10 +66,10 @@ def rephase(paths: Paths, code: RisCode) -> Paths:
         return paths
     legs = paths.ris
     columns = np.flatnonzero(legs.tx_leg >= 0)
-    cycles, num_tx = legs.tx.shape[:2]
-    weight = np.broadcast_to(np.exp(-1j * code.xi), (cycles, *legs.tx.shape[2:]))
-    weighted = (legs.tx * weight[:, None]).reshape(cycles, num_tx, -1)
-    pairs = weighted @ legs.rx.reshape(cycles, legs.rx.shape[1], -1).transpose(0, 2, 1)
+    cycles, num_tx, rows, cols = legs.tx.shape
+    weight = np.broadcast_to(np.exp(-1j * code.xi), (cycles, rows, cols))
+    weighted = (legs.tx * weight[:, None]).reshape(cycles, num_tx, rows * cols)
+    pairs = weighted @ legs.rx.reshape(cycles, legs.rx.shape[1], rows * cols).transpose(0, 2, 1)
     gain = np.array(paths.gain)
     gain[:, columns] = np.where(paths.valid[:, columns], pairs[:, legs.tx_leg[columns], legs.rx_leg[columns]], 0.0)
     return replace(paths, gain=gain)
