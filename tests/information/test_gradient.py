@@ -1,0 +1,158 @@
+"""Gradients against finite differences of the image-source path length, for every path class."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rislam_rt.channel.image_source import ImageSourceChannel
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.information import (
+    cosine_gradient,
+    heading_gradient,
+    landmark_gradient,
+    path_gradient,
+    vertex_gradient,
+)
+from rislam_rt.model import PathKind, RadioConfig, Scene, Trajectory
+from rislam_rt.scene import load_scene
+
+STEP = 1e-5
+POSES = np.array([[0.7, 1.9, 0.5], [2.3, 4.1, 0.8], [4.9, 0.6, 1.2], [5.3, 5.2, 0.3]])
+HEADING = np.array([0.2, -1.3, 2.1, 2.9])
+
+
+@pytest.fixture(scope="module")
+def channel():
+    return ImageSourceChannel(load_scene("scenes/paper_room"), RadioConfig(), depth=2)
+
+
+def trajectory(channel, position=POSES, heading=HEADING):
+    count = len(position)
+    return Trajectory(np.arange(float(count)), position, np.zeros((count, 3)), heading, channel.scene.agent.body)
+
+
+def lengths(channel, paths, **pose):
+    """Path lengths (K, P) [m] at other poses, columns matched to `paths` by identity; NaN where one is missing."""
+    found = channel.paths(trajectory(channel, **pose))
+    column = {found.identity(p): p for p in range(found.num_paths)}
+    where = [column.get(paths.identity(p), -1) for p in range(paths.num_paths)]
+    length = np.where(found.valid, found.tau * SPEED_OF_LIGHT, np.nan)
+    return np.where(np.array(where) >= 0, length[:, where], np.nan)
+
+
+def every_class(channel):
+    paths = channel.paths(trajectory(channel))
+    assert set(paths.kind) == set(PathKind)
+    assert any((paths.tx_walls[p, 0] >= 0) for p in range(paths.num_paths) if paths.kind[p] == PathKind.VS)
+    return paths
+
+
+def test_exact_gradient_equals_differences_for_every_class(channel):
+    paths = every_class(channel)
+    motion = trajectory(channel)
+    gradient = vertex_gradient(motion.tx, motion.rx, paths.vertices, paths.num_vertices)
+    compared = np.zeros(paths.num_paths, dtype=bool)
+    for axis in range(3):
+        shift = STEP * np.eye(3)[axis]
+        upper, lower = (lengths(channel, paths, position=POSES + s * shift) for s in (1.0, -1.0))
+        difference = (upper - lower) / (2 * STEP)
+        known = paths.valid & np.isfinite(difference)
+        # length 10 m with 1e-15: 1e-10 from rounding; curvature 1 / (0.05 m leg) and step 1e-5: 1e-8
+        np.testing.assert_allclose(gradient[..., axis][known], difference[known], rtol=0, atol=1e-6)
+        compared |= known.any(axis=0)
+    assert compared.mean() > 0.98  # a path on the edge of existence may be missing on one side of the step
+
+
+def test_ends_alone_give_the_same_gradient_and_line_of_sight_has_none(channel):
+    paths = every_class(channel)
+    motion = trajectory(channel)
+    gradient = vertex_gradient(motion.tx, motion.rx, paths.vertices, paths.num_vertices)
+    count = np.maximum(paths.num_vertices, 1)
+    first = paths.vertices[:, :, 0]
+    last = np.take_along_axis(paths.vertices, (count - 1)[None, :, None, None], axis=2)[:, :, 0]
+    tx, rx = motion.tx[:, None], motion.rx[:, None]
+    bounced = paths.valid & (paths.num_vertices > 0)
+    np.testing.assert_allclose(path_gradient(tx, rx, first, last)[bounced], gradient[bounced], atol=1e-14)
+    np.testing.assert_array_equal(gradient[:, paths.kind == PathKind.LOS], 0.0)
+    np.testing.assert_array_equal(path_gradient(tx, rx, rx, tx), 0.0)
+
+
+def test_paper_and_appendix_modes_are_the_sums_they_claim_to_be():
+    tx, rx = np.array([[0.0, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0]])
+    vertices = np.array([[[[0.0, 2.0, 0.0], [3.0, 2.0, 0.0]], [[0.0, 0.0, 4.0], [9.0, 9.0, 9.0]]]])
+    count = np.array([2, 1])
+    s2 = 1 / np.sqrt(2)
+    paper = vertex_gradient(tx, rx, vertices, count, mode="paper")[0]
+    np.testing.assert_allclose(paper[0], [1 - s2, 1 - s2, 0], atol=1e-15)  # up, right, back to the Rx
+    np.testing.assert_allclose(paper[1], [1 / np.sqrt(17), 0, 1 - 4 / np.sqrt(17)], atol=1e-15)
+    appendix = vertex_gradient(tx, rx, vertices, count, mode="appendix")[0]
+    np.testing.assert_allclose(appendix[0], [-s2, -s2, 0], atol=1e-15)
+    exact = vertex_gradient(tx, rx, vertices, count)[0]
+    np.testing.assert_allclose(exact[0], [-s2, -1 - s2, 0], atol=1e-15)
+
+
+def test_paper_mode_vanishes_for_a_monostatic_landmark():
+    point, agent = np.array([2.0, 1.0, 1.0]), np.array([[0.5, 0.5, 0.5]])
+    vertices = point[None, None, None]
+    one = np.array([1])
+    np.testing.assert_allclose(vertex_gradient(agent, agent, vertices, one, mode="paper"), 0.0, atol=1e-15)
+    exact = vertex_gradient(agent, agent, vertices, one)[0, 0]
+    np.testing.assert_allclose(np.linalg.norm(exact), 2.0, atol=1e-15)
+
+
+def test_landmark_gradient_equals_differences(channel):
+    """Move the sphere: the change of every PS and VS length is its neighbours' unit vectors."""
+    paths = every_class(channel)
+    motion = trajectory(channel)
+    columns = np.flatnonzero(np.isin(paths.kind, (PathKind.PS, PathKind.VS)))
+    sphere = channel.scene.scatterers[0]
+    points = np.concatenate([motion.tx[:, None, None].repeat(paths.num_paths, 1), paths.vertices], axis=2)
+    analytic = np.zeros((len(POSES), len(columns), 3))
+    for i, p in enumerate(columns):
+        at = int((paths.tx_walls[p] >= 0).sum())
+        after = paths.vertices[:, p, at + 1] if at + 1 < paths.num_vertices[p] else motion.rx
+        analytic[:, i] = landmark_gradient(points[:, p, at], paths.vertices[:, p, at], after)
+    for axis in range(3):
+        moved = []
+        for sign in (1.0, -1.0):
+            shifted = replace(sphere, position=sphere.position + sign * STEP * np.eye(3)[axis])
+            room: Scene = replace(channel.scene, scatterers=(shifted,))
+            moved.append(lengths(ImageSourceChannel(room, channel.radio, 2), paths)[:, columns])
+        difference = (moved[0] - moved[1]) / (2 * STEP)
+        known = paths.valid[:, columns] & np.isfinite(difference)
+        assert known.sum() > 40
+        np.testing.assert_allclose(analytic[..., axis][known], difference[known], rtol=0, atol=1e-6)
+
+
+def test_heading_gradient_equals_differences(channel):
+    paths = every_class(channel)
+    motion, body = trajectory(channel), channel.scene.agent.body
+    upper, lower = (lengths(channel, paths, heading=HEADING + s * STEP) for s in (1.0, -1.0))
+    difference = (upper - lower) / (2 * STEP)
+    bounced = paths.num_vertices > 0
+    last = np.take_along_axis(paths.vertices, (np.maximum(paths.num_vertices, 1) - 1)[None, :, None, None], axis=2)
+    analytic = heading_gradient(
+        body.tx_offset, body.rx_offset, HEADING[:, None], motion.tx[:, None], motion.rx[:, None],
+        paths.vertices[:, :, 0], last[:, :, 0],
+    )  # fmt: skip
+    known = paths.valid & np.isfinite(difference) & bounced
+    np.testing.assert_allclose(analytic[known], difference[known], rtol=0, atol=1e-6)
+
+
+def test_cosine_gradient_equals_differences():
+    rng = np.random.default_rng(3)
+    rx, apparent = rng.normal(size=(20, 3)), rng.normal(size=(20, 3)) + np.array([0.0, 0.0, 4.0])
+    heading = rng.uniform(-3, 3, size=20)
+
+    def cosines(position):
+        ray = apparent - position
+        body = np.einsum("kji,kj->ki", rotation_z(heading), ray / np.linalg.norm(ray, axis=-1, keepdims=True))
+        return body[:, :2]
+
+    analytic = cosine_gradient(rx, apparent, heading)
+    for axis in range(3):
+        shift = STEP * np.eye(3)[axis]
+        difference = (cosines(rx + shift) - cosines(rx - shift)) / (2 * STEP)
+        np.testing.assert_allclose(analytic[..., axis], difference, atol=1e-8)

@@ -1,0 +1,135 @@
+"""Position information, equivalent information, priors: by hand, by inversion of the joint matrix, and as outcomes."""
+
+import numpy as np
+import pytest
+
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.information import (
+    Outcome,
+    amplitude_std,
+    equivalent_information,
+    measurement_std,
+    position_bound,
+    position_information,
+    prior_from_covariance,
+    prior_from_particles,
+    range_information,
+    uncertain_range_information,
+)
+from rislam_rt.model import RadioConfig
+
+RADIO = RadioConfig()
+
+
+def test_one_path_by_hand():
+    """|g| = 2, 20 dB over all antennas, 1 GHz: c / (2 pi B sqrt(2 / 12 SNR)) / 2 = 5.85 mm."""
+    snr = np.array([100.0])
+    information = position_information(np.array([[2.0, 0.0]]), snr, RADIO)
+    by_hand = SPEED_OF_LIGHT / (2 * np.pi * 1e9 * np.sqrt(2 / 12 * 100.0)) / 2.0
+    assert 1 / np.sqrt(information[0, 0]) == pytest.approx(by_hand, rel=1e-12)
+    assert by_hand == pytest.approx(5.843e-3, rel=1e-3)
+    assert measurement_std(snr, RADIO).tau[0] * SPEED_OF_LIGHT / 2 == pytest.approx(by_hand, rel=1e-12)
+
+
+def test_outcomes_are_values():
+    gradient = np.array([[[1.0, 0.5], [2.0, 1.0]], [[1.0, 0.0], [0.0, 1.0]], [[1.0, 0.0], [0.0, 1.0]]])
+    snr = np.array([[10.0, 20.0], [10.0, 20.0], [0.0, 0.0]])
+    bound = position_bound(position_information(gradient, snr, RADIO))
+    assert bound.outcome.tolist() == [Outcome.UNOBSERVABLE, Outcome.OK, Outcome.NO_PATHS]
+    assert np.isinf(bound.variance[[0, 2]]).all()
+    assert not np.isnan(bound.rms).any()
+    helped = position_bound(position_information(gradient, snr, RADIO), 4.0 * np.eye(2))
+    assert (helped.outcome == Outcome.OK).all()
+    assert helped.variance[2] == pytest.approx(0.5)
+
+
+def test_no_paths_at_all():
+    assert position_bound(position_information(np.zeros((0, 2)), np.zeros(0), RADIO)).outcome == Outcome.NO_PATHS
+
+
+def test_adding_a_path_never_hurts_and_rotation_does_not_matter():
+    rng = np.random.default_rng(0)
+    gradient, snr = rng.normal(size=(200, 4, 2)), rng.exponential(size=(200, 4))
+    all_four = position_bound(position_information(gradient, snr, RADIO)).variance
+    three = position_bound(position_information(gradient[:, :3], snr[:, :3], RADIO)).variance
+    assert (all_four <= three * (1 + 1e-12)).all()
+    turn = np.array([[0.8, -0.6], [0.6, 0.8]])
+    turned = position_bound(position_information(gradient @ turn.T, snr, RADIO)).variance
+    np.testing.assert_allclose(turned, all_four, rtol=1e-9)
+
+
+def test_equivalent_information_inverts_to_the_joint_bound():
+    rng = np.random.default_rng(1)
+    agent, nuisance = rng.normal(size=(5, 9, 2)), rng.normal(size=(5, 9, 4))
+    weight, prior = rng.exponential(size=(5, 9)), np.diag([0.3, 0.0, 2.0, 0.0])
+    reduced = equivalent_information(agent, nuisance, weight, prior)
+    assert (reduced.outcome == Outcome.OK).all()
+    both = np.concatenate([agent, nuisance], axis=-1)
+    joint = np.swapaxes(both * weight[..., None], 1, 2) @ both
+    joint[:, 2:, 2:] += prior
+    np.testing.assert_allclose(np.linalg.inv(reduced.information), np.linalg.inv(joint)[:, :2, :2], rtol=1e-8)
+
+
+def test_equivalent_information_between_known_and_useless():
+    rng = np.random.default_rng(2)
+    agent, nuisance, weight = rng.normal(size=(6, 2)), rng.normal(size=(6, 3)), np.ones(6)
+    own = agent.T @ agent
+    certain = equivalent_information(agent, nuisance, weight, 1e12 * np.eye(3)).information
+    np.testing.assert_allclose(certain, own, rtol=1e-9)
+    unknown = equivalent_information(agent, nuisance, weight, np.zeros((3, 3))).information
+    assert (np.linalg.eigvalsh(own - unknown) > 0).all()
+    # an unknown that no measurement sees costs nothing, and is said
+    blind = equivalent_information(agent, np.zeros((6, 3)), weight, np.zeros((3, 3)))
+    np.testing.assert_allclose(blind.information, own, rtol=1e-12)
+    assert blind.outcome == Outcome.DEGENERATE
+    # one landmark seen by one path alone teaches nothing of the agent
+    lone = equivalent_information(agent[:1], nuisance[:1], weight[:1], np.zeros((3, 3)))
+    np.testing.assert_allclose(lone.information, 0.0, atol=1e-12)
+
+
+def test_a_clock_offset_costs_one_common_range():
+    gradient = np.array([[1.0, 0.0], [-0.5, 0.8], [-0.5, -0.8]])
+    unknown = equivalent_information(gradient, np.ones((3, 1)), np.ones(3), np.zeros((1, 1))).information
+    centred = gradient - gradient.mean(axis=0)
+    np.testing.assert_allclose(unknown, centred.T @ centred, atol=1e-12)
+
+
+def test_uncertain_landmark_is_the_equivalent_of_one_path():
+    rng = np.random.default_rng(3)
+    gradient, landmark, covariance = rng.normal(size=2), rng.normal(size=3), np.diag([0.1, 0.2, 0.05])
+    weight = np.array(5.0)
+    short = uncertain_range_information(weight, landmark, covariance) * np.outer(gradient, gradient)
+    long = equivalent_information(gradient[None], landmark[None], weight[None], np.linalg.inv(covariance)).information
+    np.testing.assert_allclose(short, long, rtol=1e-10)
+
+
+def test_prior_of_a_cloud_and_of_its_covariance():
+    rng = np.random.default_rng(4)
+    covariance = np.array([[0.04, 0.01], [0.01, 0.02]])
+    cloud = rng.multivariate_normal([3.0, 1.0], covariance, size=100_000)
+    # 1e5 draws: a variance is known to 0.45 %
+    np.testing.assert_allclose(prior_from_particles(cloud), np.linalg.inv(covariance), rtol=0.03, atol=0.3)
+    np.testing.assert_allclose(prior_from_covariance(covariance), np.linalg.inv(covariance), rtol=1e-12)
+    weight = np.where(cloud[:, 0] > 3.0, 0.0, -np.inf)
+    half = prior_from_particles(cloud, weight)
+    np.testing.assert_allclose(half, prior_from_particles(cloud[cloud[:, 0] > 3.0]), rtol=1e-9)
+
+
+def test_a_collapsed_cloud_is_still_finite():
+    prior = prior_from_particles(np.ones((10, 2)))
+    np.testing.assert_allclose(prior, 1e8 * np.eye(2), rtol=1e-12, atol=1e-6)
+    assert np.isfinite(prior_from_covariance(np.array([[1.0, 1.0], [1.0, 1.0]]))).all()
+
+
+def test_least_standard_deviations():
+    std = measurement_std(np.array([0.0, 100.0]), RADIO)
+    assert np.isinf(std.tau[0])
+    assert np.isinf(std.cosines[0]).all()
+    assert std.tau[1] == pytest.approx(1 / np.sqrt(8 * np.pi**2 * 1e18 / 12 * 100.0), rel=1e-12)
+    # 4 x 4, half a wavelength: sum x^2 = 4 * (2 * 0.25^2 + 2 * 0.75^2) lambda^2 = 5 lambda^2, 6.25 a antenna
+    assert std.cosines[1] == pytest.approx(np.full(2, 1 / np.sqrt(2 * (2 * np.pi) ** 2 * 6.25 * 5)), rel=1e-12)
+    assert amplitude_std(RADIO) == pytest.approx(np.sqrt(3.52e-11 / 32))
+    snr = np.array(100.0)
+    gain = np.sqrt(snr * RADIO.noise_psd / 16)
+    assert gain / amplitude_std(RADIO) == pytest.approx(np.sqrt(2 * snr))
+    assert range_information(snr, RADIO) == pytest.approx(1 / (SPEED_OF_LIGHT * std.tau[1]) ** 2)
