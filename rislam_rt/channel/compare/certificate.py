@@ -16,7 +16,7 @@ Identity = tuple[int, str, tuple[str, ...], tuple[str, ...]]
 """Kind, landmark, Tx walls, Rx walls, by name."""
 
 SHORTEST_SEGMENT = 10.07e-3
-"""[m] The tracer drops a path with a segment below 1 cm; in float32 the limit bites up to this length."""
+"""[m] Sionna RT drops a path with a segment below 1 cm; in float32 the limit bites up to this length."""
 
 EDGE_TOLERANCE = 1e-4
 """[m] How far from an outline a bounce or a passing ray may be decided either way: vertices, images and directions in
@@ -59,6 +59,8 @@ class Certifier:
     trajectory: Trajectory
     depth: int
     """Bounces up to which both sides looked."""
+    shortest: float
+    """[m] Segments below this are lost by the tracer."""
     names: tuple[str, ...]
     facets: Facets
     edges: Floats
@@ -68,14 +70,14 @@ class Certifier:
     host: int
 
     @classmethod
-    def of(cls, scene: Scene, trajectory: Trajectory, depth: int) -> "Certifier":
+    def of(cls, scene: Scene, trajectory: Trajectory, depth: int, shortest: float) -> "Certifier":
         """Prepare a scene and its poses."""
         walls = build_walls(scene)
         facets = build_facets(walls)
         outlines = [outline_edges(facets.corners[a:b]) for a, b in zip(facets.first, facets.first[1:], strict=False)]
         owner = np.repeat(np.arange(len(walls)), [len(o) for o in outlines])
         edges = np.concatenate([np.zeros((0, 2, 3)), *outlines])
-        return cls(scene, trajectory, depth, walls.names, facets, edges, owner, walls.host)
+        return cls(scene, trajectory, depth, shortest, walls.names, facets, edges, owner, walls.host)
 
     def label(self, identity: Identity) -> str:
         """An identity for people; Rx walls after the bar."""
@@ -101,7 +103,7 @@ class Certifier:
         if broken:
             only_hidden = all(c.reason == "occluded" for c in broken)
             return Proof("occluded" if only_hidden else "", broken[0].text, -broken[0].margin)
-        if side == "analytic" and shortest < SHORTEST_SEGMENT:
+        if side == "analytic" and shortest < self.shortest:
             return Proof("short segment", f"segment of {1e3 * shortest:.4f} mm", shortest)
         if close:
             closest = min(close, key=lambda c: abs(c.margin))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.compare.certificate import Certifier, Identity
+from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, Certifier, Identity
 from rislam_rt.channel.compare.report import OneSided, PathReport
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import angle_between
@@ -20,15 +20,24 @@ class Columns(NamedTuple):
     analytic: Integers
 
 
-def compare_paths(traced: Paths, analytic: Paths, scene: Scene, trajectory: Trajectory) -> PathReport:
+def compare_paths(
+    traced: Paths,
+    analytic: Paths,
+    scene: Scene,
+    trajectory: Trajectory,
+    *,
+    shortest_segment: float = SHORTEST_SEGMENT,
+) -> PathReport:
     """Compare two path sets of one scene and trajectory, cycle by cycle and identity by identity.
 
     Gains are compared as they are: give both sides the same code. Every path that one side lacks is looked up in the
-    geometry (`certificate.py`); what has no proof there counts as unexplained.
+    geometry (`certificate.py`); what has no proof there counts as unexplained. `shortest_segment` [m] is the tracer's
+    limit: below it, and only for paths that the tracer lacks, a segment's length is a proof.
     """
     columns = _align(traced, analytic)
     in_traced, in_analytic = _valid(traced, columns.traced), _valid(analytic, columns.analytic)
-    certifier = Certifier.of(scene, trajectory, min(traced.tx_walls.shape[1], analytic.tx_walls.shape[1]))
+    depth = min(traced.tx_walls.shape[1], analytic.tx_walls.shape[1])
+    certifier = Certifier.of(scene, trajectory, depth, shortest_segment)
     one_sided = [
         _certify(certifier, columns.identity[path], int(cycle), bool(in_traced[cycle, path]))
         for cycle, path in np.argwhere(in_traced != in_analytic)
