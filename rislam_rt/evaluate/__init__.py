@@ -1,1 +1,46 @@
+"""Floor 5: scores. Errors, distances between maps, consistency, confidence intervals, association."""
 
+from rislam_rt.evaluate.association import AssociationScore, association_score, label_switches
+from rislam_rt.evaluate.consistency import Consistency, chi_square_bounds, consistency, normalised_squares
+from rislam_rt.evaluate.errors import (
+    TrajectoryError,
+    WallError,
+    align,
+    landmark_rmse,
+    position_errors,
+    rmse,
+    root_mean_square,
+    trajectory_error,
+    wall_errors,
+)
+from rislam_rt.evaluate.intervals import Interval, bootstrap, bootstrap_ratio, mean_over_runs, rms_over_runs
+from rislam_rt.evaluate.sets import Gospa, Ospa, gospa, match_points, ospa
+
+__all__ = [
+    "AssociationScore",
+    "Consistency",
+    "Gospa",
+    "Interval",
+    "Ospa",
+    "TrajectoryError",
+    "WallError",
+    "align",
+    "association_score",
+    "bootstrap",
+    "bootstrap_ratio",
+    "chi_square_bounds",
+    "consistency",
+    "gospa",
+    "label_switches",
+    "landmark_rmse",
+    "match_points",
+    "mean_over_runs",
+    "normalised_squares",
+    "ospa",
+    "position_errors",
+    "rms_over_runs",
+    "rmse",
+    "root_mean_square",
+    "trajectory_error",
+    "wall_errors",
+]

@@ -1,0 +1,93 @@
+"""Confidence intervals by the bootstrap: what a difference between schemes is worth after so many seeds."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import norm
+
+from rislam_rt.arrays import Floats
+from rislam_rt.errors import ConfigError
+
+Statistic = Callable[[Floats], Floats]
+
+
+class Interval(NamedTuple):
+    """A value and its confidence interval."""
+
+    value: float
+    lower: float
+    upper: float
+
+
+def mean_over_runs(samples: Floats) -> Floats:
+    """Mean over the first axis."""
+    return np.asarray(np.mean(samples, axis=0))
+
+
+def rms_over_runs(samples: Floats) -> Floats:
+    """Root mean square over the first axis: RMSE over seeds from the RMSE of each."""
+    return np.asarray(np.sqrt(np.mean(np.asarray(samples) ** 2, axis=0)))
+
+
+def bootstrap(
+    samples: Floats,
+    *,
+    rng: np.random.Generator,
+    statistic: Statistic = mean_over_runs,
+    level: float = 0.95,
+    resamples: int = 2000,
+) -> Interval:
+    """Bias-corrected and accelerated interval (Efron 1987) of a statistic of samples (R, ...), R independent runs.
+
+    Parameters
+    ----------
+    statistic
+        From samples (R, B, ...) to values (B,): it works along the first axis.
+    """
+    samples = np.asarray(samples, dtype=np.float64)
+    if len(samples) < 2:
+        raise ConfigError(f"samples: {len(samples)} received; an interval needs at least 2 runs")
+    value = float(statistic(samples[:, None])[0])
+    draws = rng.integers(len(samples), size=(len(samples), resamples))
+    replicates = np.asarray(statistic(samples[draws]))
+    if np.ptp(replicates) == 0.0:
+        return Interval(value, value, value)
+    below = np.mean(replicates < value) + 0.5 * np.mean(replicates == value)
+    bias = norm.ppf(np.clip(below, 0.5 / resamples, 1.0 - 0.5 / resamples))
+    quantile = norm.ppf([(1.0 - level) / 2.0, (1.0 + level) / 2.0])
+    shifted = bias + (bias + quantile) / (1.0 - _acceleration(samples, statistic) * (bias + quantile))
+    lower, upper = np.quantile(replicates, norm.cdf(shifted))
+    return Interval(value, float(lower), float(upper))
+
+
+def bootstrap_ratio(
+    numerator: Floats,
+    denominator: Floats,
+    *,
+    rng: np.random.Generator,
+    statistic: Statistic = rms_over_runs,
+    level: float = 0.95,
+    resamples: int = 2000,
+) -> Interval:
+    """Interval of `statistic(numerator) / statistic(denominator)` of two schemes run on the same R seeds.
+
+    Seeds are drawn in pairs, so that what both schemes share (room, noise) does not widen the interval. 1 minus this is
+    the gain over the denominator's scheme.
+    """
+    pairs = np.stack([np.asarray(numerator), np.asarray(denominator)], axis=-1)
+
+    def ratio(samples: Floats) -> Floats:
+        return statistic(samples[..., 0]) / statistic(samples[..., 1])
+
+    return bootstrap(pairs, rng=rng, statistic=ratio, level=level, resamples=resamples)
+
+
+def _acceleration(samples: Floats, statistic: Statistic) -> float:
+    """Skewness of the jackknife values over six: how the spread changes with the value."""
+    count = len(samples)
+    others = np.array([np.delete(np.arange(count), run) for run in range(count)]).T
+    values = np.asarray(statistic(samples[others]))
+    centred = values.mean() - values
+    spread = np.sum(centred**2)
+    return float(np.sum(centred**3) / (6.0 * spread**1.5)) if spread > 0.0 else 0.0

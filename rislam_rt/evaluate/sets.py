@@ -1,0 +1,92 @@
+"""Distances between sets of points of different sizes: OSPA and GOSPA, and the assignment behind them."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.errors import ConfigError
+
+
+class Ospa(NamedTuple):
+    """OSPA distance [m] and its two parts, `distance^p = localisation^p + cardinality^p`."""
+
+    distance: float
+    localisation: float
+    cardinality: float
+
+
+class Gospa(NamedTuple):
+    """GOSPA distance [m] (alpha = 2) and its parts, `distance^p = localisation^p + c^p / 2 (missed + false)`."""
+
+    distance: float
+    localisation: float
+    missed: int
+    false: int
+
+
+def ospa(estimate: Floats, truth: Floats, *, cutoff: float = 1.0, order: float = 2.0) -> Ospa:
+    """Optimal sub-pattern assignment metric between point sets (N, D) and (M, D).
+
+    Schuhmacher, Vo and Vo, IEEE Trans. Signal Process. 56 (2008): the p-mean over max(N, M) of the assigned distances,
+    cut off at c, and of c for each point left over. Two empty sets are 0 apart.
+    """
+    distance = _distances(estimate, truth, cutoff, order)
+    larger = max(distance.shape)
+    if larger == 0:
+        return Ospa(0.0, 0.0, 0.0)
+    rows, cols = linear_sum_assignment(distance**order)
+    local = float(np.sum(distance[rows, cols] ** order)) / larger
+    count = cutoff**order * abs(distance.shape[0] - distance.shape[1]) / larger
+    return Ospa((local + count) ** (1.0 / order), local ** (1.0 / order), count ** (1.0 / order))
+
+
+def gospa(estimate: Floats, truth: Floats, *, cutoff: float = 1.0, order: float = 2.0) -> Gospa:
+    """Generalised OSPA (alpha = 2) between estimates (N, D) and truth (M, D).
+
+    Rahmathullah, Garcia-Fernandez and Svensson, FUSION 2017: not divided by the number of points, and each missed or
+    false one costs `c^p / 2`, so that a pair further apart than c counts as one of each.
+    """
+    distance = _distances(estimate, truth, cutoff, order)
+    rows, cols = linear_sum_assignment(distance**order)
+    close = distance[rows, cols] < cutoff
+    local = float(np.sum(distance[rows[close], cols[close]] ** order))
+    missed, false = distance.shape[1] - int(close.sum()), distance.shape[0] - int(close.sum())
+    total = local + cutoff**order / 2.0 * (missed + false)
+    return Gospa(total ** (1.0 / order), local ** (1.0 / order), missed, false)
+
+
+def match_points(estimate: Floats, truth: Floats, *, cutoff: float = np.inf) -> Integers:
+    """Index (M,) of the estimate (N, D) that stands for each true point (M, D), -1 for none within the cut-off [m].
+
+    As many pairs as can be within the cut-off are made, at the least sum of squared distances.
+    """
+    distance = _pairwise(estimate, truth)
+    index = np.full(distance.shape[1], -1)
+    if not distance.size:
+        return index
+    # A pair beyond the cut-off costs more than all good pairs together, but its finite cost keeps the problem feasible.
+    bound = min(cutoff, float(distance.max()))
+    cost = np.where(distance <= cutoff, distance**2, (bound**2 + 1.0) * (min(distance.shape) + 1))
+    rows, cols = linear_sum_assignment(cost)
+    close = distance[rows, cols] <= cutoff
+    index[cols[close]] = rows[close]
+    return index
+
+
+def _distances(estimate: Floats, truth: Floats, cutoff: float, order: float) -> Floats:
+    if not (cutoff > 0.0 and order >= 1.0):
+        raise ConfigError(
+            f"cutoff, order: {cutoff}, {order} received; give a positive cut-off and an order of 1 or more"
+        )
+    return np.minimum(_pairwise(estimate, truth), cutoff)
+
+
+def _pairwise(estimate: Floats, truth: Floats) -> Floats:
+    """Distances (N, M); an empty set may come without its dimension."""
+    first, second = (np.asarray(points, dtype=np.float64) for points in (estimate, truth))
+    if not first.size or not second.size:
+        return np.zeros((len(first), len(second)))
+    return np.asarray(cdist(np.atleast_2d(first), np.atleast_2d(second)))

@@ -1,0 +1,75 @@
+"""Errors of trajectories and walls against figures worked out by hand."""
+
+import numpy as np
+import pytest
+
+from rislam_rt.errors import GeometryError
+from rislam_rt.evaluate import align, landmark_rmse, rmse, trajectory_error, wall_errors
+from rislam_rt.geometry.angles import rotation_z
+
+TRUTH = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [2.0, 1.0, 1.0], [2.0, 3.0, 1.0]])
+
+
+def test_rmse_of_a_3_4_5_triangle():
+    assert rmse(np.array([[3.0, 4.0, 0.0], [0.0, 0.0, 0.0]]), np.zeros((2, 3))) == pytest.approx(np.sqrt(12.5))
+    with pytest.raises(GeometryError, match="at least one"):
+        rmse(np.zeros((0, 3)), np.zeros((0, 3)))
+
+
+def test_constant_offset_is_all_absolute_error_and_no_drift():
+    score = trajectory_error(TRUTH + np.array([0.3, 0.0, 0.4]), TRUTH)
+    assert score.rmse == pytest.approx(0.5)
+    assert score.median == pytest.approx(0.5)
+    assert score.final == pytest.approx(0.5)
+    # float64 rounding of metres
+    assert score.drift == pytest.approx(0.0, abs=1e-12)
+    assert score.rmse_aligned == pytest.approx(0.0, abs=1e-12)
+
+
+def test_growing_offset_drifts_by_its_growth():
+    score = trajectory_error(TRUTH + np.arange(4)[:, None] * np.array([0.0, 0.1, 0.0]), TRUTH, step=2)
+    assert score.drift == pytest.approx(0.2)
+    assert score.largest == pytest.approx(0.3)
+
+
+def test_heading_errors_wrap():
+    turn = np.full(4, np.pi - 0.05)
+    score = trajectory_error(TRUTH, TRUTH, heading=turn + 0.1, true_heading=turn - 2.0 * np.pi)
+    assert score.heading == pytest.approx(0.1)
+
+
+def test_alignment_undoes_a_turn_about_z_and_a_shift():
+    moved = TRUTH @ rotation_z(np.array(0.7)).T + np.array([5.0, -2.0, 0.3])
+    np.testing.assert_allclose(align(moved, TRUTH), TRUTH, atol=1e-12)
+
+
+def test_trajectories_of_different_lengths_are_refused():
+    with pytest.raises(GeometryError, match="same"):
+        trajectory_error(TRUTH[:3], TRUTH)
+
+
+def test_landmarks_count_only_the_cycles_that_know_them():
+    truth = np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
+    estimate = np.full((3, 2, 3), np.nan)
+    estimate[1:, 0] = [[1.0, 0.3, 0.0], [1.0, 0.0, 0.1]]
+    np.testing.assert_allclose(landmark_rmse(estimate, truth), [np.sqrt(0.05), np.inf])
+
+
+class TestWalls:
+    def test_a_flipped_normal_is_the_same_wall(self):
+        score = wall_errors(
+            np.array([[-1.0, 0.0, 0.0]]), np.array([-6.1]), np.array([[1.0, 0.0, 0.0]]), np.array([6.0])
+        )
+        np.testing.assert_allclose(score.angle, 0.0, atol=1e-15)
+        np.testing.assert_allclose(score.offset, 0.1, atol=1e-12)
+
+    def test_angle_of_a_tilted_wall_and_its_offset_where_it_was_seen(self):
+        tilt, seen = 0.01, np.array([0.0, 3.0, 1.0])
+        normal = np.array([[np.cos(tilt), np.sin(tilt), 0.0]])
+        foot = np.array([6.0, 3.0, 1.0])
+        offset = np.array([normal[0] @ foot])  # turned about the point next to the agent
+        score = wall_errors(normal, offset, np.array([[1.0, 0.0, 0.0]]), np.array([6.0]), at=seen)
+        np.testing.assert_allclose(score.angle, tilt, rtol=1e-9)
+        np.testing.assert_allclose(score.offset, 0.0, atol=1e-12)
+        elsewhere = wall_errors(normal, offset, np.array([[1.0, 0.0, 0.0]]), np.array([6.0]))
+        np.testing.assert_allclose(elsewhere.offset, 3.0 * np.sin(tilt), rtol=1e-9)
