@@ -15,7 +15,7 @@ STEPS = ("optimise", "communicate", "measure", "localise")
 """The four steps of a cycle, in their order."""
 
 NOTHING = -9
-"""In `SchemeResult.path` and `.associated`: no component in this column."""
+"""In `SchemeResult.component_path` and `.component_landmark`: no component in this column."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,16 +39,18 @@ class SchemeResult:
     """H, the number of phase levels of both."""
     gain: Complexes
     """(K, P) true path gains under the applied code."""
-    path: Integers
+    component_path: Integers
     """(K, M) truth, for scoring only: path column of each component, -1 for clutter, `NOTHING` beyond their number."""
-    associated: Integers
+    component_landmark: Integers
     """(K, M) number of the landmark (or image) that the agent took each component for; -1 clutter or unused, -2 removed
     as LOS or wall return, `NOTHING` beyond their number."""
     ident: Integers
     """(I,) numbers of all landmarks that were ever held."""
+    parent: Integers
+    """(I,) number of the landmark whose mirror image this is, -1 for a point."""
     held: Booleans
     """(K, I) whether the landmark was in the map."""
-    landmark: Floats
+    landmark_position: Floats
     """(K, I, 3) its estimated position [m], zero where it was not held."""
     ris_probability: Floats
     """(K, I) probability of being the panel."""
@@ -71,11 +73,12 @@ class SchemeResult:
             ("sent", np.int64, (cycles, None, None)),
             ("applied", np.int64, (cycles, None, None)),
             ("gain", np.complex128, (cycles, None)),
-            ("path", np.int64, (cycles, None)),
-            ("associated", np.int64, (cycles, None)),
+            ("component_path", np.int64, (cycles, None)),
+            ("component_landmark", np.int64, (cycles, None)),
             ("ident", np.int64, (held,)),
+            ("parent", np.int64, (held,)),
             ("held", np.bool_, (cycles, held)),
-            ("landmark", np.float64, (cycles, held, 3)),
+            ("landmark_position", np.float64, (cycles, held, 3)),
             ("ris_probability", np.float64, (cycles, held)),
             ("seconds", np.float64, (cycles, len(STEPS))),
         ):

@@ -15,12 +15,15 @@ def gather(scheme: str, cycles: Sequence[Cycle], levels: int) -> SchemeResult:
     estimates = [cycle.estimate for cycle in cycles]
     maps = [estimate.map for estimate in estimates]
     ident = np.unique(np.concatenate([m.ident for m in maps]))
+    parent = np.full(len(ident), -1)
     held = np.zeros((len(cycles), len(ident)), dtype=np.bool_)
     landmark = np.zeros((len(cycles), len(ident), 3))
     ris_probability = np.zeros((len(cycles), len(ident)))
     for row, m in enumerate(maps):
         column = np.searchsorted(ident, m.ident)
         held[row, column], landmark[row, column] = True, m.position
+        image = np.flatnonzero(m.parent >= 0)
+        parent[column[image]] = m.ident[m.parent[image]]
         ris_probability[row, column] = m.ris_probability
     return SchemeResult(
         scheme=scheme,
@@ -32,11 +35,12 @@ def gather(scheme: str, cycles: Sequence[Cycle], levels: int) -> SchemeResult:
         applied=_codes([cycle.applied for cycle in cycles]),
         levels=levels,
         gain=np.array([cycle.gain for cycle in cycles]),
-        path=_padded([cycle.truth.path for cycle in cycles]),
-        associated=_padded([cycle.info.landmark for cycle in cycles]),
+        component_path=_padded([cycle.truth.path for cycle in cycles]),
+        component_landmark=_padded([cycle.info.landmark for cycle in cycles]),
         ident=ident,
+        parent=parent,
         held=held,
-        landmark=landmark,
+        landmark_position=landmark,
         ris_probability=ris_probability,
         seconds=np.array([cycle.seconds for cycle in cycles]),
         info=_diagnostics([cycle.info for cycle in cycles]),

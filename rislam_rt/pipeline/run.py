@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rislam_rt.backend import prepare_backend
 from rislam_rt.channel.protocol import Channel
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import (
@@ -145,6 +146,18 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
             raise ConfigError(f"schemes: '{need[0]}' needs a panel and scene '{scene.name}' has none; give 'no_ris'")
     else:
         check_control(scene.ris.spec, spec.control)
+
+
+def prepare_channel(kind: str) -> None:
+    """Make sure that the machine can do what a channel needs, before anything is written.
+
+    Raises
+    ------
+    SetupError
+        It cannot.
+    """
+    if kind == "traced":
+        prepare_backend()
 
 
 def build_channel(kind: str, scene: Scene, radio: RadioConfig, depth: int) -> Channel:

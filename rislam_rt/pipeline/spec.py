@@ -36,11 +36,11 @@ _Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.")
 _Designers = _section("_Designers", DesignConfig, "Fields of `DesignConfig`.", without=("certify",))
 
 
-class SlamSection(_Filter):  # type: ignore[misc]
+class SlamSection(_Filter):  # type: ignore[misc, valid-type]
     """The filter's settings, SI units."""
 
 
-class ReceiverSection(_Receiver):  # type: ignore[misc]
+class ReceiverSection(_Receiver):  # type: ignore[misc, valid-type]
     """The receiver's settings, SI units."""
 
 
@@ -74,7 +74,7 @@ class RadioSection(Section):
         return self
 
 
-class DesignSection(_Designers):  # type: ignore[misc]
+class DesignSection(_Designers):  # type: ignore[misc, valid-type]
     """How the scheme `optimized` chooses codes."""
 
     method: Literal[tuple(DESIGNERS)] = "genetic"  # type: ignore[valid-type]

@@ -1,0 +1,29 @@
+"""`rislam-rt check SCENE`."""
+
+from pathlib import Path
+
+import typer
+
+from rislam_rt.cli.options import JsonFile, SceneFolder, write_json
+
+
+def command(scene: SceneFolder, json: JsonFile = None) -> None:
+    """Look for what is wrong with a scene. Exit code 2 if it is unusable; warnings are allowed."""
+    from rislam_rt.scene import check_scene
+
+    findings = check_scene(Path(scene))
+    for finding in findings:
+        typer.echo(f"{finding.severity}: {finding.line}")
+    errors = sum(finding.severity == "error" for finding in findings)
+    fields = ("severity", "file", "field", "message", "mend")
+    write_json(
+        json,
+        {
+            "scene": str(scene),
+            "errors": errors,
+            "findings": [{name: getattr(finding, name) for name in fields} for finding in findings],
+        },
+    )
+    typer.echo(f"{scene}: {errors} errors, {len(findings) - errors} warnings")
+    if errors:
+        raise typer.Exit(2)

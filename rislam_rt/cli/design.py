@@ -1,0 +1,39 @@
+"""`rislam-rt design SCENE`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rislam_rt.cli.options import ChannelName, Depth, JsonFile, SceneFolder, Seed, write_json
+
+
+def command(
+    scene: SceneFolder,
+    at: Annotated[str, typer.Option(metavar="X,Y,Z", help="The agent's midpoint [m].", show_default=False)],
+    depth: Depth = 2,
+    channel: ChannelName = "image_source",
+    seed: Seed = 7,
+    figure: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the codes (PNG or SVG).")] = None,
+    json: JsonFile = None,
+) -> None:
+    """Design the panel's code for one position with every method, and say how far each is from the optimum."""
+    import numpy as np
+
+    from rislam_rt.cli.scenes import open_scene, parse_point
+    from rislam_rt.model import RadioConfig
+    from rislam_rt.pipeline.design_at import design_at, design_table
+    from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.report.tables import print_designs
+
+    room = open_scene(scene)
+    point = parse_point(at, room)
+    prepare_channel(channel)
+    designs = design_at(room, RadioConfig(), point, channel=channel, depth=depth, rng=np.random.default_rng(seed))
+    table = design_table(designs)
+    print_designs(room.name, point, designs)
+    if figure is not None:
+        from rislam_rt.report.code import draw_codes
+
+        typer.echo(f"figure: {draw_codes(designs, figure)}")
+    write_json(json, {"scene": room.name, "at_m": point.tolist(), "seed": seed, **table})

@@ -1,0 +1,33 @@
+"""Arguments that several commands share, and the machine-readable copy of what they print."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+SceneFolder = Annotated[
+    Path, typer.Argument(metavar="SCENE", help="Scene folder, or its scene.toml.", show_default=False)
+]
+JsonFile = Annotated[
+    Path | None, typer.Option("--json", metavar="FILE", help="Write what is printed to FILE, machine-readable.")
+]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of all random draws.")]
+Depth = Annotated[int, typer.Option(min=0, max=4, help="Largest number of wall bounces on a path.")]
+ChannelName = Annotated[Literal["traced", "image_source"], typer.Option(help="Ray tracer, or exact image sources.")]
+
+
+def write_json(file: Path | None, content: dict[str, Any]) -> None:
+    """Write a JSON file whole or not at all; nothing if no file was asked for.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    if file is None:
+        return
+    import json
+
+    from rislam_rt.pipeline.files import write_atomic
+
+    write_atomic(file, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())

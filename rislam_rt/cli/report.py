@@ -1,0 +1,25 @@
+"""`rislam-rt report RUN`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rislam_rt.cli.options import JsonFile, write_json
+
+
+def command(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a completed run.", show_default=False)],
+    json: JsonFile = None,
+) -> None:
+    """Score a completed run again and draw its figures and page."""
+    from rislam_rt.pipeline.store import read_run
+    from rislam_rt.pipeline.summary import summarise
+    from rislam_rt.report import write_report
+    from rislam_rt.report.tables import print_summary
+
+    result = read_run(run)
+    summary = summarise(result)
+    print_summary(summary)
+    typer.echo(f"report: {write_report(result, summary, run)}")
+    write_json(json, summary)

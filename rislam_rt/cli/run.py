@@ -1,0 +1,74 @@
+"""`rislam-rt run PIPELINE`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rislam_rt.cli.options import JsonFile, write_json
+
+
+def command(
+    pipeline: Annotated[Path, typer.Argument(metavar="PIPELINE", help="Pipeline file (TOML).", show_default=False)],
+    scene: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Scene folder; the pipeline's own by default.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Change a setting, e.g. radio.bandwidth_ghz=0.5."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Run folder; runs/<pipeline>-<scene>-<seed> by default.")
+    ] = None,
+    json: JsonFile = None,
+    page: Annotated[
+        bool, typer.Option("--report/--no-report", help="Whether to draw the figures and the page.")
+    ] = True,
+) -> None:
+    """Run a pipeline in a room: trace, then design, measure, localise and map, cycle by cycle.
+
+    An interrupted run goes on where it stopped when the same command is given again; a completed one is replaced.
+    """
+    import numpy as np
+
+    from rislam_rt.cli.progress import show_progress
+    from rislam_rt.cli.scenes import open_scene
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.pipeline import load_spec, run_slam
+    from rislam_rt.pipeline.run import check_run, prepare_channel
+    from rislam_rt.pipeline.store import PartialRun, check_folder, run_folder, run_identity
+    from rislam_rt.pipeline.summary import summarise
+    from rislam_rt.report.tables import print_summary
+
+    spec = load_spec(pipeline, set_ or ())
+    if scene is None:
+        if spec.scene is None:
+            raise ConfigError(f"{pipeline}: scene: not given; add it, or give --scene DIR")
+        scene = pipeline.parent / spec.scene
+    room = open_scene(scene)
+    check_run(room, spec)
+    folder = out or run_folder(spec, room, Path("runs"))
+    check_folder(folder)
+    prepare_channel(spec.channel)
+
+    partial = PartialRun(folder, run_identity(spec, room))
+    try:
+        with show_progress() as progress:
+            result = run_slam(room, spec, rng=np.random.default_rng(spec.seed), done=partial, progress=progress)
+    except KeyboardInterrupt:
+        kept = len(partial)
+        partial.abandon()
+        typer.echo(f"interrupted: {kept} schemes kept; the same command goes on from there", err=True)
+        raise typer.Exit(130) from None
+    except BaseException:
+        partial.abandon()
+        raise
+    summary = summarise(result)
+    folder = partial.complete(result, summary)
+    print_summary(summary)
+    if page:
+        from rislam_rt.report import write_report
+
+        typer.echo(f"report: {write_report(result, summary, folder)}")
+    typer.echo(f"run folder: {folder}")
+    write_json(json, summary)

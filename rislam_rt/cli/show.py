@@ -1,0 +1,22 @@
+"""`rislam-rt show SCENE`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rislam_rt.cli.options import SceneFolder
+
+
+def command(
+    scene: SceneFolder,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Picture to write (PNG or SVG).")] = None,
+) -> None:
+    """Describe a scene, and draw it from above and in three dimensions."""
+    from rislam_rt.cli.scenes import open_scene
+    from rislam_rt.report.room import draw_scene
+    from rislam_rt.report.tables import print_scene
+
+    room = open_scene(scene)
+    print_scene(room)
+    typer.echo(f"picture: {draw_scene(room, out or Path(f'{room.name}.png'))}")

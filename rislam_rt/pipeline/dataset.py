@@ -1,0 +1,183 @@
+"""Results as NetCDF data sets, with units and meaning in the attributes, and back."""
+
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rislam_rt.errors import StoreError
+from rislam_rt.model import MapEstimate, Paths, SchemeResult, Trajectory
+from rislam_rt.pipeline.files import write_atomic
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Entry = tuple[tuple[str, ...], str, str]
+"""Dimensions, unit, meaning."""
+
+TRAJECTORY: dict[str, Entry] = {
+    "time": (("cycle",), "s", "time of the cycle's measurement"),
+    "true_position": (("cycle", "xyz"), "m", "true midpoint of Tx and Rx"),
+    "true_velocity": (("cycle", "xyz"), "m/s", "true velocity"),
+    "true_heading": (("cycle",), "rad", "true heading about z"),
+}
+PATHS: dict[str, Entry] = {
+    "kind": (("path",), "1", "0 LOS, 1 VT, 2 PS, 3 VS, 4 RIS, 5 VRIS"),
+    "landmark": (("path",), "1", "index into attribute 'landmarks', -1 for LOS and VT"),
+    "tx_walls": (("path", "bounce"), "1", "walls between Tx and landmark, index into attribute 'walls', -1 padding"),
+    "rx_walls": (("path", "bounce"), "1", "walls between landmark and Rx, likewise"),
+    "valid": (("cycle", "path"), "1", "whether the path exists; other entries mean nothing where it does not"),
+    "tau": (("cycle", "path"), "s", "delay"),
+    "departure": (("cycle", "path", "xyz"), "1", "unit vector away from the Tx"),
+    "arrival": (("cycle", "path", "xyz"), "1", "unit vector from the Rx towards the arriving ray"),
+    "gain": (("cycle", "path"), "1", "complex gain, carrier phase included, panel at level 0"),
+    "vertices": (("cycle", "path", "vertex", "xyz"), "m", "interaction points in the order of travel"),
+    "num_vertices": (("path",), "1", "number of interaction points that count"),
+}
+SCHEME: dict[str, Entry] = {
+    "position": (("cycle", "xyz"), "m", "estimated midpoint of Tx and Rx"),
+    "velocity": (("cycle", "xyz"), "m/s", "estimated velocity"),
+    "heading": (("cycle",), "rad", "heading about z"),
+    "covariance": (("cycle", "state", "state_"), "m, m/s", "believed covariance of position and velocity"),
+    "sent": (("cycle", "row", "col"), "1", "phase levels that the agent sent"),
+    "applied": (("cycle", "row", "col"), "1", "phase levels while the signals were taken"),
+    "gain": (("cycle", "path"), "1", "true complex gain under the applied code"),
+    "component_path": (("cycle", "component"), "1", "truth: path of each component, -1 clutter, -9 no component"),
+    "component_landmark": (
+        ("cycle", "component"),
+        "1",
+        "landmark taken for it, -1 unused, -2 removed, -9 no component",
+    ),
+    "ident": (("landmark",), "1", "number of each landmark ever held"),
+    "parent": (("landmark",), "1", "number of the landmark whose mirror image this is, -1 for a point"),
+    "held": (("cycle", "landmark"), "1", "whether the landmark was in the map"),
+    "landmark_position": (("cycle", "landmark", "xyz"), "m", "its estimated position"),
+    "ris_probability": (("cycle", "landmark"), "1", "probability of being the panel"),
+    "seconds": (("cycle", "step"), "s", "time taken by optimise, communicate, measure, localise"),
+}
+MAP: dict[str, Entry] = {
+    "ident": (("feature",), "1", "number of the landmark or image"),
+    "position": (("feature", "xyz"), "m", "estimated position"),
+    "covariance": (("feature", "xyz", "xyz_"), "m2", "believed covariance"),
+    "parent": (("feature",), "1", "row of the landmark whose image this is, -1 for none"),
+    "ris_probability": (("feature",), "1", "probability of being the panel"),
+    "strength": (("feature",), "m", "root of the cross-section; for an image, amplitude ratio of the wall"),
+    "wall_normal": (("wall", "xyz"), "1", "unit normal, away from the agent"),
+    "wall_offset": (("wall",), "m", "normal . x = offset"),
+    "wall_std": (("wall", "angle_offset"), "rad, m", "standard deviations of angle and offset"),
+}
+
+
+def paths_to_dataset(paths: Paths, motion: Trajectory) -> "xr.Dataset":
+    """True trajectory and true paths."""
+    content = _arrays(paths, PATHS, "")
+    truth = {"true_position": motion.position, "true_velocity": motion.velocity, "true_heading": motion.heading}
+    content |= _entries({"time": motion.time, **truth}, TRAJECTORY, "")
+    attributes = {"walls": list(paths.walls), "landmarks": list(paths.landmarks), "source": paths.source}
+    return _dataset(content, attributes)
+
+
+def dataset_to_paths(data: "xr.Dataset") -> Paths:
+    """The inverse of `paths_to_dataset`."""
+    walls, landmarks = (_names(data.attrs[name]) for name in ("walls", "landmarks"))
+    return Paths(**_values(data, PATHS, ""), walls=walls, landmarks=landmarks, source=str(data.attrs["source"]))
+
+
+def scheme_to_dataset(result: SchemeResult) -> "xr.Dataset":
+    """One scheme, with the filter's diagnostics as `info_...` and its last map as `map_...`."""
+    content = _arrays(result, SCHEME, "") | _arrays(result.map, MAP, "map_")
+    for name, values in result.info.items():
+        content[f"info_{name}"] = (("cycle",), values, {"long_name": f"filter diagnostic {name}"})
+    outcomes = sorted(set(result.outcome))
+    codes = np.array([outcomes.index(outcome) for outcome in result.outcome], dtype=np.int64)
+    content["outcome"] = (("cycle",), codes, {"long_name": "how the cycle went, index into attribute 'outcomes'"})
+    return _dataset(content, {"scheme": result.scheme, "levels": result.levels, "outcomes": outcomes})
+
+
+def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
+    """The inverse of `scheme_to_dataset`."""
+    outcomes = _names(data.attrs["outcomes"])
+    return SchemeResult(
+        scheme=str(data.attrs["scheme"]),
+        levels=int(data.attrs["levels"]),
+        **_values(data, SCHEME, ""),
+        info={str(n).removeprefix("info_"): data[n].to_numpy() for n in data.data_vars if str(n).startswith("info_")},
+        outcome=tuple(outcomes[code] for code in data["outcome"].to_numpy()),
+        map=MapEstimate(**_values(data, MAP, "map_")),
+    )
+
+
+def write_dataset(data: "xr.Dataset", path: Path) -> None:
+    """Write NetCDF whole or not at all.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    squeeze = {"zlib": True, "complevel": 1}
+    content = data.to_netcdf(
+        engine="h5netcdf", encoding={name: squeeze for name, value in data.data_vars.items() if value.size > 1000}
+    )
+    write_atomic(path, bytes(content))
+
+
+def read_dataset(path: Path) -> "xr.Dataset":
+    """Read NetCDF into memory.
+
+    Raises
+    ------
+    StoreError
+        The file is missing or damaged.
+    """
+    import xarray as xr
+
+    try:
+        return xr.load_dataset(path, engine="h5netcdf")
+    except FileNotFoundError:
+        raise StoreError(f"{path}: no such file; give the folder of a completed run") from None
+    except Exception as error:  # the HDF5 library raises nearly anything on a damaged file
+        raise StoreError(f"{path}: not a readable NetCDF file ({type(error).__name__}); run again") from None
+
+
+def _arrays(record: Any, table: dict[str, Entry], prefix: str) -> dict[str, Any]:
+    names = {f.name for f in fields(record)}
+    return _entries({name: getattr(record, name) for name in table if name in names}, table, prefix)
+
+
+def _entries(values: dict[str, Any], table: dict[str, Entry], prefix: str) -> dict[str, Any]:
+    """Variables with their attributes; NetCDF has no complex numbers, so those become two variables."""
+    content: dict[str, Any] = {}
+    for name, value in values.items():
+        dims, unit, meaning = table[name]
+        dims = tuple(prefix + d if prefix and not d.startswith("xyz") else d for d in dims)
+        parts = [("", value)]
+        if np.iscomplexobj(value):
+            parts = [("_real", np.real(value)), ("_imag", np.imag(value))]
+        for suffix, part in parts:
+            content[prefix + name + suffix] = (dims, part, {"units": unit, "long_name": meaning})
+    return content
+
+
+def _values(data: "xr.Dataset", table: dict[str, Entry], prefix: str) -> dict[str, Any]:
+    """Arrays by field name."""
+    values: dict[str, Any] = {}
+    for name in table:
+        key = prefix + name
+        if f"{key}_real" in data:
+            values[name] = data[f"{key}_real"].to_numpy() + 1j * data[f"{key}_imag"].to_numpy()
+        else:
+            values[name] = data[key].to_numpy()
+    return values
+
+
+def _dataset(content: dict[str, Any], attributes: dict[str, Any]) -> "xr.Dataset":
+    import xarray as xr
+
+    return xr.Dataset(content, attrs={"Conventions": "CF-1.11", **attributes})
+
+
+def _names(value: Any) -> tuple[str, ...]:
+    """Names from an attribute, which NetCDF gives back as one string if there is only one."""
+    return (value,) if isinstance(value, str) else tuple(str(item) for item in value)

@@ -1,0 +1,170 @@
+"""The scores of a run: agent, each landmark, each wall, for every scheme."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.channel.walls import Walls, build_walls
+from rislam_rt.evaluate import association_score, match_points, normalised_squares, position_errors, trajectory_error
+from rislam_rt.model import NOTHING, STEPS, MapEstimate, PathKind, Paths, Scene, SchemeResult, SlamResult
+
+DIVERGED = 0.5
+"""Position error [m] that no run may ever reach: far above any bound here, a fraction of the room."""
+NEAR_LANDMARK = 1.0
+"""Distance [m] from a true landmark beyond which an estimate is not held for it."""
+NEAR_WALL = 0.5
+"""RMS distance [m] from a true wall, over its surface, beyond which an estimated plane is not held for it."""
+
+
+class LandmarkTrack(NamedTuple):
+    """Estimates of the true landmarks over K cycles."""
+
+    error: Floats
+    """(K, N) distance [m] of the estimate that stands for each landmark, NaN where there is none."""
+    column: Integers
+    """(K, N) its column in the scheme's record, -1 where there is none."""
+
+
+def summarise(result: SlamResult) -> dict[str, Any]:
+    """All scores of a run, for JSON."""
+    return {
+        "seed": result.seed,
+        "cycles": len(result.scene.agent),
+        "pipeline": result.name,
+        "scene": result.scene.name,
+        "source": result.paths.source,
+        "trace_seconds": result.seconds.get("trace", 0.0),
+        "schemes": {name: summarise_scheme(result, scheme) for name, scheme in result.schemes.items()},
+    }
+
+
+def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]:
+    """The scores of one scheme."""
+    scene, truth = result.scene, result.scene.agent.position
+    errors = position_errors(scheme.position, truth)
+    motion = trajectory_error(scheme.position, truth) if len(truth) > 1 else None
+    axes = np.flatnonzero(np.einsum("kii->ki", scheme.covariance[:, :3, :3]).min(axis=0) > 0.0)
+    nees = None
+    if len(axes):
+        block = scheme.covariance[:, axes[:, None], axes]
+        nees = float(np.mean(normalised_squares((scheme.position - truth)[:, axes], block))) / len(axes)
+    score = association_score(*component_labels(result.paths, scheme))
+    largest = float(errors.max())
+    return {
+        "rmse_m": float(np.sqrt(np.mean(errors**2))),
+        "final_m": float(errors[-1]),
+        "largest_m": largest,
+        "rmse_aligned_m": motion.rmse_aligned if motion else None,
+        "nees_per_dof": nees if nees is None or np.isfinite(nees) else None,
+        "diverged": largest > DIVERGED,
+        "outcomes": {name: scheme.outcome.count(name) for name in sorted(set(scheme.outcome))},
+        "landmarks": landmark_scores(scene, scheme),
+        "walls": wall_scores(scene, scheme.map),
+        "association": {"accuracy": score.accuracy, "precision": score.precision, "recall": score.recall},
+        "step_seconds": dict(zip(STEPS, scheme.seconds.mean(axis=0).tolist(), strict=True)),
+        "seconds": result.seconds.get(scheme.scheme, 0.0),
+    }
+
+
+def landmark_track(scene: Scene, scheme: SchemeResult) -> LandmarkTrack:
+    """For each true landmark and cycle, the estimated point (not an image) that stands for it, one to one."""
+    truth = scene.landmark_positions
+    error = np.full((len(scheme.position), len(truth)), np.nan)
+    column = np.full(error.shape, -1)
+    points = scheme.held & (scheme.parent < 0)
+    for cycle in range(len(error)):
+        candidates = np.flatnonzero(points[cycle])
+        match = match_points(scheme.landmark_position[cycle, candidates], truth, cutoff=NEAR_LANDMARK)
+        found = np.flatnonzero(match >= 0)
+        column[cycle, found] = candidates[match[found]]
+        where = scheme.landmark_position[cycle, column[cycle, found]]
+        error[cycle, found] = position_errors(where, truth[found])
+    return LandmarkTrack(error, column)
+
+
+def landmark_scores(scene: Scene, scheme: SchemeResult) -> dict[str, dict[str, Any]]:
+    """Error of each landmark: RMS over the cycles that hold it, and at the end; null where it was never found."""
+    track = landmark_track(scene, scheme)
+    scores: dict[str, dict[str, Any]] = {}
+    for number, name in enumerate(scene.landmarks):
+        error, column = track.error[:, number], track.column[:, number]
+        cycles = np.flatnonzero(column >= 0)
+        entry: dict[str, Any] = {
+            "rmse_m": float(np.sqrt(np.mean(error[cycles] ** 2))) if len(cycles) else None,
+            "final_m": float(error[-1]) if column[-1] >= 0 else None,
+            "cycles_held": len(cycles),
+        }
+        if scene.ris is not None and number == len(scene.landmarks) - 1:
+            entry["cycles_identified"] = int(np.sum(scheme.ris_probability[cycles, column[cycles]] > 0.5))
+        scores[name] = entry
+    return scores
+
+
+def wall_scores(scene: Scene, estimate: MapEstimate) -> dict[str, dict[str, Any]]:
+    """Each wall of the last map: RMS distance over its true surface, angle, offset at its middle; null if missing."""
+    walls = build_walls(scene)
+    match = match_walls(walls, estimate)
+    scores: dict[str, dict[str, Any]] = {}
+    for number, name in enumerate(walls.names):
+        row = match[number]
+        if row < 0:
+            scores[name] = {"rmse_m": None, "angle_deg": None, "offset_m": None}
+            continue
+        normal, offset = estimate.wall_normal[row], estimate.wall_offset[row]
+        cosine = abs(float(normal @ walls.normal[number]))
+        sine = float(np.linalg.norm(np.cross(normal, walls.normal[number])))
+        middle, _ = _surface(walls, number)
+        scores[name] = {
+            "rmse_m": surface_rms(walls, number, normal, offset),
+            "angle_deg": float(np.degrees(np.arctan2(sine, cosine))),
+            "offset_m": abs(float(normal @ middle - offset)),
+        }
+    return scores
+
+
+def match_walls(walls: Walls, estimate: MapEstimate) -> Integers:
+    """Row (W,) of the estimated plane that stands for each true wall, -1 for none; one to one."""
+    match = np.full(len(walls), -1)
+    planes = list(zip(estimate.wall_normal, estimate.wall_offset, strict=True))
+    if not planes or not len(walls):
+        return match
+    cost = np.array([[surface_rms(walls, w, n, float(d)) for n, d in planes] for w in range(len(walls))])
+    rows, columns = linear_sum_assignment(np.minimum(cost, 10.0 * NEAR_WALL))
+    good = cost[rows, columns] <= NEAR_WALL
+    match[rows[good]] = columns[good]
+    return match
+
+
+def surface_rms(walls: Walls, number: int, normal: Floats, offset: float) -> float:
+    """RMS distance [m] of a plane from a wall, over the wall's surface.
+
+    The distance is linear in the point: over a triangle its mean square is (sum of squares + square of the sum) / 12.
+    """
+    _, weight = _surface(walls, number)
+    distance = walls.triangles[walls.wall_of_triangle == number] @ normal - offset
+    square = (np.sum(distance**2, axis=1) + np.sum(distance, axis=1) ** 2) / 12.0
+    return float(np.sqrt(weight @ square))
+
+
+def component_labels(paths: Paths, scheme: SchemeResult) -> tuple[Integers, Integers]:
+    """What the agent took each component for, and which landmark or image it truly was; -1 for none, in time order."""
+    shown = scheme.component_path != NOTHING
+    label = np.maximum(scheme.component_landmark[shown], -1)
+    numbers: dict[Any, int] = {}
+    identity = np.full(paths.num_paths + 1, -1)
+    for path in range(paths.num_paths):
+        kind, landmark, tx, rx = paths.identity(path)
+        if kind not in (PathKind.LOS, PathKind.VT):
+            identity[path] = numbers.setdefault((landmark, frozenset((*tx, *rx))), len(numbers))
+    return label, identity[scheme.component_path[shown]]
+
+
+def _surface(walls: Walls, number: int) -> tuple[Floats, Floats]:
+    """Centroid (3,) of a wall and the share (T,) of each of its triangles in its area."""
+    triangles = walls.triangles[walls.wall_of_triangle == number]
+    edges = triangles[:, 1:] - triangles[:, :1]
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
+    weight = area / area.sum()
+    return weight @ triangles.mean(axis=1), weight

@@ -1,0 +1,144 @@
+"""Tables for the terminal."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from rislam_rt.model import PathKind, Paths, Scene
+
+if TYPE_CHECKING:
+    from rislam_rt.arrays import Floats
+    from rislam_rt.channel.compare import PathReport
+    from rislam_rt.design import Design
+
+
+def print_summary(summary: Mapping[str, Any]) -> None:
+    """Agent, landmarks and walls: one row each, one column a scheme."""
+    schemes = summary["schemes"]
+    title = f"{summary['pipeline']} in {summary['scene']}: {summary['cycles']} cycles, seed {summary['seed']}"
+    table = Table(title=title, title_justify="left")
+    table.add_column("RMSE")
+    for name in schemes:
+        table.add_column(name, justify="right")
+    for row in summary_rows(summary):
+        table.add_row(*row)
+    _console().print(table)
+
+
+def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
+    """Rows of text: label, then one entry a scheme."""
+    schemes = list(summary["schemes"].values())
+    first = schemes[0]
+    rows = [["agent", *(_metres(s["rmse_m"]) for s in schemes)]]
+    for name in first["landmarks"]:
+        rows.append([f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)])
+    for name in first["walls"]:
+        rows.append([f"wall {name}", *(_wall(s["walls"][name]) for s in schemes)])
+    rows.append(["diverged", *("yes" if s["diverged"] else "no" for s in schemes)])
+    return rows
+
+
+def path_table(paths: Paths) -> list[dict[str, Any]]:
+    """For every class of paths: how many identities, how many a cycle, and the range of their gains."""
+    rows = []
+    for kind in PathKind:
+        columns = np.flatnonzero(paths.kind == kind)
+        valid = paths.valid[:, columns]
+        if not valid.any():
+            continue
+        level = 20.0 * np.log10(np.maximum(np.abs(paths.gain[:, columns][valid]), 1e-20))
+        rows.append(
+            {
+                "class": kind.name,
+                "identities": len(columns),
+                "mean_per_cycle": float(valid.sum(axis=1).mean()),
+                "lowest_gain_db": float(level.min()),
+                "highest_gain_db": float(level.max()),
+            }
+        )
+    return rows
+
+
+def print_paths(name: str, paths: Paths, rows: list[dict[str, Any]], seconds: float) -> None:
+    """The table of `path_table`."""
+    title = f"{name}: {paths.num_cycles} cycles, {paths.source}, {seconds:.2f} s (panel at level 0)"
+    table = Table("class", "identities", "a cycle", "gain \\[dB]", title=title, title_justify="left")
+    for row in rows:
+        gains = f"{row['lowest_gain_db']:.1f} to {row['highest_gain_db']:.1f}"
+        table.add_row(row["class"], str(row["identities"]), f"{row['mean_per_cycle']:.1f}", gains)
+    _console().print(table)
+
+
+def print_comparison(name: str, report: "PathReport") -> None:
+    """Matched, explained and unexplained paths, and the largest errors."""
+    content = report.as_dict()
+    table = Table("traced against analytic", "", title=f"{name}: {report.cycles} poses", title_justify="left")
+    table.add_row("matched paths", str(content["matched"]))
+    for reason, count in content["explained"].items():
+        table.add_row(f"explained: {reason}", str(count))
+    table.add_row("unexplained", str(content["unexplained"]))
+    for label, key, unit in (
+        ("length", "max_length_error_m", "m"),
+        ("gain", "max_gain_error_db", "dB"),
+        ("phase", "max_phase_error_rad", "rad"),
+        ("angle", "max_angle_error_rad", "rad"),
+    ):
+        table.add_row(f"largest {label} error", f"{content[key]:.2g} {unit}")
+    console = _console()
+    console.print(table)
+    for path in [p for p in report.one_sided if not p.reason][:10]:
+        console.print(f"unexplained: cycle {path.cycle}, {path.label}, only {path.side}", markup=False)
+
+
+def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"]) -> None:
+    """One row a method: gain of the direct path, its gap to the optimum, the bound on the position, time."""
+    at = ", ".join(f"{x:g}" for x in point)
+    table = Table("method", "gain \\[dB]", "gap \\[dB]", "CRLB \\[m]", "time \\[ms]", title=f"{name}, agent at ({at}) m",
+                  title_justify="left")  # fmt: skip
+    for method, design in designs.items():
+        crlb = f"{np.sqrt(design.crlb):.4g}" if np.isfinite(design.crlb) else design.outcome.name.lower()
+        table.add_row(method, f"{design.gain_db:.2f}", f"{design.gap_db:.2f}", crlb, f"{1e3 * design.seconds:.2f}")
+    bound = max(design.bound for design in designs.values())
+    if bound > 0.0:
+        table.add_row("lower bound", "", "", f"{np.sqrt(bound):.4g}", "", style="dim")
+    _console().print(table)
+
+
+def print_scene(scene: Scene) -> None:
+    """What a room holds."""
+    low, high = scene.bounds
+    table = Table("what", "name", "where \\[m]", title=scene.name, title_justify="left")
+    for reflector in scene.reflectors:
+        material = reflector.material
+        kind = f"R = {material.reflection:g}" if material.reflection is not None else f"{material.itu}"
+        table.add_row("reflector", reflector.name, f"{len(reflector.faces)} triangles, {kind}")
+    for scatterer in scene.scatterers:
+        table.add_row("scatterer", scatterer.name, f"{_point(scatterer.position)}, {scatterer.rcs:.3g} m2")
+    if scene.ris is not None:
+        spec = scene.ris.spec
+        table.add_row(
+            "panel", scene.ris.name, f"{_point(scene.ris.center)}, {spec.rows} x {spec.cols}, {spec.levels} levels"
+        )
+    path = scene.agent.position
+    table.add_row("agent", f"{len(path)} cycles", f"{_point(path[0])} to {_point(path[-1])}")
+    table.add_row("bounds", "", f"{_point(low)} to {_point(high)}")
+    _console().print(table)
+
+
+def _console() -> Console:
+    return Console(highlight=False)
+
+
+def _metres(value: float | None) -> str:
+    return "not found" if value is None else f"{value:.3f} m"
+
+
+def _wall(score: Mapping[str, Any]) -> str:
+    return "not found" if score["rmse_m"] is None else f"{score['rmse_m']:.3f} m, {score['angle_deg']:.1f}°"
+
+
+def _point(point: "Floats") -> str:
+    return "(" + ", ".join(f"{x:.2f}" for x in point) + ")"
