@@ -1,0 +1,69 @@
+"""Cross-section of a conducting sphere: physical optics (pi r^2, the scene's default) and the exact Mie series."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import spherical_jn, spherical_yn
+
+from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.model import Scene
+
+
+def with_exact_spheres(scene: Scene, wavelength: float) -> Scene:
+    """The scene with every sphere's cross-section replaced by the exact one for backscatter at `wavelength` [m].
+
+    Scatterers given by a cross-section, not by a radius, stay as they are. One value serves all directions, as in
+    eq. `a2`; `sphere_rcs` gives the dependence on the angle.
+    """
+    exact = tuple(
+        s if s.radius is None else replace(s, rcs=float(sphere_rcs(s.radius, wavelength, np.array(np.pi))[1]))
+        for s in scene.scatterers
+    )
+    return replace(scene, scatterers=exact)
+
+
+def sphere_rcs(radius: float, wavelength: float, angle: Floats) -> tuple[Floats, Floats]:
+    """Bistatic cross-sections (...,) [m^2] of a perfectly conducting sphere, across and in the scattering plane.
+
+    Parameters
+    ----------
+    radius, wavelength
+        [m].
+    angle
+        (...,) [rad] between the directions of travel before and after; pi is back to the source.
+
+    `4 pi |S1|^2 / k^2` and `4 pi |S2|^2 / k^2` of the Mie series (Bohren and Huffman, ch. 4).
+    """
+    number = 2.0 * np.pi / wavelength
+    across, within = mie_amplitudes(number * radius, np.cos(angle))
+    scale = 4.0 * np.pi / number**2
+    return scale * np.abs(across) ** 2, scale * np.abs(within) ** 2
+
+
+def mie_amplitudes(size: float, cos_angle: Floats) -> tuple[Complexes, Complexes]:
+    """Scattering amplitudes S1 and S2 (...,) of a conducting sphere of size parameter k r, per cosine (...,)."""
+    electric, magnetic = mie_coefficients(size)
+    cos_angle = np.asarray(cos_angle, dtype=np.float64)
+    before, here = np.zeros_like(cos_angle), np.ones_like(cos_angle)
+    s1, s2 = (np.zeros(cos_angle.shape, dtype=np.complex128) for _ in range(2))
+    for n, (a, b) in enumerate(zip(electric, magnetic, strict=True), start=1):
+        tau = n * cos_angle * here - (n + 1) * before
+        weight = (2 * n + 1) / (n * (n + 1))
+        s1 += weight * (a * here + b * tau)
+        s2 += weight * (a * tau + b * here)
+        before, here = here, ((2 * n + 1) * cos_angle * here - (n + 1) * before) / n
+    return s1, s2
+
+
+def mie_coefficients(size: float) -> tuple[Complexes, Complexes]:
+    """Coefficients a_n and b_n (N,), n = 1 .. N, of a perfectly conducting sphere of size parameter k r.
+
+    With psi and xi the Riccati-Bessel functions, `a_n = psi_n' / xi_n'`, `b_n = psi_n / xi_n`; Wiscombe's number of
+    terms.
+    """
+    n = np.arange(1, int(size + 4.05 * size ** (1.0 / 3.0) + 2.0) + 1)
+    j, y = spherical_jn(n, size), spherical_yn(n, size)
+    psi, chi = size * j, size * y
+    d_psi = j + size * spherical_jn(n, size, derivative=True)
+    d_chi = y + size * spherical_yn(n, size, derivative=True)
+    return d_psi / (d_psi + 1j * d_chi), psi / (psi + 1j * chi)
