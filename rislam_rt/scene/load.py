@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import Material, Reflector, RisPanel, RisSpec, Scatterer, Scene
+from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene
+from rislam_rt.scene.check import find_errors, find_warnings
 from rislam_rt.scene.findings import Fault, Finding, raise_errors
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, parse_mesh, read_inside
 from rislam_rt.scene.motion import build_motion
@@ -35,7 +36,21 @@ def load_scene(path: str | Path) -> Scene:
     draft = read_draft(path)
     raise_errors(draft.findings)
     assert draft.scene is not None
+    raise_errors(find_errors(draft.scene, draft.file))
     return draft.scene
+
+
+def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> list[Finding]:
+    """Everything wrong (errors) or suspicious (warnings) about a scene, or a scene folder; empty if all is well.
+
+    A bad scene is an answer, not an exception. Warnings about the panel depend on the radio, the default one if none
+    is given; where there are errors, warnings are not looked for.
+    """
+    draft = Draft(scene.name, scene, []) if isinstance(scene, Scene) else read_draft(scene)
+    if draft.scene is None:
+        return draft.findings
+    errors = find_errors(draft.scene, draft.file)
+    return errors or find_warnings(draft.scene, draft.file, radio or RadioConfig())
 
 
 def read_draft(path: str | Path) -> Draft:

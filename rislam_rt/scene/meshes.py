@@ -149,7 +149,7 @@ def _flatten(loaded: Any, node: str | None) -> Mesh:
 
 
 def _checked(mesh: Mesh) -> Mesh:
-    """The mesh, if its numbers make sense on their own."""
+    """The mesh without unused vertices (they would widen the room), if its numbers make sense on their own."""
     vertices, faces = mesh
     if len(faces) == 0:
         raise Fault("the mesh has no faces", "export a mesh with triangles")
@@ -163,4 +163,5 @@ def _checked(mesh: Mesh) -> Mesh:
         raise Fault(f"vertex {int(np.argmax(bad))} is not finite", "export the mesh again")
     if np.abs(vertices).max() > 1e5:
         raise Fault(f"a coordinate of {np.abs(vertices).max():.3g} m", "give metres, near the origin")
-    return mesh
+    used, compact = np.unique(faces, return_inverse=True)
+    return Mesh(vertices[used], compact.reshape(faces.shape).astype(np.int64))

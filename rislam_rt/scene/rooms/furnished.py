@@ -94,7 +94,7 @@ def _glb(walls: dict[str, Mesh], nodes: dict[str, str]) -> bytes:
     scene: Any = trimesh.Scene()
     for node, wall in nodes.items():
         add(node, walls[wall], _Y_UP)
-    add("Table", block([-0.6, -0.35, 0.72], [0.6, 0.35, 0.76]), _Y_UP @ _placed([3.3, 1.4, 0.0], np.radians(25.0)))
+    add("Table", block([-0.6, -0.35, 0.72], [0.6, 0.35, 0.76]), _Y_UP @ _placed([4.15, 0.75, 0.0], np.radians(25.0)))
     mount = _Y_UP @ _placed([0.0, 4.0, 0.0], -np.pi / 2.0)
     scene.graph.update(frame_to="Furniture", frame_from=scene.graph.base_frame, matrix=mount)
     shelf = block([-0.5, 0.0, 0.0], [0.5, 0.3, 0.9])

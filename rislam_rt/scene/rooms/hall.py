@@ -38,18 +38,18 @@ def large_hall() -> Room:
     strip = VAULT_STRIPS // 2 + 2
     low, high = arch[strip], arch[strip + 1]
     along = np.array([0.0, *(high - low)]) / np.linalg.norm(high - low)
-    normal = np.cross(along, [-1.0, 0.0, 0.0])
+    normal = np.cross(along, [1.0, 0.0, 0.0])
     middle = (low + high) / 2.0
     table = {
         "name": "large_hall",
         "reflector": [reflector(name, {"reflection": 0.6} if name == "crates" else None) for name in meshes],
         "scatterer": [sphere("sphere", [17.2, 13.6, 2.3], 0.15), sphere("hook", [21.7, 10.4, 3.1], 0.2)],
-        "ris": panel([18.9, *middle.tolist()], normal.tolist(), along.tolist(), "vault", 16),
+        "ris": panel([18.9, *middle.tolist()], normal.tolist(), along.tolist(), "vault", 10),
         "agent": agent,
     }
     readme = (
         "A hall of 40 x 25 m under a barrel vault of 25 strips (6 m at the eaves, 8 m at the ridge), six round "
-        "pillars of 16 sides and a dozen crates: 4296 triangles in 186 planes. The 16 x 16 panel lies "
+        "pillars of 16 sides and a dozen crates: 4296 triangles in 186 planes. The 10 x 10 panel lies "
         "in a tilted strip."
     )
     return Room(table, meshes, readme, files)

@@ -1,0 +1,107 @@
+"""Scene check, the panel's part: on its host, facing the room, physically plausible for the radio."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.geometry.triangles import triangle_planes
+from rislam_rt.model import RadioConfig, RisPanel
+from rislam_rt.scene.check.probe import ray_hits, touching
+from rislam_rt.scene.check.soup import MIN_CLEARANCE, Soup
+from rislam_rt.scene.findings import Finding
+
+MAX_TURN = 1e-2
+"""[rad] Largest angle between panel and host."""
+
+
+def panel_errors(soup: Soup) -> Iterator[Finding]:
+    """Outside the bounds, off its host, or facing out of the room."""
+    panel = soup.scene.ris
+    if panel is None:
+        return
+    at = panel.center
+    tolerant = soup._replace(bounds=soup.bounds + MIN_CLEARANCE * np.array([[-1.0], [1.0]]))
+    if len(tolerant.outside(at[None])):
+        low, high = np.round(soup.bounds, 3).tolist()
+        message = f"{at.tolist()} lies outside the meshes' bounds {low} to {high}"
+        yield soup.error("ris.center", message, "move the panel onto its host")
+        return
+    findings = list(_on_host(soup, panel))
+    yield from findings
+    if not findings:
+        yield from _facing(soup, panel)
+
+
+def panel_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
+    """Never seen from the front; reflecting more than a plate; delay spread above 1 / B."""
+    panel = soup.scene.ris
+    if panel is None:
+        return
+    spec, motion = panel.spec, soup.scene.agent
+    if ((motion.position - panel.center) @ spec.normal <= 0.0).all():
+        yield soup.warning("ris.normal", "the agent is never in front of the panel", "turn the panel or the path")
+    area = float(spec.spacing[0] * spec.spacing[1])
+    excess = 10.0 * np.log10(2.0 * radio.wavelength**2 / (np.pi * area))
+    if spec.element == "tang" and excess > 0.5:
+        message = f"at {radio.carrier / 1e9:g} GHz 'tang' elements reflect {excess:.2f} dB more than a perfect plate"
+        yield soup.warning("ris.element", message, "take 'energy', unless the paper's model is wanted")
+    spread = _delay_spread(soup, panel)
+    if spread * radio.bandwidth > 1.0:
+        message = f"delays over the panel spread by up to {spread * 1e9:.2f} ns, more than 1/B"
+        yield soup.warning("ris.rows", message, "take a smaller panel or a smaller bandwidth")
+
+
+def _on_host(soup: Soup, panel: RisPanel) -> Iterator[Finding]:
+    names = [r.name for r in soup.scene.reflectors]
+    _, near = touching(panel.center[None], soup.triangles, MIN_CLEARANCE)
+    behind = sorted({soup.name(int(t)) for t in near})
+    if panel.host is None:
+        if behind:
+            yield soup.error("ris.host", f"missing, and the panel lies on '{behind[0]}'", f'add host = "{behind[0]}"')
+        return
+    if panel.host not in names:
+        yield soup.error("ris.host", f"'{panel.host}' is no reflector", f"give one of {', '.join(names[:12])}")
+        return
+    if panel.host not in behind:
+        gap = _gap(soup, panel)
+        message = f"{panel.center.tolist()} is {gap * 1e3:.3g} mm off '{panel.host}'" if gap > MIN_CLEARANCE else (
+            f"{panel.center.tolist()} lies beside '{panel.host}', in its plane"
+        )  # fmt: skip
+        yield soup.error("ris.center", message, "move the panel onto its host")
+        return
+    normal, _ = triangle_planes(soup.triangles[[t for t in near if soup.name(int(t)) == panel.host]])
+    turn = np.linalg.norm(np.cross(normal, panel.spec.normal), axis=-1).min()
+    if turn > MAX_TURN:
+        angle = np.degrees(np.arcsin(min(turn, 1.0)))
+        yield soup.error(
+            "ris.normal", f"{angle:.2f} degrees from the normal of '{panel.host}'", "lay it flat on its host"
+        )
+
+
+def _gap(soup: Soup, panel: RisPanel) -> float:
+    """Distance [m] from the nearest plane of the host."""
+    host = [r.name for r in soup.scene.reflectors].index(panel.host or "")
+    normal, offset = triangle_planes(soup.triangles[soup.owner == host])
+    return float(np.abs(normal @ panel.center - offset).min())
+
+
+def _facing(soup: Soup, panel: RisPanel) -> Iterator[Finding]:
+    """The room is where rays hit something: a panel with nothing before and something behind it looks out."""
+    ahead, behind = (
+        ray_hits(panel.center + side * 2.0 * MIN_CLEARANCE * panel.spec.normal, np.array([side * panel.spec.normal]),
+                 soup.triangles)[0] >= 0
+        for side in (1.0, -1.0)
+    )  # fmt: skip
+    if behind and not ahead:
+        yield soup.error("ris.normal", f"{panel.spec.normal.tolist()} points out of the room", "reverse it")
+
+
+def _delay_spread(soup: Soup, panel: RisPanel) -> float:
+    """Largest difference [s] over elements of the delay Tx, element, Rx, at 50 cycles of the motion."""
+    motion = soup.scene.agent
+    cycles = np.unique(np.linspace(0, len(motion) - 1, 50).astype(np.int64))
+    corners = panel.spec.offsets()[:: max(panel.spec.rows - 1, 1), :: max(panel.spec.cols - 1, 1)].reshape(-1, 3)
+    elements = panel.center + np.concatenate([corners, np.zeros((1, 3))])
+    length = sum(np.linalg.norm(end[cycles, None, :] - elements, axis=-1) for end in (motion.tx, motion.rx))
+    return float(np.ptp(length, axis=1).max() / SPEED_OF_LIGHT)
