@@ -1,1 +1,17 @@
+"""Ray-traced paths: Sionna RT and Mitsuba on the room's meshes. The only folder that imports them, and late.
 
+How a trajectory of K cycles becomes few solves:
+
+- *legs*, not pairs: a landmark is a far end, all Tx and Rx positions are devices, and every cycle's paths are joined
+  from its legs (`compose.py`); LOS and VT are legs from Tx k to Rx k. One row asks for one device, far end and wall
+  sequence, so nothing is traced that no cycle needs.
+- *candidates* (`sequences.py`) are all wall sequences that the room's planes leave possible, at every position, instead
+  of what randomly shot rays happen to meet. So the set is complete by construction, and the same from run to run.
+- *tracing* (`solve.py`) is Sionna's: its image method mirrors in the meshes' planes and sends rays back through the
+  scene, which decides visibility and the primitives met; its field computation evaluates the radio materials.
+- *refinement* (`refine.py`) recomputes what was found in float64 on the walls' planes.
+"""
+
+from rislam_rt.channel.traced.channel import TracedChannel
+
+__all__ = ["TracedChannel"]

@@ -1,0 +1,85 @@
+"""The traced channel: legs of a whole trajectory from few solves, joined into paths."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rislam_rt.channel.compose import compose_paths
+from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.traced.problem import Problem, build_batch
+from rislam_rt.channel.traced.rows import in_blocks, joined
+from rislam_rt.channel.traced.sequences import wall_sides
+from rislam_rt.channel.traced.start import start_tracer
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.errors import ConfigError
+from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
+from rislam_rt.ris import rephase
+
+BLOCK_ROWS = 200_000
+"""Candidates traced at once: bounds the memory of a solve."""
+
+
+class TracedChannel:
+    """All paths of a room over a trajectory, traced with Sionna RT on the room's meshes.
+
+    Parameters
+    ----------
+    scene, radio
+        The room, and the radio that decides carrier and antenna gains.
+    depth
+        Largest number of wall bounces on a path, both legs together.
+    refine
+        Recompute the bounce points of what the tracer found in float64 on the walls' planes; `Paths.source` says
+        `traced, refined`. Without it the tracer's own float32 vertices stand, good to some micrometres.
+
+    The channel holds the tracer's scene; `paths` may be called for any number of trajectories.
+    """
+
+    def __init__(self, scene: Scene, radio: RadioConfig, depth: int = 2, *, refine: bool = True) -> None:
+        if depth < 0:
+            raise ConfigError(f"depth: {depth} received; give the largest number of bounces, 0 or more")
+        start_tracer()
+        from rislam_rt.channel.traced.stage import build_stage
+
+        self.scene = scene
+        self.radio = radio
+        self.depth = depth
+        self.refine = refine
+        self.walls = build_walls(scene)
+        self._sides = wall_sides(self.walls)
+        self._stage = build_stage(self.walls, radio.carrier)
+
+    def paths(self, trajectory: Trajectory) -> Paths:
+        """Every path of every cycle, with the panel at level 0."""
+        tx, rx = trajectory.tx, trajectory.rx
+        both = np.concatenate([tx, rx])
+        problems = [Problem(tx, rx)] + [Problem(both, point[None]) for point in self.scene.landmark_positions]
+        if self.scene.ris is not None:
+            problems[-1] = problems[-1]._replace(host=self.walls.host, front=self.scene.ris.spec.normal)
+        direct, *landmarks = self._trace(problems)
+        tx_legs = [_cycles(legs, slice(0, len(tx))) for legs in landmarks]
+        rx_legs = [_cycles(legs, slice(len(tx), None)) for legs in landmarks]
+        source = "traced, refined" if self.refine else "traced"
+        return compose_paths(self.scene, self.radio, self.walls, self.depth, direct, tx_legs, rx_legs, source)
+
+    def respond(self, paths: Paths, code: RisCode) -> Paths:
+        """The same paths under another code, without tracing again."""
+        return rephase(paths, code)
+
+    def _trace(self, problems: Sequence[Problem]) -> list[Legs]:
+        """Solve all problems together, block by block."""
+        from rislam_rt.channel.traced.solve import trace_rows
+
+        batch = build_batch(problems, self.walls, self._sides, self.depth)
+        sequences = batch.all_sequences
+        blocks = in_blocks(batch.candidates(self.walls, self._sides), BLOCK_ROWS)
+        found = joined([trace_rows(self._stage, sequences, batch.far, batch.device, rows) for rows in blocks])
+        return batch.legs(self.walls, found, self.refine)
+
+
+def _cycles(legs: Legs, rows: slice) -> Legs:
+    """Some of the devices of a set of legs; sequences that none of them has stay as columns without a leg."""
+    return Legs(
+        legs.walls, legs.valid[rows], legs.length[rows], legs.at_device[rows], legs.at_far_end[rows],
+        legs.coefficient[rows], legs.vertices[rows],
+    )  # fmt: skip

@@ -1,0 +1,66 @@
+"""A wall with the same reflection coefficient at every angle, as a radio material of Sionna RT."""
+
+import drjit as dr
+import mitsuba as mi
+from sionna.rt import InteractionType
+from sionna.rt.radio_materials import RadioMaterialBase
+
+
+class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
+    """Mirror with coefficient R in (0, 1] whatever the angle and the polarisation; nothing passes, nothing scatters.
+
+    The Jones matrix is R times the identity between the (theta, phi) bases of the incident and the reflected ray, in
+    which Sionna carries its fields: a bounce keeps the vertical and the horizontal part of the field and scales both.
+    Any other choice would turn part of a matched signal into the other polarisation, and |R| would depend on the angle.
+    """
+
+    def __init__(self, name: str, reflection: float) -> None:
+        props = mi.Properties("rislam-constant-reflection")
+        props.set_id(name)
+        super().__init__(props)
+        self._reflection = mi.Float(reflection)
+
+    def sample(
+        self,
+        ctx: mi.BSDFContext,
+        si: mi.SurfaceInteraction3f,
+        sample1: mi.Float,
+        sample2: mi.Point2f,
+        active: bool | mi.Bool = True,
+    ) -> tuple[mi.BSDFSample3f, mi.Spectrum]:
+        """Direction of the mirrored ray; always a specular reflection."""
+        count = dr.width(si.wi)
+        result = mi.BSDFSample3f()
+        result.sampled_component = dr.full(mi.UInt32, InteractionType.SPECULAR, count)
+        result.wo = si.to_world(mi.reflect(-si.wi))
+        result.pdf = dr.full(mi.Float, 1.0, count)  # type: ignore[assignment]
+        result.sampled_type = mi.UInt32(+mi.BSDFFlags.DeltaReflection)  # type: ignore[assignment]
+        result.eta = 1.0  # type: ignore[assignment]
+        return result, mi.Spectrum(self._jones())
+
+    def eval(
+        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: bool | mi.Bool = True
+    ) -> mi.Spectrum:
+        """Jones matrix as a real 4 x 4 matrix; zero for anything but a specular reflection."""
+        event = dr.reinterpret_array(mi.UInt, si.dp_du.z)
+        return mi.Spectrum(dr.select(event == InteractionType.SPECULAR, self._jones(), mi.Matrix4f(0.0)))
+
+    def pdf(
+        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: bool | mi.Bool = True
+    ) -> mi.Float:
+        """Probability of a specular reflection: 1."""
+        return dr.full(mi.Float, 1.0, dr.width(si.wi))
+
+    def traverse(self, callback: mi.TraversalCallback) -> None:
+        """Name R for Mitsuba's differentiable parameters."""
+        callback.put("reflection", self._reflection, mi.ParamFlags.Differentiable)
+
+    def to_string(self) -> str:
+        """Text for people."""
+        return f"ConstantReflection R={self._reflection[0]:.3f}"
+
+    def _jones(self) -> mi.Matrix4f:
+        return mi.Matrix4f(1.0) * self._reflection  # type: ignore[operator]
+
+
+mi.register_bsdf("rislam-constant-reflection", lambda props: ConstantReflection(props.id(), 1.0))

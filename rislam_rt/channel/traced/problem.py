@@ -1,0 +1,119 @@
+"""What is asked of the tracer, and what becomes of its answers: legs between many devices and their far ends."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.traced.refine import refined_course, traced_course
+from rislam_rt.channel.traced.rows import Found, Rows
+from rislam_rt.channel.traced.sequences import point_sides, possible_rows, possible_sequences
+from rislam_rt.channel.walls import Walls
+from rislam_rt.constants import SURFACE_TOLERANCE
+
+LIFT = 2e-6
+"""[m] While tracing, a panel's centre is kept this far in front of its host wall, so that the float32 rounding of the
+wall's mesh cannot hide it: far more than the rounding, and far less than any length that matters."""
+
+
+class Problem(NamedTuple):
+    """Legs sought: devices (N, 3) each to its far end (N, 3), or all to one (1, 3) [m]."""
+
+    device: Floats
+    far: Floats
+    host: int = -1
+    """Wall behind a panel at the far end: no bounce on it next to the panel."""
+    front: Floats | None = None
+    """(3,) normal of that panel, which sees only what lies before it."""
+
+    @property
+    def paired(self) -> bool:
+        """Whether every device has a far end of its own."""
+        return len(self.far) != 1
+
+
+class Batch(NamedTuple):
+    """Several problems in one set of tables, so that one solve serves them all."""
+
+    problems: Sequence[Problem]
+    sequences: list[Integers]
+    """For each problem (S, D)."""
+    device: Floats
+    """(N, 3) [m] of all problems."""
+    far: Floats
+    """(F, 3) [m] of all problems, lifted off host walls."""
+
+    @property
+    def all_sequences(self) -> Integers:
+        """(S, D) of all problems."""
+        return np.concatenate(self.sequences)
+
+    def candidates(self, walls: Walls, sides: Integers) -> Iterator[Rows]:
+        """All rows worth tracing."""
+        first_device = first_far = first_sequence = 0
+        for problem, sequences in zip(self.problems, self.sequences, strict=True):
+            ends = point_sides(walls, problem.device), point_sides(walls, problem.far)
+            for device, sequence in possible_rows(sides, sequences, *ends):
+                far = device if problem.paired else np.zeros_like(device)
+                yield Rows(far + first_far, device + first_device, sequence + first_sequence)
+            first_device += len(problem.device)
+            first_far += len(problem.far)
+            first_sequence += len(sequences)
+
+    def legs(self, walls: Walls, found: Found, refine: bool) -> list[Legs]:
+        """The tracer's answers, problem by problem."""
+        result = []
+        first_device = first_sequence = 0
+        for problem, sequences in zip(self.problems, self.sequences, strict=True):
+            here = found.rows.sequence - first_sequence
+            answer = found.only(np.flatnonzero((here >= 0) & (here < len(sequences))))
+            device, column = answer.rows.device - first_device, answer.rows.sequence - first_sequence
+            result.append(_as_legs(problem, walls, sequences, device, column, answer, refine))
+            first_device += len(problem.device)
+            first_sequence += len(sequences)
+        return result
+
+
+def build_batch(problems: Sequence[Problem], walls: Walls, sides: Integers, depth: int) -> Batch:
+    """Enumerate the wall sequences of every problem up to `depth` bounces."""
+    sequences = []
+    for problem in problems:
+        device_side, far_side = (np.bitwise_or.reduce(point_sides(walls, p)) for p in (problem.device, problem.far))
+        sequences.append(possible_sequences(sides, device_side, far_side, depth, problem.host))
+    device = np.concatenate([problem.device for problem in problems])
+    return Batch(problems, sequences, device, np.concatenate([_lifted(problem, walls) for problem in problems]))
+
+
+def _lifted(problem: Problem, walls: Walls) -> Floats:
+    """Far ends (F, 3), a panel's at least `LIFT` in front of its host wall."""
+    if problem.host < 0 or problem.front is None:
+        return problem.far
+    outward = np.copysign(1.0, walls.normal[problem.host] @ problem.front)
+    height = outward * (problem.far @ walls.normal[problem.host] - walls.offset[problem.host])
+    return problem.far + np.maximum(LIFT - height, 0.0)[:, None] * problem.front
+
+
+def _as_legs(
+    problem: Problem, walls: Walls, sequences: Integers, device: Integers, column: Integers, found: Found, refine: bool
+) -> Legs:
+    """Scatter found legs into dense arrays, one column a sequence that some device has."""
+    start, end = problem.device[device], problem.far[device if problem.paired else np.zeros_like(device)]
+    used = sequences[column]
+    course = refined_course(walls, used, start, end) if refine else traced_course(used, start, end, found)
+    keep = np.ones(len(device), dtype=np.bool_)
+    if problem.front is not None:
+        keep = course.at_far_end @ problem.front > SURFACE_TOLERANCE
+    columns, place = np.unique(column[keep], return_inverse=True)
+    shape = len(problem.device), len(columns)
+
+    def dense(part: Any) -> Any:
+        values = np.zeros(shape + part.shape[1:], dtype=part.dtype)
+        values[device[keep], place] = part[keep]
+        return values
+
+    return Legs(
+        sequences[columns], dense(np.ones(len(device), dtype=np.bool_)), dense(course.length), dense(course.at_device),
+        dense(course.at_far_end), dense(found.coefficient), dense(course.vertices),
+    )  # fmt: skip

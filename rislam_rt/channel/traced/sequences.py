@@ -1,0 +1,118 @@
+"""Which wall sequences the tracer is asked about: all that the walls' places in the room leave possible.
+
+A reflection needs both its neighbours (a wall, or an end of the leg) on the same side of its plane. What that rules
+out is not asked; everything else is, for every position, so no path depends on where rays happen to be shot.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.walls import Walls
+from rislam_rt.constants import SURFACE_TOLERANCE
+
+FRONT, BACK = 1, 2
+"""Sides of a plane, as bits: a wall may have parts on both."""
+
+NO_WALL = -1
+"""Padding of sequences."""
+
+_BLOCK = 4_000_000
+"""Largest number of entries of a temporary table."""
+
+
+def wall_sides(walls: Walls) -> Integers:
+    """(W, W): on which sides of wall i's plane wall j has parts."""
+    order = np.argsort(walls.wall_of_triangle, kind="stable")
+    corners = walls.triangles[order].reshape(-1, 3)
+    first = 3 * np.searchsorted(walls.wall_of_triangle[order], np.arange(len(walls)))
+    sides = np.zeros((len(walls), len(walls)), dtype=np.int64)
+    for rows in _blocks(len(walls), len(corners)):
+        height = walls.normal[rows] @ corners.T - walls.offset[rows, None]
+        sides[rows] = np.where(np.maximum.reduceat(height, first, axis=1) > SURFACE_TOLERANCE, FRONT, 0)
+        sides[rows] |= np.where(np.minimum.reduceat(height, first, axis=1) < -SURFACE_TOLERANCE, BACK, 0)
+    return sides
+
+
+def point_sides(walls: Walls, points: Floats) -> Integers:
+    """(N, W): on which side of wall j's plane point i lies; 0 in the plane."""
+    height = points @ walls.normal.T - walls.offset
+    return np.where(height > SURFACE_TOLERANCE, FRONT, np.where(height < -SURFACE_TOLERANCE, BACK, 0))
+
+
+def possible_sequences(sides: Integers, device: Integers, far: Integers, depth: int, host: int = NO_WALL) -> Integers:
+    """Wall sequences (S, depth) of up to `depth` bounces, from device to far end, padded with `NO_WALL`.
+
+    Parameters
+    ----------
+    sides
+        (W, W) of `wall_sides`.
+    device, far
+        (W,) sides of every wall on which the ends ever are.
+    host
+        A wall that may not come last.
+    """
+    last = np.flatnonzero((far > 0) & (np.arange(len(sides)) != host))
+    level, onward = last[:, None], far[last]
+    found = [np.full((1, depth), NO_WALL)]
+    for bounces in range(1, depth + 1):
+        complete = level[(device[level[:, 0]] & onward) > 0]
+        found.append(np.pad(complete, ((0, 0), (0, depth - bounces)), constant_values=NO_WALL))
+        if bounces < depth:
+            level, onward = _with_wall_before(level, onward, sides)
+    return np.concatenate(found)
+
+
+def possible_rows(
+    sides: Integers, sequences: Integers, device: Integers, far: Integers
+) -> Iterator[tuple[Integers, Integers]]:
+    """Pairs (device, sequence) worth tracing, in blocks, of sequences (S, D).
+
+    Parameters
+    ----------
+    device, far
+        (N, W) and (N or 1, W) sides of every wall on which the single ends are; device i belongs with far end i.
+    """
+    turned = turned_round(sequences)
+    for rows in _blocks(len(sequences), 8 * len(device)):
+        keep = _same_side(sides, device, far, sequences[rows]) & _same_side(sides, far, device, turned[rows])
+        index, sequence = np.nonzero(np.broadcast_to(keep, (len(device), keep.shape[1])))
+        yield index, sequence + rows.start
+
+
+def turned_round(sequences: Integers) -> Integers:
+    """Sequences (S, D) in the opposite order, padding kept at the end."""
+    index = (sequences != NO_WALL).sum(axis=1)[:, None] - 1 - np.arange(sequences.shape[1])
+    return np.where(index >= 0, np.take_along_axis(sequences, np.maximum(index, 0), axis=1), NO_WALL)
+
+
+def _same_side(sides: Integers, end: Integers, other: Integers, sequences: Integers) -> Booleans:
+    """(N, S): whether an end (N, W) lies where its first wall's other neighbour (a wall, or the other end) has a part.
+
+    A sequence without walls has nothing to violate.
+    """
+    if sequences.shape[1] == 0:
+        return np.ones((len(end), len(sequences)), dtype=np.bool_)
+    first = sequences[:, 0]
+    second = sequences[:, 1] if sequences.shape[1] > 1 else np.full(len(sequences), NO_WALL)
+    neighbour = np.where(second == NO_WALL, other[:, first], sides[first, second])
+    return ((end[:, first] & neighbour) > 0) | (first == NO_WALL)
+
+
+def _with_wall_before(level: Integers, onward: Integers, sides: Integers) -> tuple[Integers, Integers]:
+    """Put every possible wall in front of sequences (S, d); `onward` (S,) is where they go on their first wall."""
+    grown: list[Integers] = [np.zeros((0, level.shape[1] + 1), dtype=np.int64)]
+    for rows in _blocks(len(level), len(sides)):
+        first = level[rows, 0]
+        row, wall = np.nonzero(((sides[first] & onward[rows, None]) > 0) & (sides[:, first].T > 0))
+        grown.append(np.concatenate([wall[:, None], level[rows][row]], axis=1))
+    longer = np.concatenate(grown)
+    return longer, sides[longer[:, 0], longer[:, 1]]
+
+
+def _blocks(count: int, width: int) -> Iterator[slice]:
+    """Slices of `count` rows such that rows times width stay bounded."""
+    step = max(1, _BLOCK // max(width, 1))
+    for start in range(0, count, step):
+        yield slice(start, min(start + step, count))

@@ -1,0 +1,114 @@
+"""The room as Sionna RT sees it: one mesh a material, triangle numbers kept, so that every hit names its wall."""
+
+from dataclasses import dataclass
+
+import mitsuba as mi
+import numpy as np
+import sionna.rt as rt
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.channel.traced.material import ConstantReflection
+from rislam_rt.channel.traced.sequences import NO_WALL
+from rislam_rt.channel.walls import Walls
+from rislam_rt.errors import SceneError
+from rislam_rt.model import Material
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stage:
+    """A Sionna RT scene and the correspondence of its (shape, primitive) pairs with walls."""
+
+    scene: rt.Scene
+    shape: Integers
+    """(W,) shape of one triangle of each wall, its largest."""
+    primitive: Integers
+    """(W,) its number in that shape."""
+    corner: Floats
+    """(W, 3) [m] one of its corners."""
+    shapes: Integers
+    """(M,) all shapes, ascending."""
+    first: Integers
+    """(M,) where each shape's triangles begin in `wall_of_primitive`."""
+    wall_of_primitive: Integers
+    """(T,) walls, shape by shape."""
+
+    def wall_hit(self, shape: Integers, primitive: Integers) -> Integers:
+        """Walls (...,) of hits, `NO_WALL` where nothing was hit."""
+        place = np.searchsorted(self.shapes, shape)
+        known = (place < len(self.shapes)) & np.isin(shape, self.shapes)
+        index = np.where(known, self.first[np.where(known, place, 0)] + primitive, 0)
+        return np.where(known, self.wall_of_primitive[index], NO_WALL)
+
+
+def build_stage(walls: Walls, carrier: float) -> Stage:
+    """Put the walls on stage at the carrier [Hz]: meshes built in memory, no file read, nothing merged or reordered.
+
+    Raises
+    ------
+    SceneError
+        Sionna does not know a material at this carrier.
+    """
+    scene = rt.load_scene()
+    scene.frequency = carrier
+    materials = list(dict.fromkeys(walls.material))
+    material_of_triangle = np.array([materials.index(m) for m in walls.material], dtype=np.int64)[
+        walls.wall_of_triangle
+    ]
+    members = [np.flatnonzero(material_of_triangle == m) for m in range(len(materials))]
+    objects = [
+        rt.SceneObject(_mesh(f"walls-{m}", walls.triangles[rows]), f"walls-{m}", radio_material=_material(material, m))
+        for m, (material, rows) in enumerate(zip(materials, members, strict=True))
+    ]
+    try:
+        scene.add(objects)
+    except ValueError as error:
+        raise SceneError(f"material: {error}; give an ITU material that is specified at {carrier:g} Hz") from None
+    ids = np.array([int(o.object_id) for o in objects], dtype=np.int64)
+    return _numbered(scene, walls, ids, members)
+
+
+def _numbered(scene: rt.Scene, walls: Walls, ids: Integers, members: list[Integers]) -> Stage:
+    """Number the triangles of all shapes (M,) and pick each wall's largest."""
+    order = np.argsort(ids)
+    rows = np.concatenate([members[m] for m in order] or [np.zeros(0, dtype=np.int64)])
+    sizes = [len(members[m]) for m in order]
+    first = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64) if sizes else np.zeros(0, dtype=np.int64)
+    place = np.argsort(rows)
+    shape_of = np.repeat(ids[order], sizes)[place]
+    primitive_of = (np.arange(len(rows)) - np.repeat(first, sizes))[place]
+    edge = walls.triangles[:, 1:] - walls.triangles[:, :1]
+    area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=-1)
+    by_size = np.lexsort((-area, walls.wall_of_triangle))
+    largest = by_size[np.unique(walls.wall_of_triangle[by_size], return_index=True)[1]]
+    return Stage(
+        scene,
+        shape_of[largest],
+        primitive_of[largest],
+        walls.triangles[largest, 0],
+        ids[order],
+        first,
+        walls.wall_of_triangle[rows],
+    )
+
+
+def _mesh(name: str, triangles: Floats) -> mi.Mesh:
+    """A mesh of separate triangles (T, 3, 3), in their order."""
+    mesh = mi.Mesh(
+        name, vertex_count=3 * len(triangles), face_count=len(triangles), has_vertex_normals=False,
+        has_vertex_texcoords=False,
+    )  # fmt: skip
+    params = mi.traverse(mesh)
+    params["vertex_positions"] = mi.Float(triangles.astype(np.float32).ravel())
+    params["faces"] = mi.UInt(np.arange(3 * len(triangles), dtype=np.uint32))
+    params.update()
+    return mesh
+
+
+def _material(material: Material, number: int) -> rt.RadioMaterialBase:
+    """The radio material of a wall: a constant R of ours, or Sionna's own slab of an ITU-R P.2040 material."""
+    if material.reflection is not None:
+        return ConstantReflection(f"constant-{number}", material.reflection)
+    try:
+        return rt.ITURadioMaterial(f"itu-{number}", material.itu, material.thickness)
+    except ValueError as error:
+        raise SceneError(f"material.itu: '{material.itu}' received; {error}") from None

@@ -1,0 +1,21 @@
+"""Start the tracer once, on the backend that `rislam_rt.backend` chose."""
+
+from functools import cache
+from importlib import import_module
+
+from rislam_rt.backend import BackendInfo, prepare_backend
+
+
+@cache
+def start_tracer() -> BackendInfo:
+    """Set Mitsuba's variant and import Sionna RT (3 to 4 s the first time).
+
+    Raises
+    ------
+    SetupError
+        The machine lacks something that the tracer needs.
+    """
+    info = prepare_backend()
+    import_module("mitsuba").set_variant(info.variant)
+    import_module("sionna.rt")
+    return info
