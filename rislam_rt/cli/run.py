@@ -29,6 +29,8 @@ def command(
 
     An interrupted run goes on where it stopped when the same command is given again; a completed one is replaced.
     """
+    import os
+
     import numpy as np
 
     from rislam_rt.cli.progress import show_progress
@@ -44,7 +46,7 @@ def command(
     if scene is None:
         if spec.scene is None:
             raise ConfigError(f"{pipeline}: scene: not given; add it, or give --scene DIR")
-        scene = pipeline.parent / spec.scene
+        scene = Path(os.path.normpath(pipeline.parent / spec.scene))
     room = open_scene(scene)
     check_run(room, spec)
     folder = out or run_folder(spec, room, Path("runs"))

@@ -96,8 +96,8 @@ def print_comparison(name: str, report: "PathReport") -> None:
 def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"]) -> None:
     """One row a method: gain of the direct path, its gap to the optimum, the bound on the position, time."""
     at = ", ".join(f"{x:g}" for x in point)
-    table = Table("method", "gain \\[dB]", "gap \\[dB]", "CRLB \\[m]", "time \\[ms]", title=f"{name}, agent at ({at}) m",
-                  title_justify="left")  # fmt: skip
+    title = f"{name}, agent at ({at}) m"
+    table = Table("method", "gain \\[dB]", "gap \\[dB]", "CRLB \\[m]", "time \\[ms]", title=title, title_justify="left")
     for method, design in designs.items():
         crlb = f"{np.sqrt(design.crlb):.4g}" if np.isfinite(design.crlb) else design.outcome.name.lower()
         table.add_row(method, f"{design.gain_db:.2f}", f"{design.gap_db:.2f}", crlb, f"{1e3 * design.seconds:.2f}")

@@ -1,0 +1,89 @@
+"""The panel's codes as pictures."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+
+from rislam_rt.arrays import Integers
+from rislam_rt.design import Design
+from rislam_rt.model import PathKind, SlamResult
+from rislam_rt.report.room import middle_cycles
+from rislam_rt.report.style import save_figure, styled
+
+MAX_LABELLED = 10
+"""Largest side of a panel whose elements are labelled with their levels."""
+
+
+def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
+    """Codes that the panel was set to at some cycles, one row a scheme; None without a panel."""
+    schemes = [scheme for scheme in result.schemes.values() if scheme.applied.shape[1]]
+    if not schemes:
+        return None
+    cycles = middle_cycles(len(result.scene.agent), number)
+    direct = np.flatnonzero(result.paths.kind == PathKind.RIS)
+    with styled():
+        figure = Figure(figsize=(2.1 * number + 0.8, 2.25 * len(schemes) + 0.3))
+        axes = figure.subplots(len(schemes), number, squeeze=False)
+        for row, scheme in zip(axes, schemes, strict=True):
+            for axis, cycle in zip(row, cycles, strict=True):
+                _draw_code(axis, scheme.applied[cycle], scheme.levels)
+                gain = np.abs(scheme.gain[cycle, direct]).max(initial=0.0)
+                level = f"{20.0 * np.log10(gain):.1f} dB" if gain > 0.0 else "not seen"
+                axis.set_title(f"t = {result.scene.agent.time[cycle]:.0f} s, {level}", fontsize=9)
+            row[0].set_ylabel(scheme.scheme, weight="bold")
+        _colour_bar(figure, axes, schemes[0].levels)
+    return figure
+
+
+def draw_codes(designs: Mapping[str, Design], path: Path) -> Path:
+    """The codes of several designs, with the gain of the direct path; returns the file."""
+    with styled():
+        columns = (len(designs) + 1) // 2
+        figure = Figure(figsize=(2.4 * columns + 0.8, 5.4))
+        axes = figure.subplots(2, columns, squeeze=False)
+        for axis in axes.flat[len(designs) :]:
+            axis.set_visible(False)
+        for axis, (name, design) in zip(axes.flat, designs.items(), strict=False):
+            _draw_code(axis, design.code.index, design.code.levels)
+            axis.set_title(f"{name}\n{design.gain_db:.1f} dB", fontsize=9)
+        _colour_bar(figure, axes, next(iter(designs.values())).code.levels)
+        return save_figure(figure, path)
+
+
+def _draw_code(axis: Axes, index: Integers, levels: int) -> None:
+    """Levels of an (N, M) panel, row 0 at the bottom (rows run along `up`)."""
+    axis.imshow(index, cmap=_colours(levels), vmin=-0.5, vmax=levels - 0.5, origin="lower", interpolation="nearest")
+    axis.set_xticks([])
+    axis.set_yticks([])
+    axis.grid(False)
+    if max(index.shape) <= MAX_LABELLED:
+        for (row, col), level in np.ndenumerate(index):
+            dark = _brightness(int(level), levels) < 0.5
+            axis.text(col, row, str(level), ha="center", va="center", fontsize=7, color="white" if dark else "black")
+
+
+def _colours(levels: int) -> ListedColormap:
+    """One colour a level, from a map that goes round as phase does."""
+    from matplotlib import colormaps
+
+    return ListedColormap(colormaps["twilight"](np.arange(levels) / levels))
+
+
+def _brightness(level: int, levels: int) -> float:
+    red, green, blue, _ = _colours(levels)(int(level))
+    return float(0.299 * red + 0.587 * green + 0.114 * blue)
+
+
+def _colour_bar(figure: Figure, axes: "np.ndarray[tuple[int, ...], np.dtype[np.object_]]", levels: int) -> None:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    scale = ScalarMappable(Normalize(-0.5, levels - 0.5), _colours(levels))
+    ticks = np.arange(levels) if levels <= 16 else np.linspace(0, levels - 1, 5).astype(int)
+    bar = figure.colorbar(scale, ax=axes, ticks=ticks, fraction=0.02, pad=0.02, aspect=30)
+    bar.ax.set_yticklabels([f"{360.0 * level / levels:.0f}°" for level in ticks])
+    bar.set_label("phase shift ξ")

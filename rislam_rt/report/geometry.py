@@ -1,0 +1,49 @@
+"""Lines and polygons of rooms and estimated planes, for drawing."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.channel.walls import Walls
+
+
+def outline_edges(walls: Walls) -> Floats:
+    """(E, 2, 3) [m] edges of all walls, without the lines between triangles of the same wall."""
+    edges = []
+    for wall in range(len(walls)):
+        count: dict[tuple[tuple[float, ...], ...], int] = {}
+        for triangle in np.round(walls.triangles[walls.wall_of_triangle == wall], 9).tolist():
+            corners = [tuple(corner) for corner in triangle]
+            for a, b in pairwise([*corners, corners[0]]):
+                key = tuple(sorted((a, b)))
+                count[key] = count.get(key, 0) + 1
+        edges += [key for key, times in count.items() if times == 1]
+    return np.array(edges, dtype=np.float64).reshape(-1, 2, 3)
+
+
+def plane_trace(normal: Floats, offset: float, height: float, bounds: Floats) -> Floats | None:
+    """Segment (2, 2) [m] in which a plane cuts the horizontal plane at `height`, inside a box; None if it misses."""
+    flat, level = normal[:2], offset - normal[2] * height
+    size = float(np.linalg.norm(flat))
+    if size < 0.5:  # nearer to a floor or a ceiling than to a wall
+        return None
+    foot, along = flat * level / size**2, np.array([-flat[1], flat[0]]) / size
+    enter, leave = -np.inf, np.inf
+    for axis in range(2):
+        low, high = bounds[0, axis], bounds[1, axis]
+        if abs(along[axis]) < 1e-12:
+            if not low <= foot[axis] <= high:
+                return None
+            continue
+        first, second = sorted(((low - foot[axis]) / along[axis], (high - foot[axis]) / along[axis]))
+        enter, leave = max(enter, first), min(leave, second)
+    return np.stack([foot + enter * along, foot + leave * along]) if enter < leave else None
+
+
+def ellipse(center: Floats, covariance: Floats, sigmas: float = 2.0) -> Floats:
+    """Points (65, 2) of the ellipse of so many standard deviations of a 2-D Gaussian."""
+    value, vector = np.linalg.eigh(covariance)
+    turn = np.linspace(0.0, 2.0 * np.pi, 65)
+    circle = np.stack([np.cos(turn), np.sin(turn)])
+    return np.asarray(center) + (sigmas * vector * np.sqrt(np.maximum(value, 0.0)) @ circle).T

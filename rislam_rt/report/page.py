@@ -1,0 +1,115 @@
+"""The report of a run: figures as files, and one page that holds them all."""
+
+import base64
+import html
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.model import SlamResult
+from rislam_rt.pipeline.files import write_atomic
+from rislam_rt.pipeline.spec import PipelineSpec, build_settings
+from rislam_rt.report.code import draw_run_codes
+from rislam_rt.report.curves import draw_agent_error, draw_landmark_errors, draw_levels
+from rislam_rt.report.room import draw_above, draw_paths
+from rislam_rt.report.style import to_png
+from rislam_rt.report.tables import summary_rows
+from rislam_rt.report.timing import draw_timing
+
+PAGE = "report.html"
+
+CAPTIONS = {
+    "room": "The room from above, true and estimated. The close-up shows the end of the path with the 2σ ellipse that "
+    "the filter believes in. Walls are those found from the mirror images of the landmarks.",
+    "error": "Distance between true and estimated position; the shaded band is the filter's own standard deviation.",
+    "landmarks": "Distance between each landmark and the estimate that stands for it; a gap where there is none.",
+    "levels": "Gain of the strongest path of each class. The panel's direct path depends on the code.",
+    "paths": "Paths with at most one wall bounce, halfway through the run, with the levels of the first scheme.",
+    "codes": "Phase levels of the panel at five moments, and the gain of its direct path under them.",
+    "timing": "Median of each step, with a whisker to the 99th percentile.",
+}
+
+STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 1080px; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.5rem; margin-bottom: 0.2rem; } h2 { font-size: 1.1rem; margin-top: 2.2rem; }
+img { max-width: 100%; height: auto; } figure { margin: 1.5rem 0; }
+figcaption, .note { color: #555; font-size: 0.9rem; }
+table { border-collapse: collapse; }
+th, td { padding: 0.25rem 1rem 0.25rem 0; text-align: left; border-bottom: 1px solid #ddd; }
+td:not(:first-child), th:not(:first-child) { text-align: right; }
+"""
+
+
+def write_report(result: SlamResult, summary: Mapping[str, Any], folder: Path) -> Path:
+    """Write `figures/*.png` and `report.html` into a run folder; returns the page.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    pictures = draw_figures(result)
+    for name, picture in pictures.items():
+        write_atomic(folder / "figures" / f"{name}.png", picture)
+    page = folder / PAGE
+    write_atomic(page, build_page(result, summary, pictures).encode())
+    return page
+
+
+def draw_figures(result: SlamResult) -> dict[str, bytes]:
+    """All figures of a run as PNG, by name, in the order of the page."""
+    spec = PipelineSpec.model_validate(dict(result.config))
+    settings = build_settings(spec)
+    snr = 10.0 * float(np.log10(settings.radio.integrated_snr(np.ones(()))))
+    budget = spec.budget
+    cycle = len(result.scene.agent) // 2
+    first = next(iter(result.schemes.values()))
+    time = result.scene.agent.time[cycle]
+    figures = {
+        "room": draw_above(result),
+        "error": draw_agent_error(result),
+        "landmarks": draw_landmark_errors(result),
+        "levels": draw_levels(result, settings.receiver.detection_threshold_db, snr),
+        "paths": draw_paths(
+            result.scene, result.paths, np.abs(first.gain[cycle]), cycle,
+            f"{result.scene.name} at t = {time:.1f} s ({result.paths.source})",
+        ),
+        "codes": draw_run_codes(result),
+        "timing": draw_timing(
+            result, (budget.optimise_s, budget.communicate_s, budget.measure_s, budget.localise_s)
+        ),
+    }  # fmt: skip
+    return {name: to_png(figure) for name, figure in figures.items() if figure is not None}
+
+
+def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping[str, bytes]) -> str:
+    """One HTML page with everything in it."""
+    title = f"{result.name} in {result.scene.name}"
+    names = list(summary["schemes"])
+    head = "".join(f"<th>{html.escape(name)}</th>" for name in names)
+    rows = "".join(
+        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in summary_rows(summary)
+    )
+    figures = "".join(
+        f'<figure><img alt="{html.escape(CAPTIONS[name])}" src="data:image/png;base64,'
+        f'{base64.b64encode(picture).decode()}"><figcaption>{html.escape(CAPTIONS[name])}</figcaption></figure>'
+        for name, picture in pictures.items()
+    )
+    versions = ", ".join(f"{name} {number}" for name, number in result.versions.items())
+    return f"""<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title><style>{STYLE}</style></head><body>
+<h1>{html.escape(title)}</h1>
+<p class="note">{summary["cycles"]} cycles, seed {summary["seed"]}, paths {html.escape(result.paths.source)} in
+{summary["trace_seconds"]:.1f} s.</p>
+<h2>RMSE</h2>
+<table><tr><th></th>{head}</tr>{rows}</table>
+<p class="note">Agent and landmarks: over the cycles (for a landmark, those in which the map holds it).
+Walls, at the end: distance of the estimated plane over the true surface, and the angle between them.</p>
+{figures}
+<h2>To repeat it</h2>
+<p class="note">{html.escape(versions)}; scene SHA-256 {html.escape(result.scene.digest)}.
+The folder's <code>config.toml</code> and <code>scene/</code> hold everything.</p>
+</body></html>
+"""

@@ -1,0 +1,231 @@
+"""The room: from above with truth and estimate, and in three dimensions with the paths of one cycle."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.model import PathKind, Paths, Scene, SchemeResult, SlamResult
+from rislam_rt.pipeline.summary import landmark_track, match_walls
+from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace
+from rislam_rt.report.style import KIND, TRUTH, WALL, save_figure, scheme_colour, styled
+
+ZOOM = 0.25
+"""Half the width [m] of the close-up of the path's end, unless the error is larger."""
+
+LABEL = np.array([0.12, 0.0, 0.08])
+"""From an object to its name in the three-dimensional picture [m]."""
+
+
+def draw_above(result: SlamResult) -> Figure:
+    """One panel a scheme: room, path, landmarks and walls, true and estimated, and a close-up of the path's end."""
+    schemes = list(result.schemes.values())
+    low, high = result.scene.bounds
+    aspect = (high[1] - low[1]) / (high[0] - low[0])
+    with styled():
+        figure = Figure(figsize=(5.4 * len(schemes), 5.4 * aspect + 1.4))
+        axes = figure.subplots(1, len(schemes), squeeze=False, sharey=True)[0]
+        for axis, scheme in zip(axes, schemes, strict=True):
+            _draw_truth(axis, result.scene)
+            _draw_estimate(axis, result.scene, scheme)
+            _draw_close_up(axis, result.scene, scheme)
+            error = np.sqrt(np.mean(np.sum((scheme.position - result.scene.agent.position) ** 2, axis=1)))
+            axis.set_title(f"{scheme.scheme}: agent RMSE {100.0 * error:.1f} cm", weight="bold")
+            axis.set_xlabel("x [m]")
+        axes[0].set_ylabel("y [m]")
+        figure.legend(handles=_legend(), loc="outside lower center", ncols=4, fontsize=9)
+    return figure
+
+
+def draw_paths(scene: Scene, paths: Paths, gain: Floats, cycle: int, title: str) -> Figure:
+    """The room in three dimensions, with the paths of one cycle that have at most one wall bounce.
+
+    `gain` (P,) are the magnitudes of the path gains in that cycle.
+    """
+    with styled():
+        figure = Figure(figsize=(9.0, 6.4), layout="none")
+        axis: Any = figure.add_axes((-0.12, 0.0, 1.24, 1.08), projection="3d", computed_zorder=False)
+        _draw_room_3d(axis, scene)
+        handles = [_draw_class(axis, scene, paths, gain, cycle, kind) for kind in PathKind]
+        _draw_objects_3d(axis, scene, cycle)
+        figure.text(0.02, 0.955, title, weight="bold", size=11)
+        shown = [handle for handle in handles if handle is not None]
+        figure.legend(handles=shown, loc="lower center", ncols=2, fontsize=9)
+    return figure
+
+
+def draw_scene(scene: Scene, path: Path) -> Path:
+    """A room from above and in three dimensions, without any run; returns the file."""
+    with styled():
+        figure = Figure(figsize=(11.0, 5.0))
+        flat = figure.add_subplot(1, 2, 1)
+        _draw_truth(flat, scene)
+        flat.set_xlabel("x [m]")
+        flat.set_ylabel("y [m]")
+        flat.set_title(f"{scene.name} from above", weight="bold")
+        axis: Any = figure.add_subplot(1, 2, 2, projection="3d", computed_zorder=False)
+        _draw_room_3d(axis, scene)
+        _draw_objects_3d(axis, scene, 0)
+        return save_figure(figure, path)
+
+
+def _draw_truth(axis: Axes, scene: Scene) -> None:
+    """Walls, path and landmarks as they are."""
+    for edge in outline_edges(build_walls(scene)):
+        axis.plot(edge[:, 0], edge[:, 1], color=WALL, lw=3.0, solid_capstyle="round", zorder=1)
+    path = scene.agent.position
+    axis.plot(path[:, 0], path[:, 1], color=TRUTH, lw=4.0, alpha=0.25, zorder=2)
+    axis.plot(path[0, 0], path[0, 1], "o", color=TRUTH, ms=5, zorder=3)
+    axis.annotate("start", (path[0, 0], path[0, 1]), (6, -10), textcoords="offset points", fontsize=9)
+    for scatterer in scene.scatterers:
+        _mark(axis, scatterer.position, scatterer.name, "o")
+    if scene.ris is not None:
+        _mark(axis, scene.ris.center, scene.ris.name, "s")
+    axis.set_aspect("equal")
+    axis.grid(False)
+
+
+def _mark(axis: Axes, point: Floats, name: str, marker: str) -> None:
+    axis.plot(point[0], point[1], marker, ms=13, mfc="none", mec=TRUTH, mew=1.6, zorder=5)
+    axis.annotate(
+        f"{name} (z = {point[2]:.1f} m)", (point[0], point[1]), (10, 8), textcoords="offset points", fontsize=9
+    )
+
+
+def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
+    """What the agent holds after the last cycle."""
+    colour = scheme_colour(scheme.scheme)
+    axis.plot(scheme.position[:, 0], scheme.position[:, 1], color=colour, lw=1.4, zorder=4)
+    walls = build_walls(scene)
+    low, high = scene.bounds
+    margin = 0.06 * (high - low)
+    box = np.stack([low - margin, high + margin])
+    matched = match_walls(walls, scheme.map)
+    height = float(scene.agent.position[-1, 2])
+    for row in matched[matched >= 0]:
+        segment = plane_trace(scheme.map.wall_normal[row], scheme.map.wall_offset[row], height, box)
+        if segment is not None:
+            axis.plot(segment[:, 0], segment[:, 1], color=colour, lw=1.4, ls=(0, (5, 3)), zorder=4)
+    columns = landmark_track(scene, scheme).column[-1]
+    rows = [int(np.flatnonzero(scheme.map.ident == scheme.ident[c])[0]) for c in columns if c >= 0]
+    for row in rows:
+        point = scheme.map.position[row]
+        axis.plot(point[0], point[1], "x", color=colour, ms=9, mew=2.2, zorder=6)
+        ring = ellipse(point[:2], scheme.map.covariance[row, :2, :2])
+        axis.plot(ring[:, 0], ring[:, 1], color=colour, lw=1.0, zorder=6)
+
+
+def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
+    """The last stretch of the path, magnified, with the believed 2 sigma ellipse of the last position."""
+    truth, estimate = scene.agent.position[-1, :2], scheme.position[-1, :2]
+    half = max(ZOOM, 2.5 * float(np.linalg.norm(truth - estimate)))
+    colour = scheme_colour(scheme.scheme)
+    low, high = scene.bounds[:, :2]
+    # The corner of the room that is farthest from everything drawn holds the close-up.
+    busy = np.concatenate([scene.agent.position[:, :2], scene.landmark_positions[:, :2]])
+    side = 0.36 * float(np.min(high - low))
+    corners = [np.array([x, y]) for x in (low[0] + 0.03 * side, high[0] - 1.03 * side)
+               for y in (low[1] + 0.03 * side, high[1] - 1.03 * side)]  # fmt: skip
+    free = [np.min(np.linalg.norm(busy - (corner + 0.5 * side), axis=1)) for corner in corners]
+    x, y = corners[int(np.argmax(free))]
+    inset = axis.inset_axes((float(x), float(y), side, side), transform=axis.transData, zorder=8)
+    inset.plot(*scene.agent.position[:, :2].T, color=TRUTH, lw=4.0, alpha=0.25)
+    inset.plot(*truth, "o", color=TRUTH, ms=5)
+    inset.plot(*scheme.position[:, :2].T, color=colour, lw=1.4)
+    inset.plot(*estimate, "o", color=colour, ms=5)
+    inset.plot(*ellipse(estimate, scheme.covariance[-1, :2, :2]).T, color=colour, lw=1.0)
+    inset.set_xlim(truth[0] - half, truth[0] + half)
+    inset.set_ylim(truth[1] - half, truth[1] + half)
+    inset.set_aspect("equal")
+    inset.set_xticks([])
+    inset.set_yticks([])
+    inset.text(0.5, 0.03, f"end of the path, {100.0 * 2.0 * half:.0f} cm wide", fontsize=8.5, ha="center",
+               transform=inset.transAxes)  # fmt: skip
+    for spine in inset.spines.values():
+        spine.set_visible(True)
+        spine.set_color("#555555")
+    axis.indicate_inset_zoom(inset, edgecolor="#555555")
+
+
+def _legend() -> list[Line2D]:
+    grey = "#555555"
+    return [
+        Line2D([], [], color=WALL, lw=3.0, label="true wall"),
+        Line2D([], [], color=grey, lw=1.4, ls=(0, (5, 3)), label="estimated wall"),
+        Line2D([], [], color=TRUTH, lw=4.0, alpha=0.25, label="true path"),
+        Line2D([], [], color=grey, lw=1.4, label="estimated path"),
+        Line2D([], [], ls="", marker="o", mfc="none", mec=TRUTH, ms=10, label="true scatterer"),
+        Line2D([], [], ls="", marker="s", mfc="none", mec=TRUTH, ms=10, label="true RIS"),
+        Line2D([], [], ls="", marker="x", color=grey, ms=8, mew=2.0, label="estimated landmark, 2σ"),
+    ]
+
+
+def _draw_room_3d(axis: Any, scene: Scene) -> None:
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    walls = build_walls(scene)
+    low, high = scene.bounds
+    floor = walls.triangles[np.abs(walls.triangles[:, :, 2] - low[2]).max(axis=1) < 1e-6]
+    if len(floor):
+        axis.add_collection3d(Poly3DCollection(list(floor), facecolor="#f1f1f1", edgecolor="none", zorder=0))
+    for edge in outline_edges(walls):
+        axis.plot(*edge.T, color=WALL, lw=1.0, zorder=1)
+    axis.set_xlim(low[0], high[0])
+    axis.set_ylim(low[1], high[1])
+    axis.set_zlim(low[2], high[2])
+    axis.set_box_aspect(high - low, zoom=1.0)
+    axis.view_init(elev=24.0, azim=-62.0)
+    axis.set_xlabel("x [m]")
+    axis.set_ylabel("y [m]")
+    axis.set_zlabel("z [m]")
+    axis.grid(False)
+    for side in (axis.xaxis, axis.yaxis, axis.zaxis):
+        side.set_pane_color((1.0, 1.0, 1.0, 0.0))
+        side.line.set_color((0.0, 0.0, 0.0, 0.0))
+
+
+def _draw_objects_3d(axis: Any, scene: Scene, cycle: int) -> None:
+    path = scene.agent.position
+    axis.plot(*path.T, color=TRUTH, lw=2.0, alpha=0.3, zorder=3)
+    axis.plot(*path[cycle], "o", color=TRUTH, ms=7, zorder=9)
+    axis.text(*(path[cycle] + np.array([0.0, 0.0, -0.25])), "agent", fontsize=9, zorder=10)
+    for scatterer in scene.scatterers:
+        axis.plot(*scatterer.position, "o", color=KIND[PathKind.PS], mec=TRUTH, ms=9, zorder=9)
+        axis.text(*(scatterer.position + LABEL), scatterer.name, fontsize=9, zorder=10)
+    if scene.ris is not None:
+        axis.plot(*scene.ris.center, "s", color=KIND[PathKind.RIS], mec=TRUTH, ms=10, zorder=9)
+        axis.text(*(scene.ris.center + LABEL), scene.ris.name, fontsize=9, zorder=10)
+
+
+def _draw_class(axis: Any, scene: Scene, paths: Paths, gain: Floats, cycle: int, kind: PathKind) -> Line2D | None:
+    """Paths of one class; the legend says how many of them are shown."""
+    columns = np.flatnonzero((paths.kind == kind) & paths.valid[cycle])
+    if not len(columns):
+        return None
+    walls = np.sum(paths.tx_walls[columns] >= 0, axis=1) + np.sum(paths.rx_walls[columns] >= 0, axis=1)
+    shown = columns[walls <= 1]
+    strong = kind in (PathKind.PS, PathKind.RIS)
+    for path in shown:
+        line = path_points(scene, paths, cycle, int(path))
+        axis.plot(*line.T, color=KIND[kind], lw=2.4 if strong else 1.1, alpha=0.95 if strong else 0.7,
+                  zorder=7 if strong else 5)  # fmt: skip
+    level = 20.0 * np.log10(max(float(gain[columns].max()), 1e-20))
+    label = f"{kind.name}: {len(shown)} of {len(columns)} shown, strongest {level:.0f} dB"
+    return Line2D([], [], color=KIND[kind], lw=2.4 if strong else 1.4, label=label)
+
+
+def path_points(scene: Scene, paths: Paths, cycle: int, path: int) -> Floats:
+    """(V + 2, 3) [m]: Tx, interaction points, Rx."""
+    count = int(paths.num_vertices[path])
+    inner = paths.vertices[cycle, path, :count]
+    return np.concatenate([scene.agent.tx[cycle][None], inner, scene.agent.rx[cycle][None]])
+
+
+def middle_cycles(count: int, number: int) -> Integers:
+    """Cycles at the middles of `number` equal parts of `count` cycles."""
+    return ((np.arange(number) + 0.5) / number * count).astype(np.int64)

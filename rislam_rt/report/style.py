@@ -1,0 +1,85 @@
+"""One look for all figures: colours that colour-blind readers can tell apart (Okabe and Ito), sizes, file writing."""
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from rislam_rt.errors import ConfigError
+from rislam_rt.model import PathKind
+from rislam_rt.pipeline.files import write_atomic
+
+DPI = 120
+TRUTH = "black"
+WALL = "#8c8c8c"
+SCHEME = {
+    "optimized": "#0072B2",
+    "random": "#D55E00",
+    "exact": "#009E73",
+    "genie": "#CC79A7",
+    "no_ris": "#7a5c00",
+}
+"""Colour of each scheme, the same in every figure."""
+KIND = {
+    PathKind.LOS: "black",
+    PathKind.VT: "#999999",
+    PathKind.PS: "#009E73",
+    PathKind.VS: "#7CCBB2",
+    PathKind.RIS: "#D55E00",
+    PathKind.VRIS: "#F3B583",
+}
+"""Colour of each path class."""
+SETTINGS: dict[Any, Any] = {
+    "font.size": 10,
+    "axes.titlesize": 11,
+    "axes.titlelocation": "left",
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "figure.constrained_layout.use": True,
+}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw in the common look."""
+    with mpl.rc_context(SETTINGS):
+        yield
+
+
+def scheme_colour(name: str) -> str:
+    """Colour of a scheme."""
+    return SCHEME.get(name, "#0072B2")
+
+
+def to_png(figure: Figure) -> bytes:
+    """A figure as PNG."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": ""})
+    return buffer.getvalue()
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write a figure, its format by the file's ending, whole or not at all.
+
+    Raises
+    ------
+    ConfigError
+        The ending is of no format that can be drawn.
+    StoreError
+        The disk refused.
+    """
+    kind = path.suffix.lstrip(".").lower()
+    if kind not in ("png", "svg", "pdf"):
+        raise ConfigError(f"{path}: no picture of that ending; give a name that ends in .png, .svg or .pdf")
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=kind, dpi=DPI)
+    write_atomic(path, buffer.getvalue())
+    return path
