@@ -1,33 +1,57 @@
 """Both channels of one scene at the same random poses."""
 
+import zlib
+from collections.abc import Iterable
+
 import numpy as np
 
 from rislam_rt.channel.compare.match import compare_paths
 from rislam_rt.channel.compare.poses import random_poses
 from rislam_rt.channel.compare.report import PathReport
+from rislam_rt.channel.compare.table import Validation
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
 
 
 def compare_channels(
-    scene: Scene, radio: RadioConfig, *, poses: int, depth: int, rng: np.random.Generator
+    scene: Scene, radio: RadioConfig, *, poses: int, depth: int, rng: np.random.Generator, refine: bool = True
 ) -> PathReport:
-    """Trace and compute `poses` random poses, with the panel at one random code, and compare path by path."""
-    traced, analytic, trajectory = trace_both(scene, radio, poses=poses, depth=depth, rng=rng)
+    """Trace and compute `poses` random poses, with the panel at one random code, and compare path by path.
+
+    By default the channel as its users get it, its numbers refined in float64 on the facets that the tracer named;
+    without `refine` the tracer's own float32 numbers.
+    """
+    traced, analytic, trajectory = trace_both(scene, radio, poses=poses, depth=depth, rng=rng, refine=refine)
     return compare_paths(traced, analytic, scene, trajectory)
 
 
 def trace_both(
-    scene: Scene, radio: RadioConfig, *, poses: int, depth: int, rng: np.random.Generator
+    scene: Scene, radio: RadioConfig, *, poses: int, depth: int, rng: np.random.Generator, refine: bool = True
 ) -> tuple[Paths, Paths, Trajectory]:
     """Traced and analytic paths at random poses, under the same random code, and the poses."""
     from rislam_rt.channel.traced import TracedChannel  # starting the tracer takes seconds
 
     trajectory = random_poses(scene, poses, rng=rng)
-    channels = TracedChannel(scene, radio, depth), ImageSourceChannel(scene, radio, depth)
+    channels = TracedChannel(scene, radio, depth, refine=refine), ImageSourceChannel(scene, radio, depth)
     traced, analytic = (channel.paths(trajectory) for channel in channels)
     if scene.ris is not None:
         spec = scene.ris.spec
         code = RisCode(rng.integers(spec.levels, size=(spec.rows, spec.cols)), spec.levels)
         traced, analytic = channels[0].respond(traced, code), channels[1].respond(analytic, code)
     return traced, analytic, trajectory
+
+
+def validate_rooms(
+    rooms: Iterable[tuple[Scene, int]], radio: RadioConfig, *, poses: int, seed: int
+) -> list[Validation]:
+    """Compare both channels in several rooms, each with its depth: the tracer's own numbers, and the refined ones.
+
+    A room's poses depend on seed and name alone.
+    """
+    rows = []
+    for scene, depth in rooms:
+        for refine in (False, True):
+            rng = np.random.default_rng([seed, zlib.crc32(scene.name.encode())])
+            report = compare_channels(scene, radio, poses=poses, depth=depth, rng=rng, refine=refine)
+            rows.append(Validation(scene.name, depth, "refined" if refine else "traced", report))
+    return rows

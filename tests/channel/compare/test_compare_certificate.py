@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rislam_rt.channel.compare import compare_paths, random_poses, validation_table
+from rislam_rt.channel.compare import Validation, compare_paths, random_poses, validation_page, validation_table
 from rislam_rt.channel.compare.certificate import EDGE_TOLERANCE, SHORTEST_SEGMENT
-from rislam_rt.channel.compare.table import Validation
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import distance_to_triangles
@@ -184,8 +183,12 @@ def test_the_table_has_a_row_a_room(rooms):
     scene, trajectory = rooms.paper(), rooms.at([1.1, 2.3, 1.2])
     deep, shallow = paths_of(scene, trajectory, 2), paths_of(scene, trajectory, 1)
     report = compare_paths(deep, shallow, scene, trajectory)
-    lines = validation_table([Validation("paper", 1, report), Validation("again", 1, report)]).splitlines()
+    lines = validation_table([Validation("paper", 1, "traced", report)] * 2).splitlines()
     assert len(lines) == 4
-    assert lines[2].startswith("| paper | 1 | 1 |")
+    assert lines[2].startswith("| paper | 1 | traced | 1 |")
     assert f"beyond depth: {report.explained['beyond depth']}" in lines[2]
     assert len({line.count("|") for line in lines}) == 1
+    page = validation_page([Validation("paper", 1, "traced", report)], seed=9)
+    assert page.startswith("# Channel validation")
+    assert page.endswith(lines[2] + "\n")
+    assert "Seed 9" in page
