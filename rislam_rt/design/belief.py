@@ -27,6 +27,7 @@ def design_code(
     samples: int = 4,
     config: DesignConfig = _DEFAULT,
     landmark_uncertainty: bool = False,
+    least_snr: float = 0.0,
 ) -> Design:
     """A code for the next cycle from the belief predicted to it; truth is not looked at.
 
@@ -38,19 +39,25 @@ def design_code(
         Over how many positions the expected CRLB is taken: the mean, then the first of `belief.samples`.
     landmark_uncertainty
         Whether each landmark's own covariance discounts its path, as if unrelated to the agent's.
+    least_snr
+        SNR over all antennas, linear, at which the receiver detects a path every other time. 0, the paper's objective,
+        counts the information of paths that will be missed.
 
     If no landmark is held for the panel yet, the outcome is `NO_PATHS` and the code is a random one.
     """
     chosen = designer(method)
-    problem = problem_from_belief(belief, ris, radio, samples=samples, landmark_uncertainty=landmark_uncertainty)
+    problem = problem_from_belief(
+        belief, ris, radio, samples=samples, landmark_uncertainty=landmark_uncertainty, least_snr=least_snr
+    )
     if problem is None:
         return random_design(method, ris, rng=rng)
     return chosen(problem, rng=rng, config=config)
 
 
 def problem_from_belief(
-    belief: SlamEstimate, ris: RisSpec, radio: RadioConfig, *, samples: int = 4, landmark_uncertainty: bool = False
-) -> DesignProblem | None:
+    belief: SlamEstimate, ris: RisSpec, radio: RadioConfig, *, samples: int = 4, landmark_uncertainty: bool = False,
+    least_snr: float = 0.0,
+) -> DesignProblem | None:  # fmt: skip
     """The design problem of a belief; None if its map holds no panel.
 
     A point landmark gives one path; an image gives two, with its wall on the Rx leg and on the Tx leg. Paths of the
@@ -64,14 +71,16 @@ def problem_from_belief(
     panel, static = _believed_paths(belief.map)
     both = _Believed(*(np.concatenate(pair) for pair in zip(panel, static, strict=True)))
     points = belief.map.position
+    unit_snr = float(radio.integrated_snr(np.ones(())))
     return DesignProblem(
         response=_panel_responses(belief.map, panel, tx, rx, ris, radio),
         static_gain=_point_gains(belief.map, static, tx, rx, radio),
         gradient=path_gradient(tx, rx, points[both.tx_point], points[both.rx_point])[..., :2],
         prior=prior_from_covariance(belief.covariance[:2, :2]),
-        scale=float(range_information(radio.integrated_snr(np.ones(())), radio)),
+        scale=float(range_information(np.array(unit_snr), radio)),
         levels=ris.levels,
         variance=_length_variance(belief.map, both, tx, rx) if landmark_uncertainty else None,
+        least_power=least_snr / unit_snr,
     )
 
 

@@ -21,6 +21,7 @@ class Objective:
     """(B, 3) xx, xy, yy of prior and static paths."""
     spread: Floats | None
     """(B P,) scale times variance of the panel paths; None where all are zero."""
+    least_power: float
     table: Complexes
     """(H,) exp(-j xi) of the levels."""
     outcome: Outcome
@@ -32,7 +33,7 @@ class Objective:
 
     def value(self, gain: Complexes) -> Floats:
         """Expected CRLB (...,) [m^2] of gains (..., B P)."""
-        power = gain.real**2 + gain.imag**2
+        power = detected_power(gain.real**2 + gain.imag**2, self.least_power)
         if self.spread is not None:
             power = power / (1.0 + power * self.spread)
         return self.value_of_power(power)
@@ -72,7 +73,7 @@ def build_objective(problem: DesignProblem) -> Objective:
     matrix = np.ascontiguousarray(problem.response.reshape(samples * panel, -1).T)
     x, y = problem.gradient[..., 0], problem.gradient[..., 1]
     outer = problem.scale * np.stack([x * x, x * y, y * y], axis=-1)
-    power = np.abs(problem.static_gain) ** 2
+    power = detected_power(np.abs(problem.static_gain) ** 2, problem.least_power)
     spread = None
     if problem.variance is not None and np.any(problem.variance > 0.0):
         spread = problem.scale * problem.variance
@@ -89,9 +90,19 @@ def build_objective(problem: DesignProblem) -> Objective:
         np.ascontiguousarray(outer[:, :panel]),
         fixed,
         spread,
+        problem.least_power,
         level_table(problem.levels),
         Outcome.OK if regular.all() else Outcome.UNOBSERVABLE,
     )
+
+
+def detected_power(power: Floats, least: float) -> Floats:
+    """Powers (...,) times about the chance of detecting them, `1 / (1 + (least / power)^4)`."""
+    if least == 0.0:
+        return power
+    ratio = (power / least) ** 2
+    ratio = ratio * ratio
+    return power * (ratio / (1.0 + ratio))
 
 
 def level_table(levels: int) -> Complexes:

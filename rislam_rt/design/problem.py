@@ -14,8 +14,10 @@ class DesignProblem:
     """Minimise the mean over B samples of the belief of `tr((J_prior + sum_p w_p g_p g_p^T)^-1)`.
 
     `w_p = scale |alpha_p|^2 / (1 + scale |alpha_p|^2 variance_p)`: the information on the length of path p, where what
-    the path's landmark and walls are not known to (`variance`) is added to its own error. With zero variances this is
-    Proposition 1. Path 0 of the panel paths is the direct one; it is the target of the single-target designers.
+    the path's landmark and walls are not known to (`variance`) is added to its own error. With `least_power`,
+    |alpha|^2 is multiplied by `1 / (1 + (least_power / |alpha|^2)^4)`, about the chance of detecting the path:
+    information spread over paths that are then missed is worth nothing. With both left at zero this is Proposition 1.
+    Path 0 of the panel paths is the direct one; it is the target of the single-target designers.
     """
 
     response: Complexes
@@ -32,6 +34,8 @@ class DesignProblem:
     """H."""
     variance: Any = None
     """(B, P + S) variance [m^2] of a path's predicted length; None is zero."""
+    least_power: float = 0.0
+    """|alpha|^2 at which a path is detected every other time; 0: all are."""
 
     def __post_init__(self) -> None:
         freeze(self, "response", np.complex128, (None, None, None, None))
@@ -44,6 +48,8 @@ class DesignProblem:
             freeze(self, "variance", np.float64, (samples, count))
         if samples < 1 or panel < 1:
             raise ConfigError(f"design: {samples} belief samples and {panel} panel paths received; give at least one")
+        if not self.least_power >= 0.0:
+            raise ConfigError(f"design: least power {self.least_power} received; give 0 or more")
         if self.levels < 2:
             raise ConfigError(f"design: {self.levels} levels received; give at least 2")
 

@@ -11,7 +11,7 @@ from rislam_rt.model import PathKind, Paths, RadioConfig
 
 def problem_from_arrays(
     response: Complexes, static_gain: Complexes, gradient: Floats, radio: RadioConfig, levels: int,
-    prior: Floats | None = None,
+    prior: Floats | None = None, least_snr: float = 0.0,
 ) -> DesignProblem:  # fmt: skip
     """A problem of one position from plain arrays.
 
@@ -25,15 +25,20 @@ def problem_from_arrays(
         (P + S, 2) horizontal gradients of the path lengths, panel paths first.
     prior
         (2, 2) information [1/m^2] beforehand; none by default.
+    least_snr
+        SNR over all antennas, linear, at which a path is detected every other time; 0: all paths count.
     """
-    scale = float(range_information(radio.integrated_snr(np.ones(())), radio))
+    unit_snr = float(radio.integrated_snr(np.ones(())))
     prior = np.zeros((2, 2)) if prior is None else prior
-    return DesignProblem(response[None], static_gain[None], gradient[None], prior, scale, levels)
+    return DesignProblem(
+        response[None], static_gain[None], gradient[None], prior, float(range_information(np.array(unit_snr), radio)),
+        levels, least_power=least_snr / unit_snr,
+    )  # fmt: skip
 
 
 def problem_from_paths(
     paths: Paths, tx: Floats, rx: Floats, radio: RadioConfig, levels: int, *, cycle: int = 0,
-    prior: Floats | None = None,
+    prior: Floats | None = None, least_snr: float = 0.0,
 ) -> DesignProblem:  # fmt: skip
     """The genie's problem at one cycle of traced or analytic paths: landmark paths only (no LOS, no VT).
 
@@ -54,4 +59,4 @@ def problem_from_paths(
     gradient = vertex_gradient(tx, rx, paths.vertices[cycle, order], paths.num_vertices[order])[:, :2]
     legs = paths.ris
     response = legs.tx[cycle, legs.tx_leg[over_panel]] * legs.rx[cycle, legs.rx_leg[over_panel]]
-    return problem_from_arrays(response, paths.gain[cycle, static], gradient, radio, levels, prior)
+    return problem_from_arrays(response, paths.gain[cycle, static], gradient, radio, levels, prior, least_snr)

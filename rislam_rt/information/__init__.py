@@ -18,18 +18,26 @@ from rislam_rt.information.gradient import (
     path_gradient,
     vertex_gradient,
 )
+from rislam_rt.information.landmarks import Chain, LandmarkModel, Rows, build_landmark_model, mirror_chain
 from rislam_rt.information.outcome import Outcome
 from rislam_rt.information.position import Bound, position_bound, position_information, range_information
 from rislam_rt.information.prior import prior_from_covariance, prior_from_particles
+from rislam_rt.information.recursion import MotionPrior, PosteriorBound, posterior_bound
 
 __all__ = [
     "Bound",
+    "Chain",
     "Equivalent",
     "EquivalentPosition",
     "GradientMode",
+    "LandmarkModel",
     "MeasurementStd",
+    "MotionPrior",
     "Outcome",
+    "PosteriorBound",
+    "Rows",
     "amplitude_std",
+    "build_landmark_model",
     "cosine_gradient",
     "cosine_information",
     "delay_gain_information",
@@ -40,9 +48,11 @@ __all__ = [
     "landmark_gradient",
     "map_to_position",
     "measurement_std",
+    "mirror_chain",
     "path_gradient",
     "position_bound",
     "position_information",
+    "posterior_bound",
     "prior_from_covariance",
     "prior_from_particles",
     "range_information",

@@ -1,6 +1,7 @@
 """One list of designers drives these tests: what must hold for each, and what sets them apart."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,7 +26,8 @@ def direct_crlb(problem, xi):
     total = 0.0
     for b in range(problem.response.shape[0]):
         gain = np.concatenate([np.sum(problem.response[b] * weight, axis=(1, 2)), problem.static_gain[b]])
-        strength = problem.scale * np.abs(gain) ** 2
+        power = np.abs(gain) ** 2
+        strength = problem.scale * power / (1 + (problem.least_power / power) ** 4)
         if problem.variance is not None:
             strength = 1 / (1 / strength + problem.variance[b])
         g = problem.gradient[b]
@@ -106,6 +108,17 @@ def test_variance_of_a_path_discounts_it(make_problem, rng):
     assert design.crlb > direct_crlb(plain, design.xi)
     assert design.crlb == pytest.approx(direct_crlb(without_last, design.xi), rel=1e-9)
     assert design.crlb >= design.bound
+
+
+def test_paths_that_will_be_missed_are_worth_nothing(make_problem, rng):
+    plain = make_problem(rng, panel=3, static=2)
+    best = np.sqrt(np.max(np.sum(np.abs(plain.response), axis=(2, 3)) ** 2))
+    for least in (0.0, 0.1 * best**2, 0.5 * best**2, 10.0 * best**2):
+        problem = replace(plain, least_power=least)
+        design = DESIGNERS["coordinate"](problem, rng=rng)
+        assert design.crlb == pytest.approx(direct_crlb(problem, design.xi), rel=1e-10)
+        assert design.crlb >= design.bound * (1 - 1e-12)
+        assert design.crlb >= direct_crlb(plain, design.xi)
 
 
 def test_genetic_keeps_its_elite_and_converges(make_problem, rng):

@@ -1,0 +1,186 @@
+"""The posterior bound of a trajectory: geometry against the channel, recursion against one large inverse."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rislam_rt.channel.image_source import ImageSourceChannel
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.errors import ConfigError
+from rislam_rt.information import MotionPrior, Rows, build_landmark_model, mirror_chain, posterior_bound
+from rislam_rt.model import PathKind, RadioConfig
+from rislam_rt.scene import load_scene
+
+STEP = 1e-5
+
+
+@pytest.fixture(scope="module")
+def room():
+    scene = load_scene("scenes/tilted_room")
+    channel = ImageSourceChannel(scene, RadioConfig(), depth=2)
+    motion = scene.agent[:40]
+    walls = build_walls(scene)
+    return channel.paths(motion), motion, scene.landmark_positions, walls.normal, walls.offset
+
+
+def build(room, mode, landmark=None, normal=None, offset=None):
+    paths, motion, *rest = room
+    given = [new if new is not None else old for new, old in zip((landmark, normal, offset), rest, strict=True)]
+    return build_landmark_model(paths, motion, *given, RadioConfig(noise_psd=1e-14), walls=mode)
+
+
+def test_two_fixed_points_give_every_landmark_path_its_length_and_direction(room):
+    paths, motion, *_ = room
+    model = build(room, "planes")
+    for path in np.flatnonzero(paths.landmark >= 0):
+        a, b = model.point[model.tx_point[path]], model.point[model.rx_point[path]]
+        ray = b - motion.rx
+        length = np.linalg.norm(motion.tx - a, axis=1) + np.linalg.norm(ray, axis=1)
+        here = paths.valid[:, path]
+        np.testing.assert_allclose(length[here], paths.tau[here, path] * SPEED_OF_LIGHT, atol=1e-9)
+        direction = ray / np.linalg.norm(ray, axis=1, keepdims=True)
+        np.testing.assert_allclose(direction[here], paths.arrival[here, path], atol=1e-9)
+
+
+def tilted(normal, first, second):
+    turned = normal + first + second
+    return turned / np.linalg.norm(turned)
+
+
+@pytest.mark.parametrize("mode", ["known", "planes", "images"])
+def test_points_move_with_landmarks_and_walls_as_their_derivatives_say(room, mode):
+    _, _, landmark, normal, offset = room
+    model = build(room, mode)
+    if mode == "images":
+        assert model.num_unknowns == 3 * len(model.point)
+        return
+    for column, label in enumerate(model.labels):
+        moved = []
+        for step in (STEP, -STEP):
+            point, plane, away = landmark.copy(), normal.copy(), offset.copy()
+            if column < 3 * len(landmark):
+                point[column // 3, column % 3] += step
+            else:
+                wall = int(np.flatnonzero((model.wall_column >= 0) & (model.wall_column <= column))[-1])
+                part = column - int(model.wall_column[wall])
+                if part == 2:
+                    away[wall] += step
+                else:
+                    axis = np.eye(3)[np.argmin(np.abs(normal[wall]))]
+                    first = np.cross(normal[wall], axis) / np.linalg.norm(np.cross(normal[wall], axis))
+                    second = np.cross(normal[wall], first)
+                    plane[wall] = tilted(normal[wall], step * (part == 0) * first, step * (part == 1) * second)
+            moved.append(build(room, mode, point, plane, away).point)
+        difference = (moved[0] - moved[1]) / (2 * STEP)
+        np.testing.assert_allclose(model.jacobian[:, :, column], difference, atol=1e-7, err_msg=label)
+
+
+def test_chain_of_mirrors_of_a_moving_point():
+    rng = np.random.default_rng(0)
+    normal = rng.normal(size=(3, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    point, offset = rng.normal(size=3), rng.normal(size=3)
+    chain = mirror_chain(point, normal, offset)
+    for axis in range(3):
+        shift = STEP * np.eye(3)[axis]
+        difference = (
+            mirror_chain(point + shift, normal, offset).image - mirror_chain(point - shift, normal, offset).image
+        ) / (2 * STEP)
+        np.testing.assert_allclose(chain.linear[:, axis], difference, atol=1e-9)
+    np.testing.assert_allclose(chain.linear @ chain.linear.T, np.eye(3), atol=1e-12)
+
+
+def test_wall_returns_equal_differences(room):
+    """Agent moved and walls shifted: range and cosines of every wall return, from the channel's own lengths."""
+    paths, motion, _, normal, offset = room
+    model = build(room, "planes")
+    cycle = 7
+    tx, rx, heading = motion.tx[cycle], motion.rx[cycle], motion.heading[cycle]
+
+    def measured(path, move=0.0, away=offset):
+        walls = paths.tx_walls[path][paths.tx_walls[path] >= 0]
+        ray = mirror_chain(tx + move, normal[walls], away[walls]).image - (rx + move)
+        direction = ray / np.linalg.norm(ray)
+        turn = np.array([[np.cos(heading), np.sin(heading), 0.0], [-np.sin(heading), np.cos(heading), 0.0]])
+        return np.array([np.linalg.norm(ray), *(turn @ direction)])
+
+    for path in np.flatnonzero(paths.valid[cycle] & (paths.kind == PathKind.VT)):
+        assert measured(path)[0] == pytest.approx(paths.tau[cycle, path] * SPEED_OF_LIGHT, abs=1e-9)
+        agent, unknown = model._wall_rows(cycle, int(path))
+        for axis in range(3):
+            shift = STEP * np.eye(3)[axis]
+            difference = (measured(path, shift) - measured(path, -shift)) / (2 * STEP)
+            np.testing.assert_allclose(agent[0, :, axis], difference, atol=1e-8)
+        for wall in {int(w) for w in paths.tx_walls[path] if w >= 0 and model.wall_column[w] >= 0}:
+            shift = STEP * (np.arange(len(offset)) == wall)
+            difference = (measured(path, 0.0, offset + shift) - measured(path, 0.0, offset - shift)) / (2 * STEP)
+            np.testing.assert_allclose(unknown[0, :, model.wall_column[wall] + 2], difference, atol=1e-8)
+
+
+def test_recursion_equals_the_inverse_of_the_whole_trajectory():
+    """Five cycles, random measurements: the last block of one joint information matrix, built by hand."""
+    rng = np.random.default_rng(1)
+    cycles, unknowns, axes, dt = 5, 4, 2, 0.3
+    motion = MotionPrior(acceleration=0.7, start_position=0.2, start_velocity=0.4, axes=axes)
+    rows = [
+        Rows(rng.normal(size=(3, 3)), rng.normal(size=(3, unknowns)), rng.exponential(size=3)) for _ in range(cycles)
+    ]
+    unknown_std = np.array([1.0, 2.0, 0.5, 3.0])
+    bound = posterior_bound(rows, dt * np.arange(cycles), motion, unknown_std)
+    # unknowns: start state (4), one acceleration an axis and step (2 each), landmarks (4)
+    size = 4 + 2 * (cycles - 1) + unknowns
+    joint = np.diag(np.concatenate([[0.2] * 2, [0.4] * 2, [0.7] * (2 * (cycles - 1)), unknown_std]) ** -2.0)
+    state = np.zeros((4, size))
+    state[:, :4] = np.eye(4)
+    step = np.kron([[1, dt], [0, 1]], np.eye(2))
+    for cycle, row in enumerate(rows):
+        if cycle:
+            state = step @ state
+            state[:, 4 + 2 * (cycle - 1) : 6 + 2 * (cycle - 1)] += np.kron([[dt**2 / 2], [dt]], np.eye(2))
+        slope = row.agent[:, :2] @ state[:2]
+        slope[:, -unknowns:] += row.unknown
+        joint += slope.T * row.information @ slope
+        inverse = np.linalg.inv(joint)
+        np.testing.assert_allclose(bound.agent[cycle], state @ inverse @ state.T, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(bound.unknown[cycle], np.diag(inverse)[-unknowns:], rtol=1e-9)
+
+
+def test_without_measurements_the_bound_is_the_motion_alone():
+    nothing = [Rows(np.zeros((0, 3)), np.zeros((0, 0)), np.zeros(0))] * 11
+    motion = MotionPrior(acceleration=0.0, start_position=0.01, start_velocity=0.02)
+    bound = posterior_bound(nothing, np.arange(11.0), motion, np.zeros(0))
+    np.testing.assert_allclose(bound.rms, np.sqrt(2) * np.hypot(0.01, 0.02 * np.arange(11)), rtol=1e-12)
+
+
+def test_order_of_knowledge(room):
+    """Known walls beat unknown planes, planes beat free images; wall returns help; so does more power."""
+    _, motion, *_ = room
+
+    loose = MotionPrior(start_position=1.0, start_velocity=1.0)
+
+    def rms(mode, **rows):
+        model = build(room, mode)
+        # images' own prior so wide that it adds nothing to what planes would say of them
+        std = model.prior_std(1e3 if mode == "images" else 1.0)
+        return posterior_bound(model.rows(**rows), motion.time, loose, std).rms[-1]
+
+    known, planes, images = (rms(mode) for mode in ("known", "planes", "images"))
+    assert known < planes < images
+    assert rms("planes", use_vt=True) < planes
+    assert planes < rms("planes", angles=False)
+    model = build(room, "planes")
+    louder = replace(model, radio=RadioConfig(noise_psd=1e-15))
+    assert posterior_bound(louder.rows(), motion.time, loose, model.prior_std(1.0)).rms[-1] < planes
+    deaf = posterior_bound(model.rows(np.inf), motion.time, loose, model.prior_std())
+    np.testing.assert_allclose(deaf.unknown[-1], model.prior_std() ** 2)
+
+
+def test_bad_settings_are_refused(room):
+    with pytest.raises(ConfigError, match="give 'known'"):
+        build(room, "guessed")
+    with pytest.raises(ConfigError, match="axes: 4"):
+        MotionPrior(axes=4)
+    with pytest.raises(ConfigError, match="acceleration"):
+        MotionPrior(acceleration=-1.0)
