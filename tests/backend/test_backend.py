@@ -66,7 +66,7 @@ def test_the_old_libraries_of_the_system_are_refused_without_the_wheel(monkeypat
     monkeypatch.delitem(sys.modules, "drjit", raising=False)
     monkeypatch.setattr(backend, "_wheel_llvm", lambda: iter(()))
     monkeypatch.setattr(backend, "_SYSTEM_LLVM", (str(OLD_LLVM.parent / "libLLVM*.so*"),))
-    with pytest.raises(SetupError, match="libLLVM-?15.*17 or newer is needed"):
+    with pytest.raises(SetupError, match=r"libLLVM-?15.*17 or newer is needed"):
         backend._choose_llvm()
 
 
@@ -99,7 +99,7 @@ def test_no_llvm_at_all(monkeypatch):
     monkeypatch.delitem(sys.modules, "drjit", raising=False)
     monkeypatch.setattr(backend, "_wheel_llvm", lambda: iter(()))
     monkeypatch.setattr(backend, "_SYSTEM_LLVM", ())
-    with pytest.raises(SetupError, match="no libLLVM found; .*pip install karellen-llvm-core"):
+    with pytest.raises(SetupError, match=r"no libLLVM found; .*pip install karellen-llvm-core"):
         backend._choose_llvm()
 
 

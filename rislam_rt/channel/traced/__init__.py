@@ -7,11 +7,14 @@ How a trajectory of K cycles becomes few solves:
   sequence, so nothing is traced that no cycle needs.
 - *candidates* (`sequences.py`) are all wall sequences that the room's planes leave possible, at every position, instead
   of what randomly shot rays happen to meet. So the set is complete by construction, and the same from run to run.
-- *tracing* (`solve.py`) is Sionna's: its image method mirrors in the meshes' planes and sends rays back through the
-  scene, which decides visibility and the primitives met; its field computation evaluates the radio materials.
-- *refinement* (`refine.py`) recomputes what was found in float64 on the walls' planes.
+- *tracing* is Sionna's: its image method (`visibility.py`) mirrors in the meshes' planes and sends rays back through
+  the scene, which decides visibility and the primitives met; its field computation (`fields.py`) evaluates the radio
+  materials.
+- *refinement* (`course.py`) recomputes in float64, on the walls' planes, where the legs found run.
 """
 
 from rislam_rt.channel.traced.channel import TracedChannel
+from rislam_rt.channel.traced.limits import shortest_segment
+from rislam_rt.channel.traced.proof import BoxProof, trace_small_box
 
-__all__ = ["TracedChannel"]
+__all__ = ["BoxProof", "TracedChannel", "shortest_segment", "trace_small_box"]

@@ -6,8 +6,10 @@ import numpy as np
 
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
-from rislam_rt.channel.traced.problem import Problem, build_batch
-from rislam_rt.channel.traced.rows import in_blocks, joined
+from rislam_rt.channel.traced.course import refined_course, traced_course
+from rislam_rt.channel.traced.limits import room_center
+from rislam_rt.channel.traced.problem import Batch, Found, Problem, build_batch, join_found
+from rislam_rt.channel.traced.rows import Rows, in_blocks
 from rislam_rt.channel.traced.sequences import wall_sides
 from rislam_rt.channel.traced.start import start_tracer
 from rislam_rt.channel.walls import build_walls
@@ -30,7 +32,8 @@ class TracedChannel:
         Largest number of wall bounces on a path, both legs together.
     refine
         Recompute the bounce points of what the tracer found in float64 on the walls' planes; `Paths.source` says
-        `traced, refined`. Without it the tracer's own float32 vertices stand, good to some micrometres.
+        `traced, refined`. Without it the tracer's own float32 vertices stand: good to some
+        micrometres, but a segment of a millimetre has a direction, and Fresnel coefficients, of three digits.
 
     The channel holds the tracer's scene; `paths` may be called for any number of trajectories.
     """
@@ -47,7 +50,7 @@ class TracedChannel:
         self.refine = refine
         self.walls = build_walls(scene)
         self._sides = wall_sides(self.walls)
-        self._stage = build_stage(self.walls, radio.carrier)
+        self._stage = build_stage(self.walls, radio.carrier, room_center(scene))
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Every path of every cycle, with the panel at level 0."""
@@ -68,13 +71,22 @@ class TracedChannel:
 
     def _trace(self, problems: Sequence[Problem]) -> list[Legs]:
         """Solve all problems together, block by block."""
-        from rislam_rt.channel.traced.solve import trace_rows
-
         batch = build_batch(problems, self.walls, self._sides, self.depth)
-        sequences = batch.all_sequences
         blocks = in_blocks(batch.candidates(self.walls, self._sides), BLOCK_ROWS)
-        found = joined([trace_rows(self._stage, sequences, batch.far, batch.device, rows) for rows in blocks])
-        return batch.legs(self.walls, found, self.refine)
+        return batch.legs(join_found([self._solve(batch, rows) for rows in blocks]))
+
+    def _solve(self, batch: Batch, candidates: Rows) -> Found:
+        """Ask the tracer which candidates exist, and what their walls do to the signal."""
+        from rislam_rt.channel.traced.fields import leg_coefficients
+        from rislam_rt.channel.traced.visibility import visible_rows
+
+        rows, vertices = visible_rows(self._stage, batch.all_sequences, batch.far, batch.device, candidates)
+        sequences, (device, far) = batch.all_sequences[rows.sequence], batch.ends(rows)
+        if self.refine:
+            course = refined_course(self.walls, sequences, device, far)
+        else:
+            course = traced_course(sequences, device, far, vertices)
+        return Found(rows, course, leg_coefficients(self._stage, sequences, device, far, course))
 
 
 def _cycles(legs: Legs, rows: slice) -> Legs:

@@ -5,17 +5,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.channel.legs import Legs
-from rislam_rt.channel.traced.refine import refined_course, traced_course
-from rislam_rt.channel.traced.rows import Found, Rows
+from rislam_rt.channel.traced.course import Course
+from rislam_rt.channel.traced.limits import LIFT
+from rislam_rt.channel.traced.rows import Rows, join_rows
 from rislam_rt.channel.traced.sequences import point_sides, possible_rows, possible_sequences
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
-
-LIFT = 2e-6
-"""[m] While tracing, a panel's centre is kept this far in front of its host wall, so that the float32 rounding of the
-wall's mesh cannot hide it: far more than the rounding, and far less than any length that matters."""
 
 
 class Problem(NamedTuple):
@@ -34,6 +31,19 @@ class Problem(NamedTuple):
         return len(self.far) != 1
 
 
+class Found(NamedTuple):
+    """N legs that the tracer confirmed."""
+
+    rows: Rows
+    course: Course
+    coefficient: Complexes
+    """(N,) field without spreading loss and carrier phase: the product of the reflections."""
+
+    def only(self, keep: Integers) -> "Found":
+        """The legs chosen."""
+        return Found(self.rows.only(keep), Course(*(part[keep] for part in self.course)), self.coefficient[keep])
+
+
 class Batch(NamedTuple):
     """Several problems in one set of tables, so that one solve serves them all."""
 
@@ -43,7 +53,7 @@ class Batch(NamedTuple):
     device: Floats
     """(N, 3) [m] of all problems."""
     far: Floats
-    """(F, 3) [m] of all problems, lifted off host walls."""
+    """(F, 3) [m] of all problems, for the tracer: lifted off host walls."""
 
     @property
     def all_sequences(self) -> Integers:
@@ -62,15 +72,22 @@ class Batch(NamedTuple):
             first_far += len(problem.far)
             first_sequence += len(sequences)
 
-    def legs(self, walls: Walls, found: Found, refine: bool) -> list[Legs]:
+    def ends(self, rows: Rows) -> tuple[Floats, Floats]:
+        """Device and far end (N, 3) [m] of each row."""
+        far = np.concatenate([problem.far for problem in self.problems])
+        return self.device[rows.device], far[rows.far]
+
+    def legs(self, found: Found) -> list[Legs]:
         """The tracer's answers, problem by problem."""
         result = []
         first_device = first_sequence = 0
         for problem, sequences in zip(self.problems, self.sequences, strict=True):
             here = found.rows.sequence - first_sequence
             answer = found.only(np.flatnonzero((here >= 0) & (here < len(sequences))))
-            device, column = answer.rows.device - first_device, answer.rows.sequence - first_sequence
-            result.append(_as_legs(problem, walls, sequences, device, column, answer, refine))
+            rows = answer.rows
+            result.append(
+                _as_legs(problem, sequences, rows.device - first_device, rows.sequence - first_sequence, answer)
+            )
             first_device += len(problem.device)
             first_sequence += len(sequences)
         return result
@@ -86,6 +103,16 @@ def build_batch(problems: Sequence[Problem], walls: Walls, sides: Integers, dept
     return Batch(problems, sequences, device, np.concatenate([_lifted(problem, walls) for problem in problems]))
 
 
+def join_found(parts: list[Found]) -> Found:
+    """All legs, one part after the other."""
+    courses = zip(*(part.course for part in parts), strict=True)
+    return Found(
+        join_rows([part.rows for part in parts]),
+        Course(*(np.concatenate(column) for column in courses)),
+        np.concatenate([part.coefficient for part in parts]),
+    )
+
+
 def _lifted(problem: Problem, walls: Walls) -> Floats:
     """Far ends (F, 3), a panel's at least `LIFT` in front of its host wall."""
     if problem.host < 0 or problem.front is None:
@@ -95,13 +122,9 @@ def _lifted(problem: Problem, walls: Walls) -> Floats:
     return problem.far + np.maximum(LIFT - height, 0.0)[:, None] * problem.front
 
 
-def _as_legs(
-    problem: Problem, walls: Walls, sequences: Integers, device: Integers, column: Integers, found: Found, refine: bool
-) -> Legs:
+def _as_legs(problem: Problem, sequences: Integers, device: Integers, column: Integers, found: Found) -> Legs:
     """Scatter found legs into dense arrays, one column a sequence that some device has."""
-    start, end = problem.device[device], problem.far[device if problem.paired else np.zeros_like(device)]
-    used = sequences[column]
-    course = refined_course(walls, used, start, end) if refine else traced_course(used, start, end, found)
+    course = found.course
     keep = np.ones(len(device), dtype=np.bool_)
     if problem.front is not None:
         keep = course.at_far_end @ problem.front > SURFACE_TOLERANCE
@@ -114,6 +137,11 @@ def _as_legs(
         return values
 
     return Legs(
-        sequences[columns], dense(np.ones(len(device), dtype=np.bool_)), dense(course.length), dense(course.at_device),
-        dense(course.at_far_end), dense(found.coefficient), dense(course.vertices),
-    )  # fmt: skip
+        walls=sequences[columns],
+        valid=dense(np.ones(len(device), dtype=np.bool_)),
+        length=dense(course.length),
+        at_device=dense(course.at_device),
+        at_far_end=dense(course.at_far_end),
+        coefficient=dense(found.coefficient),
+        vertices=dense(course.vertices),
+    )

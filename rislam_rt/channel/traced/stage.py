@@ -19,18 +19,25 @@ class Stage:
     """A Sionna RT scene and the correspondence of its (shape, primitive) pairs with walls."""
 
     scene: rt.Scene
+    origin: Floats
+    """(3,) [m] point of the room that is the tracer's zero."""
     shape: Integers
     """(W,) shape of one triangle of each wall, its largest."""
     primitive: Integers
     """(W,) its number in that shape."""
     corner: Floats
-    """(W, 3) [m] one of its corners."""
+    """(W, 3) [m] one of its corners, from `origin`."""
     shapes: Integers
     """(M,) all shapes, ascending."""
     first: Integers
     """(M,) where each shape's triangles begin in `wall_of_primitive`."""
     wall_of_primitive: Integers
     """(T,) walls, shape by shape."""
+
+    @property
+    def wavelength(self) -> float:
+        """Carrier wavelength [m] as the tracer has it."""
+        return float(self.scene.wavelength[0])
 
     def wall_hit(self, shape: Integers, primitive: Integers) -> Integers:
         """Walls (...,) of hits, `NO_WALL` where nothing was hit."""
@@ -40,8 +47,8 @@ class Stage:
         return np.where(known, self.wall_of_primitive[index], NO_WALL)
 
 
-def build_stage(walls: Walls, carrier: float) -> Stage:
-    """Put the walls on stage at the carrier [Hz]: meshes built in memory, no file read, nothing merged or reordered.
+def build_stage(walls: Walls, carrier: float, origin: Floats) -> Stage:
+    """Put the walls on stage at the carrier [Hz]: meshes built in memory about `origin`, in the order of their faces.
 
     Raises
     ------
@@ -56,7 +63,9 @@ def build_stage(walls: Walls, carrier: float) -> Stage:
     ]
     members = [np.flatnonzero(material_of_triangle == m) for m in range(len(materials))]
     objects = [
-        rt.SceneObject(_mesh(f"walls-{m}", walls.triangles[rows]), f"walls-{m}", radio_material=_material(material, m))
+        rt.SceneObject(
+            _mesh(f"walls-{m}", walls.triangles[rows] - origin), f"walls-{m}", radio_material=_material(material, m)
+        )
         for m, (material, rows) in enumerate(zip(materials, members, strict=True))
     ]
     try:
@@ -64,10 +73,10 @@ def build_stage(walls: Walls, carrier: float) -> Stage:
     except ValueError as error:
         raise SceneError(f"material: {error}; give an ITU material that is specified at {carrier:g} Hz") from None
     ids = np.array([int(o.object_id) for o in objects], dtype=np.int64)
-    return _numbered(scene, walls, ids, members)
+    return _numbered(scene, origin, walls, ids, members)
 
 
-def _numbered(scene: rt.Scene, walls: Walls, ids: Integers, members: list[Integers]) -> Stage:
+def _numbered(scene: rt.Scene, origin: Floats, walls: Walls, ids: Integers, members: list[Integers]) -> Stage:
     """Number the triangles of all shapes (M,) and pick each wall's largest."""
     order = np.argsort(ids)
     rows = np.concatenate([members[m] for m in order] or [np.zeros(0, dtype=np.int64)])
@@ -82,9 +91,10 @@ def _numbered(scene: rt.Scene, walls: Walls, ids: Integers, members: list[Intege
     largest = by_size[np.unique(walls.wall_of_triangle[by_size], return_index=True)[1]]
     return Stage(
         scene,
+        origin,
         shape_of[largest],
         primitive_of[largest],
-        walls.triangles[largest, 0],
+        walls.triangles[largest, 0] - origin,
         ids[order],
         first,
         walls.wall_of_triangle[rows],

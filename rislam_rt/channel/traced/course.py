@@ -1,11 +1,13 @@
-"""Traced legs in float64: the tracer says which walls are met and seen, the images on their planes say where."""
+"""Where found legs run: as the tracer left them, or refined in float64.
+
+Refinement keeps the tracer's word on which walls are met and seen; the images on the walls' planes say where.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.rows import Found
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.geometry.angles import unit
@@ -13,7 +15,7 @@ from rislam_rt.geometry.planes import mirror, mirror_direction, signed_distance
 
 
 class Course(NamedTuple):
-    """Where N legs run."""
+    """N legs."""
 
     vertices: Floats
     """(N, D, 3) [m] bounce points from device to far end, zero beyond the last."""
@@ -44,18 +46,23 @@ def refined_course(walls: Walls, sequences: Integers, device: Floats, far: Float
         here = signed_distance(point, normal[:, bounce], offset[:, bounce])
         span = here - signed_distance(image, normal[:, bounce], offset[:, bounce])
         fraction = np.where(span != 0.0, here / np.where(span != 0.0, span, 1.0), 0.0)
-        here_real = real[:, bounce, None]
-        point = np.where(here_real, point + fraction[:, None] * (image - point), point)
-        direction = np.where(here_real, mirror_direction(direction, normal[:, bounce]), direction)
-        vertices[:, bounce] = np.where(here_real, point, 0.0)
+        is_real = real[:, bounce, None]
+        point = np.where(is_real, point + fraction[:, None] * (image - point), point)
+        direction = np.where(is_real, mirror_direction(direction, normal[:, bounce]), direction)
+        vertices[:, bounce] = np.where(is_real, point, 0.0)
     return Course(vertices, np.linalg.norm(images[0] - device, axis=-1), at_device, -direction)
 
 
-def traced_course(sequences: Integers, device: Floats, far: Floats, found: Found) -> Course:
-    """The same legs as the tracer left them."""
+def traced_course(sequences: Integers, device: Floats, far: Floats, vertices: Floats) -> Course:
+    """Legs over the bounce points (N, D, 3) that the tracer left."""
+    points = polyline(sequences, device, far, vertices)
     bounces = (sequences != NO_WALL).sum(axis=1)
-    row = np.arange(len(sequences))
-    points = np.concatenate([found.vertices, np.zeros((len(row), 1, 3))], axis=1)
-    points[row, bounces] = far
-    last = np.where(bounces[:, None] > 0, points[row, np.maximum(bounces - 1, 0)], device)
-    return Course(found.vertices, found.length, unit(points[:, 0] - device), unit(last - far))
+    length = np.linalg.norm(np.diff(points, axis=1), axis=-1).sum(axis=1)
+    before_last = points[np.arange(len(points)), bounces]
+    return Course(vertices, length, unit(points[:, 1] - device), unit(before_last - far))
+
+
+def polyline(sequences: Integers, device: Floats, far: Floats, vertices: Floats) -> Floats:
+    """Device, bounce points and far end (N, D + 2, 3) [m]; the far end repeats where a leg has fewer bounces."""
+    inner = np.where((sequences != NO_WALL)[..., None], vertices, far[:, None])
+    return np.concatenate([device[:, None], inner, far[:, None]], axis=1)

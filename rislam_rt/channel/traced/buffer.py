@@ -1,0 +1,59 @@
+"""Sionna's path buffer, filled with given wall sequences: row i names its own source, target and walls."""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import sionna.rt as rt
+from sionna.rt.path_solvers.paths_buffer import PathsBuffer
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.channel.traced.rows import Rows
+from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
+from rislam_rt.channel.traced.stage import Stage
+
+
+def fill_buffer(stage: Stage, sequences: Integers, rows: Rows, vertices: Floats | None = None) -> PathsBuffer:
+    """Paths from far ends (sources) to devices (targets) over `sequences` (N, D), which run the other way.
+
+    `vertices` (N, D, 3) [m] are in the order from device to far end; without them any point of each wall's plane, which
+    the image method needs, from the stage's origin.
+    """
+    count, depth = sequences.shape
+    buffer = PathsBuffer(count, depth, False)
+    walls = turned_round(sequences)
+    points = stage.corner[walls] if vertices is None else turned_vertices(vertices, sequences)
+    for column, (wall, point) in enumerate(zip(walls.T, np.moveaxis(points, 1, 0), strict=True)):
+        real = wall != NO_WALL
+        event = np.where(real, rt.InteractionType.SPECULAR, rt.InteractionType.NONE)
+        at, here = dr.full(mi.UInt, column + 1, count), mi.Bool(real)
+        buffer.set_interaction_type(at, as_indices(event), mi.Bool(True))
+        buffer.set_shape(at, as_indices(stage.shape[wall]), here)
+        buffer.set_primitive(at, as_indices(stage.primitive[wall]), here)
+        buffer.set_vertex(at, as_points(point), here)
+        buffer.set_prob(at, mi.Float(1.0), here)
+    buffer._src_indices = as_indices(rows.far)
+    buffer._tgt_indices = as_indices(rows.device)
+    return buffer
+
+
+def read_vertices(stage: Stage, buffer: PathsBuffer, keep: Integers, sequences: Integers) -> Floats:
+    """Bounce points (N, D, 3) [m] of the paths `keep`, from device to far end over `sequences` (N, D)."""
+    columns = [np.array(getattr(buffer, f"vertices_{axis}"), dtype=np.float64) for axis in "xyz"]
+    return turned_vertices(np.stack(columns, axis=-1)[keep, : sequences.shape[1]] + stage.origin, sequences)
+
+
+def as_points(points: Floats) -> mi.Point3f:
+    """Positions (N, 3) for the tracer, in float32."""
+    return mi.Point3f(*(mi.Float(np.ascontiguousarray(column, dtype=np.float32)) for column in points.T))
+
+
+def as_indices(values: Integers) -> mi.UInt:
+    """Numbers (N,) for the tracer."""
+    return mi.UInt(np.ascontiguousarray(values, dtype=np.uint32))
+
+
+def turned_vertices(vertices: Floats, sequences: Integers) -> Floats:
+    """Bounce points (N, D, 3) in the opposite order, zero where the sequences (N, D) have no wall."""
+    index = (sequences != NO_WALL).sum(axis=1)[:, None] - 1 - np.arange(sequences.shape[1])
+    turned = np.take_along_axis(vertices, np.maximum(index, 0)[..., None], axis=1)
+    return np.where((index >= 0)[..., None], turned, 0.0)

@@ -1,0 +1,28 @@
+"""Lengths below which the tracer's float32 rays say nothing."""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.model import Scene
+
+RAY_OFFSET = 6e-6
+"""Sionna RT starts a ray off its surface by this much of (1 m + the largest coordinate)."""
+
+SEGMENT_LIMIT = 1e-5
+"""[m] What Sionna RT's limit of 1 cm on segments is lowered to: that limit loses double bounces near a corner, and
+below `shortest_segment` the rays' offsets take over anyway."""
+
+LIFT = 2e-6
+"""[m] While tracing, a panel's centre is kept this far in front of its host wall, so that the float32 rounding of the
+wall's mesh cannot hide it."""
+
+
+def room_center(scene: Scene) -> Floats:
+    """(3,) [m] middle of the room's bounds: the tracer works about it, where float32 is finest."""
+    return scene.bounds.mean(axis=0)
+
+
+def shortest_segment(scene: Scene) -> float:
+    """[m] Below this a path may be lost next to a corner: four times a ray's offset from its surface, 0.1 mm in a room
+    of 6 m."""
+    return 4.0 * RAY_OFFSET * (1.0 + float(np.abs(scene.bounds - room_center(scene)).max()))

@@ -1,0 +1,72 @@
+"""Sionna's image method on chosen wall sequences: which candidates the meshes really admit, and where they bounce.
+
+`PathSolver` finds its candidates by shooting rays, for all pairs of sources and targets. Here the candidates are
+given (`sequences.py`), each row naming one far end, one device and one wall sequence, so that a whole trajectory is
+one solve and no candidate depends on luck. The answer is the tracer's own: images in the meshes' planes, rays back
+through the scene, occlusion, and the primitives hit.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+from sionna.rt.path_solvers import image_method
+from sionna.rt.path_solvers.image_method import ImageMethod
+from sionna.rt.path_solvers.paths_buffer import PathsBuffer
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.channel.traced.buffer import as_points, fill_buffer, read_vertices
+from rislam_rt.channel.traced.limits import SEGMENT_LIMIT
+from rislam_rt.channel.traced.rows import Rows
+from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
+from rislam_rt.channel.traced.stage import Stage
+
+
+def visible_rows(stage: Stage, sequences: Integers, far: Floats, device: Floats, rows: Rows) -> tuple[Rows, Floats]:
+    """The candidates that exist, and their bounce points (N, D, 3) [m] from device to far end.
+
+    Parameters
+    ----------
+    sequences
+        (S, D) from device to far end.
+    far, device
+        Positions (F, 3) and (N, 3) [m]. Rays run from the device back to the far end, which may lie on a face.
+    """
+    if len(rows.far) == 0:
+        return rows, np.zeros((0, sequences.shape[1], 3))
+    candidates = sequences[rows.sequence]
+    with _short_segments():
+        traced = ImageMethod()(
+            scene=stage.scene.mi_scene,
+            paths=fill_buffer(stage, candidates, rows),
+            diffraction=False,
+            diffraction_lit_region=False,
+            src_positions=as_points(far - stage.origin),
+            tgt_positions=as_points(device - stage.origin),
+        )
+    keep = _confirmed(stage, candidates, traced)
+    return rows.only(keep), read_vertices(stage, traced, keep, candidates[keep])
+
+
+def _confirmed(stage: Stage, sequences: Integers, traced: PathsBuffer) -> Integers:
+    """Rows that the tracer found visible with every bounce on the wall asked for.
+
+    The image method also accepts a hit on another wall in the same plane; that is another path's business.
+    """
+    valid = np.array(traced.valid, dtype=np.bool_)
+    wanted = turned_round(sequences)
+    depth = wanted.shape[1]
+    shape, primitive = (np.array(t, dtype=np.int64)[:, :depth] for t in (traced.shapes, traced.primitives))
+    hit = stage.wall_hit(shape, primitive)
+    return np.flatnonzero(valid & ((hit == wanted) | (wanted == NO_WALL)).all(axis=1))
+
+
+@contextmanager
+def _short_segments() -> Iterator[None]:
+    """Let the image method keep short segments while this lasts."""
+    own = image_method.MIN_SEGMENT_LENGTH
+    image_method.MIN_SEGMENT_LENGTH = SEGMENT_LIMIT
+    try:
+        yield
+    finally:
+        image_method.MIN_SEGMENT_LENGTH = own
