@@ -5,11 +5,26 @@ import sys
 
 def main() -> None:
     """Entry point of `rislam-rt`: run a command; a failure that was foreseen is one line and its exit code."""
+    import typer
+
     from rislam_rt.cli.app import app
     from rislam_rt.errors import RislamError
 
     try:
-        app()
+        code = app(sys.argv[1:] or ["--help"], prog_name="rislam-rt", standalone_mode=False)
     except RislamError as error:
-        print("error: " + " ".join(str(error).split()), file=sys.stderr)
-        sys.exit(error.exit_code)
+        _leave(str(error), error.exit_code)
+    except typer.Abort:
+        _leave("interrupted", 130)
+    except Exception as error:
+        # Wrong usage: the parser's exceptions have no public base class, but all can say what is wrong.
+        if not hasattr(error, "format_message"):
+            raise
+        _leave(f"{error.format_message()}; see rislam-rt --help", 2)
+    else:
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+def _leave(message: str, code: int) -> None:
+    print("error: " + " ".join(message.split()), file=sys.stderr)
+    sys.exit(code)

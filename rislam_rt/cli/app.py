@@ -6,9 +6,7 @@ from rislam_rt.cli import check, compare, design, doctor, new, report, run, show
 
 app = typer.Typer(
     name="rislam-rt",
-    help="Ray-traced propagation and SLAM with a reconfigurable intelligent surface.",
     epilog="Exit codes: 0 done, 1 a failure in the work, 2 bad input, 3 the machine lacks something, 4 the disk.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -17,12 +15,18 @@ for _command in (run, trace, compare, design, check, new, show, report, doctor):
     app.command(_command.__name__.rpartition(".")[2])(_command.command)
 
 
-@app.callback(invoke_without_command=True)
-def _options(
-    version: bool = typer.Option(False, "--version", help="Print the version and leave.", is_eager=True),
-) -> None:
-    if version:
+def _print_version(wanted: bool) -> None:
+    if wanted:
         from rislam_rt import __version__
 
         typer.echo(__version__)
         raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: bool = typer.Option(
+        False, "--version", help="Print the version and leave.", is_eager=True, callback=_print_version
+    ),
+) -> None:
+    """Ray-traced propagation and SLAM with a reconfigurable intelligent surface."""

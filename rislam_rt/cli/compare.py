@@ -23,8 +23,10 @@ def command(
     from rislam_rt.model import RadioConfig
     from rislam_rt.report.tables import print_comparison
 
-    room = open_scene(scene)
+    opened = open_scene(scene)
+    room = opened.scene
     prepare_backend()
+    opened.warn()
     report = compare_channels(room, RadioConfig(), poses=poses, depth=depth, rng=np.random.default_rng(seed))
     print_comparison(room.name, report)
     write_json(json, {"scene": room.name, "poses": poses, "depth": depth, "seed": seed, **report.as_dict()})

@@ -26,9 +26,11 @@ def command(
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.report.tables import print_designs
 
-    room = open_scene(scene)
+    opened = open_scene(scene)
+    room = opened.scene
     point = parse_point(at, room)
     prepare_channel(channel)
+    opened.warn()
     designs = design_at(room, RadioConfig(), point, channel=channel, depth=depth, rng=np.random.default_rng(seed))
     table = design_table(designs)
     print_designs(room.name, point, designs)

@@ -12,6 +12,8 @@ def command(json: JsonFile = None) -> None:
     findings = diagnose()
     width = max(len(finding.name) for finding in findings)
     for finding in findings:
+        if not finding.ok and finding.name == "backend":
+            continue  # `prepare_backend` says it below, and ends the command
         typer.echo(f"{'ok ' if finding.ok else 'BAD'} {finding.name:<{width}}  {finding.value}")
     prepare_backend()
     from rislam_rt.channel.traced import trace_small_box

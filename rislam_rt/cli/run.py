@@ -47,13 +47,15 @@ def command(
         if spec.scene is None:
             raise ConfigError(f"{pipeline}: scene: not given; add it, or give --scene DIR")
         scene = Path(os.path.normpath(pipeline.parent / spec.scene))
-    room = open_scene(scene)
+    opened = open_scene(scene)
+    room = opened.scene
     check_run(room, spec)
     folder = out or run_folder(spec, room, Path("runs"))
     check_folder(folder)
     prepare_channel(spec.channel)
 
     partial = PartialRun(folder, run_identity(spec, room))
+    opened.warn()
     try:
         with show_progress() as progress:
             result = run_slam(room, spec, rng=np.random.default_rng(spec.seed), done=partial, progress=progress)

@@ -1,32 +1,40 @@
 """Opening a scene for a command."""
 
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
     from rislam_rt.model import Scene
 
 
-def open_scene(path: Path) -> "Scene":
-    """A scene that was read and checked; its warnings go to the error stream.
+class Opened(NamedTuple):
+    """A scene that was read and checked, and what is odd about it."""
+
+    scene: "Scene"
+    warnings: tuple[str, ...]
+
+    def warn(self) -> None:
+        """Print the warnings; once all else is known to be in order, so that an error is one line."""
+        for line in self.warnings:
+            print(f"warning: {line}", file=sys.stderr)
+
+
+def open_scene(path: Path) -> Opened:
+    """Read and check a scene.
 
     Raises
     ------
     SceneError
         It is unusable.
     """
-    import typer
-
     from rislam_rt.scene import check_scene, load_scene
     from rislam_rt.scene.findings import raise_errors
 
-    scene = load_scene(path)
     findings = check_scene(path)
     raise_errors(findings)
-    for finding in findings:
-        typer.echo(f"warning: {finding.line}", err=True)
-    return scene
+    return Opened(load_scene(path), tuple(finding.line for finding in findings))
 
 
 def parse_point(text: str, scene: "Scene") -> "Floats":

@@ -17,6 +17,8 @@ def command(
     from rislam_rt.report.room import draw_scene
     from rislam_rt.report.tables import print_scene
 
-    room = open_scene(scene)
+    opened = open_scene(scene)
+    opened.warn()
+    room = opened.scene
     print_scene(room)
     typer.echo(f"picture: {draw_scene(room, out or Path(f'{room.name}.png'))}")

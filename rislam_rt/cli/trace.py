@@ -24,8 +24,10 @@ def command(
     from rislam_rt.pipeline.run import build_channel, prepare_channel
     from rislam_rt.report.tables import path_table, print_paths
 
-    room = open_scene(scene)
+    opened = open_scene(scene)
+    room = opened.scene
     prepare_channel(channel)
+    opened.warn()
     begin = perf_counter()
     paths = build_channel(channel, room, RadioConfig(), depth).paths(room.agent)
     seconds = perf_counter() - begin

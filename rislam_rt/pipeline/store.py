@@ -165,8 +165,12 @@ def read_run(folder: Path) -> SlamResult:
     Raises
     ------
     StoreError
-        The folder is not a completed run, or one of its files is damaged.
+        One of its files is missing or damaged.
+    ConfigError
+        The folder is not a completed run.
     """
+    if not (folder / RUN_FILE).is_file():
+        raise ConfigError(f"{folder}: not a completed run (no {RUN_FILE}); give a folder that `run` wrote")
     try:
         about = json.loads((folder / RUN_FILE).read_text())
         names = [str(name) for name in about["schemes"]]
@@ -192,8 +196,6 @@ def read_run(folder: Path) -> SlamResult:
         )
     except StoreError:
         raise
-    except FileNotFoundError:
-        raise StoreError(f"{folder}: not a completed run (no {RUN_FILE}); give a folder that `run` wrote") from None
     except (OSError, ValueError, KeyError, TypeError, RislamError) as error:
         cause = f"{type(error).__name__}: {error}"[:120]
         raise StoreError(f"{folder}: a file of the run is damaged ({cause}); run again") from None

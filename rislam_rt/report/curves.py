@@ -38,21 +38,23 @@ def draw_agent_error(result: SlamResult) -> Figure:
 def draw_landmark_errors(result: SlamResult) -> Figure:
     """Distance between each true landmark and the estimate that stands for it."""
     scene, time = result.scene, result.scene.agent.time
+    tracks = {name: landmark_track(scene, scheme).error for name, scheme in result.schemes.items()}
     with styled():
         figure = Figure(figsize=(8.6, 3.9))
         axes = figure.subplots(1, max(len(scene.landmarks), 1), sharey=True, squeeze=False)[0]
-        for name, scheme in result.schemes.items():
-            errors = landmark_track(scene, scheme).error
+        for name, errors in tracks.items():
             for number, axis in enumerate(axes[: errors.shape[1]]):
                 axis.plot(time, 100.0 * errors[:, number], color=scheme_colour(name), lw=1.4, label=name)
-        for axis, landmark in zip(axes, scene.landmarks, strict=False):
+        never = set(np.flatnonzero(~np.any([np.isfinite(e).any(axis=0) for e in tracks.values()], axis=0)).tolist())
+        for number, (axis, landmark) in enumerate(zip(axes, scene.landmarks, strict=False)):
             axis.set_title(landmark, weight="bold")
             axis.set_xlabel("time [s]")
             axis.set_xlim(time[0], time[-1])
             axis.set_yscale("log")
             axis.yaxis.set_major_formatter(ScalarFormatter())
             axis.yaxis.set_minor_formatter(NullFormatter())
-            if not any(np.isfinite(line.get_ydata()).any() for line in axis.lines):
+            if number in never:
+                axis.set_ylim(1.0, 100.0)
                 axis.text(0.5, 0.5, "never found", transform=axis.transAxes, ha="center", color="#555555")
         axes[0].set_ylabel("landmark position error [cm]")
         handles, labels = axes[0].get_legend_handles_labels()

@@ -48,7 +48,8 @@ def draw_paths(scene: Scene, paths: Paths, gain: Floats, cycle: int, title: str)
     `gain` (P,) are the magnitudes of the path gains in that cycle.
     """
     with styled():
-        figure = Figure(figsize=(9.0, 6.4), layout="none")
+        figure = Figure(figsize=(9.0, 6.4))
+        figure.set_layout_engine("none")
         axis: Any = figure.add_axes((-0.12, 0.0, 1.24, 1.08), projection="3d", computed_zorder=False)
         _draw_room_3d(axis, scene)
         handles = [_draw_class(axis, scene, paths, gain, cycle, kind) for kind in PathKind]

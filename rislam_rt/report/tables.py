@@ -19,13 +19,13 @@ def print_summary(summary: Mapping[str, Any]) -> None:
     """Agent, landmarks and walls: one row each, one column a scheme."""
     schemes = summary["schemes"]
     title = f"{summary['pipeline']} in {summary['scene']}: {summary['cycles']} cycles, seed {summary['seed']}"
-    table = Table(title=title, title_justify="left")
+    table = Table()
     table.add_column("RMSE")
     for name in schemes:
         table.add_column(name, justify="right")
     for row in summary_rows(summary):
         table.add_row(*row)
-    _console().print(table)
+    _show(title, table)
 
 
 def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
@@ -65,17 +65,18 @@ def path_table(paths: Paths) -> list[dict[str, Any]]:
 def print_paths(name: str, paths: Paths, rows: list[dict[str, Any]], seconds: float) -> None:
     """The table of `path_table`."""
     title = f"{name}: {paths.num_cycles} cycles, {paths.source}, {seconds:.2f} s (panel at level 0)"
-    table = Table("class", "identities", "a cycle", "gain \\[dB]", title=title, title_justify="left")
+    table = Table("class", "identities", "a cycle", "gain \\[dB]")
     for row in rows:
         gains = f"{row['lowest_gain_db']:.1f} to {row['highest_gain_db']:.1f}"
         table.add_row(row["class"], str(row["identities"]), f"{row['mean_per_cycle']:.1f}", gains)
-    _console().print(table)
+    _show(title, table)
 
 
 def print_comparison(name: str, report: "PathReport") -> None:
     """Matched, explained and unexplained paths, and the largest errors."""
     content = report.as_dict()
-    table = Table("traced against analytic", "", title=f"{name}: {report.cycles} poses", title_justify="left")
+    title = f"{name}: {report.cycles} poses"
+    table = Table("traced against analytic", "")
     table.add_row("matched paths", str(content["matched"]))
     for reason, count in content["explained"].items():
         table.add_row(f"explained: {reason}", str(count))
@@ -87,30 +88,29 @@ def print_comparison(name: str, report: "PathReport") -> None:
         ("angle", "max_angle_error_rad", "rad"),
     ):
         table.add_row(f"largest {label} error", f"{content[key]:.2g} {unit}")
-    console = _console()
-    console.print(table)
+    _show(title, table)
     for path in [p for p in report.one_sided if not p.reason][:10]:
-        console.print(f"unexplained: cycle {path.cycle}, {path.label}, only {path.side}", markup=False)
+        print(f"unexplained: cycle {path.cycle}, {path.label}, only {path.side}")
 
 
 def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"]) -> None:
     """One row a method: gain of the direct path, its gap to the optimum, the bound on the position, time."""
     at = ", ".join(f"{x:g}" for x in point)
     title = f"{name}, agent at ({at}) m"
-    table = Table("method", "gain \\[dB]", "gap \\[dB]", "CRLB \\[m]", "time \\[ms]", title=title, title_justify="left")
+    table = Table("method", "gain \\[dB]", "gap \\[dB]", "CRLB \\[m]", "time \\[ms]")
     for method, design in designs.items():
         crlb = f"{np.sqrt(design.crlb):.4g}" if np.isfinite(design.crlb) else design.outcome.name.lower()
         table.add_row(method, f"{design.gain_db:.2f}", f"{design.gap_db:.2f}", crlb, f"{1e3 * design.seconds:.2f}")
     bound = max(design.bound for design in designs.values())
     if bound > 0.0:
         table.add_row("lower bound", "", "", f"{np.sqrt(bound):.4g}", "", style="dim")
-    _console().print(table)
+    _show(title, table)
 
 
 def print_scene(scene: Scene) -> None:
     """What a room holds."""
     low, high = scene.bounds
-    table = Table("what", "name", "where \\[m]", title=scene.name, title_justify="left")
+    table = Table("what", "name", "where \\[m]")
     for reflector in scene.reflectors:
         material = reflector.material
         kind = f"R = {material.reflection:g}" if material.reflection is not None else f"{material.itu}"
@@ -125,11 +125,14 @@ def print_scene(scene: Scene) -> None:
     path = scene.agent.position
     table.add_row("agent", f"{len(path)} cycles", f"{_point(path[0])} to {_point(path[-1])}")
     table.add_row("bounds", "", f"{_point(low)} to {_point(high)}")
-    _console().print(table)
+    _show(scene.name, table)
 
 
-def _console() -> Console:
-    return Console(highlight=False)
+def _show(title: str, table: Table) -> None:
+    """Print a table under its title (rich would wrap a title at the table's width)."""
+    console = Console(highlight=False)
+    console.print(title, style="bold", markup=False)
+    console.print(table)
 
 
 def _metres(value: float | None) -> str:
