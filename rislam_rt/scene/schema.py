@@ -182,6 +182,8 @@ def _remark(item: Any) -> str:
         near = get_close_matches(str(item["loc"][-1]), _known_keys(), n=1)
         return f"{place}: unknown key" + (f" (did you mean '{near[0]}'?)" if near else "")
     message = item["msg"].removeprefix("Value error, ")
+    if item["type"] == "string_pattern_mismatch":
+        message = "give letters, digits, '_', '-' and '.' only"
     if isinstance(item["input"], dict):
         return f"{place}: {message}"
     return f"{place}: {_short(repr(item['input']), 60)} received, {message[:1].lower()}{message[1:]}"

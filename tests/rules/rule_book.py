@@ -4,6 +4,7 @@ import ast
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache, cached_property
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -62,7 +63,7 @@ class Source:
     path: str
     text: str
 
-    @property
+    @cached_property
     def tree(self) -> ast.Module:
         return ast.parse(self.text)
 
@@ -72,6 +73,7 @@ class Source:
         return self.path.split("/")[0].removesuffix(".py")
 
 
+@cache
 def package_sources() -> list[Source]:
     """Every Python file of the package."""
     folder = ROOT / PACKAGE

@@ -1,22 +1,110 @@
-"""The scene file becomes the scene it describes."""
+"""The committed rooms: what the builder writes, what the loader reads, what the check says."""
 
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from rislam_rt.scene import load_scene
+from rislam_rt.geometry.triangles import planar_groups, triangle_planes
+from rislam_rt.scene import check_scene, load_scene
+from rislam_rt.scene.build import main
+from rislam_rt.scene.meshes import parse_mesh
+from rislam_rt.scene.rooms import ROOMS
+from rislam_rt.scene.templates import room_files
 
 SCENES = Path(__file__).parents[2] / "scenes"
+NAMES = sorted(ROOMS)
+
+
+def test_every_committed_room_has_a_builder() -> None:
+    assert sorted(path.parent.name for path in SCENES.glob("*/scene.toml")) == NAMES
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_builder_writes_what_is_committed(name: str) -> None:
+    files = room_files(ROOMS[name]())
+    folder = SCENES / name
+    assert sorted(files) == sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
+    for path, content in files.items():
+        committed = (folder / path).read_bytes()
+        if path.endswith(".glb"):  # its header names the version of the library that wrote it
+            ours, theirs = parse_mesh(content, path), parse_mesh(committed, path)
+            assert np.array_equal(ours.vertices, theirs.vertices)
+            assert np.array_equal(ours.faces, theirs.faces)
+        elif path.endswith((".ply", ".tum")):  # the last digit may differ between mathematical libraries
+            assert len(content) == len(committed)
+        else:
+            assert content == committed, path
+    assert sum(map(len, files.values())) < 500_000
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_room_passes_its_check(name: str) -> None:
+    """The one remark is the paper's element, which reflects more than a plate; METHOD wants it said."""
+    findings = check_scene(SCENES / name)
+    assert {(f.severity, f.field) for f in findings} <= {("warning", "ris.element")}
+    assert all("4.05 dB" in f.message for f in findings)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_agent_walks_600_cycles_at_a_steady_pace(name: str) -> None:
+    agent = load_scene(SCENES / name).agent
+    assert len(agent) == 600
+    assert np.allclose(np.diff(agent.time), 0.1, rtol=0, atol=1e-9)
+    step = np.linalg.norm(np.diff(agent.position, axis=0), axis=1)
+    # Poses are written with nine digits, so a step of 1 cm is good to 1e-6; chords are shorter than the arc by 1e-5.
+    assert np.ptp(step) < 1e-4 * step.mean()
+    course = np.arctan2(agent.velocity[1:-1, 1], agent.velocity[1:-1, 0])
+    assert np.abs(np.angle(np.exp(1j * (course - agent.heading[1:-1])))).max() < 1e-3
 
 
 def test_paper_room_is_the_papers() -> None:
     scene = load_scene(SCENES / "paper_room")
     assert scene.bounds.tolist() == [[0.0, 0.0, 0.0], [6.0, 6.0, 3.0]]
+    assert [r.name for r in scene.reflectors] == ["floor", "ceiling", "wall_x0", "wall_x6", "wall_y0", "wall_y6"]
     assert scene.landmarks == ("sphere", "ris")
     assert {r.material.reflection for r in scene.reflectors} == {0.85}
-    assert len(scene.agent) == 600
+    assert scene.scatterers[0].rcs == np.pi * 0.05**2
     # 0.1 m baseline, turned 0.5 rad against the heading; the file's offsets have five decimals.
     baseline = scene.agent.rx[0] - scene.agent.tx[0]
-    assert np.isclose(np.linalg.norm(baseline), 0.1, atol=1e-5)
-    assert np.isclose(np.arctan2(baseline[1], baseline[0]), np.pi / 4 + 0.5, atol=1e-4)
+    assert np.isclose(np.linalg.norm(baseline), 0.1, rtol=0, atol=1e-5)
+    assert np.isclose(np.arctan2(baseline[1], baseline[0]), np.pi / 4 + 0.5, rtol=0, atol=1e-4)
     assert np.allclose(scene.agent.position[-1], [0.5 + 59.9 * 0.0707, 0.7 + 59.9 * 0.0707, 0.5])
+
+
+def test_tilted_room_has_no_parallel_and_no_axis_aligned_faces() -> None:
+    normals = []
+    for reflector in load_scene(SCENES / "tilted_room").reflectors:
+        assert planar_groups(reflector.triangles, 1e-9, 1e-9).max() == 0
+        normals.append(triangle_planes(reflector.triangles)[0][0])
+    cosines = np.abs(np.array(normals) @ np.array(normals).T) - np.eye(6)
+    assert cosines.max() < np.cos(np.radians(2.0))
+    assert np.abs(normals).max() < np.cos(np.radians(1.0))
+
+
+def test_large_hall_has_thousands_of_triangles_in_hundreds_of_planes() -> None:
+    scene = load_scene(SCENES / "large_hall")
+    assert sum(len(r.faces) for r in scene.reflectors) > 4000
+    assert sum(planar_groups(r.triangles, 1e-4, 1e-4).max() + 1 for r in scene.reflectors) > 150
+
+
+def test_glb_nodes_stand_where_their_transforms_put_them() -> None:
+    scene = load_scene(SCENES / "imported_glb")
+    found = {r.name: r.triangles.reshape(-1, 3) for r in scene.reflectors}
+    assert np.allclose(scene.bounds, [[0, 0, 0], [5, 6, 3]], atol=1e-6)
+    # The shelf's parent hangs on wall_x0 at y = 4, the shelf 2 cm off it, 1.2 m up; GLB holds float32.
+    assert np.allclose(found["shelf"].min(axis=0), [0.02, 3.5, 1.2], atol=1e-6)
+    assert np.allclose(found["shelf"].max(axis=0), [0.32, 4.5, 2.1], atol=1e-6)
+    turn = np.radians(25.0)
+    reach = [0.6 * np.cos(turn) + 0.35 * np.sin(turn), 0.6 * np.sin(turn) + 0.35 * np.cos(turn), 0.02]
+    assert np.allclose(found["table"].max(axis=0), np.array([4.15, 0.75, 0.74]) + reach, atol=1e-6)
+
+
+def test_builder_command_writes_and_refuses_to_overwrite(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["paper_room", "--out", str(tmp_path)]) == 0
+    assert load_scene(tmp_path / "paper_room").digest == load_scene(SCENES / "paper_room").digest
+    assert main(["paper_room", "--out", str(tmp_path)]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert main(["paper_room", "--out", str(tmp_path), "--overwrite"]) == 0
+    assert main(["no_such_room", "--out", str(tmp_path)]) == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["paper_room"]

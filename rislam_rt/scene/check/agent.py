@@ -52,7 +52,7 @@ def agent_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
             yield soup.warning(
                 field, "it lies below the array, which hears from above only", "raise it above the agent"
             )
-        name = _enclosing(soup, scatterer.position, holding=None)
+        name = _enclosing(soup, scatterer.position, holding=motion.position[:1])
         if name:
             yield soup.warning(field, f"it lies inside '{name}', where no ray reaches it", "move it out")
 
@@ -87,11 +87,11 @@ def _inside_object(soup: Soup) -> Iterator[Finding]:
         yield soup.error("agent.start", f"{start.tolist()} lies inside the object '{name}'", "move the start out of it")
 
 
-def _enclosing(soup: Soup, point: Floats, holding: Floats | None) -> str:
+def _enclosing(soup: Soup, point: Floats, holding: Floats) -> str:
     """Name of an object around a point, if any.
 
     An object is a connected piece that takes up less than a tenth of the scene's box and, so that a room of a larger
-    building is none, has no landmark of `holding` in it.
+    building is none, has none of the points `holding` (H, 3) in it.
     """
     scene_box = np.prod(soup.bounds[1] - soup.bounds[0])
     for number, reflector in enumerate(soup.scene.reflectors):
@@ -104,7 +104,7 @@ def _enclosing(soup: Soup, point: Floats, holding: Floats | None) -> str:
             solid = mine[label == piece]
             if np.prod(np.ptp(solid.reshape(-1, 3), axis=0)) > 0.1 * scene_box or abs(winding(point, solid)) < 0.5:
                 continue
-            if holding is None or not any(abs(winding(mark, solid)) > 0.25 for mark in holding):
+            if not any(abs(winding(mark, solid)) > 0.25 for mark in holding):
                 return reflector.name
     return ""
 

@@ -1,0 +1,261 @@
+"""Every remark of the scene check has a scene that earns it, and a near miss that does not."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rislam_rt.errors import SceneError
+from rislam_rt.model import Body, RadioConfig, Reflector, RisPanel, RxArray, Scatterer, Scene, Trajectory
+from rislam_rt.scene import check_scene, load_scene
+from rislam_rt.scene.check.probe import components, ray_hits, sphere_directions, touching, winding
+from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.rooms.shapes import block, box_walls, grid, joined
+
+Change = Callable[[Scene], Scene]
+
+
+@pytest.fixture(scope="module")
+def paper() -> Scene:
+    return load_scene(Path(__file__).parents[2] / "scenes/paper_room")
+
+
+def remarks(scene: Scene, radio: RadioConfig | None = None) -> dict[str, str]:
+    """Field and message of every finding but the one on the paper's element."""
+    findings = [f for f in check_scene(scene, radio) if f.field != "ris.element"]
+    return {f"{f.severity} {f.field}": f"{f.message}; {f.mend}" for f in findings}
+
+
+def moved(scene: Scene, start: list[float], velocity: list[float], body: Body | None = None) -> Scene:
+    time = scene.agent.time
+    position = np.array(start) + time[:, None] * np.array(velocity)
+    speed = np.tile(velocity, (len(time), 1))
+    return replace(scene, agent=Trajectory(time, position, speed, np.zeros(len(time)), body or scene.agent.body))
+
+
+def panel(scene: Scene, **changes: Any) -> Scene:
+    assert scene.ris is not None
+    spec = replace(scene.ris.spec, **{k: v for k, v in changes.items() if k not in ("center", "host")})
+    return replace(scene, ris=RisPanel(spec, changes.get("center", scene.ris.center), changes.get("host", "ceiling")))
+
+
+def furnished(scene: Scene, name: str, mesh: Mesh) -> Scene:
+    part = Reflector(name, mesh.vertices, mesh.faces, scene.reflectors[0].material)
+    return replace(scene, reflectors=(*scene.reflectors, part))
+
+
+def without(scene: Scene, *names: str) -> Scene:
+    return replace(scene, reflectors=tuple(r for r in scene.reflectors if r.name not in names))
+
+
+def scatterer(scene: Scene, at: list[float]) -> Scene:
+    return replace(scene, scatterers=(Scatterer("sphere", np.array(at), 0.01, 0.05),))
+
+
+def scaled(scene: Scene, factor: float) -> Scene:
+    parts = tuple(replace(r, vertices=r.vertices * factor) for r in scene.reflectors)
+    return moved(replace(scene, reflectors=parts, scatterers=(), ris=None), [factor] * 3, [0.0] * 3)
+
+
+TINY = Body(np.array([-1e-4, 0.0, 0.0]), np.array([1e-4, 0.0, 0.0]))
+SLIVER = Mesh(np.array([[1.0, 1, 1], [2, 1, 1], [3, 1, 1 + 1e-7]]), np.array([[0, 1, 2]]))
+TABLE = block([2.5, 2.5, 0.4], [3.5, 3.5, 0.6])
+CRATE = block([0.2, 0.2, 0.0], [1.2, 1.2, 1.0], without=("floor",))
+SCREEN = grid([1.0, 0.2, 0.1], [0.0, 5.0, 0.0], [0.0, 0.0, 2.0], 1, 1)
+
+CASES: dict[str, tuple[Change, str, str]] = {
+    "start outside": (lambda s: moved(s, [7, 1, 1], [0, 0, 0]), "error agent.start", "lies outside"),
+    "walks out": (lambda s: moved(s, [5, 1, 1], [0.1, 0, 0]), "error agent.trajectory", "lies outside"),
+    "start on a wall": (lambda s: moved(s, [3, 3, 0.0005], [0, 0, 0]), "error agent.start", "lies on 'floor'"),
+    "Tx out of the wall": (lambda s: moved(s, [0.02, 3, 1], [0, 0, 0]), "error agent.start", "Tx at"),
+    "walks through": (
+        lambda s: moved(furnished(s, "screen", SCREEN), [0.5, 3, 1], [0.03, 0, 0]),
+        "error agent.trajectory",
+        "goes through 'screen' after cycle 166",
+    ),
+    "astride": (
+        lambda s: moved(furnished(s, "screen", SCREEN), [1.01, 3, 1], [0, 0, 0]),
+        "error agent.start",
+        "'screen' stands between Tx and Rx",
+    ),
+    "in an object": (
+        lambda s: moved(furnished(s, "table", TABLE), [3, 3, 0.5], [0, 0, 0], TINY),
+        "error agent.start",
+        "inside the object 'table'",
+    ),
+    "in a bottomless object": (
+        lambda s: moved(furnished(s, "crate", CRATE), [0.7, 0.7, 0.3], [0, 0, 0]),
+        "error agent.start",
+        "inside the object 'crate'",
+    ),
+    "doubled name": (lambda s: furnished(s, "sphere", TABLE), "error name", "called 'sphere'"),
+    "sliver": (lambda s: furnished(s, "sliver", SLIVER), "error reflector[6].mesh (sliver)", "first is face 0"),
+    "doubled faces": (
+        lambda s: furnished(s, "again", Mesh(s.reflectors[0].vertices, s.reflectors[0].faces[:, ::-1])),
+        "warning reflector",
+        "2 faces lie exactly on others",
+    ),
+    "scatterer outside": (lambda s: scatterer(s, [2, 1, 4]), "error scatterer[0].position (sphere)", "outside"),
+    "scatterer on a wall": (
+        lambda s: scatterer(s, [2, 1, 2.9995]), "error scatterer[0].position (sphere)", "on 'ceiling'"
+    ),
+    "scatterer in an object": (
+        lambda s: scatterer(furnished(s, "table", block([2, 4, 1], [3, 5, 2])), [2.5, 4.5, 1.5]),
+        "warning scatterer[0].position (sphere)",
+        "inside 'table'",
+    ),
+    "scatterer below": (lambda s: scatterer(s, [2, 1, 0.4]), "warning scatterer[0].position (sphere)", "below"),
+    "panel outside": (lambda s: panel(s, center=[3, 3, 3.1]), "error ris.center", "lies outside"),
+    "panel off its host": (lambda s: panel(s, center=[3, 3, 2.98]), "error ris.center", "20 mm off 'ceiling'"),
+    "panel beside its host": (
+        lambda s: panel(furnished(s, "shelf", grid([1, 1, 2], [1, 0, 0], [0, 1, 0], 1, 1)), center=[3, 3, 2],
+                        host="shelf"),
+        "error ris.center",
+        "beside 'shelf', in its plane",
+    ),
+    "host unknown": (lambda s: panel(s, host="roof"), "error ris.host", "'roof' is no reflector; give one of floor"),
+    "host not named": (lambda s: panel(s, host=None), "error ris.host", 'add host = "ceiling"'),
+    "panel askew": (
+        lambda s: panel(s, normal=[np.sin(0.05), 0, -np.cos(0.05)]),
+        "error ris.normal",
+        "2.86 degrees from the normal of 'ceiling'",
+    ),
+    "panel facing out": (lambda s: panel(s, normal=[0, 0, 1]), "error ris.normal", "points out of the room"),
+    "agent behind the panel": (
+        lambda s: panel(furnished(s, "shelf", grid([2, 2, 0.2], [2, 0, 0], [0, 2, 0], 1, 1)), center=[3, 3, 0.2],
+                        host="shelf"),
+        "warning ris.normal",
+        "never in front",
+    ),
+    "large panel": (lambda s: panel(s, rows=40, cols=40), "warning ris.rows", "more than 1/B"),
+    "open room": (lambda s: without(s, "wall_x6"), "warning reflector", "rays from the start leave the room"),
+    "millimetres": (lambda s: scaled(s, 1000.0), "warning reflector", "is it in millimetres?"),
+    "too small": (lambda s: scaled(moved(s, [3, 3, 1], [0, 0, 0], TINY), 0.01), "warning reflector", "9 m across"),
+    "too fast": (lambda s: replace(s, agent=_fast(s.agent)), "warning agent", "moves at up to 14.1 m/s"),
+}  # fmt: skip
+
+
+def _fast(agent: Trajectory) -> Trajectory:
+    return Trajectory(agent.time[:2], [[1, 1, 0.5], [2, 2, 0.5]], agent.velocity[:2], agent.heading[:2], agent.body)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_remark(paper: Scene, case: str) -> None:
+    change, field, says = CASES[case]
+    found = remarks(change(paper))
+    assert field in found, found
+    assert says in found[field]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda s: s,
+        lambda s: moved(s, [0.06, 3, 0.9], [0, 0, 0]),
+        lambda s: moved(furnished(s, "table", TABLE), [3, 3, 0.7], [0, 0, 0]),
+        lambda s: moved(furnished(s, "crate", CRATE), [0.7, 1.3, 0.9], [0, 0, 0]),
+        lambda s: moved(furnished(s, "screen", SCREEN), [0.5, 3, 0.9], [0.005, 0, 0]),
+        lambda s: panel(s, center=[3, 3, 2.9995]),
+        lambda s: panel(s, center=[3, 3, 2.5], host=None),
+        lambda s: panel(s, rows=9, cols=9),
+        lambda s: scatterer(s, [2, 1, 0.6]),
+    ],
+)
+def test_no_remark_on_what_is_sound(paper: Scene, change: Change) -> None:
+    assert remarks(change(paper)) == {}
+
+
+def test_room_of_a_larger_building_is_no_object(paper: Scene) -> None:
+    """Two closed rooms, one a thousandth of the scene's box: its landmark says that it is lived in."""
+    far = block([40.0, 40.0, 0.0], [60.0, 60.0, 20.0])
+    walls = joined(list(box_walls(6.0, 6.0, 3.0).values()))
+    building = replace(furnished(furnished(paper, "house", walls), "far", far), ris=None)
+    building = without(building, "floor", "ceiling", "wall_x0", "wall_x6", "wall_y0", "wall_y6")
+    assert remarks(building) == {}
+    empty = replace(building, scatterers=())
+    assert "inside the object 'house'" in remarks(empty)["error agent.start"]
+
+
+def test_element_remark_depends_on_carrier_and_pattern(paper: Scene) -> None:
+    """Excess of `tang` over a plate: 8 dx dy against 4 pi (dx dy)^2 / lambda^2, 4.05 dB at 15 mm and 10 GHz."""
+    at_10, at_20 = (check_scene(paper, RadioConfig(carrier=f, bandwidth=1e9)) for f in (10e9, 20e9))
+    assert [f.message for f in at_10] == ["at 10 GHz 'tang' elements reflect 4.05 dB more than a perfect plate"]
+    assert at_20 == []
+    assert check_scene(panel(paper, element="energy")) == []
+
+
+def test_isotropic_array_hears_from_below(paper: Scene) -> None:
+    radio = RadioConfig(array=RxArray(pattern="isotropic"))
+    assert remarks(scatterer(paper, [2, 1, 0.4]), radio) == {}
+
+
+def test_loader_refuses_what_the_check_calls_an_error(room: Path, damaged: Callable[[str, str], Path]) -> None:
+    damaged("start = [0.5, 0.7, 0.5]", "start = [0.5, 7.7, 0.5]")
+    findings = check_scene(room)
+    assert [f.severity for f in findings] == ["error"]
+    with pytest.raises(SceneError, match=r"scene\.toml: agent\.start: agent at ") as caught:
+        load_scene(room)
+    assert str(caught.value) == findings[0].line
+    damaged("host = \"ceiling\"", "host = \"roof\"")  # fmt: skip
+    with pytest.raises(SceneError, match=r"\(and 1 more\)$"):
+        load_scene(room)
+
+
+def test_warnings_do_not_keep_a_scene_from_loading(room: Path, damaged: Callable[[str, str], Path]) -> None:
+    text = (room / "scene.toml").read_text()
+    start = text.index('[[reflector]]\nname = "wall_x6"')
+    (room / "scene.toml").write_text(text[:start] + text[text.index("[[reflector]]", start + 5) :])
+    assert len(load_scene(room).reflectors) == 5
+    assert any("leave the room" in f.message for f in check_scene(room))
+
+
+def test_winding_of_a_closed_and_an_open_box() -> None:
+    closed = block([0, 0, 0], [2, 1, 1])
+    triangles = closed.vertices[closed.faces]
+    rng = np.random.default_rng(5)
+    for point in rng.uniform([-1, -1, -1], [3, 2, 2], (200, 3)):
+        inside = bool(((point > 0) & (point < [2, 1, 1])).all())
+        assert np.isclose(abs(winding(point, triangles)), float(inside), rtol=0, atol=1e-9)
+    # Without one face of a cube its centre keeps five sixths of the full solid angle.
+    cube = block([0, 0, 0], [1, 1, 1], without=("ceiling",))
+    assert np.isclose(abs(winding(np.full(3, 0.5), cube.vertices[cube.faces])), 5 / 6, rtol=0, atol=1e-9)
+
+
+def test_rays_hit_the_nearest_face() -> None:
+    room = joined([*box_walls(6.0, 5.0, 3.0).values(), block([4, 2, 0], [5, 3, 3])])
+    triangles = room.vertices[room.faces]
+    origin, directions = np.array([1.0, 2.5, 1.0]), sphere_directions(1000)
+    hits = ray_hits(origin, directions, triangles)
+    assert (hits >= 0).all()
+    # The pillar's front face at x = 4 is the only one with a constant x of 4 m.
+    front = (triangles[hits][:, :, 0] == 4.0).all(axis=1)
+    at = origin + directions * (3.0 / directions[:, :1])
+    expected = (directions[:, 0] > 0) & (at[:, 1] > 2) & (at[:, 1] < 3) & (at[:, 2] > 0) & (at[:, 2] < 3)
+    assert np.array_equal(front, expected)
+    assert expected.sum() > 10
+
+
+def test_touching_equals_brute_force_over_samples() -> None:
+    """A triangle's neighbourhood against the distance to a fine sampling of it (1 mm apart, so 2 mm either side)."""
+    triangle = np.array([[[0.0, 0, 0], [1, 0, 0.2], [0.3, 0.8, 0]]])
+    u, v = np.meshgrid(np.linspace(0, 1, 700), np.linspace(0, 1, 700))
+    keep = u + v <= 1
+    edges = triangle[0, 1:] - triangle[0, 0]
+    cloud = triangle[0, 0] + u[keep][:, None] * edges[0] + v[keep][:, None] * edges[1]
+    rng = np.random.default_rng(9)
+    points = cloud[rng.integers(len(cloud), size=60)] + rng.normal(0, 0.02, (60, 3))
+    distance = np.array([np.linalg.norm(cloud - p, axis=1).min() for p in points])
+    near = np.isin(np.arange(60), touching(points, triangle, 0.02)[0])
+    assert near[distance < 0.018].all()
+    assert not near[distance > 0.03].any()  # beyond a corner the edges' lines reach further than the triangle
+
+
+def test_components_counts_pieces_not_vertices() -> None:
+    pieces = joined([block([0, 0, 0], [1, 1, 1]), block([2, 0, 0], [3, 1, 1]), block([1, 1, 1], [1.5, 2, 2])])
+    label = components(pieces.vertices[pieces.faces])
+    assert np.array_equal(label[:12], np.full(12, label[0]))
+    assert label[12] != label[0]
+    assert label[24] == label[0]  # the third box shares a corner with the first

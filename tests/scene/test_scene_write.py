@@ -1,0 +1,99 @@
+"""Written scenes read back equal, appear whole or not at all, and overwrite nothing unasked."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rislam_rt.errors import SceneError, StoreError
+from rislam_rt.model import Scene
+from rislam_rt.scene import load_scene, new_scene, write_scene
+from rislam_rt.scene.rooms import ROOMS
+from rislam_rt.scene.write import write_files
+
+SCENES = Path(__file__).parents[2] / "scenes"
+
+
+def assert_equal(a: Scene, b: Scene) -> None:
+    assert a.name == b.name
+    assert a.landmarks == b.landmarks
+    for one, other in zip(a.reflectors, b.reflectors, strict=True):
+        assert one.name == other.name
+        assert one.material == other.material
+        assert np.array_equal(one.triangles, other.triangles)
+    for one, other in zip(a.scatterers, b.scatterers, strict=True):
+        assert np.array_equal(one.position, other.position)
+        assert (one.rcs, one.radius) == (other.rcs, other.radius)
+    if a.ris is not None and b.ris is not None:
+        assert np.array_equal(a.ris.center, b.ris.center)
+        assert a.ris.host == b.ris.host
+        # normal and up are brought to length 1 once more on reading
+        assert np.allclose(a.ris.spec.offsets(), b.ris.spec.offsets(), rtol=0, atol=1e-15)
+        assert (a.ris.spec.levels, a.ris.spec.element) == (b.ris.spec.levels, b.ris.spec.element)
+    # TUM files have nine digits
+    assert np.allclose(a.agent.position, b.agent.position, rtol=0, atol=1e-8)
+    assert np.allclose(a.agent.heading, b.agent.heading, rtol=0, atol=1e-8)
+    assert np.allclose(a.agent.tx, b.agent.tx, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", sorted(ROOMS))
+def test_written_scene_reads_back_equal(name: str, tmp_path: Path) -> None:
+    scene = load_scene(SCENES / name)
+    again = load_scene(write_scene(scene, tmp_path / "deep" / name))
+    assert_equal(scene, again)
+    assert sorted(path.name for path in (tmp_path / "deep").iterdir()) == [name]
+
+
+def test_digest_follows_content(room: Path) -> None:
+    first = load_scene(room).digest
+    assert first == load_scene(room / "scene.toml").digest == load_scene(SCENES / "paper_room").digest
+    (room / "meshes/floor.ply").write_bytes((room / "meshes/ceiling.ply").read_bytes())
+    second = load_scene(room).digest
+    (room / "scene.toml").write_text((room / "scene.toml").read_text() + "# a remark\n")
+    third = load_scene(room).digest
+    assert len({first, second, third}) == 3
+
+
+def test_existing_folder_is_left_alone(tmp_path: Path) -> None:
+    scene = load_scene(SCENES / "paper_room")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/notes.txt").write_text("keep")
+    with pytest.raises(SceneError, match="exists already"):
+        write_scene(scene, tmp_path / "mine")
+    assert [path.name for path in (tmp_path / "mine").iterdir()] == ["notes.txt"]
+    write_scene(scene, tmp_path / "mine", overwrite=True)
+    assert (tmp_path / "mine/notes.txt").read_text() == "keep"
+    assert_equal(scene, load_scene(tmp_path / "mine"))
+
+
+def test_a_failed_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(StoreError, match="No space left on device"):
+        write_scene(load_scene(SCENES / "paper_room"), tmp_path / "new")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_in_the_way_of_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(StoreError):
+        write_files({"a": b""}, tmp_path / "file" / "below")
+
+
+def test_new_scene_from_a_template(tmp_path: Path) -> None:
+    folder = new_scene("l_room", tmp_path / "mine")
+    assert_equal(load_scene(folder), load_scene(SCENES / "l_room"))
+    with pytest.raises(SceneError, match="give one of paper_room, "):
+        new_scene("attic", tmp_path / "other")
+    assert not (tmp_path / "other").exists()
+
+
+def test_cross_section_apart_from_the_sphere_is_kept(tmp_path: Path) -> None:
+    scene = load_scene(SCENES / "paper_room")
+    for changed in (replace(scene.scatterers[0], rcs=0.02), replace(scene.scatterers[0], rcs=0.02, radius=None)):
+        room = replace(scene, scatterers=(changed,))
+        again = load_scene(write_scene(room, tmp_path / str(changed.radius)))
+        assert (again.scatterers[0].rcs, again.scatterers[0].radius) == (0.02, changed.radius)
