@@ -8,6 +8,7 @@ import pytest
 from rislam_rt.geometry.triangles import planar_groups, triangle_planes
 from rislam_rt.scene import check_scene, load_scene
 from rislam_rt.scene.build import main
+from rislam_rt.scene.check.probe import crossings
 from rislam_rt.scene.meshes import parse_mesh
 from rislam_rt.scene.rooms import ROOMS
 from rislam_rt.scene.templates import room_files
@@ -108,3 +109,15 @@ def test_builder_command_writes_and_refuses_to_overwrite(tmp_path: Path, capsys:
     assert main(["paper_room", "--out", str(tmp_path), "--overwrite"]) == 0
     assert main(["no_such_room", "--out", str(tmp_path)]) == 2
     assert sorted(path.name for path in tmp_path.iterdir()) == ["paper_room"]
+
+
+@pytest.mark.parametrize(("name", "landmark", "lost"), [("l_room", "sphere", 100), ("office", "ris", 90)])
+def test_agent_loses_a_landmark_behind_a_wall(name: str, landmark: str, lost: int) -> None:
+    """In sight at first, out of sight for the last cycles, as the README says."""
+    scene = load_scene(SCENES / name)
+    mark = scene.landmark_positions[scene.landmarks.index(landmark)]
+    below = mark - [0.0, 0.0, 1e-6]  # off the panel's own host
+    triangles = np.concatenate([r.triangles for r in scene.reflectors])
+    hidden = crossings(scene.agent.position, np.tile(below, (600, 1)), triangles)[0]
+    assert hidden.min() > 300
+    assert set(range(600 - lost, 600)) <= set(hidden.tolist())

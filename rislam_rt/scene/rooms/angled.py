@@ -39,7 +39,7 @@ def l_room() -> Room:
     table = {
         "name": "l_room",
         "reflector": [reflector(name) for name in meshes],
-        "scatterer": [sphere("sphere", [5.1, 0.8, 1.5])],
+        "scatterer": [sphere("sphere", [6.3, 2.4, 1.5])],
         "ris": panel([1.7, 1.8, height], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]),
         "agent": agent,
     }

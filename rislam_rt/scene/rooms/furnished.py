@@ -36,7 +36,7 @@ def office() -> Room:
         "name": "office",
         "reflector": [reflector(name, names.get(name)) for name in meshes],
         "scatterer": [sphere("lamp", [1.9, 5.2, 1.6]), sphere("sensor", [8.4, 1.3, 1.9])],
-        "ris": panel([4.3, 3.0, height], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]),
+        "ris": panel([3.6, 4.0, height], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]),
         "agent": agent,
     }
     readme = (
