@@ -2,7 +2,9 @@
 
 from rislam_rt.design.belief import design_code, problem_from_belief
 from rislam_rt.design.bound import best_magnitudes, relaxation_bound
+from rislam_rt.design.curves import GainCurves, Interval, design_along, direct_only, gain_curves
 from rislam_rt.design.designers import DESIGNERS, designer
+from rislam_rt.design.dual import dual_bound
 from rislam_rt.design.objective import Objective, build_objective
 from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.result import Design, DesignConfig, Designer
@@ -15,13 +17,19 @@ __all__ = [
     "DesignConfig",
     "DesignProblem",
     "Designer",
+    "GainCurves",
+    "Interval",
     "Objective",
     "best_magnitudes",
     "build_objective",
     "continuous_phases",
+    "design_along",
     "design_code",
     "designer",
+    "direct_only",
+    "dual_bound",
     "exact_code",
+    "gain_curves",
     "nearest_code",
     "problem_from_arrays",
     "problem_from_belief",

@@ -19,6 +19,7 @@ from rislam_rt.information.gradient import (
     vertex_gradient,
 )
 from rislam_rt.information.landmarks import Chain, LandmarkModel, Rows, build_landmark_model, mirror_chain
+from rislam_rt.information.maps import dilution, position_error_map
 from rislam_rt.information.outcome import Outcome
 from rislam_rt.information.position import Bound, position_bound, position_information, range_information
 from rislam_rt.information.prior import prior_from_covariance, prior_from_particles
@@ -42,6 +43,7 @@ __all__ = [
     "cosine_information",
     "delay_gain_information",
     "delay_information",
+    "dilution",
     "eliminate_gains",
     "equivalent_information",
     "heading_gradient",
@@ -51,6 +53,7 @@ __all__ = [
     "mirror_chain",
     "path_gradient",
     "position_bound",
+    "position_error_map",
     "position_information",
     "posterior_bound",
     "prior_from_covariance",
