@@ -1,6 +1,6 @@
 """Floor 5: the receiver. What arrives, the noise, and multipath components with their standard deviations."""
 
-from rislam_rt.measurement.bound import detection_probability, path_std
+from rislam_rt.measurement.bound import detection_probability
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.measure import measure
 from rislam_rt.measurement.noise import (
@@ -10,6 +10,7 @@ from rislam_rt.measurement.noise import (
     with_paper_snr,
     with_reference_snr,
 )
+from rislam_rt.measurement.parts import path_std
 from rislam_rt.measurement.received import twin
 
 __all__ = [

@@ -6,8 +6,10 @@ import numpy as np
 
 from rislam_rt.errors import ConfigError
 
-ESTIMATORS = ("bound",)
+ESTIMATORS = ("bound", "waveform")
 """Ways from the channel to multipath components: errors drawn from the Cramér-Rao bound, or a real estimator."""
+
+RESOLUTIONS = ("cell", "joint")
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,31 +24,47 @@ class ReceiverConfig:
     leakage_cancellation_db: float = 0.0
     """By how much the Tx-Rx leakage (LOS) is attenuated before sampling."""
     merge: bool = True
-    """Whether paths inside one resolution cell (1/B in delay, the array's beam) come out as one (`bound`)."""
+    """Whether paths that cannot be resolved come out as one (`bound`)."""
+    resolution: str = "cell"
+    """What that is (`bound`): `cell`, two paths within 1/B in delay and the array's beam; `joint`, paths among which
+    the joint bound cannot share the amplitude out. `joint` draws the errors from that bound too, and costs more."""
     alternation: bool = False
     """Whether the slot is split between the code and its phase-reversed twin, which sets the panel's paths apart."""
     min_delay: float = 0.0
     """Components before this delay [s] are not reported."""
     max_delay: float = 80e-9
     """Components after this delay [s] are not reported."""
+    false_alarm_rate: float = 0.0
+    """Mean number of false components a cycle that noise alone may cause; above 0 it sets the threshold instead."""
+    num_subcarriers: int = 0
+    """M: tones, or samples, of a sounding; 0 takes as many as the latest delay needs."""
+    element_exact: bool = False
+    """Whether every element has its own exact delay (`waveform`), instead of plane waves and a narrow band."""
+    converter_bits: int = 0
+    """Bits of the converters for each of real and imaginary part (`waveform`); 0 for none."""
+    max_components: int = 120
+    """Most components that are looked for in one cycle (`waveform`)."""
 
     def __post_init__(self) -> None:
-        if self.estimator not in ESTIMATORS:
-            raise ConfigError(
-                f"receiver.estimator: '{self.estimator}' received; give one of {', '.join(map(repr, ESTIMATORS))}"
-            )
-        for name in ("detection_threshold_db", "clutter_rate", "leakage_cancellation_db", "min_delay", "max_delay"):
+        for name, allowed in (("estimator", ESTIMATORS), ("resolution", RESOLUTIONS)):
+            if getattr(self, name) not in allowed:
+                choice = " or ".join(map(repr, allowed))
+                raise ConfigError(f"receiver.{name}: '{getattr(self, name)}' received; give {choice}")
+        not_negative = ("clutter_rate", "leakage_cancellation_db", "min_delay", "false_alarm_rate")
+        for name in ("detection_threshold_db", "max_delay", *not_negative):
             if not np.isfinite(getattr(self, name)):
                 raise ConfigError(f"receiver.{name}: {getattr(self, name)} received; give a finite number")
-        for name in ("clutter_rate", "leakage_cancellation_db", "min_delay"):
+        for name in not_negative:
             if getattr(self, name) < 0.0:
                 raise ConfigError(f"receiver.{name}: {getattr(self, name)} received; give 0 or more")
+        for name, least, most in (
+            ("num_subcarriers", 0, 65536),
+            ("converter_bits", 0, 32),
+            ("max_components", 1, 1000),
+        ):
+            if not least <= getattr(self, name) <= most:
+                raise ConfigError(f"receiver.{name}: {getattr(self, name)} received; give {least} to {most}")
         if self.max_delay <= self.min_delay:
             raise ConfigError(
                 f"receiver.max_delay: {self.max_delay} s received; give more than min_delay, {self.min_delay} s"
             )
-
-    @property
-    def detection_threshold(self) -> float:
-        """Linear threshold on the measured SNR over all antennas."""
-        return float(10.0 ** (self.detection_threshold_db / 10.0))

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.measurement.config import ReceiverConfig
@@ -27,6 +28,8 @@ class Received(NamedTuple):
     """(N,)."""
     from_panel: Booleans
     """(N,) whether the path meets the panel: its gain changes sign under the phase-reversed code."""
+    wave_radius: Floats
+    """(N,) distance [m] from the array back to the point from which the wave spreads: the mirrored Tx or landmark."""
 
 
 def receive(paths: Paths, cycle: int, heading: float, radio: RadioConfig, config: ReceiverConfig) -> Received:
@@ -46,7 +49,32 @@ def receive(paths: Paths, cycle: int, heading: float, radio: RadioConfig, config
     leakage = 10.0 ** (-config.leakage_cancellation_db / 20.0)
     gain = paths.gain[cycle, path] * np.where(kind == PathKind.LOS, leakage, 1.0)
     from_panel = (kind == PathKind.RIS) | (kind == PathKind.VRIS)
-    return Received(path, paths.tau[cycle, path], arrival[path], gain, from_panel)
+    radius = SPEED_OF_LIGHT * paths.tau[cycle, path]
+    if config.element_exact:
+        radius = radius - _tx_leg_length(paths, cycle, path)
+    return Received(path, paths.tau[cycle, path], arrival[path], gain, from_panel, radius)
+
+
+def _tx_leg_length(paths: Paths, cycle: int, path: Integers) -> Floats:
+    """(N,) length [m] of the legs from Tx to landmark; 0 for leakage and wall returns, whose wave spreads from the Tx.
+
+    The Tx is where the departing rays of all paths meet (least squares); half the path, if they are too few to tell.
+    """
+    length = np.zeros(len(path))
+    landmark = np.flatnonzero(paths.landmark[path] >= 0)
+    columns = np.flatnonzero(paths.valid[cycle] & (paths.num_vertices > 0))
+    away = paths.departure[cycle, columns]
+    across = np.eye(3) - away[:, :, None] * away[:, None, :]
+    normal = across.sum(axis=0)
+    if len(columns) < 2 or np.linalg.cond(normal) > 1e8:
+        length[landmark] = 0.5 * SPEED_OF_LIGHT * paths.tau[cycle, path[landmark]]
+        return length
+    tx = np.linalg.solve(normal, np.einsum("nij,nj->i", across, paths.vertices[cycle, columns, 0]))
+    for row in landmark:
+        bounces = int(np.sum(paths.tx_walls[path[row]] >= 0))
+        corners = np.vstack([tx, paths.vertices[cycle, path[row], : bounces + 1]])
+        length[row] = np.sum(np.linalg.norm(np.diff(corners, axis=0), axis=1))
+    return length
 
 
 def twin(code: RisCode) -> RisCode:

@@ -1,0 +1,113 @@
+"""The waveform estimator: delays, cosines and amplitudes of all paths in one sounding, without a grid.
+
+Newtonised orthogonal matching pursuit (Mamandipoor, Ramasamy and Madhow 2016) over three parameters: find peaks in the
+residual, refine all paths found so far, repeat until the residual holds no peak above the threshold. Its cyclic
+single-path refinements are replaced by joint Gauss-Newton steps, which also part paths inside one resolution cell; a
+path that its neighbours could explain as well as noise could is taken out again.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats
+from rislam_rt.measurement.atoms import Sounding
+from rislam_rt.measurement.detect import Grid, into_range, pick_peaks
+from rislam_rt.measurement.refine import Accuracy, Fit, accuracy, fit_amplitudes, refine, removal_loss
+
+BATCH = 16
+"""Most paths that are added between two refinements."""
+ROUNDS = 40
+"""Most rounds of search; each but the last adds a path."""
+SEARCH_STEPS = 2
+"""Refinements a round: enough for the residual of the next one, since every round refines all paths again."""
+FINAL_STEPS = 12
+TRIAL_STEPS = 2
+"""Refinements of the other paths after one was taken out, before the costs are compared."""
+SLACK = 0.1
+"""How far (B tau, u, v) may leave the window and the sky during the search, so that paths on the edge do not stick."""
+
+
+class Estimate(NamedTuple):
+    """P paths found in one sounding, with the noise normalised to one."""
+
+    fit: Fit
+    accuracy: Accuracy
+
+
+def estimate_paths(
+    sounding: Sounding, grid: Grid, samples: Complexes, threshold: float, window: tuple[float, float], most: int
+) -> Estimate:
+    """All paths in samples (L, M) whose noise has unit variance.
+
+    Parameters
+    ----------
+    threshold
+        On the measured SNR `L M |alpha|^2` of a path, linear; see `false_alarms` for the rate that it stands for.
+    window
+        First and last delay, in resolution cells.
+    most
+        Largest number of paths.
+    """
+    fit = fit_amplitudes(sounding, np.zeros((0, 3)), samples)
+    for _ in range(ROUNDS):
+        room = min(BATCH, most - len(fit.parameters))
+        fresh = pick_peaks(sounding, grid, fit.residual, threshold, window, room)
+        if not len(fresh):
+            break
+        grown = fit_amplitudes(sounding, np.concatenate([fit.parameters, fresh]), samples)
+        grown = refine(sounding, grown, samples, steps=SEARCH_STEPS)
+        grown = _drop(sounding, grown, samples, threshold, window)
+        if grown.cost >= fit.cost - threshold:
+            break
+        fit = grown
+    fit = refine(sounding, fit, samples, steps=FINAL_STEPS)
+    fit = _prune(sounding, _drop(sounding, fit, samples, threshold, window), samples, threshold)
+    return Estimate(fit, accuracy(fit))
+
+
+def _drop(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float, window: tuple[float, float]) -> Fit:
+    """Without the paths that left the window or the sky, and those whose loss alone costs less than the threshold."""
+    while len(fit.parameters):
+        astray = ~_inside(fit.parameters, window)
+        loss = np.where(astray, np.inf, removal_loss(fit))
+        weakest = int(np.argmin(loss))
+        keep = ~astray
+        keep[weakest] = loss[weakest] >= threshold
+        if keep.all():
+            return fit
+        fit = refine(sounding, fit_amplitudes(sounding, fit.parameters[keep], samples), samples, steps=1)
+    return fit
+
+
+def _prune(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float) -> Fit:
+    """Without the paths that their neighbours, refined, can stand in for.
+
+    Noise alone lowers the cost by its highest peak when a path is added, so the threshold is the one of the search.
+    Only paths whose amplitude is uncertain by more than that are tried, the most uncertain first.
+    """
+    tried = np.zeros((0, 3))
+    while len(fit.parameters):
+        certainty = np.abs(fit.amplitude) ** 2 / accuracy(fit).amplitude ** 2
+        certainty[_among(fit.parameters, tried)] = np.inf
+        weakest = int(np.argmin(certainty))
+        if certainty[weakest] >= threshold:
+            return fit
+        rest = np.delete(fit.parameters, weakest, axis=0)
+        trial = refine(sounding, fit_amplitudes(sounding, rest, samples), samples, steps=TRIAL_STEPS)
+        if trial.cost < fit.cost + threshold:
+            fit = trial
+        else:
+            tried = np.concatenate([tried, fit.parameters[weakest : weakest + 1]])
+    return fit
+
+
+def _inside(parameters: Floats, window: tuple[float, float]) -> Booleans:
+    """Whether parameters (P, 3) stayed within the window and the sky, or near enough."""
+    return np.all(np.abs(parameters - into_range(parameters, window)) <= SLACK, axis=-1)
+
+
+def _among(parameters: Floats, marked: Floats) -> Booleans:
+    """Which of the parameters (P, 3) are marked (Q, 3), or have moved little since."""
+    apart = np.abs(parameters[:, None] - marked)
+    return np.any(np.all(apart < SLACK, axis=-1), axis=1)

@@ -1,0 +1,62 @@
+"""Threshold and false alarms of a search over delay and both cosines without a grid.
+
+Noise alone makes the matched filter's output a stationary complex Gaussian field over (tau, u, v). How many of its
+peaks exceed a level follows from the expected Euler characteristic of the excursion set of a chi-square field with two
+degrees of freedom (Worsley, Adv. Appl. Probab. 26, 1994), which includes the edges of the searched region: small
+arrays have only a few beams across the sky, and half of the peaks lie on its edge.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import ellipe
+
+from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.model import RadioConfig
+
+
+def detection_threshold(radio: RadioConfig, config: ReceiverConfig) -> float:
+    """Linear threshold on the measured SNR over all antennas: as set, or as the false-alarm rate demands."""
+    if not config.false_alarm_rate:
+        return float(10.0 ** (config.detection_threshold_db / 10.0))
+    return _threshold_of_rate(config.false_alarm_rate, radio, config.max_delay - config.min_delay)
+
+
+def expected_false_alarms(threshold: float, radio: RadioConfig, window: float) -> float:
+    """Mean number of peaks of noise alone above a linear SNR threshold, in delays over a window [s] and the whole sky.
+
+    `sum_d mu_d rho_d(2 threshold)` over d = 0 .. 3: mu_d are the intrinsic volumes of (disc of cosines) x (window) in
+    units in which the field's derivatives have unit variance, rho_d Worsley's densities for two degrees of freedom.
+    """
+    volume = _intrinsic_volumes(radio, window)
+    u = 2.0 * threshold
+    tail = np.exp(-threshold)
+    density = np.array(
+        [
+            tail,
+            np.sqrt(u / (2.0 * np.pi)) * tail,
+            (u - 1.0) / (2.0 * np.pi) * tail,
+            np.sqrt(u) * (u - 3.0) / (2.0 * np.pi) ** 1.5 * tail,
+        ]
+    )
+    return float(density @ volume)
+
+
+def _intrinsic_volumes(radio: RadioConfig, window: float) -> tuple[float, float, float, float]:
+    """mu_0 .. mu_3 of the product of an ellipse and an interval."""
+    length = 2.0 * np.pi * np.sqrt(radio.effective_bandwidth_squared) * window
+    positions = 2.0 * np.pi * radio.array.positions(1.0)[:, :2]
+    minor, major = np.sort(np.sqrt(np.mean(positions**2, axis=0)))
+    area = np.pi * minor * major
+    half_perimeter = 2.0 * major * float(ellipe(1.0 - (minor / major) ** 2)) if major > 0.0 else 0.0
+    return 1.0, half_perimeter + length, area + half_perimeter * length, area * length
+
+
+@lru_cache(maxsize=64)
+def _threshold_of_rate(rate: float, radio: RadioConfig, window: float) -> float:
+    # From here on all densities fall with the threshold; fewer alarms than exp(-300) nobody asks for.
+    lowest, highest = 4.0, 300.0
+    if expected_false_alarms(lowest, radio, window) <= rate:
+        return lowest
+    return float(brentq(lambda level: expected_false_alarms(level, radio, window) - rate, lowest, highest))

@@ -1,0 +1,165 @@
+"""Joint refinement of all paths: least squares by Gauss-Newton with the amplitudes eliminated.
+
+Separable least squares (Golub and Pereyra 1973, in Kaufman's form): the amplitudes follow from the parameters, so the
+steps are in the 3 P real parameters alone. The matrix of a step is the Fisher information with the amplitudes as
+nuisance, so the joint Cramer-Rao bound comes with it.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.measurement.atoms import Factors, Grams, Sounding, correlate, factors, inner_products, synthesise
+
+RIDGE = 1e-9
+"""Added to the diagonal of matrices of unit diagonal, so that coinciding paths do not stop the solver."""
+PRIOR = np.array([0.0, 2.0, 2.0])
+"""Half the information that lying in the unit disc gives on a cosine (standard deviation 0.5): it matters only along an
+axis on which the array has no aperture."""
+LARGEST_STEP = np.array([0.3, 0.15, 0.15])
+"""Most that one step may change (B tau, u, v): about a third of a cell, within which the error is nearly quadratic."""
+
+
+class Fit(NamedTuple):
+    """P paths fitted to samples whose noise has unit variance."""
+
+    parameters: Floats
+    """(P, 3) of (B tau, u, v)."""
+    parts: Factors
+    """Their signals."""
+    inner: Grams
+    """Inner products of those."""
+    amplitude: Complexes
+    """(P,)."""
+    residual: Complexes
+    """(L, M) samples less the fitted paths."""
+    cost: float
+    """Energy of the residual."""
+
+
+class Accuracy(NamedTuple):
+    """Joint bound at a fit."""
+
+    parameters: Floats
+    """(P, 3) standard deviations."""
+    amplitude: Floats
+    """(P,) standard deviation of the complex amplitude, the other paths' parameters unknown as well."""
+
+
+def fit_amplitudes(sounding: Sounding, parameters: Floats, samples: Complexes) -> Fit:
+    """The fit with these parameters (P, 3) and the amplitudes that suit them best."""
+    parts = factors(sounding, parameters)
+    inner = inner_products(parts)
+    amplitude = _solve(inner.signal, correlate(parts, samples)[0])
+    residual = samples - synthesise(parts, amplitude)
+    return Fit(parameters, parts, inner, amplitude, residual, float(np.vdot(residual, residual).real))
+
+
+def refine(sounding: Sounding, fit: Fit, samples: Complexes, *, steps: int, tolerance: float = 0.1) -> Fit:
+    """Up to so many damped Gauss-Newton steps, ending when one promises less than `tolerance` of noise energy."""
+    damping = 1e-3
+    for _ in range(steps):
+        information, _ = information_matrix(fit.inner, fit.amplitude)
+        gradient = np.real(fit.amplitude.conj() * correlate(fit.parts, fit.residual)[1]).ravel()
+        while damping < 1e3:
+            step = _solve(information + damping * np.diag(np.diagonal(information)), gradient)
+            if gradient @ step < tolerance:
+                return fit
+            trial = fit_amplitudes(sounding, fit.parameters + _limited(step), samples)
+            if trial.cost < fit.cost:
+                fit, damping = trial, max(0.1 * damping, 1e-6)
+                break
+            damping *= 10.0
+        else:
+            return fit
+    return fit
+
+
+def accuracy(fit: Fit) -> Accuracy:
+    """Joint bound of parameters and amplitudes; enormous where paths cannot be told apart."""
+    covariance, variance = joint_bound(fit.inner, fit.amplitude)
+    deviations = np.sqrt(np.maximum(np.diagonal(covariance), 0.0)).reshape(3, -1).T
+    return Accuracy(deviations, np.sqrt(variance))
+
+
+def joint_bound(inner: Grams, amplitude: Complexes) -> tuple[Floats, Floats]:
+    """Covariance (3P, 3P) of the parameters, parameter by parameter, and variance (P,) of the complex amplitudes.
+
+    At unit noise, everything unknown.
+    """
+    information, (inverse, coupling) = information_matrix(inner, amplitude)
+    covariance = _inverse(2.0 * information)
+    spread = np.real(np.diagonal(inverse)) + np.sum(np.real(coupling @ covariance * coupling.conj()), axis=1)
+    return covariance, np.maximum(spread, 0.0)
+
+
+def removal_loss(fit: Fit) -> Floats:
+    """(P,) by how much the cost would grow without each path, the others' amplitudes fitted again."""
+    return np.abs(fit.amplitude) ** 2 / np.real(np.diagonal(amplitude_covariance(fit)))
+
+
+def amplitude_covariance(fit: Fit) -> Complexes:
+    """(P, P) covariance of the complex amplitudes at known parameters."""
+    return _inverse(fit.inner.signal)
+
+
+def information_matrix(inner: Grams, amplitude: Complexes) -> tuple[Floats, tuple[Complexes, Complexes]]:
+    """Half the Fisher information (3P, 3P) on the parameters at unit noise, parameter by parameter, then path by path.
+
+    Also returns the inverse (P, P) of `a^H a`, and the coupling (P, 3P) `(a^H a)^-1 a^H d alpha` of amplitudes to
+    parameters.
+    """
+    count = len(amplitude)
+    inverse = _inverse(inner.signal)
+    mixed = (inner.mixed * amplitude).transpose(1, 0, 2).reshape(count, 3 * count)
+    slope = inner.slope * amplitude.conj()[:, None] * amplitude
+    coupling = inverse @ mixed
+    full = slope.transpose(0, 2, 1, 3).reshape(3 * count, 3 * count) - mixed.conj().T @ coupling
+    information = 0.5 * np.real(full + full.conj().T)
+    information[np.diag_indices(3 * count)] += np.repeat(PRIOR, count)
+    return information, (inverse, coupling)
+
+
+def _limited(step: Floats) -> Floats:
+    """A step (3P,) as (P, 3), no path moving further than the model holds."""
+    moves = step.reshape(3, -1).T
+    return np.clip(moves, -LARGEST_STEP, LARGEST_STEP)
+
+
+def _solve(matrix: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
+    """Solution for a Hermitian positive matrix, scaled to unit diagonal."""
+    scale, factor = _factor(matrix)
+    if not len(scale):
+        return right
+    solve = lapack.zpotrs if np.iscomplexobj(factor) else lapack.dpotrs
+    return scale * solve(factor, scale * right, lower=1)[0]
+
+
+def _inverse(matrix: NDArray[Any]) -> NDArray[Any]:
+    """Inverse of a Hermitian positive matrix, likewise."""
+    scale, factor = _factor(matrix)
+    if not len(scale):
+        return matrix
+    invert = lapack.zpotri if np.iscomplexobj(factor) else lapack.dpotri
+    lower = np.tril(invert(factor, lower=1)[0])
+    full = lower + np.tril(lower, -1).conj().T
+    return scale[:, None] * full * scale
+
+
+def _factor(matrix: NDArray[Any]) -> tuple[Floats, NDArray[Any]]:
+    """Scale (n,) and Cholesky factor of the scaled matrix; the ridge grows until it is positive."""
+    diagonal = np.real(np.diagonal(matrix))
+    scale = 1.0 / np.sqrt(np.maximum(diagonal, np.finfo(np.float64).tiny))
+    scaled = matrix * scale[:, None] * scale
+    decompose = lapack.zpotrf if np.iscomplexobj(matrix) else lapack.dpotrf
+    ridge = RIDGE
+    while len(scale):
+        scaled[np.diag_indices(len(scale))] += ridge
+        factor, failed = decompose(scaled, lower=1)
+        if not failed:
+            return scale, factor
+        ridge *= 100.0
+    return scale, scaled

@@ -1,0 +1,112 @@
+"""The received signal, eq. `all`: one sounding per antenna, as tones or as samples of the flat pulse.
+
+A sounding of M tones carries E / M each; tone m at antenna l is
+`y[l, m] = sqrt(E / M) sum_i alpha_i b_l(i) exp(-j 2 pi f_m tau_i) + n`, n of variance N0. That is the unitary transform
+of M samples at rate B, scaled by 1 / sqrt(B), whose noise has the variance N0 B.
+"""
+
+import numpy as np
+
+from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.received import Received
+from rislam_rt.model import RadioConfig
+from rislam_rt.waveform import delay_response, flat_pulse, subcarrier_frequencies
+
+FEWEST_TONES = 16
+
+
+def num_tones(radio: RadioConfig, config: ReceiverConfig) -> int:
+    """M: as set, or the power of two whose period M / B leaves a quarter of room after the latest delay."""
+    if config.num_subcarriers:
+        return config.num_subcarriers
+    needed = max(1.25 * radio.bandwidth * config.max_delay, FEWEST_TONES)
+    return int(2 ** np.ceil(np.log2(needed)))
+
+
+def tones(received: Received, radio: RadioConfig, config: ReceiverConfig) -> Complexes:
+    """Noiseless tones (L, M) [sqrt(J)]."""
+    count = num_tones(radio, config)
+    frequencies = subcarrier_frequencies(count, radio.bandwidth)
+    scale = np.sqrt(radio.energy / count)
+    if config.element_exact:
+        return scale * _element_exact(received, radio, frequencies)
+    antennas = np.exp(2j * np.pi * radio.array.positions(1.0) @ received.direction.T)
+    return scale * (antennas * received.gain) @ delay_response(received.tau, frequencies)
+
+
+def pulse_samples(received: Received, radio: RadioConfig, config: ReceiverConfig) -> Complexes:
+    """Noiseless samples (L, U) [sqrt(W)] at times n / B, n = 0 .. U-1, after a single flat pulse; U is `num_tones`.
+
+    Unlike the tones, which repeat, the pulse's tails are cut off at the window's ends.
+    """
+    time = np.arange(num_tones(radio, config)) / radio.bandwidth
+    pulses = flat_pulse(time - received.tau[:, None], radio.bandwidth, radio.energy)
+    antennas = np.exp(2j * np.pi * radio.array.positions(1.0) @ received.direction.T)
+    return (antennas * received.gain) @ pulses
+
+
+def to_tones(samples: Complexes, radio: RadioConfig) -> Complexes:
+    """Tones (..., M) [sqrt(J)] of samples (..., M) [sqrt(W)] at rate B from time 0 on; noise N0 B becomes N0."""
+    count = samples.shape[-1]
+    advance = np.exp(1j * np.pi * (count - 1) / count * np.arange(count))
+    return np.fft.fft(samples * advance, axis=-1, norm="ortho") / np.sqrt(radio.bandwidth)
+
+
+def to_samples(spectrum: Complexes, radio: RadioConfig) -> Complexes:
+    """Samples (..., M) [sqrt(W)] at rate B from time 0 on of tones (..., M) [sqrt(J)]: the inverse of `to_tones`."""
+    count = spectrum.shape[-1]
+    delay = np.exp(-1j * np.pi * (count - 1) / count * np.arange(count))
+    return np.fft.ifft(spectrum, axis=-1, norm="ortho") * delay * np.sqrt(radio.bandwidth)
+
+
+def add_noise(signal: Complexes, variance: float, *, rng: np.random.Generator) -> Complexes:
+    """The signal in white circular normal noise of this variance per complex sample: N0 for tones, N0 B for samples."""
+    parts = rng.standard_normal((2, *signal.shape))
+    return signal + np.sqrt(variance / 2.0) * (parts[0] + 1j * parts[1])
+
+
+def quantise(spectrum: Complexes, bits: int, radio: RadioConfig) -> Complexes:
+    """Tones (L, M) after converters of this many bits for each of real and imaginary part; 0 bits convert exactly.
+
+    The converters see samples in time, with the gain set so that the largest of all just fits.
+    """
+    if not bits:
+        return spectrum
+    samples = to_samples(spectrum, radio)
+    step = _converter_step(samples, bits)
+    return to_tones(_mid_rise(samples.real, step, bits) + 1j * _mid_rise(samples.imag, step, bits), radio)
+
+
+def converter_noise(spectrum: Complexes, bits: int, radio: RadioConfig) -> float:
+    """Variance [J] that the converters add to a tone: a sixth of the squared step, which the receiver knows."""
+    if not bits:
+        return 0.0
+    return _converter_step(to_samples(spectrum, radio), bits) ** 2 / 6.0 / radio.bandwidth
+
+
+def _converter_step(samples: Complexes, bits: int) -> float:
+    largest = max(float(np.abs(samples.real).max()), float(np.abs(samples.imag).max()), np.finfo(np.float64).tiny)
+    return 2.0 * largest / 2**bits
+
+
+def _mid_rise(value: Floats, step: float, bits: int) -> Floats:
+    level = np.clip(np.floor(value / step), -(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    return (level + 0.5) * step
+
+
+def _element_exact(received: Received, radio: RadioConfig, frequencies: Floats) -> Complexes:
+    """Sum over paths of spherical waves, each element at its own distance from where the wave comes from.
+
+    No plane-wave and no narrow-band approximation: the phase is `-2 pi (f_c + f) (delay at the element)`, and the part
+    at the array's centre and the carrier is in the gain.
+    """
+    elements = radio.array.positions(1.0)
+    source = received.direction * (received.wave_radius / radio.wavelength)[:, None]
+    excess = np.linalg.norm(source - elements[:, None], axis=-1) - np.linalg.norm(source, axis=-1)
+    response = np.zeros((len(elements), len(frequencies)), dtype=np.complex128)
+    centre = received.gain * delay_response(received.tau, frequencies).T
+    for row, longer in enumerate(excess):  # one antenna at a time keeps the phases of all paths in the cache
+        phase = (1.0 + frequencies[:, None] / radio.carrier) * longer
+        response[row] = np.sum(centre * np.exp(-2j * np.pi * phase), axis=-1)
+    return response

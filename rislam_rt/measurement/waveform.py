@@ -1,0 +1,166 @@
+"""The waveform-driven receiver: makes the signal of a cycle, and finds the paths in it again."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.information import measurement_std
+from rislam_rt.measurement.atoms import build_sounding
+from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.detect import build_grid
+from rislam_rt.measurement.estimate import Estimate, estimate_paths
+from rislam_rt.measurement.false_alarms import detection_threshold
+from rislam_rt.measurement.identify import identify
+from rislam_rt.measurement.joint import LEAST_CERTAINTY
+from rislam_rt.measurement.parts import capped, into_disc
+from rislam_rt.measurement.received import Received
+from rislam_rt.measurement.refine import amplitude_covariance
+from rislam_rt.measurement.signal import add_noise, converter_noise, quantise, tones
+from rislam_rt.model import Measurement, PathTruth, RadioConfig
+
+
+class Capture(NamedTuple):
+    """Samples of one cycle, in which one set of paths is to be found."""
+
+    samples: Complexes
+    """(L, M) tones [sqrt(J)] at full energy E."""
+    noise_psd: float
+    """Variance per tone, converters included [J]."""
+    from_panel: bool
+    """Whether it is the difference under alternation, which only the panel's paths enter."""
+
+
+class Components(NamedTuple):
+    """N components found, in the order of their delays."""
+
+    tau: Floats
+    """(N,) [s]."""
+    cosines: Floats
+    """(N, 2) body frame."""
+    gain: Complexes
+    """(N,)."""
+    tau_std: Floats
+    """(N,) [s]."""
+    cosines_std: Floats
+    """(N, 2)."""
+    amplitude_std: Floats
+    """(N,)."""
+    from_panel: Booleans
+    """(N,)."""
+
+
+def capture(
+    received: Received, radio: RadioConfig, config: ReceiverConfig, *, rng: np.random.Generator
+) -> list[Capture]:
+    """Sound the channel: one capture, or with alternation the sum and the difference of two at half the energy each.
+
+    Sum and difference of the two halves, over sqrt 2, hold the walls' and the panel's paths at the full energy and the
+    noise of one sounding: splitting the slot costs nothing but a second code.
+    """
+    if not config.alternation:
+        noisy = add_noise(tones(received, radio, config), radio.noise_psd, rng=rng)
+        extra = converter_noise(noisy, config.converter_bits, radio)
+        return [Capture(quantise(noisy, config.converter_bits, radio), radio.noise_psd + extra, False)]
+    sign = np.where(received.from_panel, -1.0, 1.0)
+    halves, extra = [], 0.0
+    for gain in (received.gain, sign * received.gain):
+        clean = np.sqrt(0.5) * tones(received._replace(gain=gain), radio, config)
+        noisy = add_noise(clean, radio.noise_psd, rng=rng)
+        extra += 0.5 * converter_noise(noisy, config.converter_bits, radio)
+        halves.append(quantise(noisy, config.converter_bits, radio))
+    level = radio.noise_psd + extra
+    return [
+        Capture(np.sqrt(0.5) * (halves[0] + halves[1]), level, False),
+        Capture(np.sqrt(0.5) * (halves[0] - halves[1]), level, True),
+    ]
+
+
+def find_components(captures: list[Capture], radio: RadioConfig, config: ReceiverConfig) -> Components:
+    """All components in the captures of one cycle."""
+    found = [_find(one, radio, config) for one in captures]
+    joined = [np.concatenate(fields) for fields in zip(*found, strict=True)]
+    order = np.argsort(joined[0])
+    tau, cosines, gain, tau_std, cosines_std, amplitude_std, from_panel = (field[order] for field in joined)
+    return Components(tau, cosines, gain, tau_std, cosines_std, amplitude_std, from_panel)
+
+
+def measure_waveform(
+    received: Received, radio: RadioConfig, config: ReceiverConfig, *, rng: np.random.Generator
+) -> tuple[Measurement, PathTruth]:
+    """Components estimated from the cycle's signal, and the paths that they most likely are."""
+    found = find_components(capture(received, radio, config, rng=rng), radio, config)
+    return to_measurement(found, config), PathTruth(identify(found.tau, found.cosines, found.gain, received, radio))
+
+
+def to_measurement(found: Components, config: ReceiverConfig) -> Measurement:
+    """What the agent gets to see of the components."""
+    return Measurement(
+        found.tau,
+        found.cosines,
+        np.abs(found.gain),
+        found.tau_std,
+        found.cosines_std,
+        found.amplitude_std,
+        found.from_panel if config.alternation else None,
+    )
+
+
+def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig) -> Components:
+    """Components of one capture."""
+    sounding = build_sounding(one.samples.shape[1], radio)
+    window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
+    grid = build_grid(sounding, window)
+    threshold = detection_threshold(radio, config)
+    samples = one.samples / np.sqrt(one.noise_psd)
+    found = estimate_paths(sounding, grid, samples, threshold, window, config.max_components)
+    parameters, gain, deviation, amplitude_std = _resolved(found, radio)
+    scale = np.sqrt(one.noise_psd * one.samples.shape[1] / radio.energy)
+    return Components(
+        np.clip(parameters[:, 0], *window) / radio.bandwidth,
+        into_disc(parameters[:, 1:]),
+        scale * gain,
+        deviation[:, 0] / radio.bandwidth,
+        capped(deviation[:, 1:], radio),
+        scale * amplitude_std,
+        np.full(len(gain), one.from_panel),
+    )
+
+
+def _resolved(found: Estimate, radio: RadioConfig) -> tuple[Floats, Complexes, Floats, Floats]:
+    """Parameters (N, 3), gains (N,), deviations (N, 3) and amplitude deviations (N,) of what can be told apart.
+
+    Where the data ask for several paths but cannot share the amplitude out between them, they are reported as one, as
+    wide as they lie apart.
+    """
+    fit, bound = found.fit, found.accuracy
+    parameters, amplitude = fit.parameters, fit.amplitude
+    label = _groups(parameters, np.abs(amplitude) < LEAST_CERTAINTY * bound.amplitude, radio)
+    member = (label == np.unique(label)[:, None]).astype(np.float64)
+    gain = member @ amplitude
+    spread = np.real(np.einsum("gi,ij,gj->g", member, amplitude_covariance(fit), member))
+    single = member.sum(axis=1) == 1
+    share = member * np.abs(amplitude)
+    share /= share.sum(axis=1, keepdims=True)
+    centre = share @ parameters
+    lone = measurement_std(np.abs(gain) ** 2 * fit.residual.size, radio)
+    lone_std = np.column_stack([lone.tau * radio.bandwidth, lone.cosines])
+    offset = np.where(member[..., None] > 0.0, np.abs(parameters - centre[:, None]), 0.0).max(axis=1, initial=0.0)
+    deviation = np.where(single[:, None], member @ bound.parameters, np.hypot(lone_std, offset))
+    return centre, gain, deviation, np.sqrt(np.where(single, member @ bound.amplitude**2, spread) / 2.0)
+
+
+def _groups(parameters: Floats, doubtful: Booleans, radio: RadioConfig) -> Integers:
+    """(P,) group of each path: a doubtful one joins its nearest neighbour, if that lies within a cell."""
+    count = len(parameters)
+    label = np.arange(count)
+    if count < 2:
+        return label
+    beams = [1.0 / (n * radio.array.spacing) if n > 1 else np.inf for n in (radio.array.rows, radio.array.cols)]
+    cell = np.array([1.0, *beams])
+    distance = np.linalg.norm((parameters[:, None] - parameters) / cell, axis=-1) + np.diag(np.full(count, np.inf))
+    for row in np.flatnonzero(doubtful):
+        nearest = int(np.argmin(distance[row]))
+        if distance[row, nearest] < 1.0:
+            label[label == label[row]] = label[nearest]
+    return label
