@@ -7,6 +7,8 @@ from rislam_rt.cli.options import JsonFile, write_json
 
 def command(json: JsonFile = None) -> None:
     """Say what this machine has, and trace a small box to prove it. Exit code 3 if something is missing."""
+    from dataclasses import asdict
+
     from rislam_rt.backend import diagnose, prepare_backend
 
     findings = diagnose()
@@ -17,8 +19,13 @@ def command(json: JsonFile = None) -> None:
         typer.echo(f"{'ok ' if finding.ok else 'BAD'} {finding.name:<{width}}  {finding.value}")
     prepare_backend()
     from rislam_rt.channel.traced import trace_small_box
+    from rislam_rt.errors import TraceError
 
     proof = trace_small_box()
-    typer.echo(f"ok  {'small box':<{width}}  {proof}")
+    error = max(proof.los_error_db, proof.wall_error_db)
+    text = f"{proof.num_paths} of {proof.expected_paths} paths, gain within {error:.1g} dB of theory"
+    typer.echo(f"{'ok ' if proof.ok else 'BAD'} {'small box':<{width}}  {text}, {proof.seconds:.1f} s")
     rows = [{"name": finding.name, "value": finding.value, "ok": finding.ok} for finding in findings]
-    write_json(json, {"findings": rows, "small_box": str(proof)})
+    write_json(json, {"findings": rows, "small_box": {"ok": proof.ok, **asdict(proof)}})
+    if not proof.ok:
+        raise TraceError(f"small box: {text}; the tracer's libraries are damaged, run 'make clean' and 'make demo'")

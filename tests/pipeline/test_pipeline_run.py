@@ -1,0 +1,103 @@
+"""The run: repeatable, fair between schemes, resumable, and strict about what does not fit."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rislam_rt.errors import ConfigError
+from rislam_rt.model import PathKind
+from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline.run import check_run, without_panel
+
+PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
+
+
+def test_same_seed_same_bits(short_result, run_short):
+    again = run_short()
+    for name, scheme in short_result.schemes.items():
+        for field in ("position", "covariance", "applied", "gain", "component_path", "component_landmark"):
+            np.testing.assert_array_equal(getattr(again.schemes[name], field), getattr(scheme, field))
+
+
+def test_other_seed_other_noise(short_result, run_short):
+    other = run_short('schemes=["random"]', seed=8)
+    assert (other.schemes["random"].position != short_result.schemes["random"].position).any()
+
+
+def test_a_scheme_does_not_depend_on_the_others(short_result, run_short):
+    alone = run_short('schemes=["random"]').schemes["random"]
+    np.testing.assert_array_equal(alone.position, short_result.schemes["random"].position)
+    np.testing.assert_array_equal(alone.applied, short_result.schemes["random"].applied)
+
+
+def test_gains_are_those_of_the_applied_code(room, short_result):
+    from rislam_rt.channel.image_source import ImageSourceChannel
+    from rislam_rt.model import RisCode
+    from rislam_rt.pipeline.spec import PipelineSpec, build_settings
+
+    radio = build_settings(PipelineSpec.model_validate(short_result.config)).radio
+    channel = ImageSourceChannel(replace(room, agent=room.agent[:8]), radio, 2)
+    scheme = short_result.schemes["random"]
+    expected = channel.respond(channel.paths(channel.scene.agent), RisCode(scheme.applied, scheme.levels))
+    np.testing.assert_allclose(scheme.gain, expected.gain, rtol=1e-12)
+
+
+def test_without_panel_only_panel_paths_go(short_result):
+    plain = without_panel(short_result.paths)
+    panel = np.isin(plain.kind, (PathKind.RIS, PathKind.VRIS))
+    assert panel.any()
+    assert not plain.valid[:, panel].any()
+    np.testing.assert_array_equal(plain.valid[:, ~panel], short_result.paths.valid[:, ~panel])
+
+
+def test_references_run(run_short):
+    result = run_short('schemes=["no_ris", "exact", "genie"]', "cycles=3")
+    assert result.schemes["no_ris"].applied.shape == (3, 0, 0)
+    direct = result.paths.kind == PathKind.RIS
+    # The genie knows where the panel is from the first cycle on; with random codes its path is ten times weaker.
+    assert np.abs(result.schemes["genie"].gain[:, direct]).min() > 2.0 * np.abs(result.schemes["exact"].gain[0, direct])
+    assert not result.schemes["no_ris"].gain[:, direct].any()
+
+
+def test_completed_schemes_are_not_run_again(short_result, run_short):
+    done, stages = {"random": short_result.schemes["random"]}, []
+    result = run_short(done=done, progress=lambda stage, at, total: stages.append(stage))
+    assert set(stages) == {"trace", "optimized"}
+    assert result.schemes["random"] is short_result.schemes["random"]
+    assert list(done) == ["random", "optimized"]
+    np.testing.assert_array_equal(result.schemes["optimized"].position, short_result.schemes["optimized"].position)
+
+
+def test_progress_counts_to_the_end(run_short):
+    news = []
+    run_short('schemes=["random"]', "cycles=4", progress=lambda *item: news.append(item))
+    assert news == [("trace", 0, 1), ("trace", 1, 1), *[("random", k, 4) for k in range(5)]]
+
+
+def test_lost_and_late_codes_run(run_short):
+    result = run_short('schemes=["random"]', "control.delay_cycles=2", "control.loss_probability=0.5")
+    scheme = result.schemes["random"]
+    assert not scheme.applied[:2].any()
+    assert scheme.sent[:2].any()
+
+
+@pytest.mark.parametrize(
+    ("override", "field"),
+    [("cycles=601", "cycles: 601"), ("budget.measure_s=0.5", "budget"), ("control.levels=3", "control.levels")],
+)
+def test_what_does_not_fit_is_refused(room, override, field):
+    spec = load_spec(PIPELINE, [override])
+    with pytest.raises(ConfigError, match=field):
+        check_run(room, spec)
+
+
+def test_a_scheme_with_a_panel_needs_one(room, short_spec):
+    with pytest.raises(ConfigError, match="needs a panel"):
+        check_run(replace(room, ris=None), short_spec)
+
+
+def test_room_without_panel_runs(room, run_short):
+    result = run_short('schemes=["no_ris"]', "cycles=3", scene=replace(room, ris=None))
+    assert not np.isin(result.paths.kind, (PathKind.RIS, PathKind.VRIS)).any()
