@@ -1,5 +1,6 @@
 """The scores of a run: agent, each landmark, each wall, for every scheme."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,6 +53,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         nees = float(np.mean(normalised_squares((scheme.position - truth)[:, axes], block))) / len(axes)
     score = association_score(*component_labels(result.paths, scheme))
     largest = float(errors.max())
+    seconds = dict(zip(STEPS, scheme.seconds.mean(axis=0).tolist(), strict=True))
     return {
         "rmse_m": float(np.sqrt(np.mean(errors**2))),
         "final_m": float(errors[-1]),
@@ -63,9 +65,15 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "landmarks": landmark_scores(scene, scheme),
         "walls": wall_scores(scene, scheme.map),
         "association": {"accuracy": score.accuracy, "precision": score.precision, "recall": score.recall},
-        "step_seconds": dict(zip(STEPS, scheme.seconds.mean(axis=0).tolist(), strict=True)),
+        "step_seconds": seconds,
+        "over_budget": over_budget(seconds, result.config["budget"]),
         "seconds": result.seconds.get(scheme.scheme, 0.0),
     }
+
+
+def over_budget(seconds: Mapping[str, float], budget: Mapping[str, float]) -> list[str]:
+    """Names of the steps whose mean time exceeds their share of the cycle."""
+    return [step for step in STEPS if seconds[step] > budget[f"{step}_s"]]
 
 
 def landmark_track(scene: Scene, scheme: SchemeResult) -> LandmarkTrack:

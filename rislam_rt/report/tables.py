@@ -37,6 +37,7 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
         rows.append([f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)])
     for name in first["walls"]:
         rows.append([f"wall {name}", *(_wall(s["walls"][name]) for s in schemes)])
+    rows.append(["over budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)])
     rows.append(["diverged", *("yes" if s["diverged"] else "no" for s in schemes)])
     return rows
 

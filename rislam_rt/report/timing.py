@@ -1,6 +1,6 @@
 """Time of the cycle's four steps against their budgets."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -35,8 +35,3 @@ def draw_timing(result: SlamResult, budget: Sequence[float]) -> Figure:
         budget_line = Line2D([], [], color="black", lw=2.0, label="budget")
         figure.legend(handles=[*handles, budget_line], loc="outside lower center", ncols=5, fontsize=9)
     return figure
-
-
-def over_budget(seconds: Mapping[str, float], budget: Mapping[str, float]) -> list[str]:
-    """Names of the steps whose mean time exceeds the budget."""
-    return [step for step in STEPS if seconds[step] > budget[step]]

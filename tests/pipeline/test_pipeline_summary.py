@@ -108,3 +108,9 @@ def test_summary_is_plain_and_complete(short_result):
         assert len(scheme["walls"]) == 6
         assert scheme["rmse_m"] > 0.0
         assert scheme["diverged"] is False
+
+
+def test_steps_over_budget_are_named():
+    seconds = {"optimise": 0.2, "communicate": 0.0, "measure": 0.01, "localise": 0.02}
+    budget = {"optimise_s": 0.1, "communicate_s": 0.1, "measure_s": 0.1, "localise_s": 0.01}
+    assert over_budget(seconds, budget) == ["optimise", "localise"]

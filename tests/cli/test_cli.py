@@ -1,0 +1,258 @@
+"""Every command on good and on bad input: exit codes, one line for each failure, nothing written."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rislam_rt.cli import main
+
+ROOT = Path(__file__).parents[2]
+SCENE = ROOT / "scenes" / "paper_room"
+PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
+SHORT = ("--set", "channel=image_source", "--set", "cycles=6", "--set", "slam.num_particles=40")
+HEAVY = ("numpy", "scipy", "sionna", "mitsuba", "drjit", "matplotlib", "xarray", "trimesh")
+
+
+@pytest.fixture
+def run(capsys, monkeypatch, tmp_path):
+    """Run a command in an empty folder; returns exit code, output and error stream."""
+    monkeypatch.chdir(tmp_path)
+
+    def _run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["rislam-rt", *map(str, arguments)])
+        with pytest.raises(SystemExit) as left:
+            main()
+        captured = capsys.readouterr()
+        return left.value.code, captured.out, captured.err
+
+    return _run
+
+
+@pytest.fixture
+def edited(tmp_path_factory):
+    """A copy of the paper's room with one text replaced in its scene file."""
+    import shutil
+
+    def _edited(old, new):
+        folder = tmp_path_factory.mktemp("scene") / "room"
+        shutil.copytree(SCENE, folder)
+        file = folder / "scene.toml"
+        text = file.read_text()
+        assert old in text
+        file.write_text(text.replace(old, new))
+        return folder
+
+    return _edited
+
+
+def test_help_and_version_import_nothing_heavy():
+    code = (
+        "import sys\n"
+        "from rislam_rt.cli import main\n"
+        "for words in (['--help'], ['run', '--help'], ['--version']):\n"
+        "    sys.argv = ['rislam-rt', *words]\n"
+        "    try:\n        main()\n"
+        "    except SystemExit as left:\n        assert left.code == 0, left.code\n"
+        f"print([name for name in {HEAVY} if name in sys.modules])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["nonsense"],
+        ["compare"],
+        ["compare", SCENE, "--poses", "0"],
+        ["run", PIPELINE, "--colour"],
+        ["trace", SCENE, "--channel", "magic"],
+        ["design", SCENE],
+        ["design", SCENE, "--at", "1,2"],
+        ["design", SCENE, "--at", "1,2,nan"],
+        ["design", SCENE, "--at", "1,2,30"],
+        ["run", "nowhere.toml"],
+        ["run", PIPELINE, "--scene", "nowhere"],
+        ["run", PIPELINE, "--set", "radio.carier_ghz=1"],
+        ["run", PIPELINE, "--set", "cycles=1000"],
+        ["run", PIPELINE, "--set", "budget.measure_s=1"],
+        ["run", PIPELINE, "--out", ROOT / "docs"],
+        ["check", "nowhere"],
+        ["show", "nowhere"],
+        ["show", SCENE, "--out", "room.doc"],
+        ["new", "room", "--template", "palace"],
+        ["new", ROOT / "docs"],
+        ["report", ROOT / "docs"],
+    ],
+    ids=lambda words: " ".join(str(word) for word in words).replace(str(ROOT), ""),
+)
+def test_bad_input_is_one_line_and_exit_2(run, arguments, tmp_path):
+    code, _, err = run(*arguments)
+    lines = [line for line in err.splitlines() if not line.startswith("warning: ")]
+    assert code == 2
+    assert len(lines) <= 1
+    assert "Traceback" not in err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field"),
+    [
+        ("meshes/floor.ply", "meshes/none.ply", "mesh"),
+        ("radius =", "radios =", "radios"),
+        ("radius = 0.05", "radius = -0.05", "radius"),
+        ("center = [3.0, 3.0, 3.0]", "center = [3.0, 3.0, 9.0]", "ris.center"),
+        ("start = [0.5, 0.7, 0.5]", "start = [-2.0, 0.7, 0.5]", "agent.start"),
+    ],
+)
+def test_bad_scene_is_one_line_with_file_and_field(run, edited, tmp_path, old, new, field):
+    folder = edited(old, new)
+    code, out, err = run("run", PIPELINE, "--scene", folder)
+    assert code == 2
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert str(folder / "scene.toml") in err
+    assert field in err
+    assert list(tmp_path.iterdir()) == []
+    assert run("check", folder)[0] == 2
+
+
+def test_missing_library_is_one_line_and_exit_3(tmp_path):
+    import os
+
+    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(tmp_path / "libLLVM.so")}
+    for words in (["doctor"], ["run", PIPELINE], ["trace", SCENE]):
+        done = subprocess.run(
+            [sys.executable, "-m", "rislam_rt.cli", *map(str, words)],
+            capture_output=True, text=True, cwd=tmp_path, env=environment, check=False,
+        )  # fmt: skip
+        assert done.returncode == 3
+        assert len(done.stderr.splitlines()) == 1
+        assert "DRJIT_LIBLLVM_PATH" in done.stderr
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_unwritable_file_is_exit_4(run):
+    code, _, err = run("check", SCENE, "--json", "/proc/none/check.json")
+    assert code == 4
+    assert "/proc/none/check.json" in err
+
+
+def test_run_report_and_json(run, tmp_path):
+    code, out, _ = run("run", PIPELINE, *SHORT, "--json", "run.json", "--out", "mine")
+    assert code == 0
+    assert "agent" in out
+    content = json.loads((tmp_path / "run.json").read_text())
+    assert (content["seed"], content["cycles"]) == (7, 6)
+    for scheme in content["schemes"].values():
+        assert {"rmse_m", "landmarks", "walls", "diverged", "seconds"} <= set(scheme)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "run.json"]
+    page = tmp_path / "mine" / "report.html"
+    first = page.read_bytes()
+    code, again, _ = run("report", "mine")
+    assert code == 0
+    assert page.read_bytes() == first
+    assert [line for line in again.splitlines() if "agent" in line] == [
+        line for line in out.splitlines() if "agent" in line
+    ]
+
+
+def test_second_run_replaces_the_first(run, tmp_path):
+    for seed in (1, 2):
+        run(
+            "run",
+            PIPELINE,
+            *SHORT,
+            "--set",
+            f"seed={seed}",
+            "--no-report",
+            "--out",
+            "mine",
+            "--set",
+            'schemes=["random"]',
+        )
+    assert json.loads((tmp_path / "mine" / "summary.json").read_text())["seed"] == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+
+
+def test_interrupted_run_goes_on(run, tmp_path, monkeypatch):
+    import rislam_rt.pipeline.run as module
+
+    whole = module.run_scheme
+    seen = []
+
+    def broken(name, *rest):
+        seen.append(name)
+        if name == "random" and seen.count("random") == 1:
+            raise KeyboardInterrupt
+        return whole(name, *rest)
+
+    monkeypatch.setattr(module, "run_scheme", broken)
+    code, _, err = run("run", PIPELINE, *SHORT, "--no-report")
+    assert code == 130
+    assert "1 schemes kept" in err
+    folder = tmp_path / "runs" / "trace_then_slam-paper_room-7"
+    assert not folder.exists()
+    assert run("run", PIPELINE, *SHORT, "--no-report")[0] == 0
+    assert seen == ["optimized", "random", "random"]
+    assert [path.name for path in folder.parent.iterdir()] == [folder.name]
+
+
+def test_compare_writes_what_it_found(run, tmp_path):
+    code, out, _ = run("compare", SCENE, "--poses", 2, "--depth", 1, "--seed", 3, "--json", "compare.json")
+    content = json.loads((tmp_path / "compare.json").read_text())
+    assert code == 0
+    assert content["unexplained"] == 0
+    assert content["matched"] > 0
+    assert content["max_length_error_m"] < 2e-5
+    assert {"explained", "max_gain_error_db", "max_phase_error_rad", "max_angle_error_rad"} <= set(content)
+    assert "unexplained" in out
+
+
+def test_trace_writes_paths(run, tmp_path):
+    import xarray as xr
+
+    code, _, _ = run("trace", SCENE, "--channel", "image_source", "--depth", 1, "--out", "paths.nc", "--json", "t.json")
+    assert code == 0
+    data = xr.load_dataset(tmp_path / "paths.nc", engine="h5netcdf")
+    classes = {row["class"]: row["identities"] for row in json.loads((tmp_path / "t.json").read_text())["classes"]}
+    # a box: 6 walls, both legs of the sphere, and of the panel without the bounces on its host next to it
+    assert classes == {"LOS": 1, "VT": 6, "PS": 1, "VS": 12, "RIS": 1, "VRIS": 10}
+    assert data.sizes["path"] == sum(classes.values())
+
+
+def test_design_lists_every_method(run, tmp_path):
+    from rislam_rt.design import DESIGNERS
+
+    code, out, _ = run("design", SCENE, "--at", "1.5,1.5,0", "--json", "design.json", "--figure", "codes.png")
+    content = json.loads((tmp_path / "design.json").read_text())
+    assert code == 0
+    assert set(content["methods"]) == set(DESIGNERS)
+    # the paper's panel from (1.5, 1.5, 0): reference figures of the exact and the all-zero code
+    assert content["methods"]["exact"]["gain_db"] == pytest.approx(-88.51, abs=0.05)
+    assert content["methods"]["zero"]["gain_db"] == pytest.approx(-118.25, abs=0.05)
+    assert content["bound"] <= min(m["crlb_m2"] for m in content["methods"].values())
+    assert (tmp_path / "codes.png").read_bytes().startswith(b"\x89PNG")
+    assert "exact" in out
+
+
+def test_new_check_and_show(run, tmp_path):
+    assert run("new", "mine", "--template", "empty_box")[0] == 0
+    code, out, _ = run("check", "mine", "--json", "check.json")
+    assert code == 0
+    assert json.loads((tmp_path / "check.json").read_text())["errors"] == 0
+    assert "0 errors" in out
+    code, out, _ = run("show", "mine", "--out", "mine.svg")
+    assert code == 0
+    assert "floor" in out
+    assert b"<svg" in (tmp_path / "mine.svg").read_bytes()
+
+
+def test_doctor_proves_the_tracer(run, tmp_path):
+    code, out, _ = run("doctor", "--json", "doctor.json")
+    assert code == 0
+    assert json.loads((tmp_path / "doctor.json").read_text())["small_box"]["num_paths"] == 25
+    assert "libLLVM" in out

@@ -1,0 +1,108 @@
+"""The report: lines that are drawn, figures that exist, a page that needs nothing else."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.model import PathKind
+from rislam_rt.pipeline import load_spec, run_slam
+from rislam_rt.pipeline.summary import summarise
+from rislam_rt.report import draw_figures, write_report
+from rislam_rt.report.curves import strongest_db
+from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace
+from rislam_rt.report.room import path_points
+from rislam_rt.scene import load_scene
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def result():
+    settings = ["channel=image_source", "cycles=6", "slam.num_particles=40", 'schemes=["random", "no_ris"]']
+    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
+    return run_slam(load_scene(ROOT / "scenes" / "paper_room"), spec, rng=np.random.default_rng(7))
+
+
+def test_outline_has_no_diagonals(result):
+    edges = outline_edges(build_walls(result.scene))
+    along = np.abs(edges[:, 1] - edges[:, 0])
+    assert len(edges) == 24  # six walls, four sides each
+    assert (np.sum(along > 1e-9, axis=1) == 1).all()
+
+
+@pytest.mark.parametrize(("height", "x"), [(0.0, 2.0), (1.0, 2.5)])
+def test_trace_of_a_leaning_wall_moves_with_height(height, x):
+    normal = np.array([2.0, 0.0, -1.0]) / np.sqrt(5.0)
+    box = np.array([[0.0, 0.0, 0.0], [6.0, 4.0, 3.0]])
+    segment = plane_trace(normal, 4.0 / np.sqrt(5.0), height, box)
+    np.testing.assert_allclose(segment[:, 0], x)
+    np.testing.assert_allclose(np.sort(segment[:, 1]), [0.0, 4.0])
+
+
+def test_trace_ends_at_the_box():
+    normal, box = np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0), np.array([[0.0, 0.0, 0.0], [6.0, 4.0, 3.0]])
+    segment = plane_trace(normal, 3.0 / np.sqrt(2.0), 0.0, box)
+    np.testing.assert_allclose(segment[np.argsort(segment[:, 0])], [[0.0, 3.0], [3.0, 0.0]], atol=1e-12)
+
+
+def test_floors_and_distant_planes_have_no_trace():
+    box = np.array([[0.0, 0.0, 0.0], [6.0, 4.0, 3.0]])
+    assert plane_trace(np.array([0.0, 0.0, 1.0]), 0.5, 0.5, box) is None
+    assert plane_trace(np.array([1.0, 0.0, 0.0]), 9.0, 0.5, box) is None
+
+
+def test_ellipse_lies_at_its_mahalanobis_distance():
+    covariance = np.array([[4.0, 1.0], [1.0, 2.0]])
+    offset = ellipse(np.array([1.0, -1.0]), covariance, 2.0) - [1.0, -1.0]
+    distance = np.einsum("ni,ij,nj->n", offset, np.linalg.inv(covariance), offset)
+    np.testing.assert_allclose(distance, 4.0)
+
+
+def test_drawn_paths_have_the_length_of_their_delays(result):
+    paths = result.paths
+    for path in np.flatnonzero(paths.valid[2]):
+        points = path_points(result.scene, paths, 2, int(path))
+        length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+        assert length == pytest.approx(299_792_458.0 * paths.tau[2, path], abs=1e-9)
+
+
+def test_strongest_path_of_a_class(result):
+    scheme = result.schemes["random"]
+    columns = result.paths.kind == PathKind.VT
+    level = strongest_db(scheme, columns)
+    np.testing.assert_allclose(10.0 ** (level / 20.0), np.abs(scheme.gain[:, columns]).max(axis=1))
+    assert np.isnan(strongest_db(result.schemes["no_ris"], result.paths.kind == PathKind.RIS)).all()
+
+
+def test_every_figure_is_drawn_and_none_is_blank(result):
+    import io
+
+    from matplotlib.image import imread
+
+    figures = draw_figures(result)
+    assert set(figures) == {"room", "error", "landmarks", "levels", "paths", "codes", "timing"}
+    for picture in figures.values():
+        pixels = imread(io.BytesIO(picture))
+        assert min(pixels.shape[:2]) > 200
+        assert 0.005 < np.mean(pixels[..., :3].min(axis=-1) < 0.98) < 0.9
+
+
+def test_page_needs_no_other_file(result, tmp_path):
+    page = write_report(result, summarise(result), tmp_path).read_text()
+    assert page.count("data:image/png;base64,") == 7
+    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+    assert "<script" not in page
+    assert "wall wall_x0" in page
+    assert len(list((tmp_path / "figures").glob("*.png"))) == 7
+
+
+def test_names_from_files_cannot_break_the_page(result):
+    from dataclasses import replace
+
+    from rislam_rt.report.page import build_page
+
+    evil = replace(result, name="<script>alert(1)</script>")
+    assert "<script" not in build_page(evil, summarise(evil), {})
