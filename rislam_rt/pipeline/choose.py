@@ -22,7 +22,7 @@ def build_designer(scheme: Scheme, panel: RisSpec, room: Room, spec: PipelineSpe
 def _on_belief(method: str, panel: RisSpec, spec: PipelineSpec, settings: Settings) -> Designer:
     section = spec.design
 
-    def choose(belief: SlamEstimate, cycle: int, rng: np.random.Generator) -> RisCode:
+    def choose(belief: SlamEstimate, cycle: int, *, rng: np.random.Generator) -> RisCode:
         design = design_code(
             belief, panel, settings.radio, method=method, rng=rng, samples=section.samples, config=settings.design,
             landmark_uncertainty=section.landmark_uncertainty,
@@ -36,7 +36,7 @@ def _on_truth(method: str, panel: RisSpec, room: Room, spec: PipelineSpec, setti
     """The genie: true paths of the cycle in which the code will take effect, and the belief's own prior."""
     last = len(room.trajectory) - 1
 
-    def choose(belief: SlamEstimate, cycle: int, rng: np.random.Generator) -> RisCode:
+    def choose(belief: SlamEstimate, cycle: int, *, rng: np.random.Generator) -> RisCode:
         due = min(cycle + spec.control.delay_cycles, last)
         prior = prior_from_covariance(belief.covariance[:2, :2])
         tx, rx = room.trajectory.tx[due], room.trajectory.rx[due]

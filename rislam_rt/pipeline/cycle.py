@@ -4,10 +4,9 @@ The agent's side of it (design and filter) gets the measurement, the code that i
 its heading; paths and poses stay on the room's side.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -67,8 +66,12 @@ class Cycle(NamedTuple):
     seconds: tuple[float, float, float, float]
 
 
-Designer = Callable[[SlamEstimate, int, np.random.Generator], RisCode]
-"""Chooses a code from the predicted belief; the number of the cycle is for the reference that knows the truth."""
+class Designer(Protocol):
+    """Chooses a code from the predicted belief."""
+
+    def __call__(self, belief: SlamEstimate, cycle: int, *, rng: np.random.Generator) -> RisCode:
+        """`cycle` is for the reference that knows the truth."""
+        ...
 
 
 def run_cycle(
@@ -91,7 +94,7 @@ def run_cycle(
     link, sent = agent.link, None
     if link is not None and designer is not None:
         ahead = dt + control.delay_cycles * _nominal_step(motion)
-        sent = designer(predict(agent.state, ahead, settings.slam), cycle, rng.design)
+        sent = designer(predict(agent.state, ahead, settings.slam), cycle, rng=rng.design)
     clock.append(perf_counter())
 
     air = 0.0
