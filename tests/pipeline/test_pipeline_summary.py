@@ -12,6 +12,7 @@ from rislam_rt.pipeline.summary import (
     component_labels,
     landmark_track,
     match_walls,
+    over_budget,
     summarise,
     surface_rms,
     wall_scores,
