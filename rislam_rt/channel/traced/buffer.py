@@ -19,7 +19,7 @@ def fill_buffer(stage: Stage, sequences: Integers, rows: Rows, vertices: Floats 
     the image method needs, from the stage's origin.
     """
     count, depth = sequences.shape
-    buffer = PathsBuffer(count, depth, False)
+    buffer = PathsBuffer(count, max(depth, 1), False)  # at depth 0 the image method counts down from 0 without end
     walls = turned_round(sequences)
     points = stage.corner[walls] if vertices is None else turned_vertices(vertices, sequences)
     for column, (wall, point) in enumerate(zip(walls.T, np.moveaxis(points, 1, 0), strict=True)):

@@ -50,7 +50,7 @@ class TracedChannel:
         self.refine = refine
         self.walls = build_walls(scene)
         self._sides = wall_sides(self.walls)
-        self._stage = build_stage(self.walls, radio.carrier, room_center(scene))
+        self.stage = build_stage(self.walls, radio.carrier, room_center(scene))
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Every path of every cycle, with the panel at level 0."""
@@ -71,7 +71,7 @@ class TracedChannel:
 
     def _trace(self, problems: Sequence[Problem]) -> list[Legs]:
         """Solve all problems together, block by block."""
-        batch = build_batch(problems, self.walls, self._sides, self.depth)
+        batch = build_batch(problems, self.walls, self._sides, self.depth if len(self.walls) else 0)
         blocks = in_blocks(batch.candidates(self.walls, self._sides), BLOCK_ROWS)
         return batch.legs(join_found([self._solve(batch, rows) for rows in blocks]))
 
@@ -80,13 +80,13 @@ class TracedChannel:
         from rislam_rt.channel.traced.fields import leg_coefficients
         from rislam_rt.channel.traced.visibility import visible_rows
 
-        rows, vertices = visible_rows(self._stage, batch.all_sequences, batch.far, batch.device, candidates)
+        rows, vertices = visible_rows(self.stage, batch.all_sequences, batch.far, batch.device, candidates)
         sequences, (device, far) = batch.all_sequences[rows.sequence], batch.ends(rows)
         if self.refine:
             course = refined_course(self.walls, sequences, device, far)
         else:
             course = traced_course(sequences, device, far, vertices)
-        return Found(rows, course, leg_coefficients(self._stage, sequences, device, far, course))
+        return Found(rows, course, leg_coefficients(self.stage, sequences, device, far, course))
 
 
 def _cycles(legs: Legs, rows: slice) -> Legs:

@@ -9,6 +9,8 @@ through the scene, occlusion, and the primitives hit.
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from sionna.rt.path_solvers import image_method
 from sionna.rt.path_solvers.image_method import ImageMethod
@@ -20,6 +22,7 @@ from rislam_rt.channel.traced.limits import SEGMENT_LIMIT
 from rislam_rt.channel.traced.rows import Rows
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
 from rislam_rt.channel.traced.stage import Stage
+from rislam_rt.errors import TraceError
 
 
 def visible_rows(stage: Stage, sequences: Integers, far: Floats, device: Floats, rows: Rows) -> tuple[Rows, Floats]:
@@ -35,17 +38,49 @@ def visible_rows(stage: Stage, sequences: Integers, far: Floats, device: Floats,
     if len(rows.far) == 0:
         return rows, np.zeros((0, sequences.shape[1], 3))
     candidates = sequences[rows.sequence]
+    sources, targets = as_points(far - stage.origin), as_points(device - stage.origin)
+    traced = _trace(stage, candidates, sources, targets, rows, ImageMethod())
+    traced.schedule()  # one pass through the scene for all that is read below
+    dr.eval()
+    keep = _confirmed(stage, candidates, traced)
+    return rows.only(keep), read_vertices(stage, traced, keep, candidates[keep])
+
+
+def attached_vertices(
+    stage: Stage, sequences: Integers, far: mi.Point3f, device: mi.Point3f, rows: Rows
+) -> list[mi.Point3f]:
+    """Bounce points from far end to device, bounce by bounce, that keep their dependence on the ends' positions.
+
+    Raises
+    ------
+    TraceError
+        The tracer denies a leg.
+    """
+    method = ImageMethod()
+    method.loop_mode = "evaluated"
+    candidates = sequences[rows.sequence]
+    traced = _trace(stage, candidates, far, device, rows, method)
+    if len(_confirmed(stage, candidates, traced)) < len(candidates):
+        raise TraceError("legs: one that was found before is denied now; were paths and channel made for one scene?")
+    depth = traced.depth_dim_size
+    index = dr.arange(mi.UInt, len(candidates)) * depth
+    columns = [getattr(traced, f"vertices_{axis}").array for axis in "xyz"]
+    return [mi.Point3f(*(dr.gather(mi.Float, c, index + d) for c in columns)) for d in range(sequences.shape[1])]
+
+
+def _trace(
+    stage: Stage, candidates: Integers, far: mi.Point3f, device: mi.Point3f, rows: Rows, method: ImageMethod
+) -> PathsBuffer:
+    """Run the image method on candidates (N, D)."""
     with _short_segments():
-        traced = ImageMethod()(
+        return method(
             scene=stage.scene.mi_scene,
             paths=fill_buffer(stage, candidates, rows),
             diffraction=False,
             diffraction_lit_region=False,
-            src_positions=as_points(far - stage.origin),
-            tgt_positions=as_points(device - stage.origin),
+            src_positions=far,
+            tgt_positions=device,
         )
-    keep = _confirmed(stage, candidates, traced)
-    return rows.only(keep), read_vertices(stage, traced, keep, candidates[keep])
 
 
 def _confirmed(stage: Stage, sequences: Integers, traced: PathsBuffer) -> Integers:

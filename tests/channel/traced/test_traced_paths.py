@@ -1,0 +1,230 @@
+"""The traced channel against theory: mirror lattice of a box, published figures, Sionna's own solvers."""
+
+import numpy as np
+import pytest
+
+from rislam_rt.channel.compare import compare_paths
+from rislam_rt.channel.image_source import ImageSourceChannel
+from rislam_rt.channel.traced import TracedChannel, shortest_segment, trace_small_box
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.design.single import exact_code
+from rislam_rt.errors import ConfigError, SceneError
+from rislam_rt.model import Material, PathKind, RadioConfig, RisCode
+
+RADIO = RadioConfig()
+SIZE = np.array([6.0, 6.0, 3.0])
+
+
+def decibels(gain):
+    return 20.0 * np.log10(np.abs(gain))
+
+
+def column(paths, kind, *walls):
+    """The column of a kind whose walls on the Tx leg have these names."""
+    for path in range(paths.num_paths):
+        identity = paths.identity(path)
+        if identity[0] == kind and [paths.walls[w] for w in identity[2]] == list(walls) and not identity[3]:
+            return path
+    raise AssertionError(f"no {kind.name} over {walls}")
+
+
+def lattice_lengths(tx, rx, depth):
+    """Lengths of all paths of a box: image (2 i S + x) or (2 i S - x) along every axis, |index| bounces each."""
+    images = []
+    for axis in range(3):
+        even = [(2 * abs(i), 2 * i * SIZE[axis] + rx[axis]) for i in range(-depth, depth + 1)]
+        odd = [(abs(2 * i - 1), 2 * i * SIZE[axis] - rx[axis]) for i in range(-depth, depth + 1)]
+        images.append(even + odd)
+    return sorted(
+        float(np.linalg.norm(np.array([x, y, z]) - tx))
+        for a, x in images[0]
+        for b, y in images[1]
+        for c, z in images[2]
+        if a + b + c <= depth
+    )
+
+
+@pytest.mark.parametrize(("depth", "count"), [(0, 1), (1, 7), (2, 25), (3, 63)])
+def test_box_has_the_mirror_lattice(rooms, depth, count):
+    trajectory = rooms.at([[1.3, 2.1, 0.8], [4.4, 0.9, 2.2]])
+    paths = TracedChannel(rooms.scene(rooms.box((0, 0, 0), SIZE), scatterers=()), RADIO, depth).paths(trajectory)
+    for cycle in range(2):
+        expected = lattice_lengths(trajectory.tx[cycle], trajectory.rx[cycle], depth)
+        assert len(expected) == count
+        found = np.sort(SPEED_OF_LIGHT * paths.tau[cycle, paths.valid[cycle]])
+        np.testing.assert_allclose(found, expected, rtol=1e-12)  # both float64; sums of a dozen terms
+
+
+def test_constant_walls_scale_every_path_alike(rooms):
+    """|gain| is R^bounces lambda / (4 pi d) at every angle; the field is float32, hence 1e-5."""
+    trajectory = rooms.at([[1.3, 2.1, 0.8], [4.4, 0.9, 2.2]])
+    paths = TracedChannel(rooms.scene(rooms.box((0, 0, 0), SIZE), scatterers=()), RADIO, 3).paths(trajectory)
+    cycle, path = np.nonzero(paths.valid)
+    length = SPEED_OF_LIGHT * paths.tau[cycle, path]
+    expected = 0.85 ** paths.num_vertices[path] * RADIO.wavelength / (4.0 * np.pi * length)
+    np.testing.assert_allclose(np.abs(paths.gain[cycle, path]), expected, rtol=1e-5)
+    phase = np.angle(paths.gain[cycle, path] * np.exp(2j * np.pi * length / RADIO.wavelength))
+    np.testing.assert_allclose(phase, 0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("room", ["paper", "l_shape", "parted"])
+def test_same_paths_as_the_image_source_channel(rooms, room):
+    """Two independent finders, identity by identity; the committed comparison covers every room at length."""
+    scene = getattr(rooms, room)()
+    rng = np.random.default_rng(11)
+    trajectory = rooms.at(rng.uniform([0.3, 0.3, 0.3], [2.7, 2.7, 2.7], size=(25, 3)))
+    traced, analytic = (channel(scene, RADIO, 2).paths(trajectory) for channel in (TracedChannel, ImageSourceChannel))
+    report = compare_paths(traced, analytic, scene, trajectory, shortest_segment=shortest_segment(scene))
+    assert report.matched > 2000
+    assert report.unexplained == 0
+    assert len(report.one_sided) < 1e-3 * report.matched
+    assert report.length_error.max() < 1e-12
+    assert report.gain_error_db.max() < 1e-3  # float32 field; nulls of the panel's sum magnify it
+
+
+def test_unrefined_paths_are_the_tracers_own_float32(rooms):
+    scene = rooms.paper()
+    trajectory = rooms.at([[1.3, 2.1, 0.8], [4.4, 0.9, 2.2]])
+    refined, plain = (TracedChannel(scene, RADIO, 2, refine=refine).paths(trajectory) for refine in (True, False))
+    assert (refined.source, plain.source) == ("traced, refined", "traced")
+    np.testing.assert_array_equal(refined.valid, plain.valid)
+    error = SPEED_OF_LIGHT * np.abs(refined.tau - plain.tau)[refined.valid]
+    # Three segments of vertices at +-3 m about the room's centre, float32 spacing 2.4e-7, plus the panel's lift of 2e-6
+    # on both legs: 2e-5 is the bound that the comparison of the channels is held to.
+    assert 0.0 < error.max() < 2e-5
+
+
+def test_scatterer_figure(rooms):
+    """|alpha| = 4.4332e-6 for the sphere at (2, 1, 1) with the Tx at (4, 4, 0.5) and the Rx 0.1 m further in x."""
+    trajectory = rooms.at([4.05, 4.0, 0.5], tx=(-0.05, 0, 0), rx=(0.05, 0, 0))
+    paths = TracedChannel(rooms.paper(), RADIO, 1).paths(trajectory)
+    gain = paths.gain[0, column(paths, PathKind.PS)]
+    assert abs(gain) == pytest.approx(4.4332e-6, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("x", "exact", "random", "zero"),
+    [(0.5, -98.63, -113.32, -135.44), (1.5, -88.51, -103.21, -118.25), (3.0, -78.87, -94.42, -78.87)],
+)
+def test_panel_figures(rooms, x, exact, random, zero):
+    """Direct RIS path for the agent on the floor, Tx and Rx 0.05 m to either side, in dB within 0.05."""
+    trajectory = rooms.at([x, x, 0.0], tx=(-0.05, 0, 0), rx=(0.05, 0, 0))
+    scene = rooms.paper()
+    channel = TracedChannel(scene, RADIO, 1)
+    paths = channel.paths(trajectory)
+    path = column(paths, PathKind.RIS)
+    assert decibels(paths.gain[0, path]) == pytest.approx(zero, abs=0.05)
+    element = (paths.ris.tx[0, paths.ris.tx_leg[path]] * paths.ris.rx[0, paths.ris.rx_leg[path]]).ravel()
+    assert 10.0 * np.log10(np.sum(np.abs(element) ** 2)) == pytest.approx(random, abs=0.05)
+    code = RisCode(exact_code(element, 4)[0].reshape(6, 6), 4)
+    assert decibels(channel.respond(paths, code).gain[0, path]) == pytest.approx(exact, abs=0.05)
+
+
+def test_leakage_and_ceiling_figures(rooms):
+    trajectory = rooms.at([3.0, 3.0, 0.0], tx=(-0.05, 0, 0), rx=(0.05, 0, 0))
+    paths = TracedChannel(rooms.paper(), RADIO, 1).paths(trajectory)
+    assert decibels(paths.gain[0, column(paths, PathKind.LOS)]) == pytest.approx(-32.45, abs=0.05)
+    assert decibels(paths.gain[0, column(paths, PathKind.VT, "ceiling")]) == pytest.approx(-69.4, abs=0.05)
+
+
+def test_panel_keeps_real_bounces_and_drops_those_on_its_host(rooms):
+    """Ceiling, floor, RIS is a path; floor, ceiling, RIS would bounce on the wall that the panel hangs on."""
+    paths = TracedChannel(rooms.paper(), RADIO, 2).paths(rooms.at([1.3, 2.1, 0.8]))
+    legs = {
+        tuple(paths.walls[w] for w in paths.identity(p)[2])
+        for p in range(paths.num_paths)
+        if paths.kind[p] == PathKind.VRIS and not paths.identity(p)[3]
+    }
+    assert ("ceiling", "floor") in legs
+    assert ("floor", "ceiling") not in legs
+    assert not any(walls[-1] == "ceiling" for walls in legs)
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-7, 1e-3])
+def test_devices_on_and_near_a_wall(rooms, height):
+    """On the floor its own bounces vanish (they are degenerate), a millimetre above they are there; the rest stays."""
+    rng = np.random.default_rng(5)
+    position = np.column_stack([rng.uniform(1.0, 5.0, (6, 2)), np.full(6, height)])
+    trajectory = rooms.at(position, tx=(-0.04, -0.03, 0.0), rx=(0.04, 0.03, 0.0))
+    traced, analytic = (
+        channel(rooms.paper(), RADIO, 1).paths(trajectory) for channel in (TracedChannel, ImageSourceChannel)
+    )
+    np.testing.assert_array_equal(traced.valid.sum(axis=1), analytic.valid.sum(axis=1))
+    floor = [p for p in range(traced.num_paths) if "floor" in traced.label(p)]
+    assert bool(floor) == (height == 1e-3)
+
+
+def test_a_bounce_names_the_wall_that_was_hit(rooms):
+    """Walls in one plane: a partition's two leaves are two walls, and each bounce lies on the one it names."""
+    scene = rooms.parted()
+    rng = np.random.default_rng(2)
+    paths = TracedChannel(scene, RADIO, 1).paths(rooms.at(rng.uniform([0.5, 0.5, 0.9], [2.5, 5.5, 2.0], size=(40, 3))))
+    for name, low, high in (("left", 0.0, 2.5), ("right", 3.5, 6.0)):
+        path = column(paths, PathKind.VT, name)
+        y = paths.vertices[paths.valid[:, path], path, 0, 1]
+        assert len(y) > 5
+        assert ((y > low) & (y < high)).all()
+
+
+def test_same_bits_every_time(rooms):
+    scene, trajectory = rooms.paper(), rooms.at([[1.3, 2.1, 0.8], [4.4, 0.9, 2.2]])
+    first, second = (TracedChannel(scene, RADIO, 2, refine=False).paths(trajectory) for _ in range(2))
+    for name in ("valid", "tau", "gain", "vertices", "departure"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+
+
+def test_blocks_change_nothing(rooms, monkeypatch):
+    scene, trajectory = rooms.paper(), rooms.at([[1.3, 2.1, 0.8], [4.4, 0.9, 2.2]])
+    channel = TracedChannel(scene, RADIO, 2)
+    whole = channel.paths(trajectory)
+    monkeypatch.setattr("rislam_rt.channel.traced.channel.BLOCK_ROWS", 37)
+    parts = channel.paths(trajectory)
+    np.testing.assert_array_equal(whole.gain, parts.gain)
+    np.testing.assert_array_equal(whole.tx_walls, parts.tx_walls)
+
+
+def test_reciprocity(rooms):
+    """Tx and Rx exchanged: the same gains, departure and arrival exchanged."""
+    scene = rooms.paper()
+    position = [[1.3, 2.1, 0.8], [4.4, 0.9, 2.2]]
+    tx, rx = (-0.04, -0.03, 0.01), (0.05, 0.02, -0.02)
+    channel = TracedChannel(scene, RADIO, 2)
+    there, back = channel.paths(rooms.at(position, tx, rx)), channel.paths(rooms.at(position, rx, tx))
+    for cycle in range(2):
+        a, b = (p.gain[cycle, p.valid[cycle]] for p in (there, back))
+        np.testing.assert_allclose(np.sort(np.abs(a)), np.sort(np.abs(b)), rtol=1e-5)
+        np.testing.assert_allclose(there.tau[cycle].sum(), back.tau[cycle].sum(), rtol=1e-12)
+
+
+def test_an_empty_trajectory_and_a_room_without_walls(rooms):
+    nothing = TracedChannel(rooms.paper(), RADIO, 2).paths(rooms.at(np.zeros((0, 3))))
+    assert (nothing.num_cycles, nothing.num_paths) == (0, 0)
+    open_air = TracedChannel(rooms.scene((), ris=None), RADIO, 2).paths(rooms.at([1.0, 1.0, 1.0]))
+    assert sorted(open_air.kind.tolist()) == [PathKind.LOS, PathKind.PS]
+
+
+def test_short_segments_next_to_a_corner_are_kept(rooms):
+    """Sionna's own limit of 1 cm would lose the double bounces whose middle segment is 2 mm long."""
+    scene = rooms.scene(rooms.box((0, 0, 0), SIZE), scatterers=())
+    assert shortest_segment(scene) < 2e-4
+    # seen from the corner, Tx and Rx lie 1e-3 rad apart
+    trajectory = rooms.at([1.0, 1.0, 1.5], tx=(-0.001, 0.0, 0.0), rx=(0.001, 0.0, 0.05))
+    paths = TracedChannel(scene, RADIO, 2).paths(trajectory)
+    assert paths.valid.sum() == 25
+    segment = np.linalg.norm(np.diff(paths.vertices[0, paths.num_vertices == 2], axis=1), axis=-1)
+    assert 1e-3 < segment.min() < 1e-2
+
+
+def test_small_box_proves_the_machine():
+    proof = trace_small_box()
+    assert proof.ok
+    assert proof.num_paths == 25
+
+
+def test_bad_settings(rooms):
+    with pytest.raises(ConfigError, match="depth: -1 received"):
+        TracedChannel(rooms.paper(), RADIO, -1)
+    with pytest.raises(SceneError, match="'cheese' received"):
+        TracedChannel(rooms.paper(material=Material(itu="cheese")), RADIO, 1)
+    with pytest.raises(SceneError, match="material"):
+        TracedChannel(rooms.paper(material=Material(itu="very_dry_ground")), RadioConfig(carrier=60e9), 1)
