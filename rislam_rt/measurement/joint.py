@@ -38,28 +38,23 @@ def joint_errors(received: Received, radio: RadioConfig, config: ReceiverConfig,
 def _one_problem(
     received: Received, sounding: Sounding, radio: RadioConfig, merging: bool, draws: Floats
 ) -> tuple[Parts, Errors]:
+    """Merge until every component is certain enough, or has no neighbour to merge with."""
     near = np.linalg.norm(cell_offsets(received, radio), axis=-1)
-    leader = np.arange(len(received.tau))
-    unit = np.sqrt(radio.energy / (sounding.num_samples / radio.array.num_antennas * radio.noise_psd))
+    unit = np.sqrt(radio.energy * radio.array.num_antennas / (sounding.num_samples * radio.noise_psd))
+    strength = np.abs(received.gain)
+    leader = np.arange(len(strength))
     if merging:
-        lone = np.abs(received.gain) * unit * np.sqrt(sounding.num_samples)
-        leader = _absorbed(leader, lone < LEAST_CERTAINTY, lone, near)
+        leader = _absorbed(strength * unit * np.sqrt(sounding.num_samples) < LEAST_CERTAINTY, near)
     while True:
         parts = join(received, leader)
         covariance, variance = _bound(parts, sounding, radio, unit)
-        certainty = np.abs(parts.gain) * unit / np.sqrt(variance)
         rows = np.unique(leader)
-        merged = leader
-        if merging:
-            doubtful = np.zeros(len(leader), dtype=bool)
-            doubtful[rows] = certainty < LEAST_CERTAINTY
-            alive = np.isin(np.arange(len(leader)), rows)
-            strength = np.where(alive, np.abs(received.gain), 0.0)
-            merged = _absorbed(leader, _one_of_each_pair(doubtful, strength, near), strength, near)
+        certainty = np.abs(parts.gain) * unit / np.sqrt(variance)
+        doubtful = rows[np.argsort(certainty)[: np.sum(certainty < LEAST_CERTAINTY)]]
+        merged = _paired(leader, doubtful, strength, near) if merging else leader
         if np.array_equal(merged, leader):
-            break
+            return parts, _draw(parts, covariance, np.sqrt(variance) / unit, draws, radio)
         leader = merged
-    return parts, _draw(parts, covariance, np.sqrt(variance) / unit, draws, radio)
 
 
 def _bound(parts: Parts, sounding: Sounding, radio: RadioConfig, unit: float) -> tuple[Floats, Floats]:
@@ -67,22 +62,25 @@ def _bound(parts: Parts, sounding: Sounding, radio: RadioConfig, unit: float) ->
     return joint_bound(inner_products(factors(sounding, parameters)), parts.gain * unit)
 
 
-def _absorbed(leader: Integers, doubtful: Booleans, strength: Floats, near: Floats) -> Integers:
-    """Leaders (N,) after each doubtful row joined the nearest stronger row that is not doubtful, within a cell."""
-    open_to = (strength[:, None] < strength) & ~doubtful & (near < 1.0)
-    distance = np.where(open_to, near, np.inf)
-    joins = np.flatnonzero(doubtful & open_to.any(axis=1))
-    moved = leader.copy()
-    for row in joins:
-        moved[leader == row] = np.argmin(distance[row])
-    return moved
+def _absorbed(faint: Booleans, near: Floats) -> Integers:
+    """Leaders (N,) when each path too faint to stand alone joins the nearest that is not, within a cell."""
+    distance = np.where(~faint & (near < 1.0), near, np.inf)
+    joins = faint & np.isfinite(distance).any(axis=1)
+    return np.where(joins, np.argmin(distance, axis=1), np.arange(len(faint))) if len(faint) else np.arange(0)
 
 
-def _one_of_each_pair(doubtful: Booleans, strength: Floats, near: Floats) -> Booleans:
-    """Of doubtful rows within a cell of each other all but the strongest: one must be left to join."""
-    rivals = doubtful & (near < 1.0) & (strength[:, None] < strength)
-    settled = ~doubtful & (strength > 0.0) & (near < 1.0) & (strength[:, None] < strength)
-    return doubtful & (rivals.any(axis=1) | settled.any(axis=1))
+def _paired(leader: Integers, doubtful: Integers, strength: Floats, near: Floats) -> Integers:
+    """Leaders (N,) after doubtful ones, in their order, joined their nearest neighbours within a cell, each once."""
+    merged = leader.copy()
+    free = leader == np.arange(len(leader))
+    for row in doubtful:
+        distance = np.where(free & (np.arange(len(free)) != row), near[row], np.inf)
+        nearest = int(np.argmin(distance))
+        if free[row] and distance[nearest] < 1.0:
+            weak, strong = (row, nearest) if strength[row] <= strength[nearest] else (nearest, row)
+            merged[merged == weak] = strong
+            free[[row, nearest]] = False
+    return merged
 
 
 def _draw(parts: Parts, covariance: Floats, gain_std: Floats, draws: Floats, radio: RadioConfig) -> Errors:

@@ -195,3 +195,51 @@ def test_unusable_settings_are_refused_in_one_line(wrong):
     with pytest.raises(ConfigError, match=f"receiver.{next(iter(wrong))}") as error:
         ReceiverConfig(**wrong)
     assert "\n" not in str(error.value)
+
+
+class TestJointResolution:
+    """Errors from the joint bound: wider where signals overlap, and one component where they cannot be shared out."""
+
+    config = ReceiverConfig(clutter_rate=0.0, resolution="joint")
+
+    def pair(self, make_paths, make_gain, gap, snr_db):
+        gains = make_gain(snr_db, RADIO), make_gain(snr_db, RADIO, 1.0)
+        rows = [(PathKind.PS, 5.0 + i * gap * SPEED_OF_LIGHT / RADIO.bandwidth, UP, g) for i, g in enumerate(gains)]
+        return make_paths(rows)
+
+    @pytest.mark.parametrize(
+        ("gap", "snr_db", "count"), [(0.5, 40.0, 2), (0.5, 15.0, 1), (0.05, 40.0, 1), (3.0, 15.0, 2)]
+    )
+    def test_resolution_depends_on_the_snr(self, make_paths, make_gain, gap, snr_db, count):
+        paths = self.pair(make_paths, make_gain, gap, snr_db)
+        counts = [len(m) for m, _ in repeat(paths, self.config, 20)]
+        # at 15 dB one of the two may be missed
+        assert np.median(counts) == count
+
+    def test_errors_have_the_joint_deviation_that_is_reported(self, make_paths, make_gain):
+        paths = self.pair(make_paths, make_gain, 0.6, 40.0)
+        runs = [m for m, _ in repeat(paths, self.config, 800)]
+        errors = np.array([m.tau - paths.tau[0] for m in runs])
+        reported = np.mean([m.tau_std for m in runs], axis=0)
+        # 800 draws: five standard errors of a deviation are 12 %
+        np.testing.assert_allclose(errors.std(axis=0), reported, rtol=0.12)
+        lone, _ = path_std(np.array(1e4), RADIO)
+        assert np.all(reported > 1.5 * lone)
+        assert abs(np.corrcoef(errors.T)[0, 1]) > 0.3
+
+    def test_far_apart_it_is_the_lone_bound(self, make_paths, make_gain):
+        paths = self.pair(make_paths, make_gain, 20.0, 30.0)
+        measurement, _ = repeat(paths, self.config, 1)[0]
+        tau, _ = path_std(RADIO.integrated_snr(measurement.amplitude), RADIO)
+        np.testing.assert_allclose(measurement.tau_std, tau, rtol=0.01)
+
+    def test_alternation_keeps_the_panel_apart(self, make_paths, make_gain):
+        rows = [(PathKind.VT, 5.0, UP, make_gain(30.0, RADIO)), (PathKind.RIS, 5.01, UP, make_gain(20.0, RADIO))]
+        config = ReceiverConfig(clutter_rate=0.0, resolution="joint", alternation=True)
+        measurement, truth = repeat(make_paths(rows), config, 1)[0]
+        assert sorted(truth.path.tolist()) == [0, 1]
+        assert measurement.from_panel[truth.path == 1].all()
+        assert len(repeat(make_paths(rows), self.config, 1)[0][0]) == 1
+
+    def test_nothing_heard_is_nothing_reported(self, make_paths):
+        assert len(repeat(make_paths([]), self.config, 1)[0][0]) == 0
