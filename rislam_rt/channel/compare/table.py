@@ -7,7 +7,7 @@ from rislam_rt.channel.compare.report import PathReport
 
 _HEAD = [
     "room", "depth", "numbers", "poses", "matched", "explained", "unexplained",
-    "length [m]", "gain [dB]", "phase [rad]", "angle [rad]",
+    "length [m]", "gain [dB]", "phase [rad]", "AoD [rad]", "AoA [rad]",
 ]  # fmt: skip
 
 _TEXT = """\
@@ -19,7 +19,8 @@ landmark, walls in the order of travel. Written by `rislam-rt` from one run; do 
 - *matched*: paths on both sides, counted per pose; *unexplained*: one-sided paths without a proof.
 - *explained*: one-sided paths with the proof recomputed from the geometry (`rislam_rt/channel/compare/certificate.py`);
   in brackets the weakest proof, the largest length or distance that any of them rests on.
-- errors are the largest of all matched paths, the panel at one random code. *traced* rows are the tracer's own float32
+- errors are the largest of all matched paths, in brackets the 99th percentile; the panel at one random code. *traced*
+  rows are the tracer's own float32
   numbers. In *refined* rows the tracer decides which paths exist and what its materials do to the field; lengths and
   directions are recomputed in float64 on the walls it named, so that their errors say little beyond rounding.
   Directions of float32 vertices suffer where a segment is short, and gains where the panel's elements nearly cancel.
@@ -42,10 +43,9 @@ def validation_table(rows: Sequence[Validation]) -> str:
     lines = [_row(_HEAD), _row(["---"] * len(_HEAD))]
     for scene, depth, kind, report in rows:
         numbers = report.as_dict()
-        errors = [
-            f"{numbers[f'max_{name}']:.1e}"
-            for name in ("length_error_m", "gain_error_db", "phase_error_rad", "angle_error_rad")
-        ]
+        spread = numbers["percentiles"]
+        columns = ("length_error_m", "gain_error_db", "phase_error_rad", "aod_error_rad", "aoa_error_rad")
+        errors = [_error(spread[name]) for name in columns]
         counts = [str(report.cycles), str(report.matched), _reasons(numbers), str(report.unexplained)]
         lines.append(_row([scene, str(depth), kind, *counts, *errors]))
     return "\n".join(lines) + "\n"
@@ -66,6 +66,16 @@ def _reasons(numbers: Mapping[str, Any]) -> str:
         for reason, n in numbers["explained"].items()
     ]
     return ", ".join(texts) or "none needed"
+
+
+def _error(spread: Mapping[str, float]) -> str:
+    """Largest error and 99th percentile; rounding is rounding, whatever its digits."""
+    if not spread:
+        return "-"
+    return " ".join(
+        text.format("< 1e-12" if value < 1e-12 else f"{value:.1e}")
+        for text, value in (("{}", spread["max"]), ("({})", spread["p99"]))
+    )
 
 
 def _row(cells: Sequence[str]) -> str:
