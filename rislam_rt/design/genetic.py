@@ -24,19 +24,39 @@ def genetic_search(
     history[0] = value.min()
     # all random numbers at once: drawing them generation by generation costs as much as the search
     spin = rng.random((config.iterations, 2 * pairs))
-    swap = np.arange(num_elements) >= rng.integers(num_elements, size=(config.iterations, pairs))[..., None]
-    mutants = rng.random((config.iterations, 2 * pairs, num_elements)) < config.mutation
-    redrawn = rng.integers(levels, size=mutants.shape)
+    cuts = rng.integers(num_elements, size=(config.iterations, pairs, 1))
+    place, gene = _mutations(config.iterations * 2 * pairs * num_elements, levels, config.mutation, rng=rng)
+    bounds = np.searchsorted(place, np.arange(config.iterations + 1) * 2 * pairs * num_elements)
+    element = np.arange(num_elements)
     children = np.empty((2 * pairs, num_elements), dtype=population.dtype)
     for generation in range(config.iterations):
         wheel = np.cumsum(1.0 / value)
         parent = population[np.minimum(np.searchsorted(wheel, spin[generation] * wheel[-1]), size - 1)]
-        first, second, cut = parent[:pairs], parent[pairs:], swap[generation]
-        children[:pairs] = np.where(cut, second, first)
-        children[pairs:] = np.where(cut, first, second)
-        np.copyto(children, redrawn[generation], where=mutants[generation])
+        first, second, swap = parent[:pairs], parent[pairs:], element >= cuts[generation]
+        children[:pairs] = np.where(swap, second, first)
+        children[pairs:] = np.where(swap, first, second)
+        now = slice(bounds[generation], bounds[generation + 1])
+        children.ravel()[place[now] - generation * children.size] = gene[now]
         fittest = np.argsort(value, kind="stable")[:elite]
         population = np.concatenate([population[fittest], children])
         value = np.concatenate([value[fittest], objective.of_index(children)])
         history[generation + 1] = value.min()
     return population[np.argmin(value)], history
+
+
+def _mutations(genes: int, levels: int, probability: float, *, rng: np.random.Generator) -> tuple[Integers, Integers]:
+    """Which of so many genes mutate, each on its own with the same probability, in order; and what they become.
+
+    The gaps between mutated genes are geometric, so that only those are drawn.
+    """
+    if probability == 0.0:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    expected = genes * probability
+    place = np.zeros(0, dtype=np.int64)
+    last = -1
+    while last < genes:
+        gaps = rng.geometric(probability, size=int(expected + 6.0 * np.sqrt(expected) + 10.0))
+        place = np.concatenate([place, last + np.cumsum(gaps)])
+        last = int(place[-1])
+    place = place[: np.searchsorted(place, genes)]
+    return place, rng.integers(levels, size=len(place))

@@ -14,6 +14,7 @@ from rislam_rt.design import (
     designer,
     exact_code,
 )
+from rislam_rt.design import genetic as genetic_module
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import Outcome, position_bound
 
@@ -180,3 +181,20 @@ def test_bad_settings_are_refused():
         DesignConfig(population=50, elite=9)
     with pytest.raises(ConfigError, match="probability"):
         DesignConfig(mutation=1.5)
+
+
+@pytest.mark.parametrize("probability", [0.0, 0.02, 0.5, 1.0])
+def test_mutations_fall_independently(probability):
+    genes, rng = 200_000, np.random.default_rng(3)
+    place, gene = genetic_module._mutations(genes, 4, probability, rng=rng)
+    assert (np.diff(place) > 0).all()
+    assert len(place) == len(gene)
+    # binomial count, five standard deviations; the halves agree as well
+    spread = 5 * np.sqrt(genes * probability * (1 - probability)) + 1e-9
+    assert abs(len(place) - genes * probability) <= spread
+    assert abs(np.sum(place < genes // 2) - genes * probability / 2) <= spread
+    if probability:
+        assert place[-1] < genes
+        np.testing.assert_allclose(np.bincount(gene, minlength=4) / len(gene), 0.25, atol=2.5 / np.sqrt(len(gene)))
+        adjacent = np.mean(np.isin(place + 1, place))
+        assert adjacent == pytest.approx(probability, abs=5 * np.sqrt(probability / len(place)) + 1e-3)
