@@ -9,7 +9,7 @@ from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.traced.rows import Rows
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
-from rislam_rt.channel.traced.stage import Stage
+from rislam_rt.channel.traced.stage import Stage, as_points
 
 
 def fill_buffer(stage: Stage, sequences: Integers, rows: Rows, vertices: Floats | None = None) -> PathsBuffer:
@@ -40,11 +40,6 @@ def read_vertices(stage: Stage, buffer: PathsBuffer, keep: Integers, sequences: 
     """Bounce points (N, D, 3) [m] of the paths `keep`, from device to far end over `sequences` (N, D)."""
     columns = [np.array(getattr(buffer, f"vertices_{axis}"), dtype=np.float64) for axis in "xyz"]
     return turned_vertices(np.stack(columns, axis=-1)[keep, : sequences.shape[1]] + stage.origin, sequences)
-
-
-def as_points(points: Floats) -> mi.Point3f:
-    """Positions (N, 3) for the tracer, in float32."""
-    return mi.Point3f(*(mi.Float(np.ascontiguousarray(column, dtype=np.float32)) for column in points.T))
 
 
 def as_indices(values: Integers) -> mi.UInt:

@@ -72,7 +72,7 @@ class TracedChannel:
     def _trace(self, problems: Sequence[Problem]) -> list[Legs]:
         """Solve all problems together, block by block."""
         batch = build_batch(problems, self.walls, self._sides, self.depth if len(self.walls) else 0)
-        blocks = in_blocks(batch.candidates(self.walls, self._sides), BLOCK_ROWS)
+        blocks = in_blocks(batch.candidates(self.stage), BLOCK_ROWS)
         return batch.legs(join_found([self._solve(batch, rows) for rows in blocks]))
 
     def _solve(self, batch: Batch, candidates: Rows) -> Found:

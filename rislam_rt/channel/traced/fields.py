@@ -7,10 +7,10 @@ from sionna.rt.antenna_pattern import PolarizedAntennaPattern, v_iso_pattern
 from sionna.rt.path_solvers.field_calculator import FieldCalculator
 
 from rislam_rt.arrays import Complexes, Floats, Integers
-from rislam_rt.channel.traced.buffer import as_points, fill_buffer
+from rislam_rt.channel.traced.buffer import fill_buffer
 from rislam_rt.channel.traced.course import Course, polyline
 from rislam_rt.channel.traced.rows import Rows
-from rislam_rt.channel.traced.stage import Stage
+from rislam_rt.channel.traced.stage import Stage, as_points
 
 
 def leg_coefficients(stage: Stage, sequences: Integers, device: Floats, far: Floats, course: Course) -> Complexes:

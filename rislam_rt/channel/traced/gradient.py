@@ -78,7 +78,7 @@ def _differentiate(channel: TracedChannel, legs: MovingLegs) -> Floats:
     import drjit as dr
     import mitsuba as mi
 
-    from rislam_rt.channel.traced.buffer import as_points
+    from rislam_rt.channel.traced.stage import as_points
     from rislam_rt.channel.traced.visibility import attached_vertices
 
     count = len(legs.device)

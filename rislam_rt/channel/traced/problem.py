@@ -1,7 +1,7 @@
 """What is asked of the tracer, and what becomes of its answers: legs between many devices and their far ends."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -10,9 +10,12 @@ from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.traced.course import Course
 from rislam_rt.channel.traced.limits import LIFT
 from rislam_rt.channel.traced.rows import Rows, join_rows
-from rislam_rt.channel.traced.sequences import point_sides, possible_rows, possible_sequences
+from rislam_rt.channel.traced.sequences import point_sides, possible_sequences
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
+
+if TYPE_CHECKING:
+    from rislam_rt.channel.traced.stage import Stage
 
 
 class Problem(NamedTuple):
@@ -60,12 +63,13 @@ class Batch(NamedTuple):
         """(S, D) of all problems."""
         return np.concatenate(self.sequences)
 
-    def candidates(self, walls: Walls, sides: Integers) -> Iterator[Rows]:
+    def candidates(self, stage: "Stage") -> Iterator[Rows]:
         """All rows worth tracing."""
+        from rislam_rt.channel.traced.sift import sift_rows
+
         first_device = first_far = first_sequence = 0
         for problem, sequences in zip(self.problems, self.sequences, strict=True):
-            ends = point_sides(walls, problem.device), point_sides(walls, problem.far)
-            for device, sequence in possible_rows(sides, sequences, *ends):
+            for device, sequence in sift_rows(stage, sequences, problem.device, problem.far):
                 far = device if problem.paired else np.zeros_like(device)
                 yield Rows(far + first_far, device + first_device, sequence + first_sequence)
             first_device += len(problem.device)

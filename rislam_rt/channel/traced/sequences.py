@@ -8,15 +8,19 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
+from rislam_rt.errors import ConfigError
 
 FRONT, BACK = 1, 2
 """Sides of a plane, as bits: a wall may have parts on both."""
 
 NO_WALL = -1
 """Padding of sequences."""
+
+MOST_SEQUENCES = 10_000_000
+"""Largest number of wall sequences of one bounce count."""
 
 _BLOCK = 4_000_000
 """Largest number of entries of a temporary table."""
@@ -52,6 +56,11 @@ def possible_sequences(sides: Integers, device: Integers, far: Integers, depth: 
         (W,) sides of every wall on which the ends ever are.
     host
         A wall that may not come last.
+
+    Raises
+    ------
+    ConfigError
+        There are more than `MOST_SEQUENCES`.
     """
     last = np.flatnonzero((far > 0) & (np.arange(len(sides)) != host))
     level, onward = last[:, None], far[last]
@@ -60,44 +69,26 @@ def possible_sequences(sides: Integers, device: Integers, far: Integers, depth: 
         complete = level[(device[level[:, 0]] & onward) > 0]
         found.append(np.pad(complete, ((0, 0), (0, depth - bounces)), constant_values=NO_WALL))
         if bounces < depth:
+            _check_growth(level, onward, sides, depth)
             level, onward = _with_wall_before(level, onward, sides)
     return np.concatenate(found)
 
 
-def possible_rows(
-    sides: Integers, sequences: Integers, device: Integers, far: Integers
-) -> Iterator[tuple[Integers, Integers]]:
-    """Pairs (device, sequence) worth tracing, in blocks, of sequences (S, D).
-
-    Parameters
-    ----------
-    device, far
-        (N, W) and (N or 1, W) sides of every wall on which the single ends are; device i belongs with far end i.
-    """
-    turned = turned_round(sequences)
-    for rows in _blocks(len(sequences), 8 * len(device)):
-        keep = _same_side(sides, device, far, sequences[rows]) & _same_side(sides, far, device, turned[rows])
-        index, sequence = np.nonzero(np.broadcast_to(keep, (len(device), keep.shape[1])))
-        yield index, sequence + rows.start
+def _check_growth(level: Integers, onward: Integers, sides: Integers, depth: int) -> None:
+    """Refuse what would not end in an hour or fit the memory, before it is built."""
+    walls, rows = np.unique(np.stack([level[:, 0], onward], axis=1), axis=0, return_counts=True)
+    count = sum(int(n) * int(((sides[wall] & side) > 0).sum()) for (wall, side), n in zip(walls, rows, strict=True))
+    if count > MOST_SEQUENCES:
+        raise ConfigError(
+            f"depth: {depth} received; {len(sides)} walls allow {count} sequences, more than {MOST_SEQUENCES}: "
+            "lower the depth, or merge the scene's small facets"
+        )
 
 
 def turned_round(sequences: Integers) -> Integers:
     """Sequences (S, D) in the opposite order, padding kept at the end."""
     index = (sequences != NO_WALL).sum(axis=1)[:, None] - 1 - np.arange(sequences.shape[1])
     return np.where(index >= 0, np.take_along_axis(sequences, np.maximum(index, 0), axis=1), NO_WALL)
-
-
-def _same_side(sides: Integers, end: Integers, other: Integers, sequences: Integers) -> Booleans:
-    """(N, S): whether an end (N, W) lies where its first wall's other neighbour (a wall, or the other end) has a part.
-
-    A sequence without walls has nothing to violate.
-    """
-    if sequences.shape[1] == 0:
-        return np.ones((len(end), len(sequences)), dtype=np.bool_)
-    first = sequences[:, 0]
-    second = sequences[:, 1] if sequences.shape[1] > 1 else np.full(len(sequences), NO_WALL)
-    neighbour = np.where(second == NO_WALL, other[:, first], sides[first, second])
-    return ((end[:, first] & neighbour) > 0) | (first == NO_WALL)
 
 
 def _with_wall_before(level: Integers, onward: Integers, sides: Integers) -> tuple[Integers, Integers]:

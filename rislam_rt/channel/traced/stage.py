@@ -1,6 +1,7 @@
 """The room as Sionna RT sees it: one mesh a material, triangle numbers kept, so that every hit names its wall."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mitsuba as mi
 import numpy as np
@@ -12,6 +13,21 @@ from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.errors import SceneError
 from rislam_rt.model import Material
+
+
+class Sieve(NamedTuple):
+    """Planes and boxes of the walls, on the tracer's side."""
+
+    normal: mi.Vector3f
+    """(W,)."""
+    offset: mi.Float
+    """(W,) [m]."""
+    center: mi.Point3f
+    """(W,) [m] middle of each wall's bounds."""
+    half: mi.Vector3f
+    """(W,) [m] half the size of each wall's bounds."""
+    margin: float
+    """[m] A thousandth of the room, hundreds of times what float32 leaves uncertain."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +49,7 @@ class Stage:
     """(M,) where each shape's triangles begin in `wall_of_primitive`."""
     wall_of_primitive: Integers
     """(T,) walls, shape by shape."""
+    sieve: Sieve
 
     @property
     def wavelength(self) -> float:
@@ -98,7 +115,29 @@ def _numbered(scene: rt.Scene, origin: Floats, walls: Walls, ids: Integers, memb
         ids[order],
         first,
         walls.wall_of_triangle[rows],
+        _sieve(walls, origin),
     )
+
+
+def _sieve(walls: Walls, origin: Floats) -> Sieve:
+    """Planes and bounds about the origin."""
+    low, high = np.full((len(walls), 3), np.inf), np.full((len(walls), 3), -np.inf)
+    np.minimum.at(low, walls.wall_of_triangle, walls.triangles.min(axis=1) - origin)
+    np.maximum.at(high, walls.wall_of_triangle, walls.triangles.max(axis=1) - origin)
+    margin = 1e-3 * (1.0 + np.abs([low, high]).max(initial=0.0))
+    offset = mi.Float((walls.offset - walls.normal @ origin).astype(np.float32))
+    return Sieve(
+        mi.Vector3f(as_points(walls.normal)),
+        offset,
+        as_points(0.5 * (low + high)),
+        mi.Vector3f(as_points(0.5 * (high - low))),
+        margin,
+    )
+
+
+def as_points(points: Floats) -> mi.Point3f:
+    """Positions (N, 3) for the tracer, in float32."""
+    return mi.Point3f(*(mi.Float(np.ascontiguousarray(column, dtype=np.float32)) for column in points.T))
 
 
 def _mesh(name: str, triangles: Floats) -> mi.Mesh:

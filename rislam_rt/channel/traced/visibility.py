@@ -17,11 +17,11 @@ from sionna.rt.path_solvers.image_method import ImageMethod
 from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.buffer import as_points, fill_buffer, read_vertices
+from rislam_rt.channel.traced.buffer import fill_buffer, read_vertices
 from rislam_rt.channel.traced.limits import SEGMENT_LIMIT
 from rislam_rt.channel.traced.rows import Rows
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
-from rislam_rt.channel.traced.stage import Stage
+from rislam_rt.channel.traced.stage import Stage, as_points
 from rislam_rt.errors import TraceError
 
 
