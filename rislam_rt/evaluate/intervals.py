@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
@@ -54,10 +54,10 @@ def bootstrap(
     if np.ptp(replicates) == 0.0:
         return Interval(value, value, value)
     below = np.mean(replicates < value) + 0.5 * np.mean(replicates == value)
-    bias = norm.ppf(np.clip(below, 0.5 / resamples, 1.0 - 0.5 / resamples))
-    quantile = norm.ppf([(1.0 - level) / 2.0, (1.0 + level) / 2.0])
+    bias = ndtri(np.clip(below, 0.5 / resamples, 1.0 - 0.5 / resamples))
+    quantile = ndtri(np.array([(1.0 - level) / 2.0, (1.0 + level) / 2.0]))
     shifted = bias + (bias + quantile) / (1.0 - _acceleration(samples, statistic) * (bias + quantile))
-    lower, upper = np.quantile(replicates, norm.cdf(shifted))
+    lower, upper = np.quantile(replicates, ndtr(shifted))
     return Interval(value, float(lower), float(upper))
 
 

@@ -2,6 +2,8 @@
 
 from rislam_rt.measurement.bound import detection_probability
 from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.dataset import load_signals, signals_dataset
+from rislam_rt.measurement.false_alarms import detection_threshold, expected_false_alarms
 from rislam_rt.measurement.measure import measure
 from rislam_rt.measurement.noise import (
     paper_snr_db,
@@ -11,16 +13,38 @@ from rislam_rt.measurement.noise import (
     with_reference_snr,
 )
 from rislam_rt.measurement.parts import path_std
-from rislam_rt.measurement.received import twin
+from rislam_rt.measurement.received import Received, receive, twin
+from rislam_rt.measurement.signal import pulse_samples, to_samples, to_tones, tones
+from rislam_rt.measurement.tracking import TrackInfo, TrackingConfig, TrackState, init_tracks, step_tracks
+from rislam_rt.measurement.waveform import Capture, Components, capture, find_components
 
 __all__ = [
+    "Capture",
+    "Components",
+    "Received",
     "ReceiverConfig",
+    "TrackInfo",
+    "TrackState",
+    "TrackingConfig",
+    "capture",
     "detection_probability",
+    "detection_threshold",
+    "expected_false_alarms",
+    "find_components",
+    "init_tracks",
+    "load_signals",
     "measure",
     "paper_snr_db",
     "path_snr_db",
     "path_std",
+    "pulse_samples",
+    "receive",
     "reference_gain",
+    "signals_dataset",
+    "step_tracks",
+    "to_samples",
+    "to_tones",
+    "tones",
     "twin",
     "with_paper_snr",
     "with_reference_snr",

@@ -7,7 +7,6 @@ says.
 """
 
 import numpy as np
-from scipy.stats import ncx2
 
 from rislam_rt.arrays import Floats
 from rislam_rt.measurement.config import ReceiverConfig
@@ -36,6 +35,8 @@ def detection_probability(snr: Floats, threshold: float) -> Floats:
 
     Marcum's `Q_1(sqrt(2 snr), sqrt(2 threshold))`; `exp(-threshold)` for noise alone.
     """
+    from scipy.stats import ncx2  # takes a second to import, and no receiver needs it
+
     return np.asarray(ncx2.sf(2.0 * threshold, 2, 2.0 * np.asarray(snr, dtype=np.float64)))
 
 

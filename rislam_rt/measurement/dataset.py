@@ -1,0 +1,133 @@
+"""Data sets of received signals: samples, what the receiver found in them, and which path each finding was."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rislam_rt.errors import StoreError
+from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.identify import identify
+from rislam_rt.measurement.received import receive
+from rislam_rt.measurement.tracking import TrackingConfig, init_tracks, step_tracks
+from rislam_rt.measurement.waveform import Components, capture, find_components, to_measurement
+from rislam_rt.model import Paths, RadioConfig, Trajectory
+from rislam_rt.waveform import subcarrier_frequencies
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NO_COMPONENT = -9
+"""Fills the integer variables where a cycle has fewer components than the fullest one."""
+
+SCHEMA: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "samples": (("cycle", "capture", "antenna", "tone"), "sqrt(J)", "received tones, noise of variance noise_psd"),
+    "capture": (("capture",), "1", "0 as received (or the sum of both codes), 1 difference of code and twin"),
+    "frequency": (("tone",), "Hz", "baseband frequency of each tone"),
+    "antenna_position": (("antenna", "xyz"), "m", "element positions in the body frame, about the array's centre"),
+    "receiver_heading": (("cycle",), "rad", "heading of the body about z"),
+    "found_tau": (("cycle", "component"), "s", "delay"),
+    "found_cosines": (("cycle", "component", "cosine"), "1", "direction cosines along body x and y"),
+    "found_gain": (("cycle", "component"), "1", "complex gain, carrier phase included"),
+    "found_tau_std": (("cycle", "component"), "s", "standard deviation of found_tau"),
+    "found_cosines_std": (("cycle", "component", "cosine"), "1", "standard deviation of found_cosines"),
+    "found_amplitude_std": (("cycle", "component"), "1", "standard deviation of |found_gain|"),
+    "found_from_panel": (("cycle", "component"), "1", "1 if found in the difference, 0 if not, -9 no component"),
+    "found_label": (("cycle", "component"), "1", "the tracker's label, -9 no component"),
+    "found_path": (("cycle", "component"), "1", "truth, for scoring only: column of the path, -1 clutter, -9 none"),
+}
+"""Dimensions, unit and meaning; complex variables are stored as `_real` and `_imag`."""
+
+
+def signals_dataset(
+    paths: Paths,
+    trajectory: Trajectory,
+    radio: RadioConfig,
+    config: ReceiverConfig,
+    *,
+    rng: np.random.Generator,
+    on_cycle: Callable[[], None] | None = None,
+) -> "xr.Dataset":
+    """Samples of every cycle, the components found in them with their tracks, and the truth about each.
+
+    Variables as in `SCHEMA`; the radio and the receiver are in the attributes. `on_cycle` is called after each cycle.
+    """
+    samples, found, labels, truth = [], [], [], []
+    tracks, last = init_tracks(), trajectory.time[0]
+    for cycle in range(paths.num_cycles):
+        received = receive(paths, cycle, float(trajectory.heading[cycle]), radio, config)
+        captures = capture(received, radio, config, rng=rng)
+        components = find_components(captures, radio, config)
+        step = float(trajectory.time[cycle] - last)
+        tracks, info = step_tracks(tracks, to_measurement(components, config), step, TrackingConfig())
+        last = trajectory.time[cycle]
+        samples.append([one.samples for one in captures])
+        found.append(components)
+        labels.append(info.label)
+        truth.append(identify(components.tau, components.cosines, components.gain, received, radio))
+        if on_cycle is not None:
+            on_cycle()
+    values: dict[str, Any] = {
+        "samples": np.array(samples, dtype=np.complex64),
+        "capture": np.arange(len(samples[0])),
+        "frequency": subcarrier_frequencies(samples[0][0].shape[1], radio.bandwidth),
+        "antenna_position": radio.array.positions(radio.wavelength),
+        "receiver_heading": trajectory.heading,
+        "found_label": _padded(labels, NO_COMPONENT),
+        "found_path": _padded(truth, NO_COMPONENT),
+        "found_from_panel": _padded([one.from_panel.astype(np.int64) for one in found], NO_COMPONENT),
+    }
+    for name in Components._fields[:-1]:
+        values[f"found_{name}"] = _padded([getattr(one, name) for one in found], 0.0)
+    return _dataset(values, radio, config)
+
+
+def load_signals(path: str | Path) -> "xr.Dataset":
+    """A data set of signals with its complex variables joined again.
+
+    Raises
+    ------
+    StoreError
+        The file is missing or not a readable data set.
+    """
+    import xarray as xr
+
+    try:
+        data = xr.load_dataset(path, engine="h5netcdf")
+    except FileNotFoundError:
+        raise StoreError(f"{path}: no such file; write one with 'rislam-rt trace SCENE --signals FILE'") from None
+    except Exception as error:  # the HDF5 library raises nearly anything on a damaged file
+        raise StoreError(f"{path}: not a readable NetCDF file ({type(error).__name__}); write it again") from None
+    names = [str(name)[:-5] for name in data.data_vars if str(name).endswith("_real")]
+    joined = {name: data[f"{name}_real"] + 1j * data[f"{name}_imag"] for name in names}
+    return data.drop_vars([f"{name}{part}" for name in names for part in ("_real", "_imag")]).assign(joined)
+
+
+def _dataset(values: dict[str, Any], radio: RadioConfig, config: ReceiverConfig) -> "xr.Dataset":
+    import xarray as xr
+
+    content: dict[str, Any] = {}
+    for name, value in values.items():
+        dims, unit, meaning = SCHEMA[name]
+        parts = {"": value}
+        if np.iscomplexobj(value):
+            parts = {"_real": value.real, "_imag": value.imag}
+        for suffix, part in parts.items():
+            content[name + suffix] = (dims, part, {"units": unit, "long_name": meaning})
+    attributes = {f"radio_{key}": value for key, value in asdict(radio).items() if key != "array"}
+    attributes |= {f"array_{key}": value for key, value in asdict(radio.array).items()}
+    # NetCDF attributes know numbers and text, not truth values.
+    settings = {key: int(value) if isinstance(value, bool) else value for key, value in asdict(config).items()}
+    attributes |= {f"receiver_{key}": value for key, value in settings.items()}
+    return xr.Dataset(content, attrs={"Conventions": "CF-1.11", **attributes})
+
+
+def _padded(rows: list[Any], fill: Any) -> Any:
+    """Arrays (M_k, ...) of K cycles as one (K, max M, ...)."""
+    longest = max((len(row) for row in rows), default=0)
+    table = np.full((len(rows), longest, *rows[0].shape[1:]), fill, dtype=rows[0].dtype)
+    for cycle, row in enumerate(rows):
+        table[cycle, : len(row)] = row
+    return table

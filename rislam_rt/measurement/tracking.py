@@ -1,0 +1,167 @@
+"""Labels for components across cycles: a component keeps its label while its path lives, also through a crossing.
+
+One small Kalman filter a track over path length and both cosines with their rates; optimal assignment of predicted
+tracks to components within a gate. The amplitude takes part, so that a strong and a weak path keep their labels where
+they cross. Nothing here knows what a path is: associating landmarks is the filter's business.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.errors import ConfigError
+from rislam_rt.model import Measurement
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingConfig:
+    """Settings of the tracker. SI units."""
+
+    length_acceleration: float = 0.05
+    """Standard deviation of the white acceleration of a path's length [m/s^2]."""
+    cosine_acceleration: float = 0.05
+    """Likewise of a cosine [1/s^2]."""
+    length_rate: float = 0.5
+    """Standard deviation of a new track's rate of length [m/s]."""
+    cosine_rate: float = 0.2
+    """Likewise of a cosine [1/s]."""
+    std_scale: float = 1.5
+    """By how much true errors exceed the reported standard deviations: unresolved neighbours pull at a component."""
+    loudness_std: float = 0.35
+    """Standard deviation of the change of the log amplitude (natural) from cycle to cycle; 0.35 is 3 dB."""
+    gate: float = 20.0
+    """Largest squared distance of length, cosines and log amplitude together (chi^2, 4 dof: 0.9995)."""
+    confirm_hits: int = 3
+    """Components after which a track counts as a path; before, one miss ends it."""
+    max_misses: int = 10
+    """Cycles without a component after which a confirmed track ends."""
+
+    def __post_init__(self) -> None:
+        for name in ("length_acceleration", "cosine_acceleration", "length_rate", "cosine_rate", "std_scale"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(f"tracking.{name}: {getattr(self, name)} received; give a positive number")
+        if not (self.loudness_std > 0.0 and self.gate > 0.0):
+            raise ConfigError(f"tracking.loudness_std, gate: {self.loudness_std}, {self.gate} received; give positive")
+        if self.confirm_hits < 1 or self.max_misses < 0:
+            raise ConfigError(
+                f"tracking.confirm_hits, max_misses: {self.confirm_hits}, {self.max_misses} received; give 1, 0 or more"
+            )
+
+
+class TrackState(NamedTuple):
+    """T living tracks."""
+
+    label: Integers
+    """(T,)."""
+    mean: Floats
+    """(T, 3, 2) length [m] and cosines, each with its rate [1/s]."""
+    covariance: Floats
+    """(T, 3, 2, 2)."""
+    loudness: Floats
+    """(T,) log amplitude."""
+    hits: Integers
+    """(T,) components so far."""
+    misses: Integers
+    """(T,) cycles since the last one."""
+    next_label: int
+
+
+class TrackInfo(NamedTuple):
+    """What the tracker made of a cycle's M components."""
+
+    label: Integers
+    """(M,) label of each component: every one gets one, a new one if it fits no track."""
+    confirmed: Booleans
+    """(M,) whether its track has been seen often enough to be a path."""
+    born: int
+    died: int
+
+
+def init_tracks() -> TrackState:
+    """No tracks."""
+    none = np.zeros(0, dtype=np.int64)
+    return TrackState(none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, 0)
+
+
+def step_tracks(
+    state: TrackState, measurement: Measurement, dt: float, config: TrackingConfig
+) -> tuple[TrackState, TrackInfo]:
+    """Carry the tracks over `dt` [s], give the components of this cycle to them, start and end tracks."""
+    seen = np.column_stack([SPEED_OF_LIGHT * measurement.tau, measurement.cosines])
+    noise = config.std_scale**2 * np.column_stack([SPEED_OF_LIGHT * measurement.tau_std, measurement.cosines_std]) ** 2
+    loudness = np.log(np.maximum(measurement.amplitude, 1e-300))
+    state = _predict(state, dt, config)
+    rows, cols = _assign(state, seen, noise, loudness, config)
+
+    mean, covariance = state.mean.copy(), state.covariance.copy()
+    mean[rows], covariance[rows] = _update(mean[rows], covariance[rows], seen[cols], noise[cols])
+    hit = np.zeros(len(state.label), dtype=bool)
+    hit[rows] = True
+    level = state.loudness.copy()
+    level[rows] += 0.5 * (loudness[cols] - level[rows])
+    hits, misses = state.hits + hit, np.where(hit, 0, state.misses + 1)
+    alive = hit | ((state.hits >= config.confirm_hits) & (misses <= config.max_misses))
+
+    fresh = np.setdiff1d(np.arange(len(seen)), cols)
+    label = np.full(len(seen), -1)
+    label[cols] = state.label[rows]
+    label[fresh] = state.next_label + np.arange(len(fresh))
+    confirmed = np.zeros(len(seen), dtype=bool)
+    confirmed[cols] = hits[rows] >= config.confirm_hits
+    new_mean, new_covariance = _start(seen[fresh], noise[fresh], config)
+    tracks = TrackState(
+        np.concatenate([state.label[alive], label[fresh]]),
+        np.concatenate([mean[alive], new_mean]),
+        np.concatenate([covariance[alive], new_covariance]),
+        np.concatenate([level[alive], loudness[fresh]]),
+        np.concatenate([hits[alive], np.ones(len(fresh), dtype=np.int64)]),
+        np.concatenate([misses[alive], np.zeros(len(fresh), dtype=np.int64)]),
+        state.next_label + len(fresh),
+    )
+    return tracks, TrackInfo(label, confirmed, len(fresh), int(np.sum(~alive)))
+
+
+def _predict(state: TrackState, dt: float, config: TrackingConfig) -> TrackState:
+    """Discrete white-noise acceleration."""
+    transition = np.array([[1.0, dt], [0.0, 1.0]])
+    shape = np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
+    strength = np.array([config.length_acceleration, config.cosine_acceleration, config.cosine_acceleration]) ** 2
+    covariance = transition @ state.covariance @ transition.T + strength[:, None, None] * shape
+    return state._replace(mean=state.mean @ transition.T, covariance=covariance)
+
+
+def _assign(
+    state: TrackState, seen: Floats, noise: Floats, loudness: Floats, config: TrackingConfig
+) -> tuple[Integers, Integers]:
+    """Rows of tracks and of components that belong together: least cost, each pair within the gate."""
+    innovation = seen - state.mean[:, None, :, 0]
+    spread = state.covariance[:, None, :, 0, 0] + noise
+    distance = np.sum(innovation**2 / spread, axis=-1)
+    distance += ((loudness - state.loudness[:, None]) / config.loudness_std) ** 2
+    # The normaliser keeps an uncertain track from taking every component: it fits all of them badly.
+    cost = distance + np.sum(np.log(spread), axis=-1)
+    barred = distance > config.gate
+    ceiling = np.abs(np.where(barred, 0.0, cost)).max(initial=0.0) * 2.0 * (min(cost.shape) + 1) + 1.0
+    rows, cols = linear_sum_assignment(np.where(barred, ceiling, cost))
+    good = ~barred[rows, cols]
+    return rows[good], cols[good]
+
+
+def _update(mean: Floats, covariance: Floats, seen: Floats, noise: Floats) -> tuple[Floats, Floats]:
+    """Kalman update of (N, 3) independent pairs of value and rate by measured values (N, 3)."""
+    gain = covariance[..., :, 0] / (covariance[..., 0, 0] + noise)[..., None]
+    mean = mean + gain * (seen - mean[..., 0])[..., None]
+    return mean, covariance - gain[..., :, None] * covariance[..., None, 0, :]
+
+
+def _start(seen: Floats, noise: Floats, config: TrackingConfig) -> tuple[Floats, Floats]:
+    """Tracks of one component each: its value, and a rate about 0."""
+    mean = np.stack([seen, np.zeros_like(seen)], axis=-1)
+    covariance = np.zeros((*seen.shape, 2, 2))
+    covariance[..., 0, 0] = noise
+    covariance[..., 1, 1] = np.array([config.length_rate, config.cosine_rate, config.cosine_rate]) ** 2
+    return mean, covariance
