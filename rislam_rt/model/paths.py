@@ -1,12 +1,13 @@
 """Propagation paths over a trajectory: one column an identity, one row a cycle."""
 
-from dataclasses import dataclass, replace
+from copy import copy
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, freeze
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, freeze, frozen
 from rislam_rt.geometry.angles import angles_from_direction
 
 
@@ -132,5 +133,7 @@ class Paths:
         return f"{text} | {' '.join(self.walls[w] for w in rx)}" if rx else text
 
     def with_gain(self, gain: Any) -> "Paths":
-        """The same paths with other gains (K, P)."""
-        return replace(self, gain=gain)
+        """The same paths with other gains (K, P); all else is shared, not copied and checked again."""
+        paths = copy(self)
+        object.__setattr__(paths, "gain", frozen(gain, np.complex128, self.valid.shape, "Paths.gain"))
+        return paths

@@ -1,11 +1,8 @@
 """Gain of paths over the panel: element-wise (eq. `single`, the default) and far-field (eq. `a3`)."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats
-from rislam_rt.model.paths import Paths
 from rislam_rt.model.ris import RisCode, RisSpec
 from rislam_rt.ris.element import element_gain_area, element_pattern
 
@@ -53,26 +50,6 @@ def far_field_response(
     along = np.einsum("nmi,...i->...nm", spec.offsets(), direction)
     phase = np.exp(-2j * np.pi / wavelength * (distance[..., None, None] - along))
     return (np.asarray(coefficient) * amplitude)[..., None, None] * phase
-
-
-def panel_gain(tx: Complexes, rx: Complexes, code: RisCode) -> Complexes:
-    """Gain (...,) of panel paths from the responses (..., N, M) of their two legs under a code (..., N, M)."""
-    return np.einsum("...nm,...nm,...nm->...", tx, rx, np.exp(-1j * code.xi))
-
-
-def rephase(paths: Paths, code: RisCode) -> Paths:
-    """The same paths under another code, (N, M) or one a cycle (K, N, M): no new trace."""
-    if paths.ris is None:
-        return paths
-    legs = paths.ris
-    columns = np.flatnonzero(legs.tx_leg >= 0)
-    cycles, num_tx, rows, cols = legs.tx.shape
-    weight = np.broadcast_to(np.exp(-1j * code.xi), (cycles, rows, cols))
-    weighted = (legs.tx * weight[:, None]).reshape(cycles, num_tx, rows * cols)
-    pairs = weighted @ legs.rx.reshape(cycles, legs.rx.shape[1], rows * cols).transpose(0, 2, 1)
-    gain = np.array(paths.gain)
-    gain[:, columns] = np.where(paths.valid[:, columns], pairs[:, legs.tx_leg[columns], legs.rx_leg[columns]], 0.0)
-    return replace(paths, gain=gain)
 
 
 def zero_code(spec: RisSpec) -> RisCode:

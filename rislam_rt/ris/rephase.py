@@ -1,0 +1,68 @@
+"""Gains of panel paths under a code: linear in exp(-j xi), so that a new code needs no new trace."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Complexes, Integers
+from rislam_rt.model.paths import Paths
+from rislam_rt.model.ris import RisCode
+
+
+class Block(NamedTuple):
+    """Tx legs (I,) of which each meets all of the Rx legs (J,): the paths (I J,), those of the first Tx leg first."""
+
+    tx: Integers
+    rx: Integers
+    path: Integers
+
+
+def panel_gain(tx: Complexes, rx: Complexes, code: RisCode, weight: Complexes | float = 1.0) -> Complexes:
+    """Gain (...,) of panel paths from the responses (..., N, M) of their two legs under a code (..., N, M).
+
+    `weight` (..., N, M): what the elements really do to the signal, divided by what they should.
+    """
+    return np.einsum("...nm,...nm,...nm->...", tx, rx, weight * np.exp(-1j * code.xi))
+
+
+def rephase(paths: Paths, code: RisCode, weight: Complexes | float = 1.0) -> Paths:
+    """The same paths under another code, (N, M) or one a cycle (K, N, M): no new trace.
+
+    `weight` (N, M) or (K, N, M): what the elements really do, divided by what they should (`PanelErrors.weight`).
+    """
+    if paths.ris is None:
+        return paths
+    cycles, _, rows, cols = paths.ris.tx.shape
+    factor = np.broadcast_to(weight * np.exp(-1j * code.xi), (cycles, rows, cols)).reshape(cycles, 1, rows * cols)
+    tx, rx = (legs.reshape(*legs.shape[:2], rows * cols) for legs in (paths.ris.tx, paths.ris.rx))
+    gain = np.array(paths.gain)
+    for block in _blocks(paths.ris.tx_leg, paths.ris.rx_leg):
+        one, other = tx[:, _span(block.tx)], rx[:, _span(block.rx)]
+        # the shorter side takes the factor: half of all legs of a deep trace meet the bare leg alone
+        one, other = (one * factor, other) if len(block.tx) <= len(block.rx) else (one, other * factor)
+        pairs = (one @ other.swapaxes(1, 2)).reshape(cycles, -1)
+        gain[:, block.path] = np.where(paths.valid[:, block.path], pairs, 0.0)
+    return paths.with_gain(gain)
+
+
+def _blocks(tx_leg: Integers, rx_leg: Integers) -> Iterator[Block]:
+    """Panel paths sorted into full products of legs: Tx legs that meet the same Rx legs go together.
+
+    With `depth` bounces for both legs together, most pairs of legs are no path; these blocks hold none of them.
+    """
+    path_of = {(int(tx_leg[p]), int(rx_leg[p])): int(p) for p in np.flatnonzero(tx_leg >= 0)}
+    partners: dict[int, list[int]] = {}
+    for i, j in sorted(path_of):
+        partners.setdefault(i, []).append(j)
+    groups: dict[tuple[int, ...], list[int]] = {}
+    for i, js in partners.items():
+        groups.setdefault(tuple(js), []).append(i)
+    for rx, tx in groups.items():
+        yield Block(np.array(tx), np.array(rx), np.array([path_of[i, j] for i in tx for j in rx]))
+
+
+def _span(legs: Integers) -> Integers | slice:
+    """Neighbouring legs as a slice, which numpy reads in place."""
+    first, last = int(legs[0]), int(legs[-1])
+    return slice(first, last + 1) if last - first + 1 == len(legs) else legs
