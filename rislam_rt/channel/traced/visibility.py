@@ -8,6 +8,7 @@ through the scene, occlusion, and the primitives hit.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -23,6 +24,24 @@ from rislam_rt.channel.traced.rows import Rows
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
 from rislam_rt.channel.traced.stage import Stage, as_points
 from rislam_rt.errors import TraceError
+
+
+class SingleRays:
+    """The tracer's scene with every ray cast by itself.
+
+    The image method declares its rays coherent, and Embree then casts them in packets in which a ray that grazes the
+    edge between two triangles hits or misses depending on its neighbours: a path came and went with its row's number.
+    """
+
+    def __init__(self, scene: Any) -> None:
+        self._scene = scene
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._scene, name)
+
+    def ray_intersect(self, *args: Any, **options: Any) -> Any:
+        """`mi.Scene.ray_intersect` without packets."""
+        return self._scene.ray_intersect(*args, **{**options, "coherent": False})
 
 
 def visible_rows(stage: Stage, sequences: Integers, far: Floats, device: Floats, rows: Rows) -> tuple[Rows, Floats]:
@@ -74,7 +93,7 @@ def _trace(
     """Run the image method on candidates (N, D)."""
     with _short_segments():
         return method(
-            scene=stage.scene.mi_scene,
+            scene=SingleRays(stage.scene.mi_scene),
             paths=fill_buffer(stage, candidates, rows),
             diffraction=False,
             diffraction_lit_region=False,
