@@ -73,25 +73,26 @@ def print_paths(name: str, paths: Paths, rows: list[dict[str, Any]], seconds: fl
     _show(title, table)
 
 
-def print_comparison(name: str, report: "PathReport") -> None:
-    """Matched, explained and unexplained paths, and the largest errors."""
-    content = report.as_dict()
-    title = f"{name}: {report.cycles} poses"
-    table = Table("traced against analytic", "")
-    table.add_row("matched paths", str(content["matched"]))
-    for reason, count in content["explained"].items():
-        table.add_row(f"explained: {reason}", str(count))
-    table.add_row("unexplained", str(content["unexplained"]))
+def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> None:
+    """Matched, explained and unexplained paths, and the largest errors: refined, and the tracer's own float32."""
+    title = f"{name}: {refined.cycles} poses"
+    table = Table("traced against analytic", "refined", "float32")
+    contents = refined.as_dict(), raw.as_dict()
+    for key in ("matched", "unexplained"):
+        table.add_row(f"{key} paths", *(str(content[key]) for content in contents))
+    for reason in sorted({reason for content in contents for reason in content["explained"]}):
+        table.add_row(f"explained: {reason}", *(str(content["explained"].get(reason, 0)) for content in contents))
     for label, key, unit in (
         ("length", "max_length_error_m", "m"),
         ("gain", "max_gain_error_db", "dB"),
         ("phase", "max_phase_error_rad", "rad"),
         ("angle", "max_angle_error_rad", "rad"),
     ):
-        table.add_row(f"largest {label} error", f"{content[key]:.2g} {unit}")
+        table.add_row(f"largest {label} error", *(f"{content[key]:.2g} {unit}" for content in contents))
     _show(title, table)
-    for path in [p for p in report.one_sided if not p.reason][:10]:
-        print(f"unexplained: cycle {path.cycle}, {path.label}, only {path.side}")
+    for report in (refined, raw):
+        for path in [p for p in report.one_sided if not p.reason][:10]:
+            print(f"unexplained: cycle {path.cycle}, {path.label}, only {path.side}")
 
 
 def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"]) -> None:
