@@ -20,6 +20,7 @@ def command(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Run folder; runs/<pipeline>-<scene>-<seed> by default.")
     ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Schemes at a time; one a core by default.")] = None,
     json: JsonFile = None,
     page: Annotated[
         bool, typer.Option("--report/--no-report", help="Whether to draw the figures and the page.")
@@ -58,7 +59,14 @@ def command(
     opened.warn()
     try:
         with show_progress() as progress:
-            result = run_slam(room, spec, rng=np.random.default_rng(spec.seed), done=partial, progress=progress)
+            result = run_slam(
+                room,
+                spec,
+                rng=np.random.default_rng(spec.seed),
+                jobs=jobs or os.cpu_count() or 1,
+                done=partial,
+                progress=progress,
+            )
     except KeyboardInterrupt:
         kept = len(partial)
         partial.abandon()

@@ -103,4 +103,4 @@ class SlamResult:
     versions: Mapping[str, str]
     """Of this package, of Python and of the libraries that numbers depend on."""
     seconds: Mapping[str, float] = field(default_factory=dict)
-    """Time [s] of tracing and of each scheme."""
+    """Time [s] of the stages that all schemes share."""

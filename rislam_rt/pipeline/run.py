@@ -27,6 +27,7 @@ from rislam_rt.pipeline.cycle import Agent, Cycle, Rng, Room, run_cycle
 from rislam_rt.pipeline.record import gather
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.spec import PipelineSpec, Settings, build_settings
+from rislam_rt.pipeline.workers import run_side_by_side
 from rislam_rt.slam import StartPrior, init
 
 Progress = Callable[[str, int, int], None]
@@ -51,6 +52,7 @@ def run_slam(
     spec: PipelineSpec,
     *,
     rng: np.random.Generator,
+    jobs: int = 1,
     done: MutableMapping[str, SchemeResult] | None = None,
     progress: Progress | None = None,
 ) -> SlamResult:
@@ -60,6 +62,8 @@ def run_slam(
     ----------
     rng
         Source of all randomness, through children; the same seed gives the same result, whatever other schemes run.
+    jobs
+        Schemes that run at the same time, in processes of their own if more than one; the result is the same.
     done
         Schemes that need not run again; each new one is put there as soon as it is complete.
     progress
@@ -84,11 +88,9 @@ def run_slam(
     paths = build_channel(spec.channel, scene, settings.radio, spec.depth).paths(scene.agent)
     seconds = {"trace": perf_counter() - begin}
     tell("trace", 1, 1)
-    for name in spec.schemes:
-        begin = perf_counter()
-        if name not in done:
-            done[name] = run_scheme(name, scene, paths, spec, settings, seeds, tell)
-        seconds[name] = perf_counter() - begin
+    todo = [name for name in spec.schemes if name not in done]
+    for name, scheme in run_side_by_side(run_scheme, todo, (scene, paths, spec, seeds), jobs, tell):
+        done[name] = scheme
     return SlamResult(
         name=spec.name,
         scene=scene,
@@ -101,10 +103,9 @@ def run_slam(
     )
 
 
-def run_scheme(
-    name: str, scene: Scene, paths: Paths, spec: PipelineSpec, settings: Settings, seeds: Seeds, tell: Progress
-) -> SchemeResult:
+def run_scheme(name: str, scene: Scene, paths: Paths, spec: PipelineSpec, seeds: Seeds, tell: Progress) -> SchemeResult:
     """One scheme over all cycles."""
+    settings = build_settings(spec)
     scheme, motion = SCHEMES[name], scene.agent
     panel = scene.ris.spec if scene.ris is not None and scheme.method is not None else None
     room = Room(paths if panel is not None else without_panel(paths), motion)

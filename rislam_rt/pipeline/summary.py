@@ -67,7 +67,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "association": {"accuracy": score.accuracy, "precision": score.precision, "recall": score.recall},
         "step_seconds": seconds,
         "over_budget": over_budget(seconds, result.config["budget"]),
-        "seconds": result.seconds.get(scheme.scheme, 0.0),
+        "seconds": float(scheme.seconds.sum()),
     }
 
 

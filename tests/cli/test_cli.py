@@ -191,12 +191,12 @@ def test_interrupted_run_goes_on(run, tmp_path, monkeypatch):
         return whole(name, *rest)
 
     monkeypatch.setattr(module, "run_scheme", broken)
-    code, _, err = run("run", PIPELINE, *SHORT, "--no-report")
+    code, _, err = run("run", PIPELINE, *SHORT, "--no-report", "--jobs", 1)
     assert code == 130
     assert "1 schemes kept" in err
     folder = tmp_path / "runs" / "trace_then_slam-paper_room-7"
     assert not folder.exists()
-    assert run("run", PIPELINE, *SHORT, "--no-report")[0] == 0
+    assert run("run", PIPELINE, *SHORT, "--no-report", "--jobs", 1)[0] == 0
     assert seen == ["optimized", "random", "random"]
     assert [path.name for path in folder.parent.iterdir()] == [folder.name]
 

@@ -53,11 +53,12 @@ def test_without_panel_only_panel_paths_go(short_result):
 
 
 def test_references_run(run_short):
-    result = run_short('schemes=["no_ris", "exact", "genie"]', "cycles=3")
+    result = run_short('schemes=["no_ris", "exact", "genie"]', "cycles=3", "design.method=exact")
     assert result.schemes["no_ris"].applied.shape == (3, 0, 0)
     direct = result.paths.kind == PathKind.RIS
-    # The genie knows where the panel is from the first cycle on; with random codes its path is ten times weaker.
-    assert np.abs(result.schemes["genie"].gain[:, direct]).min() > 2.0 * np.abs(result.schemes["exact"].gain[0, direct])
+    # The genie knows the direct path itself: the exact optimum of its gain is above that of any other code.
+    genie, exact = (np.abs(result.schemes[name].gain[:, direct]) for name in ("genie", "exact"))
+    assert (genie > exact).all()
     assert not result.schemes["no_ris"].gain[:, direct].any()
 
 

@@ -1,0 +1,50 @@
+"""Work side by side: the same results, news on the way, and no silence when a process dies."""
+
+import os
+
+import numpy as np
+import pytest
+
+from rislam_rt.errors import RislamError, TraceError
+from rislam_rt.pipeline.workers import run_side_by_side
+
+
+def square(name, offset, tell):
+    tell(name, 1, 1)
+    return int(name) ** 2 + offset
+
+
+def fail(name, tell):
+    if name == "bad":
+        raise TraceError("no path; move the agent")
+    return name
+
+
+def die(name, tell):
+    os._exit(11)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_every_piece_is_done_once_and_heard_of(jobs):
+    news = []
+    found = dict(run_side_by_side(square, ["1", "2", "3"], (10,), jobs, lambda *item: news.append(item)))
+    assert found == {"1": 11, "2": 14, "3": 19}
+    assert sorted(news) == [("1", 1, 1), ("2", 1, 1), ("3", 1, 1)]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_failure_is_raised_as_it_was(jobs):
+    with pytest.raises(TraceError, match="no path; move the agent"):
+        list(run_side_by_side(fail, ["bad", "good"], (), jobs, print))
+
+
+def test_a_dead_process_is_told():
+    with pytest.raises(RislamError, match="exit code 11"):
+        list(run_side_by_side(die, ["a", "b"], (), 2, print))
+
+
+def test_two_processes_give_the_same_bits(run_short, short_result):
+    twice = run_short(jobs=2)
+    for name, scheme in short_result.schemes.items():
+        np.testing.assert_array_equal(twice.schemes[name].position, scheme.position)
+        np.testing.assert_array_equal(twice.schemes[name].applied, scheme.applied)
