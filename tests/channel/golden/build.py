@@ -79,7 +79,7 @@ def main():
     for folder in sorted(path.parent for path in SCENES.glob("*/scene.toml")):
         scene = load_scene(folder)
         depth = DEPTH.get(folder.name, 2)
-        trajectory = random_poses(scene, 2, rng=np.random.default_rng(12))
+        trajectory = random_poses(scene, 2, rng=np.random.default_rng(11))
         paths = ImageSourceChannel(scene, RadioConfig(), depth).paths(trajectory)
         write(FOLDER / f"{folder.name}.nc", trajectory, depth, golden_paths(paths))
 
