@@ -16,12 +16,17 @@ Booleans = NDArray[np.bool_]
 def frozen(value: ArrayLike, dtype: Any, shape: tuple[int | None, ...], name: str) -> NDArray[Any]:
     """A read-only array of the given type and shape (`None` matches any length).
 
+    A copy, unless the value is such an array already and owns its memory: then nobody can change it.
+
     Raises
     ------
     GeometryError
         The value has another shape, or holds a NaN.
     """
-    array = np.array(value, dtype=dtype)
+    if isinstance(value, np.ndarray) and value.dtype == dtype and value.base is None and not value.flags.writeable:
+        array = value
+    else:
+        array = np.array(value, dtype=dtype)
     if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
         wanted = ", ".join("any" if n is None else str(n) for n in shape)
         raise GeometryError(f"{name}: shape {array.shape} received, ({wanted}) needed")

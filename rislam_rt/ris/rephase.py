@@ -43,6 +43,7 @@ def rephase(paths: Paths, code: RisCode, weight: Complexes | float = 1.0) -> Pat
         one, other = (one * factor, other) if len(block.tx) <= len(block.rx) else (one, other * factor)
         pairs = (one @ other.swapaxes(1, 2)).reshape(cycles, -1)
         gain[:, block.path] = np.where(paths.valid[:, block.path], pairs, 0.0)
+    gain.flags.writeable = False  # so that it is taken as it is
     return paths.with_gain(gain)
 
 

@@ -1,0 +1,37 @@
+"""Frozen arrays: checked, read-only, and copied unless nobody can change them."""
+
+import numpy as np
+import pytest
+
+from rislam_rt.arrays import frozen
+from rislam_rt.errors import GeometryError
+
+
+def test_what_could_still_change_is_copied():
+    own = np.arange(6.0).reshape(2, 3).copy()
+    first = frozen(own, np.float64, (2, 3), "x")
+    own[0, 0] = 9.0
+    assert first[0, 0] == 0.0
+    view = own[:1]
+    view.flags.writeable = False
+    second = frozen(view, np.float64, (1, 3), "x")
+    own[0, 0] = 7.0
+    assert second[0, 0] == 9.0
+    with pytest.raises(ValueError, match="read-only"):
+        second[0, 0] = 1.0
+
+
+def test_what_cannot_change_is_taken_as_it_is():
+    array = frozen(np.arange(3.0), np.float64, (3,), "x")
+    assert frozen(array, np.float64, (None,), "x") is array
+    assert frozen(array, np.complex128, (3,), "x").dtype == np.complex128
+
+
+def test_checks_hold_for_both():
+    array = np.array([0.0, np.nan])
+    for writeable in (True, False):
+        array.flags.writeable = writeable
+        with pytest.raises(GeometryError, match=r"x: NaN at index \(1,\)"):
+            frozen(array, np.float64, (2,), "x")
+        with pytest.raises(GeometryError, match=r"x: shape \(2,\) received, \(3\) needed"):
+            frozen(array, np.float64, (3,), "x")
