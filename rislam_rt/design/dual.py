@@ -9,7 +9,6 @@ relaxation over phases. Y, the shares and d are free: every choice gives a valid
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
 
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.design.bound import best_magnitudes
@@ -31,6 +30,8 @@ def dual_bound(problem: DesignProblem, index: Integers, *, iterations: int = 300
 
     Detection and the landmarks' uncertainty are left out, which can only lower the bound.
     """
+    from scipy.optimize import minimize  # half a second of import that no other designer needs
+
     objective = build_objective(problem)
     code = objective.table[np.ravel(index)]
     power = np.abs(objective.gains(code)) ** 2

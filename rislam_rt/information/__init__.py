@@ -9,6 +9,7 @@ from rislam_rt.information.delay_gain import (
     map_to_position,
     steering,
 )
+from rislam_rt.information.diffuse import DiffuseTail, diffuse_snr
 from rislam_rt.information.equivalent import EquivalentPosition, equivalent_information, uncertain_range_information
 from rislam_rt.information.gradient import (
     GradientMode,
@@ -28,6 +29,7 @@ from rislam_rt.information.recursion import MotionPrior, PosteriorBound, posteri
 __all__ = [
     "Bound",
     "Chain",
+    "DiffuseTail",
     "Equivalent",
     "EquivalentPosition",
     "GradientMode",
@@ -43,6 +45,7 @@ __all__ = [
     "cosine_information",
     "delay_gain_information",
     "delay_information",
+    "diffuse_snr",
     "dilution",
     "eliminate_gains",
     "equivalent_information",

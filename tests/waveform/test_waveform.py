@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import spherical_jn
 
 from rislam_rt.waveform import (
     autocorrelation,
@@ -59,6 +60,16 @@ def test_nothing_cancels_near_zero():
     np.testing.assert_allclose(
         autocorrelation(tau, BANDWIDTH, derivative=1) / (np.pi * BANDWIDTH), -x / 3 + x**3 / 30, rtol=1e-13
     )
+
+
+def test_closed_form_and_series_meet():
+    x = np.concatenate([np.geomspace(1e-6, 50.0, 400), [0.0, 1.0, np.nextafter(1.0, 0.0)]])
+    tau, scale = np.concatenate([x, -x]) / (np.pi * BANDWIDTH), np.pi * BANDWIDTH
+    j0, j1, j2 = (spherical_jn(n, scale * tau) for n in range(3))
+    # closed form next to 1: a difference of terms ten times the result
+    np.testing.assert_allclose(autocorrelation(tau, BANDWIDTH, derivative=1) / scale, -j1, rtol=1e-13, atol=1e-15)
+    second = autocorrelation(tau, BANDWIDTH, derivative=2) / scale**2
+    np.testing.assert_allclose(second, (2 * j2 - j0) / 3, rtol=1e-13, atol=1e-15)
 
 
 def test_pulse_derivative_equals_differences():
