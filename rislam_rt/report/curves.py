@@ -2,7 +2,7 @@
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter, ScalarFormatter
+from matplotlib.patches import Patch
 
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import position_errors
@@ -17,21 +17,21 @@ def draw_agent_error(result: SlamResult) -> Figure:
     with styled():
         figure = Figure(figsize=(8.6, 4.1))
         axis = figure.subplots()
-        for name, scheme in result.schemes.items():
+        for name, scheme in reversed(list(result.schemes.items())):
             error = position_errors(scheme.position, result.scene.agent.position)
             believed = np.sqrt(np.einsum("kii->k", scheme.covariance[:, :3, :3]))
             colour = scheme_colour(name)
             axis.fill_between(time, 0.0, 100.0 * believed, color=colour, alpha=0.15, lw=0.0)
-            label = (
-                f"{name}: RMSE {100.0 * np.sqrt(np.mean(error**2)):.1f} cm (shaded: the σ that the filter believes in)"
-            )
+            label = f"{name}, RMSE {100.0 * np.sqrt(np.mean(error**2)):.1f} cm"
             axis.plot(time, 100.0 * error, color=colour, lw=1.6, label=label)
         axis.set_xlabel("time [s]")
         axis.set_ylabel("agent position error [cm]")
         axis.set_title("How far off the agent is, and how far off it believes to be", weight="bold")
         axis.set_xlim(time[0], time[-1])
         axis.set_ylim(0.0)
-        figure.legend(loc="outside lower center", ncols=2, fontsize=9)
+        band = Patch(color="#555555", alpha=0.2, lw=0.0, label="the filter's own σ")
+        handles, _ = axis.get_legend_handles_labels()
+        figure.legend(handles=[*handles[::-1], band], loc="outside lower center", ncols=6, fontsize=9)
     return figure
 
 
@@ -42,7 +42,7 @@ def draw_landmark_errors(result: SlamResult) -> Figure:
     with styled():
         figure = Figure(figsize=(8.6, 3.9))
         axes = figure.subplots(1, max(len(scene.landmarks), 1), sharey=True, squeeze=False)[0]
-        for name, errors in tracks.items():
+        for name, errors in reversed(tracks.items()):
             for number, axis in enumerate(axes[: errors.shape[1]]):
                 axis.plot(time, 100.0 * errors[:, number], color=scheme_colour(name), lw=1.4, label=name)
         never = set(np.flatnonzero(~np.any([np.isfinite(e).any(axis=0) for e in tracks.values()], axis=0)).tolist())
@@ -50,15 +50,12 @@ def draw_landmark_errors(result: SlamResult) -> Figure:
             axis.set_title(landmark, weight="bold")
             axis.set_xlabel("time [s]")
             axis.set_xlim(time[0], time[-1])
-            axis.set_yscale("log")
-            axis.yaxis.set_major_formatter(ScalarFormatter())
-            axis.yaxis.set_minor_formatter(NullFormatter())
+            axis.set_ylim(0.0)
             if number in never:
-                axis.set_ylim(1.0, 100.0)
                 axis.text(0.5, 0.5, "never found", transform=axis.transAxes, ha="center", color="#555555")
         axes[0].set_ylabel("landmark position error [cm]")
         handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=9)
+        figure.legend(handles[::-1], labels[::-1], loc="outside lower center", ncols=5, fontsize=9)
     return figure
 
 
@@ -85,7 +82,7 @@ def draw_levels(result: SlamResult, detection_snr_db: float, snr_per_gain_db: fl
             level = strongest_db(scheme, paths.kind == PathKind.RIS)
             if np.isfinite(level).any():
                 random = name == "random"
-                width, order = (0.7, 2) if random else (2.2, 3)
+                width, order = (0.7, 2) if random else (1.8, 3)
                 axis.plot(time, level, color=scheme_colour(name), lw=width, zorder=order, label=f"RIS, {name}")
         threshold = detection_snr_db - snr_per_gain_db
         axis.axhline(threshold, color="#555555", lw=1.0, ls="--", label="detection threshold")

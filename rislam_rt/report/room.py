@@ -30,10 +30,12 @@ def draw_above(result: SlamResult) -> Figure:
     with styled():
         figure = Figure(figsize=(5.4 * len(schemes), 5.4 * aspect + 1.4))
         axes = figure.subplots(1, len(schemes), squeeze=False, sharey=True)[0]
+        final = [scheme.position[-1, :2] - result.scene.agent.position[-1, :2] for scheme in schemes]
+        half = max(ZOOM, 2.5 * float(np.linalg.norm(final, axis=1).max()))
         for axis, scheme in zip(axes, schemes, strict=True):
             _draw_truth(axis, result.scene)
             _draw_estimate(axis, result.scene, scheme)
-            _draw_close_up(axis, result.scene, scheme)
+            _draw_close_up(axis, result.scene, scheme, half)
             error = np.sqrt(np.mean(np.sum((scheme.position - result.scene.agent.position) ** 2, axis=1)))
             axis.set_title(f"{scheme.scheme}: agent RMSE {100.0 * error:.1f} cm", weight="bold")
             axis.set_xlabel("x [m]")
@@ -92,10 +94,11 @@ def _draw_truth(axis: Axes, scene: Scene) -> None:
 
 
 def _mark(axis: Axes, point: Floats, name: str, marker: str) -> None:
+    """A true landmark, its name and height beside it."""
     axis.plot(point[0], point[1], marker, ms=13, mfc="none", mec=TRUTH, mew=1.6, zorder=5)
-    axis.annotate(
-        f"{name} (z = {point[2]:.1f} m)", (point[0], point[1]), (10, 8), textcoords="offset points", fontsize=9
-    )
+    paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
+    axis.annotate(f"{name}, z = {point[2]:.1f} m", (point[0], point[1]), (12, -3), textcoords="offset points",
+                  fontsize=9, zorder=7, bbox=paper)  # fmt: skip
 
 
 def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
@@ -121,10 +124,9 @@ def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
         axis.plot(ring[:, 0], ring[:, 1], color=colour, lw=1.0, zorder=6)
 
 
-def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
+def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) -> None:
     """The last stretch of the path, magnified, with the believed 2 sigma ellipse of the last position."""
     truth, estimate = scene.agent.position[-1, :2], scheme.position[-1, :2]
-    half = max(ZOOM, 2.5 * float(np.linalg.norm(truth - estimate)))
     colour = scheme_colour(scheme.scheme)
     low, high = scene.bounds[:, :2]
     # The corner of the room that is farthest from everything drawn holds the close-up.
@@ -145,7 +147,7 @@ def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
     inset.set_aspect("equal")
     inset.set_xticks([])
     inset.set_yticks([])
-    inset.text(0.5, 0.03, f"end of the path, {100.0 * 2.0 * half:.0f} cm wide", fontsize=8.5, ha="center",
+    inset.text(0.5, 0.03, f"end, {100.0 * 2.0 * half:.0f} cm wide", fontsize=8.5, ha="center",
                transform=inset.transAxes)  # fmt: skip
     for spine in inset.spines.values():
         spine.set_visible(True)
