@@ -23,6 +23,8 @@ class Sounding(NamedTuple):
     """(R,) element positions along body x [wavelengths]."""
     col: Floats
     """(C,) element positions along body y [wavelengths]."""
+    squint: float
+    """Bandwidth over carrier where every element has its own delay (`waves`), else 0."""
 
     @property
     def num_samples(self) -> int:
@@ -49,15 +51,16 @@ class Grams(NamedTuple):
     """(3, 3, P, P) `d_i^H d_j`."""
 
 
-def build_sounding(num_tones: int, radio: RadioConfig) -> Sounding:
+def build_sounding(num_tones: int, radio: RadioConfig, *, element_exact: bool = False) -> Sounding:
     """Tones and element positions of a radio."""
     x = radio.array.positions(1.0).reshape(radio.array.rows, radio.array.cols, 3)
-    return Sounding(subcarrier_frequencies(num_tones, 1.0), x[:, 0, 0], x[0, :, 1])
+    squint = radio.bandwidth / radio.carrier if element_exact else 0.0
+    return Sounding(subcarrier_frequencies(num_tones, 1.0), x[:, 0, 0], x[0, :, 1], squint)
 
 
 def factors(sounding: Sounding, parameters: Floats) -> Factors:
     """Factors of the signals of P paths (P, 3)."""
-    delay = _tone_response(sounding.frequency, parameters[:, 0])
+    delay = tone_response(sounding.frequency, parameters[:, 0])
     row = np.exp(2j * np.pi * sounding.row[:, None] * parameters[:, 1])
     col = np.exp(2j * np.pi * sounding.col[:, None] * parameters[:, 2])
     slopes = (-sounding.frequency, sounding.row, sounding.col)
@@ -69,7 +72,7 @@ def factors(sounding: Sounding, parameters: Floats) -> Factors:
     )
 
 
-def _tone_response(frequency: Floats, delay: Floats) -> Complexes:
+def tone_response(frequency: Floats, delay: Floats) -> Complexes:
     """`exp(-j 2 pi f tau)` (M, P); of evenly spaced tones: a coarse and a fine factor save most exponentials."""
     count = len(frequency)
     fine = int(np.sqrt(count))

@@ -21,12 +21,15 @@ def identify(tau: Floats, cosines: Floats, gain: Complexes, received: Received, 
     """Column (N,) of the path that each component most likely is, -1 for none.
 
     The assignment with the least sum of squared misfits in delay, cosines and amplitude. The scale is the resolution
-    cell, not the bound: next to a stronger path a component errs by more than its bound, and is still that path.
+    cell, not the bound: next to a stronger path a component errs by more than its bound, and is still that path. So it
+    is if it came out on the wrong side of the sky, where the array cannot tell (`u` from `u - 1 / spacing`).
     """
     heard = np.flatnonzero(radio.integrated_snr(received.gain) > FAINTEST)
     beams = [1.0 / (n * radio.array.spacing) if n > 1 else np.inf for n in (radio.array.rows, radio.array.cols)]
     delay = (tau[:, None] - received.tau[heard]) * radio.bandwidth / TOLERANCE
-    angle = (cosines[:, None] - received.direction[heard, :2]) / np.array(beams) / TOLERANCE
+    period = 1.0 / radio.array.spacing
+    offset = cosines[:, None] - received.direction[heard, :2]
+    angle = (offset - period * np.round(offset / period)) / np.array(beams) / TOLERANCE
     ratio = np.abs(gain)[:, None] / np.abs(received.gain[heard])
     loudness = 20.0 * np.log10(np.maximum(ratio, 1e-300)) / LOUDNESS
     misfit = delay**2 + np.sum(angle**2, axis=-1) + loudness**2

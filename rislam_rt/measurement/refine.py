@@ -13,6 +13,7 @@ from scipy.linalg import lapack
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.measurement.atoms import Factors, Grams, Sounding, correlate, factors, inner_products, synthesise
+from rislam_rt.measurement.waves import correlate_waves, wave_signals
 
 RIDGE = 1e-9
 """Added to the diagonal of matrices of unit diagonal, so that coinciding paths do not stop the solver."""
@@ -32,6 +33,8 @@ class Fit(NamedTuple):
     """Their signals."""
     inner: Grams
     """Inner products of those."""
+    waves: Complexes | None
+    """(L M, P) their signals without approximations, where the sounding asks for it."""
     amplitude: Complexes
     """(P,)."""
     residual: Complexes
@@ -53,9 +56,15 @@ def fit_amplitudes(sounding: Sounding, parameters: Floats, samples: Complexes) -
     """The fit with these parameters (P, 3) and the amplitudes that suit them best."""
     parts = factors(sounding, parameters)
     inner = inner_products(parts)
-    amplitude = _solve(inner.signal, correlate(parts, samples)[0])
-    residual = samples - synthesise(parts, amplitude)
-    return Fit(parameters, parts, inner, amplitude, residual, float(np.vdot(residual, residual).real))
+    waves = None
+    if sounding.squint:
+        waves = wave_signals(sounding, parameters)
+        amplitude = _solve(waves.conj().T @ waves, waves.conj().T @ samples.ravel())
+        residual = samples - (waves @ amplitude).reshape(samples.shape)
+    else:
+        amplitude = _solve(inner.signal, correlate(parts, samples)[0])
+        residual = samples - synthesise(parts, amplitude)
+    return Fit(parameters, parts, inner, waves, amplitude, residual, float(np.vdot(residual, residual).real))
 
 
 def refine(sounding: Sounding, fit: Fit, samples: Complexes, *, steps: int, tolerance: float = 0.1) -> Fit:
@@ -63,7 +72,7 @@ def refine(sounding: Sounding, fit: Fit, samples: Complexes, *, steps: int, tole
     damping = 1e-3
     for _ in range(steps):
         information, _ = information_matrix(fit.inner, fit.amplitude)
-        gradient = np.real(fit.amplitude.conj() * correlate(fit.parts, fit.residual)[1]).ravel()
+        gradient = np.real(fit.amplitude.conj() * _slopes(sounding, fit)).ravel()
         while damping < 1e3:
             step = _solve(information + damping * np.diag(np.diagonal(information)), gradient)
             if gradient @ step < tolerance:
@@ -76,6 +85,13 @@ def refine(sounding: Sounding, fit: Fit, samples: Complexes, *, steps: int, tole
         else:
             return fit
     return fit
+
+
+def _slopes(sounding: Sounding, fit: Fit) -> Complexes:
+    """`d^H r` (3, P) of the residual."""
+    if fit.waves is None:
+        return correlate(fit.parts, fit.residual)[1]
+    return correlate_waves(sounding, fit.waves, fit.residual)[1]
 
 
 def accuracy(fit: Fit) -> Accuracy:

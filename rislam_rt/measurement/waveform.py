@@ -108,7 +108,7 @@ def to_measurement(found: Components, config: ReceiverConfig) -> Measurement:
 
 def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig) -> Components:
     """Components of one capture."""
-    sounding = build_sounding(one.samples.shape[1], radio)
+    sounding = build_sounding(one.samples.shape[1], radio, element_exact=config.element_exact)
     window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
     grid = build_grid(sounding, window)
     threshold = detection_threshold(radio, config)
@@ -147,7 +147,9 @@ def _resolved(found: Estimate, radio: RadioConfig) -> tuple[Floats, Complexes, F
     lone_std = np.column_stack([lone.tau * radio.bandwidth, lone.cosines])
     offset = np.where(member[..., None] > 0.0, np.abs(parameters - centre[:, None]), 0.0).max(axis=1, initial=0.0)
     deviation = np.where(single[:, None], member @ bound.parameters, np.hypot(lone_std, offset))
-    return centre, gain, deviation, np.sqrt(np.where(single, member @ bound.amplitude**2, spread) / 2.0)
+    variance = np.where(single, member @ bound.amplitude**2, spread)
+    sure = np.abs(gain) ** 2 > LEAST_CERTAINTY**2 * variance
+    return centre[sure], gain[sure], deviation[sure], np.sqrt(variance[sure] / 2.0)
 
 
 def _groups(parameters: Floats, doubtful: Booleans, radio: RadioConfig) -> Integers:

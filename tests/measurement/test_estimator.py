@@ -215,3 +215,20 @@ def test_same_seed_same_measurement(make_paths, make_gain):
     paths = make_paths([(PathKind.PS, 6.0, UP, make_gain(30.0, RADIO, 0.4))])
     (first, _), (second, _) = (repeat(paths, WAVEFORM, 1, seed=3)[0] for _ in range(2))
     np.testing.assert_array_equal(first.tau, second.tau)
+
+
+def test_wrong_side_of_the_sky_is_still_the_path(make_paths, make_gain):
+    """Half a wavelength apart, elements see the same from either end of their axis."""
+    gain = make_gain(30.0, RADIO)
+    paths = make_paths([(PathKind.VT, 5.0, (1.0, 0.01, 0.0), gain)])
+    received = receive(paths, 0, 0.0, RADIO, WAVEFORM)
+    assert identify(paths.tau[0], np.array([[-0.999, 0.01]]), np.array([gain]), received, RADIO).tolist() == [0]
+
+
+def test_elements_of_their_own_cost_nothing_when_the_model_knows(make_paths, make_gain):
+    """A near wall 60 dB above the noise: plane waves leave a hundredth of it, the exact model nothing."""
+    rows = [(PathKind.VT, 1.0, (0.6, 0.3, 0.1), make_gain(60.0, RADIO)), (PathKind.PS, 4.0, UP, make_gain(25.0, RADIO))]
+    config = ReceiverConfig(estimator="waveform", element_exact=True, false_alarm_rate=0.01)
+    for measurement, truth in repeat(make_paths(rows), config, 3):
+        assert truth.path.tolist() == [0, 1]
+        assert abs(measurement.tau[1] * SPEED_OF_LIGHT - 4.0) < 5.0 * SPEED_OF_LIGHT * measurement.tau_std[1]

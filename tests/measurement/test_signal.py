@@ -5,6 +5,7 @@ import pytest
 
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.measurement import ReceiverConfig
+from rislam_rt.measurement.atoms import build_sounding
 from rislam_rt.measurement.received import receive
 from rislam_rt.measurement.signal import (
     add_noise,
@@ -16,6 +17,7 @@ from rislam_rt.measurement.signal import (
     to_tones,
     tones,
 )
+from rislam_rt.measurement.waves import correlate_waves, wave_signals
 from rislam_rt.model import PathKind, Paths, RadioConfig, RxArray
 
 RADIO = RadioConfig()
@@ -158,3 +160,23 @@ def test_arrays_of_one_antenna_work_too(make_paths, make_gain):
     radio = RadioConfig(array=RxArray(rows=1, cols=1))
     paths = make_paths([(PathKind.PS, 4.0, UP, make_gain(20.0, radio))])
     assert tones(received(paths, radio=radio), radio, CONFIG).shape == (1, 128)
+
+
+def test_estimator_models_elements_as_the_signal_makes_them(make_paths, make_gain):
+    """`waves` against the synthesis: a wall return, whose wave front spreads from a whole path away."""
+    config = ReceiverConfig(element_exact=True)
+    rows = [(PathKind.VT, 1.0, (0.6, 0.3, 0.4), 1.0), (PathKind.VT, 6.0, (-0.2, 0.9, 0.1), 1.0j)]
+    paths = make_paths(rows)
+    signal = tones(received(paths, config), RADIO, config)
+    sounding = build_sounding(128, RADIO, element_exact=True)
+    parameters = np.column_stack([paths.tau[0] * RADIO.bandwidth, paths.arrival[0, :, :2]])
+    waves = wave_signals(sounding, parameters)
+    model = (waves @ paths.gain[0]).reshape(signal.shape) * np.sqrt(1.0 / 128)
+    np.testing.assert_allclose(model, signal, atol=1e-9 * np.abs(signal).max())
+    # and its derivatives, by central differences; the model's neglect how the wave front bends with the path
+    samples = np.exp(1j * np.arange(16 * 128)).reshape(16, 128)
+    _, slopes = correlate_waves(sounding, waves, samples)
+    for axis, step in enumerate(1e-6 * np.eye(3)):
+        change = (wave_signals(sounding, parameters + step) - wave_signals(sounding, parameters - step)) / 2e-6
+        expected = change.conj().T @ samples.ravel()
+        np.testing.assert_allclose(slopes[axis], expected, atol=0.05 * np.linalg.norm(change, axis=0).max())
