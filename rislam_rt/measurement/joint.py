@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.measurement.atoms import Sounding, build_sounding, factors, inner_products
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.parts import Errors, Parts, audible, cell_offsets, join
+from rislam_rt.measurement.parts import Errors, Parts, audible, in_cells, join
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.refine import joint_bound
 from rislam_rt.measurement.signal import num_tones
@@ -39,7 +39,8 @@ def _one_problem(
     received: Received, sounding: Sounding, radio: RadioConfig, merging: bool, draws: Floats
 ) -> tuple[Parts, Errors]:
     """Merge until every component is certain enough, or has no neighbour to merge with."""
-    near = np.linalg.norm(cell_offsets(received, radio), axis=-1)
+    place = in_cells(received, radio)
+    near = np.linalg.norm(place[:, None] - place, axis=-1)
     unit = np.sqrt(radio.energy * radio.array.num_antennas / (sounding.num_samples * radio.noise_psd))
     strength = np.abs(received.gain)
     leader = np.arange(len(strength))
