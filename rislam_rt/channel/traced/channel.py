@@ -32,8 +32,9 @@ class TracedChannel:
         Largest number of wall bounces on a path, both legs together.
     refine
         Recompute the bounce points of what the tracer found in float64 on the walls' planes; `Paths.source` says
-        `traced, refined`. Without it the tracer's own float32 vertices stand: good to some
-        micrometres, but a segment of a millimetre has a direction, and Fresnel coefficients, of three digits.
+        `traced, refined`. Without it the tracer's own float32 vertices stand, good to some
+        micrometres (a segment of a millimetre then has a direction of three digits, so reflection is computed on the
+        refined points in either case).
 
     The channel holds the tracer's scene; `paths` may be called for any number of trajectories.
     """
@@ -82,11 +83,9 @@ class TracedChannel:
 
         rows, vertices = visible_rows(self.stage, batch.all_sequences, batch.far, batch.device, candidates)
         sequences, (device, far) = batch.all_sequences[rows.sequence], batch.ends(rows)
-        if self.refine:
-            course = refined_course(self.walls, sequences, device, far)
-        else:
-            course = traced_course(sequences, device, far, vertices)
-        return Found(rows, course, leg_coefficients(self.stage, sequences, device, far, course))
+        exact = refined_course(self.walls, sequences, device, far)
+        coefficient = leg_coefficients(self.stage, sequences, device, far, exact)
+        return Found(rows, exact if self.refine else traced_course(sequences, device, far, vertices), coefficient)
 
 
 def _cycles(legs: Legs, rows: slice) -> Legs:
