@@ -2,7 +2,7 @@
 
 import typer
 
-from rislam_rt.cli import check, compare, design, doctor, new, report, run, show, trace
+from rislam_rt.cli import check, compare, design, doctor, new, report, run, show, sweep, trace
 
 app = typer.Typer(
     name="rislam-rt",
@@ -11,7 +11,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _command in (run, trace, compare, design, check, new, show, report, doctor):
+for _command in (run, trace, compare, design, check, new, show, sweep, report, doctor):
     app.command(_command.__name__.rpartition(".")[2])(_command.command)
 
 

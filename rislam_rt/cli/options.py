@@ -8,6 +8,12 @@ import typer
 SceneFolder = Annotated[
     Path, typer.Argument(metavar="SCENE", help="Scene folder, or its scene.toml.", show_default=False)
 ]
+PipelineFile = Annotated[Path, typer.Argument(metavar="PIPELINE", help="Pipeline file (TOML).", show_default=False)]
+SceneOption = Annotated[Path | None, typer.Option(metavar="DIR", help="Scene folder; the pipeline's own by default.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a setting, e.g. radio.bandwidth_ghz=0.5; repeatable."),
+]
 JsonFile = Annotated[
     Path | None, typer.Option("--json", metavar="FILE", help="Write what is printed to FILE, machine-readable.")
 ]

@@ -5,18 +5,13 @@ from typing import Annotated
 
 import typer
 
-from rislam_rt.cli.options import JsonFile, write_json
+from rislam_rt.cli.options import JsonFile, PipelineFile, SceneOption, Settings, write_json
 
 
 def command(
-    pipeline: Annotated[Path, typer.Argument(metavar="PIPELINE", help="Pipeline file (TOML).", show_default=False)],
-    scene: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Scene folder; the pipeline's own by default.")
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Change a setting, e.g. radio.bandwidth_ghz=0.5."),
-    ] = None,
+    pipeline: PipelineFile,
+    scene: SceneOption = None,
+    set_: Settings = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Run folder; runs/<pipeline>-<scene>-<seed> by default.")
     ] = None,
@@ -35,8 +30,7 @@ def command(
     import numpy as np
 
     from rislam_rt.cli.progress import show_progress
-    from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.errors import ConfigError
+    from rislam_rt.cli.scenes import open_scene, scene_of
     from rislam_rt.pipeline import load_spec, run_slam
     from rislam_rt.pipeline.run import check_run, prepare_channel
     from rislam_rt.pipeline.store import PartialRun, check_folder, run_folder, run_identity
@@ -44,11 +38,7 @@ def command(
     from rislam_rt.report.tables import print_summary
 
     spec = load_spec(pipeline, set_ or ())
-    if scene is None:
-        if spec.scene is None:
-            raise ConfigError(f"{pipeline}: scene: not given; add it, or give --scene DIR")
-        scene = Path(os.path.normpath(pipeline.parent / spec.scene))
-    opened = open_scene(scene)
+    opened = open_scene(scene_of(scene, spec, pipeline))
     room = opened.scene
     check_run(room, spec)
     folder = out or run_folder(spec, room, Path("runs"))

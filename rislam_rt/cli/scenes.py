@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
     from rislam_rt.model import Scene
+    from rislam_rt.pipeline import PipelineSpec
 
 
 class Opened(NamedTuple):
@@ -35,6 +36,25 @@ def open_scene(path: Path) -> Opened:
     findings = check_scene(path)
     raise_errors(findings)
     return Opened(load_scene(path), tuple(finding.line for finding in findings))
+
+
+def scene_of(option: Path | None, spec: "PipelineSpec", pipeline: Path) -> Path:
+    """The folder of `--scene`, or the one that the pipeline names, relative to its file.
+
+    Raises
+    ------
+    ConfigError
+        Neither names one.
+    """
+    import os
+
+    from rislam_rt.errors import ConfigError
+
+    if option is not None:
+        return option
+    if spec.scene is None:
+        raise ConfigError(f"{pipeline}: scene: not given; add it, or give --scene DIR")
+    return Path(os.path.normpath(pipeline.parent / spec.scene))
 
 
 def parse_point(text: str, scene: "Scene") -> "Floats":

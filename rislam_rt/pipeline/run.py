@@ -11,7 +11,7 @@ import numpy as np
 
 from rislam_rt.backend import prepare_backend
 from rislam_rt.channel.protocol import Channel
-from rislam_rt.errors import ConfigError
+from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.model import (
     PathKind,
     Paths,
@@ -90,6 +90,8 @@ def run_slam(
     tell("trace", 1, 1)
     todo = [name for name in spec.schemes if name not in done]
     for name, scheme in run_side_by_side(run_scheme, todo, (scene, paths, spec, seeds), jobs, tell):
+        if isinstance(scheme, RislamError):
+            raise scheme
         done[name] = scheme
     return SlamResult(
         name=spec.name,

@@ -1,6 +1,6 @@
 """Tables for the terminal."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
     from rislam_rt.channel.compare import PathReport
     from rislam_rt.design import Design
+    from rislam_rt.pipeline.sweep import Row
 
 
 def print_summary(summary: Mapping[str, Any]) -> None:
@@ -107,6 +108,18 @@ def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"]) -
     if bound > 0.0:
         table.add_row("lower bound", "", "", f"{np.sqrt(bound):.4g}", "", style="dim")
     _show(title, table)
+
+
+def print_sweep(rows: Sequence["Row"]) -> None:
+    """One line a point of the axes and a scheme."""
+    keys = [setting.partition("=")[0].rpartition(".")[2] for setting in rows[0].settings]
+    table = Table(*keys, "scheme", "agent RMSE", "95 %", "runs", "diverged", "failed")
+    for row in rows:
+        interval = f"{row.interval[0]:.3f}-{row.interval[1]:.3f}" if row.interval else ""
+        overall = f"{row.overall:.3f} m" if row.rmse else "none"
+        counts = (str(len(row.rmse)), str(row.diverged), str(row.failed))
+        table.add_row(*(setting.partition("=")[2] for setting in row.settings), row.scheme, overall, interval, *counts)
+    _show("sweep", table)
 
 
 def print_scene(scene: Scene) -> None:
