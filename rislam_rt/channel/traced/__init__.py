@@ -13,8 +13,9 @@ How a trajectory of K cycles becomes few solves:
 - *refinement* (`course.py`) recomputes in float64, on the walls' planes, where the legs found run.
 """
 
+from rislam_rt.channel.traced.antennas import Antennas
 from rislam_rt.channel.traced.channel import TracedChannel
 from rislam_rt.channel.traced.limits import shortest_segment
 from rislam_rt.channel.traced.proof import BoxProof, trace_small_box
 
-__all__ = ["BoxProof", "TracedChannel", "shortest_segment", "trace_small_box"]
+__all__ = ["Antennas", "BoxProof", "TracedChannel", "shortest_segment", "trace_small_box"]

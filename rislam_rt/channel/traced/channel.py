@@ -2,10 +2,9 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.traced.antennas import Antennas
 from rislam_rt.channel.traced.course import refined_course, traced_course
 from rislam_rt.channel.traced.limits import room_center
 from rislam_rt.channel.traced.problem import Batch, Found, Problem, build_batch, join_found
@@ -19,6 +18,8 @@ from rislam_rt.ris import rephase
 
 BLOCK_ROWS = 200_000
 """Candidates traced at once: bounds the memory of a solve."""
+
+_ISOTROPIC = Antennas()
 
 
 class TracedChannel:
@@ -36,10 +37,15 @@ class TracedChannel:
         micrometres (a segment of a millimetre then has a direction of three digits, so reflection is computed on the
         refined points in either case).
 
+    antennas
+        Patterns and polarisation of the agent's antennas; by default both are isotropic and vertical.
+
     The channel holds the tracer's scene; `paths` may be called for any number of trajectories.
     """
 
-    def __init__(self, scene: Scene, radio: RadioConfig, depth: int = 2, *, refine: bool = True) -> None:
+    def __init__(
+        self, scene: Scene, radio: RadioConfig, depth: int = 2, *, refine: bool = True, antennas: Antennas = _ISOTROPIC
+    ) -> None:
         if depth < 0:
             raise ConfigError(f"depth: {depth} received; give the largest number of bounces, 0 or more")
         start_tracer()
@@ -49,20 +55,22 @@ class TracedChannel:
         self.radio = radio
         self.depth = depth
         self.refine = refine
+        self.antennas = antennas
         self.walls = build_walls(scene)
         self._sides = wall_sides(self.walls)
         self.stage = build_stage(self.walls, radio.carrier, room_center(scene))
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Every path of every cycle, with the panel at level 0."""
-        tx, rx = trajectory.tx, trajectory.rx
-        both = np.concatenate([tx, rx])
-        problems = [Problem(tx, rx)] + [Problem(both, point[None]) for point in self.scene.landmark_positions]
-        if self.scene.ris is not None:
-            problems[-1] = problems[-1]._replace(host=self.walls.host, front=self.scene.ris.spec.normal)
-        direct, *landmarks = self._trace(problems)
-        tx_legs = [_cycles(legs, slice(0, len(tx))) for legs in landmarks]
-        rx_legs = [_cycles(legs, slice(len(tx), None)) for legs in landmarks]
+        tx, rx, heading = trajectory.tx, trajectory.rx, trajectory.heading
+        problems = [Problem(tx, rx, heading, to_rx=True)]
+        for number, point in enumerate(self.scene.landmark_positions):
+            panel = self.scene.ris if number == len(self.scene.scatterers) else None
+            behind, front = (self.walls.host, panel.spec.normal) if panel is not None else (-1, None)
+            problems.append(Problem(tx, point[None], heading, host=behind, front=front))
+            problems.append(Problem(rx, point[None], heading, from_rx=True, host=behind, front=front))
+        direct, *legs = self._trace(problems)
+        tx_legs, rx_legs = legs[0::2], legs[1::2]
         source = "traced, refined" if self.refine else "traced"
         return compose_paths(self.scene, self.radio, self.walls, self.depth, direct, tx_legs, rx_legs, source)
 
@@ -82,15 +90,8 @@ class TracedChannel:
         from rislam_rt.channel.traced.visibility import visible_rows
 
         rows, vertices = visible_rows(self.stage, batch.all_sequences, batch.far, batch.device, candidates)
-        sequences, (device, far) = batch.all_sequences[rows.sequence], batch.ends(rows)
-        exact = refined_course(self.walls, sequences, device, far)
-        coefficient = leg_coefficients(self.stage, sequences, device, far, exact)
-        return Found(rows, exact if self.refine else traced_course(sequences, device, far, vertices), coefficient)
-
-
-def _cycles(legs: Legs, rows: slice) -> Legs:
-    """Some of the devices of a set of legs; sequences that none of them has stay as columns without a leg."""
-    return Legs(
-        legs.walls, legs.valid[rows], legs.length[rows], legs.at_device[rows], legs.at_far_end[rows],
-        legs.coefficient[rows], legs.vertices[rows],
-    )  # fmt: skip
+        sequences, ends = batch.all_sequences[rows.sequence], batch.ends(rows)
+        exact = refined_course(self.walls, sequences, ends.device, ends.far)
+        coefficient = leg_coefficients(self.stage, sequences, ends, exact, self.antennas)
+        course = exact if self.refine else traced_course(sequences, ends.device, ends.far, vertices)
+        return Found(rows, course, coefficient)

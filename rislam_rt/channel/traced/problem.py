@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.traced.course import Course
 from rislam_rt.channel.traced.limits import LIFT
@@ -23,6 +23,12 @@ class Problem(NamedTuple):
 
     device: Floats
     far: Floats
+    heading: Floats
+    """(N,) [rad] of the agent."""
+    from_rx: bool = False
+    """Whether the devices are the Rx (else the Tx)."""
+    to_rx: bool = False
+    """Whether the far ends are the Rx (else a landmark)."""
     host: int = -1
     """Wall behind a panel at the far end: no bounce on it next to the panel."""
     front: Floats | None = None
@@ -32,6 +38,21 @@ class Problem(NamedTuple):
     def paired(self) -> bool:
         """Whether every device has a far end of its own."""
         return len(self.far) != 1
+
+
+class Ends(NamedTuple):
+    """What the two ends of N legs are."""
+
+    device: Floats
+    """(N, 3) [m]."""
+    far: Floats
+    """(N, 3) [m]."""
+    heading: Floats
+    """(N,) [rad]."""
+    from_rx: Booleans
+    """(N,)."""
+    to_rx: Booleans
+    """(N,)."""
 
 
 class Found(NamedTuple):
@@ -76,10 +97,18 @@ class Batch(NamedTuple):
             first_far += len(problem.far)
             first_sequence += len(sequences)
 
-    def ends(self, rows: Rows) -> tuple[Floats, Floats]:
-        """Device and far end (N, 3) [m] of each row."""
+    def ends(self, rows: Rows) -> Ends:
+        """The two ends of each row."""
+        sizes = [len(problem.device) for problem in self.problems]
         far = np.concatenate([problem.far for problem in self.problems])
-        return self.device[rows.device], far[rows.far]
+        heading = np.concatenate([problem.heading for problem in self.problems])
+        from_rx, to_rx = (np.repeat(np.array(flag, dtype=np.bool_), sizes) for flag in self._flags())
+        device = rows.device
+        return Ends(self.device[device], far[rows.far], heading[device], from_rx[device], to_rx[device])
+
+    def _flags(self) -> tuple[list[bool], list[bool]]:
+        """Which problems start, and which end, at the Rx."""
+        return [problem.from_rx for problem in self.problems], [problem.to_rx for problem in self.problems]
 
     def legs(self, found: Found) -> list[Legs]:
         """The tracer's answers, problem by problem."""
