@@ -142,7 +142,8 @@ def test_unwritable_file_is_exit_4(run):
 
 
 def test_run_report_and_json(run, tmp_path):
-    code, out, _ = run("run", PIPELINE, *SHORT, "--json", "run.json", "--out", "mine")
+    one = ("--set", 'schemes=["random"]')
+    code, out, _ = run("run", PIPELINE, *SHORT, *one, "--json", "run.json", "--out", "mine")
     assert code == 0
     assert "agent" in out
     content = json.loads((tmp_path / "run.json").read_text())
@@ -152,6 +153,7 @@ def test_run_report_and_json(run, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "run.json"]
     page = tmp_path / "mine" / "report.html"
     first = page.read_bytes()
+    assert len(list((tmp_path / "mine" / "figures").glob("*.png"))) == 7
     code, again, _ = run("report", "mine")
     assert code == 0
     assert page.read_bytes() == first
