@@ -25,7 +25,7 @@ def _on_belief(method: str, panel: RisSpec, spec: PipelineSpec, settings: Settin
     def choose(belief: SlamEstimate, cycle: int, *, rng: np.random.Generator) -> RisCode:
         design = design_code(
             belief, panel, settings.radio, method=method, rng=rng, samples=section.samples, config=settings.design,
-            landmark_uncertainty=section.landmark_uncertainty,
+            landmark_uncertainty=section.landmark_uncertainty, least_snr=section.least_snr,
         )  # fmt: skip
         return design.code
 
@@ -41,7 +41,9 @@ def _on_truth(method: str, panel: RisSpec, room: Room, spec: PipelineSpec, setti
         prior = prior_from_covariance(belief.covariance[:2, :2])
         tx, rx = room.trajectory.tx[due], room.trajectory.rx[due]
         try:
-            problem = problem_from_paths(room.at(due), tx, rx, settings.radio, panel.levels, prior=prior)
+            problem = problem_from_paths(
+                room.at(due), tx, rx, settings.radio, panel.levels, prior=prior, least_snr=spec.design.least_snr
+            )
         except ConfigError:  # the panel is out of sight: any code will do
             return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)
         return designer(method)(problem, rng=rng, config=settings.design).code

@@ -82,6 +82,14 @@ class DesignSection(_Designers):  # type: ignore[misc, valid-type]
     """Positions of the belief over which the objective is averaged; 1 designs on the mean."""
     landmark_uncertainty: bool = False
     """Whether each landmark's covariance discounts its path."""
+    least_snr_db: Decibel | None = None
+    """SNR over all antennas at which the receiver detects a path every other time, for a design that knows what will be
+    missed; the paper's objective counts the information of every path."""
+
+    @property
+    def least_snr(self) -> float:
+        """Linear; 0 if there is none."""
+        return 0.0 if self.least_snr_db is None else _linear(self.least_snr_db)
 
 
 class BudgetSection(Section):
