@@ -124,14 +124,18 @@ def _panel_responses(
         # a point that is the panel itself has no plane: its zero normal mirrors nothing
         device = mirror(end, *plane_between(center, landmarks.position[seen]))
         coefficient = np.full(device.shape[:-1], np.sqrt(antenna_gain), dtype=np.complex128)
-        legs.append(leg_response(ris, center, device, coefficient, radio.wavelength))
-    return _ratio(landmarks, paths)[:, None, None] * legs[0] * legs[1]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            legs.append(leg_response(ris, center, device, coefficient, radio.wavelength))
+    # a belief may put the agent onto an element: that response means nothing, and must not spoil the others
+    response = _ratio(landmarks, paths)[:, None, None] * legs[0] * legs[1]
+    return np.where(np.isfinite(response), response, 0.0)
 
 
 def _point_gains(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, radio: RadioConfig) -> Complexes:
     """(B, Q) gains by eq. `a2`, two legs joined by the landmark's strength (root of its cross-section)."""
-    first = np.linalg.norm(landmarks.position[paths.tx_point] - tx, axis=-1)
-    second = np.linalg.norm(landmarks.position[paths.rx_point] - rx, axis=-1)
+    nearest = radio.wavelength  # a believed landmark may lie on the agent; the law ends about there
+    first = np.maximum(np.linalg.norm(landmarks.position[paths.tx_point] - tx, axis=-1), nearest)
+    second = np.maximum(np.linalg.norm(landmarks.position[paths.rx_point] - rx, axis=-1), nearest)
     strength = landmarks.strength[paths.source] * _ratio(landmarks, paths)
     amplitude = radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi) ** 1.5
     phase = np.exp(-2j * np.pi / radio.wavelength * (first + second))

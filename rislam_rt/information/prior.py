@@ -8,8 +8,13 @@ LEAST_VARIANCE = 1e-8
 """(0.1 mm)^2: no belief about a position is taken for better than this, nor inverted when it has collapsed."""
 
 
+MOST_VARIANCE = 1e6
+"""(1 km)^2: what is less certain than this, or not finite, counts as known to this."""
+
+
 def prior_from_covariance(covariance: Floats) -> Floats:
-    """Information (..., D, D) [1/m^2] of covariances (..., D, D) [m^2], their eigenvalues held above (0.1 mm)^2."""
+    """Information (..., D, D) [1/m^2] of covariances (..., D, D) [m^2], held between (0.1 mm)^2 and (1 km)^2."""
+    covariance = np.clip(np.nan_to_num(covariance, nan=MOST_VARIANCE), -MOST_VARIANCE, MOST_VARIANCE)
     value, vector = np.linalg.eigh(0.5 * (covariance + np.swapaxes(covariance, -1, -2)))
     return (vector / np.maximum(value, LEAST_VARIANCE)[..., None, :]) @ np.swapaxes(vector, -1, -2)
 

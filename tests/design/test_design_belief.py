@@ -83,3 +83,18 @@ def test_uncertain_landmarks_are_worth_less(make_belief, make_spec, radio, rng):
     )  # fmt: skip
     assert uncertain.crlb > certain.crlb
     np.testing.assert_array_equal(uncertain.code.index, certain.code.index)
+
+
+def test_absurd_beliefs_give_a_code_and_no_nan(make_belief, make_spec, radio, rng):
+    """Agent on the panel or on the sphere, on an image; a covariance gone to zero or to infinity."""
+    belief = make_belief(POSITION, rng)
+    tx_offset = belief.body.ends(np.zeros(3), np.array(belief.heading))[0]
+    element = np.array([3.0, 3.0, 3.0]) + make_spec().offsets()[2, 4]
+    places = [p - tx_offset for p in (belief.map.position[0], belief.map.position[1], belief.map.position[3], element)]
+    covariances = [np.zeros((6, 6)), np.full((6, 6), np.inf), belief.covariance]
+    for place in places:
+        for covariance in covariances:
+            odd = replace(belief, position=place, samples=np.tile(place, (3, 1)), covariance=covariance)
+            for method in ("genetic", "coordinate"):
+                design = design_code(odd, make_spec(), radio, method=method, rng=rng)
+                assert not np.isnan([design.crlb, design.bound, design.gain_db, design.gap_db]).any()
