@@ -191,14 +191,7 @@ def build_landmark_model(
         path meets; `images`: every landmark and every image of it is a point of its own, as a filter without walls
         holds them.
     """
-    depth_tx, depth_rx = paths.tx_walls, paths.rx_walls[:, ::-1]
-    keys: dict[tuple[int, ...], int] = {}
-    seen = np.full((2, paths.num_paths), -1, dtype=np.int64)
-    for path in np.flatnonzero(paths.landmark >= 0):
-        for side, sequence in enumerate((depth_tx[path], depth_rx[path])):
-            # from the device outwards: the wall nearest to the landmark mirrors it first
-            order = tuple(int(w) for w in sequence[sequence >= 0][::-1])
-            seen[side, path] = keys.setdefault((int(paths.landmark[path]), *order), len(keys))
+    keys, seen = _points_seen(paths)
     names = [paths.landmarks[key[0]] + "".join(f" | {paths.walls[w]}" for w in key[1:]) for key in keys]
     met = sorted({w for key in keys for w in key[1:]})
     column = np.full(len(wall_offset), -1, dtype=np.int64)
@@ -228,3 +221,15 @@ def build_landmark_model(
         paths, motion, radio, tuple(labels), seen[0], seen[1], point, jacobian, walls,
         wall_normal, wall_offset, column,
     )  # fmt: skip
+
+
+def _points_seen(paths: Paths) -> tuple[list[tuple[int, ...]], Integers]:
+    """Fixed points as (landmark, walls that mirror it in turn), and which one Tx and Rx of each path see (2, P)."""
+    keys: dict[tuple[int, ...], int] = {}
+    seen = np.full((2, paths.num_paths), -1, dtype=np.int64)
+    for path in np.flatnonzero(paths.landmark >= 0):
+        for side, sequence in enumerate((paths.tx_walls[path], paths.rx_walls[path, ::-1])):
+            # from the device outwards: the wall nearest to the landmark mirrors it first
+            order = tuple(int(w) for w in sequence[sequence >= 0][::-1])
+            seen[side, path] = keys.setdefault((int(paths.landmark[path]), *order), len(keys))
+    return list(keys), seen
