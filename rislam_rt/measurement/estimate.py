@@ -22,8 +22,10 @@ ROUNDS = 40
 SEARCH_STEPS = 2
 """Refinements a round: enough for the residual of the next one, since every round refines all paths again."""
 FINAL_STEPS = 12
-TRIAL_STEPS = 2
-"""Refinements of the other paths after one was taken out, before the costs are compared."""
+FINAL_TOLERANCE = 0.01
+"""Noise energy that the last step may leave: a tenth of a standard deviation."""
+TRIAL_STEPS = 6
+"""Most refinements of the other paths after one was taken out, before the costs are compared."""
 SLACK = 0.1
 """How far (B tau, u, v) may leave the window and the sky during the search, so that paths on the edge do not stick."""
 
@@ -63,6 +65,7 @@ def estimate_paths(
         fit = grown
     fit = refine(sounding, fit, samples, steps=FINAL_STEPS)
     fit = _prune(sounding, _drop(sounding, fit, samples, threshold, window), samples, threshold)
+    fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
     return Estimate(fit, accuracy(fit))
 
 
@@ -94,8 +97,10 @@ def _prune(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float) -
         if certainty[weakest] >= threshold:
             return fit
         rest = np.delete(fit.parameters, weakest, axis=0)
-        trial = refine(sounding, fit_amplitudes(sounding, rest, samples), samples, steps=TRIAL_STEPS)
-        if trial.cost < fit.cost + threshold:
+        enough = fit.cost + threshold
+        trial = fit_amplitudes(sounding, rest, samples)
+        trial = refine(sounding, trial, samples, steps=TRIAL_STEPS, enough=enough)
+        if trial.cost < enough:
             fit = trial
         else:
             tried = np.concatenate([tried, fit.parameters[weakest : weakest + 1]])

@@ -67,10 +67,18 @@ def fit_amplitudes(sounding: Sounding, parameters: Floats, samples: Complexes) -
     return Fit(parameters, parts, inner, waves, amplitude, residual, float(np.vdot(residual, residual).real))
 
 
-def refine(sounding: Sounding, fit: Fit, samples: Complexes, *, steps: int, tolerance: float = 0.1) -> Fit:
-    """Up to so many damped Gauss-Newton steps, ending when one promises less than `tolerance` of noise energy."""
-    damping = 1e-3
-    for _ in range(steps):
+def refine(
+    sounding: Sounding, fit: Fit, samples: Complexes, *, steps: int, tolerance: float = 0.1, enough: float = 0.0
+) -> Fit:
+    """Up to so many damped Gauss-Newton steps.
+
+    They end when one promises less than `tolerance` of noise energy; with `enough`, also when the cost has come below
+    it, or would not if every step left gained as much as the last.
+    """
+    damping, gained = 1e-3, np.inf
+    for left in range(steps, 0, -1):
+        if enough and not 0.0 < fit.cost - enough < left * gained:
+            return fit
         information, _ = information_matrix(fit.inner, fit.amplitude)
         gradient = np.real(fit.amplitude.conj() * _slopes(sounding, fit)).ravel()
         while damping < 1e3:
@@ -79,6 +87,7 @@ def refine(sounding: Sounding, fit: Fit, samples: Complexes, *, steps: int, tole
                 return fit
             trial = fit_amplitudes(sounding, fit.parameters + _limited(step), samples)
             if trial.cost < fit.cost:
+                gained = fit.cost - trial.cost
                 fit, damping = trial, max(0.1 * damping, 1e-6)
                 break
             damping *= 10.0
