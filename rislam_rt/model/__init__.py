@@ -6,7 +6,7 @@ from rislam_rt.model.paths import PathKind, Paths, RisLegs
 from rislam_rt.model.radio import RadioConfig, RxArray
 from rislam_rt.model.result import NOTHING, STEPS, SchemeResult, SlamResult
 from rislam_rt.model.ris import RisCode, RisPanel, RisSpec
-from rislam_rt.model.scene import Material, Reflector, Scatterer, Scene
+from rislam_rt.model.scene import Material, Reflector, Scatterer, Scene, Shade
 from rislam_rt.model.trajectory import Body, Trajectory
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "Scatterer",
     "Scene",
     "SchemeResult",
+    "Shade",
     "SlamEstimate",
     "SlamResult",
     "Trajectory",

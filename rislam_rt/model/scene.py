@@ -1,6 +1,6 @@
 """A room: reflecting meshes, point scatterers, at most one panel, and the agent's true motion."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -43,14 +43,25 @@ class Reflector:
     material: Material
 
     def __post_init__(self) -> None:
-        freeze(self, "vertices", np.float64, (None, 3))
-        freeze(self, "faces", np.int64, (None, 3))
-        if len(self.faces) == 0:
-            raise SceneError(f"reflector '{self.name}': the mesh has no faces")
-        if self.faces.min() < 0 or self.faces.max() >= len(self.vertices):
-            raise SceneError(
-                f"reflector '{self.name}': a face names vertex {int(self.faces.max())} of {len(self.vertices)}"
-            )
+        _freeze_mesh(self, f"reflector '{self.name}'")
+
+    @property
+    def triangles(self) -> Floats:
+        """(F, 3, 3) [m]: face, corner, xyz."""
+        return self.vertices[self.faces]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shade:
+    """An opaque mesh that hides what lies behind it and reflects nothing."""
+
+    vertices: Floats
+    """(V, 3) [m]."""
+    faces: Any
+    """(F, 3) indices into `vertices`."""
+
+    def __post_init__(self) -> None:
+        _freeze_mesh(self, "shade")
 
     @property
     def triangles(self) -> Floats:
@@ -60,20 +71,39 @@ class Reflector:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scatterer:
-    """A small object that re-radiates in all directions. It shades nothing unless it has a mesh."""
+    """A small object that re-radiates in all directions. It shades nothing unless it has a shade."""
 
     name: str
     position: Floats
     """(3,) [m]."""
     rcs: float
-    """Radar cross-section [m^2]."""
+    """Radar cross-section [m^2]; where `law` makes it depend on the carrier or on directions, its nominal value."""
     radius: float | None = None
-    """Radius [m] of a sphere, if it is one."""
+    """Radius [m] of a sphere or cylinder, if it is one."""
+    law: str = "constant"
+    """`constant`: `rcs` for all directions; `mie`: a sphere's exact value at the carrier; `cylinder`: that of a
+    cylinder by physical optics, for each pair of directions."""
+    height: float | None = None
+    """Length [m] of a cylinder along its axis."""
+    axis: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    """(3,) unit vector along a cylinder."""
+    shade: Shade | None = None
+    """What it hides; its own centre it does not hide."""
 
     def __post_init__(self) -> None:
         freeze(self, "position", np.float64, (3,))
+        freeze(self, "axis", np.float64, (3,))
+        place = f"scatterer '{self.name}'"
         if not self.rcs > 0.0:
-            raise SceneError(f"scatterer '{self.name}': cross-section {self.rcs} m^2 received; give a positive one")
+            raise SceneError(f"{place}: cross-section {self.rcs} m^2 received; give a positive one")
+        if self.law not in ("constant", "mie", "cylinder"):
+            raise SceneError(f"{place}: law '{self.law}' received; give 'constant', 'mie' or 'cylinder'")
+        if self.law == "mie" and (self.radius is None or self.height is not None):
+            raise SceneError(f"{place}: the Mie series is a sphere's; give a radius and no height")
+        if self.law == "cylinder" and (self.radius is None or self.height is None):
+            raise SceneError(f"{place}: a cylinder needs a radius and a height; give both")
+        if abs(np.linalg.norm(self.axis) - 1.0) > 1e-9:
+            raise SceneError(f"{place}: axis {self.axis.tolist()} received; give a unit vector")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,3 +134,13 @@ class Scene:
         """(2, 3) [m]: lowest and highest corner of all reflectors."""
         points = np.concatenate([r.vertices for r in self.reflectors]) if self.reflectors else np.zeros((1, 3))
         return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+def _freeze_mesh(mesh: Any, place: str) -> None:
+    """Check and freeze `vertices` and `faces`."""
+    freeze(mesh, "vertices", np.float64, (None, 3))
+    freeze(mesh, "faces", np.int64, (None, 3))
+    if len(mesh.faces) == 0:
+        raise SceneError(f"{place}: the mesh has no faces")
+    if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
+        raise SceneError(f"{place}: a face names vertex {int(mesh.faces.max())} of {len(mesh.vertices)}")

@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene
+from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade
 from rislam_rt.scene.check import find_errors, find_warnings
 from rislam_rt.scene.findings import Fault, Finding, raise_errors
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, parse_mesh, read_inside
 from rislam_rt.scene.motion import build_motion
 from rislam_rt.scene.schema import MaterialSection, ReflectorSection, RisSection, ScattererSection, SceneSpec, read_spec
+from rislam_rt.scene.solids import solid_mesh
 
 SCENE_FILE = "scene.toml"
 
@@ -79,6 +80,12 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
             reflectors.append(_reflector(section, folder, contents))
         except Fault as fault:
             findings.append(fault.at(str(file), f"reflector[{number}].mesh ({section.name})"))
+    scatterers = []
+    for number, scatterer in enumerate(spec.scatterer):
+        try:
+            scatterers.append(_scatterer(scatterer, folder, contents))
+        except Fault as fault:
+            findings.append(fault.at(str(file), f"scatterer[{number}].mesh ({scatterer.name})"))
     panel = None
     try:
         panel = _panel(spec.ris) if spec.ris else None
@@ -90,20 +97,22 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
         findings.append(fault.at(str(file), "agent"))
     if findings:
         return Draft(str(file), None, findings)
-    scatterers = tuple(_scatterer(section) for section in spec.scatterer)
-    return Draft(
-        str(file), Scene(spec.name, tuple(reflectors), scatterers, panel, agent, _digest(content, contents)), []
-    )
+    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), panel, agent, _digest(content, contents))
+    return Draft(str(file), scene, [])
 
 
 def _reflector(section: ReflectorSection, folder: Path, contents: dict[str, bytes]) -> Reflector:
-    name, _, node = section.mesh.partition("#")
+    mesh = _mesh(section.mesh, section.up_axis, folder, contents)
+    return Reflector(section.name, mesh.vertices, mesh.faces, _material(section.material))
+
+
+def _mesh(place: str, up_axis: str, folder: Path, contents: dict[str, bytes]) -> Mesh:
+    """The mesh `file` or `file#node`; every file is read once and kept for the digest."""
+    name, _, node = place.partition("#")
     if name not in contents:
         contents[name] = read_inside(folder, name, MAX_MESH_BYTES)
     mesh = parse_mesh(contents[name], name, node or None)
-    if section.up_axis == "y":
-        mesh = _z_up(mesh)
-    return Reflector(section.name, mesh.vertices, mesh.faces, _material(section.material))
+    return _z_up(mesh) if up_axis == "y" else mesh
 
 
 def _z_up(mesh: Mesh) -> Mesh:
@@ -118,10 +127,25 @@ def _material(section: MaterialSection) -> Material:
     return Material(section.reflection, section.itu, section.thickness_m)
 
 
-def _scatterer(section: ScattererSection) -> Scatterer:
-    """The paper's sphere has the cross-section pi r^2, unless the file gives another one."""
-    rcs = section.rcs_m2 if section.rcs_m2 is not None else np.pi * (section.radius or 0.0) ** 2
-    return Scatterer(section.name, np.array(section.position), rcs, section.radius)
+def _scatterer(section: ScattererSection, folder: Path, contents: dict[str, bytes]) -> Scatterer:
+    """The paper's sphere has the cross-section pi r^2, unless the file gives another one.
+
+    A cylinder's nominal one, pi r h / 2, is the mean of its backscattering over all directions.
+    """
+    position, radius, height = np.array(section.position), section.radius, section.height_m
+    axis = unit(np.array(section.axis)) if section.axis is not None else np.array([0.0, 0.0, 1.0])
+    law, rcs = ("mie" if section.mie else "constant"), section.rcs_m2
+    if rcs is None and height is not None:
+        law, rcs = "cylinder", np.pi * (radius or 0.0) * height / 2.0
+    elif rcs is None:
+        rcs = np.pi * (radius or 0.0) ** 2
+    mesh = None
+    if section.mesh is not None:
+        mesh = _mesh(section.mesh, section.up_axis, folder, contents)
+    elif section.shadow:
+        mesh = solid_mesh(position, radius or 0.0, height, axis)
+    shade = None if mesh is None else Shade(mesh.vertices, mesh.faces)
+    return Scatterer(section.name, position, rcs, radius, law, height, axis, shade)
 
 
 def _panel(section: RisSection) -> RisPanel:

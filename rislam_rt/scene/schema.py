@@ -59,17 +59,36 @@ class ReflectorSection(Section):
 
 
 class ScattererSection(Section):
-    """A small object: a sphere by its `radius` (cross-section pi r^2) or a point by its `rcs_m2`."""
+    """A small object: a sphere by its `radius` (cross-section pi r^2, or by `mie` the exact series), a cylinder by
+    `radius` and `height_m`, or a point by its `rcs_m2`.
+
+    It shades nothing, unless `shadow` asks for the shadow of its own shape or `mesh` gives a shape (PLY, OBJ, STL or
+    GLB in the room's frame, as a reflector's).
+    """
 
     name: Name
     position: Vector
     radius: Length | None = None
     rcs_m2: Length | None = None
+    mie: bool = False
+    height_m: Length | None = None
+    axis: Vector | None = None
+    shadow: bool = False
+    mesh: str | None = None
+    up_axis: Literal["y", "z"] = "z"
 
     @model_validator(mode="after")
     def _one_size(self) -> "ScattererSection":
         if self.radius is None and self.rcs_m2 is None:
             raise ValueError("give 'radius' or 'rcs_m2'")
+        if self.radius is None and (self.mie or self.height_m is not None or self.shadow):
+            raise ValueError("'mie', 'height_m' and 'shadow' need a 'radius'")
+        if self.mie and (self.height_m is not None or self.rcs_m2 is not None):
+            raise ValueError("'mie' is for spheres whose cross-section is not given")
+        if self.axis is not None and (self.height_m is None or not any(self.axis)):
+            raise ValueError("'axis' is a cylinder's direction: give it a length, and 'height_m' beside it")
+        if self.shadow and self.mesh is not None:
+            raise ValueError("give either 'shadow' or 'mesh'")
         return self
 
 

@@ -11,9 +11,10 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError, StoreError
-from rislam_rt.model import Material, Scene, Trajectory
+from rislam_rt.model import Material, Scatterer, Scene, Trajectory
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
+from rislam_rt.scene.solids import solid_mesh
 
 TRAJECTORY_FILE = "path.tum"
 
@@ -31,6 +32,9 @@ def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) ->
         The disk refused.
     """
     files = {f"meshes/{r.name}.ply": ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
+    for scatterer in scene.scatterers:
+        if scatterer.shade is not None and not _has_own_shadow(scatterer):
+            files[_shade_file(scatterer)] = ply_bytes(scatterer.shade.vertices, scatterer.shade.faces)
     agent = _agent_table(scene.agent)
     if "trajectory" in agent:
         files[TRAJECTORY_FILE] = tum_bytes(scene.agent.time, scene.agent.position, scene.agent.heading)
@@ -128,12 +132,7 @@ def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
         {"name": r.name, "mesh": f"meshes/{r.name}.ply", "material": _material_table(r.material)}
         for r in scene.reflectors
     ]
-    table["scatterer"] = [
-        {"name": s.name, "position": s.position.tolist()}
-        | ({"radius": s.radius} if s.radius is not None else {})
-        | ({"rcs_m2": s.rcs} if s.radius is None or s.rcs != np.pi * s.radius**2 else {})
-        for s in scene.scatterers
-    ]
+    table["scatterer"] = [_scatterer_table(scatterer) for scatterer in scene.scatterers]
     if scene.ris is not None:
         spec = scene.ris.spec
         table["ris"] = {"name": scene.ris.name, "center": scene.ris.center.tolist()}
@@ -143,6 +142,36 @@ def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
         table["ris"] |= {"host": scene.ris.host} if scene.ris.host else {}
     table["agent"] = agent
     return {key: value for key, value in table.items() if value != []}
+
+
+def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
+    """A cross-section is written where it does not follow from shape and law."""
+    radius, table = scatterer.radius, {"name": scatterer.name, "position": scatterer.position.tolist()}
+    table |= {"radius": radius} if radius is not None else {}
+    if scatterer.height is not None:
+        table |= {"height_m": scatterer.height, "axis": scatterer.axis.tolist()}
+    if scatterer.law == "mie":
+        table["mie"] = True
+    elif scatterer.law == "constant" and (
+        radius is None or scatterer.height is not None or scatterer.rcs != np.pi * radius**2
+    ):
+        table["rcs_m2"] = scatterer.rcs
+    if scatterer.shade is not None:
+        table |= {"shadow": True} if _has_own_shadow(scatterer) else {"mesh": _shade_file(scatterer)}
+    return table
+
+
+def _has_own_shadow(scatterer: Scatterer) -> bool:
+    """Whether the shade is the one that `shadow = true` makes."""
+    if scatterer.shade is None or scatterer.radius is None:
+        return False
+    mesh = solid_mesh(scatterer.position, scatterer.radius, scatterer.height, scatterer.axis)
+    shade = scatterer.shade
+    return np.array_equal(mesh.vertices, shade.vertices) and np.array_equal(mesh.faces, shade.faces)
+
+
+def _shade_file(scatterer: Scatterer) -> str:
+    return f"meshes/{scatterer.name}.ply"
 
 
 def _material_table(material: Material) -> dict[str, Any]:

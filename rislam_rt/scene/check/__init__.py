@@ -4,6 +4,7 @@ from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.scene.check.agent import agent_errors, agent_warnings
 from rislam_rt.scene.check.meshes import face_errors, mesh_warnings, name_errors, scatterer_errors
 from rislam_rt.scene.check.panel import panel_errors, panel_warnings
+from rislam_rt.scene.check.shades import cylinder_warnings, shade_errors, shade_face_errors
 from rislam_rt.scene.check.soup import build_soup
 from rislam_rt.scene.findings import Finding
 
@@ -13,8 +14,9 @@ __all__ = ["find_errors", "find_warnings"]
 def find_errors(scene: Scene, file: str) -> list[Finding]:
     """What makes a scene unusable. Damaged meshes hide the rest, which could not be computed."""
     soup = build_soup(scene, file)
-    return [*name_errors(soup), *face_errors(soup)] or [
+    return [*name_errors(soup), *face_errors(soup), *shade_face_errors(soup)] or [
         *scatterer_errors(soup),
+        *shade_errors(soup),
         *panel_errors(soup),
         *agent_errors(soup),
     ]
@@ -23,4 +25,9 @@ def find_errors(scene: Scene, file: str) -> list[Finding]:
 def find_warnings(scene: Scene, file: str, radio: RadioConfig) -> list[Finding]:
     """What may be meant but seldom is, of a scene whose meshes are not damaged."""
     soup = build_soup(scene, file)
-    return [*mesh_warnings(soup), *panel_warnings(soup, radio), *agent_warnings(soup, radio)]
+    return [
+        *mesh_warnings(soup),
+        *panel_warnings(soup, radio),
+        *cylinder_warnings(soup, radio),
+        *agent_warnings(soup, radio),
+    ]

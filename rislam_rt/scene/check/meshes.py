@@ -6,11 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from rislam_rt.scene.check.probe import touching
-from rislam_rt.scene.check.soup import MIN_CLEARANCE, Soup
+from rislam_rt.scene.check.soup import MIN_CLEARANCE, Soup, without_area
 from rislam_rt.scene.findings import Finding
-
-MIN_ALTITUDE = 1e-6
-"""[m] A triangle with a smaller height has no usable normal."""
 
 
 def name_errors(soup: Soup) -> Iterator[Finding]:
@@ -23,10 +20,7 @@ def name_errors(soup: Soup) -> Iterator[Finding]:
 
 def face_errors(soup: Soup) -> Iterator[Finding]:
     """Faces without area."""
-    edges = np.roll(soup.triangles, -1, axis=1) - soup.triangles
-    longest = np.linalg.norm(edges, axis=-1).max(axis=1)
-    double_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
-    bad = double_area <= MIN_ALTITUDE * longest
+    bad = without_area(soup.triangles)
     for number in np.unique(soup.owner[bad]):
         name, mine = soup.scene.reflectors[number].name, bad[soup.owner == number]
         message = f"{int(mine.sum())} faces without area, the first is face {int(np.argmax(mine))}"

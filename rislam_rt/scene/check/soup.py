@@ -4,12 +4,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Scene
 from rislam_rt.scene.findings import Finding
 
 MIN_CLEARANCE = 1e-3
 """[m] A device or scatterer nearer to a surface loses that surface's reflection."""
+
+
+MIN_ALTITUDE = 1e-6
+"""[m] A triangle with a smaller height has no usable normal."""
 
 
 class Soup(NamedTuple):
@@ -48,3 +52,11 @@ def build_soup(scene: Scene, file: str) -> Soup:
     owner = np.repeat(np.arange(len(scene.reflectors)), [len(r.faces) for r in scene.reflectors])
     corners = triangles.reshape(-1, 3)
     return Soup(file, scene, triangles, owner, np.stack([corners.min(axis=0), corners.max(axis=0)]))
+
+
+def without_area(triangles: Floats) -> Booleans:
+    """Which triangles (T, 3, 3) are no more than a line."""
+    edges = np.roll(triangles, -1, axis=1) - triangles
+    longest = np.linalg.norm(edges, axis=-1).max(axis=1)
+    double_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
+    return double_area <= MIN_ALTITUDE * longest
