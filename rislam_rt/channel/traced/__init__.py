@@ -15,7 +15,17 @@ How a trajectory of K cycles becomes few solves:
 
 from rislam_rt.channel.traced.antennas import Antennas
 from rislam_rt.channel.traced.channel import TracedChannel
+from rislam_rt.channel.traced.extras import ExtraConfig, ExtraKind, ExtraPaths
 from rislam_rt.channel.traced.limits import shortest_segment
 from rislam_rt.channel.traced.proof import BoxProof, trace_small_box
 
-__all__ = ["Antennas", "BoxProof", "TracedChannel", "shortest_segment", "trace_small_box"]
+__all__ = [
+    "Antennas",
+    "BoxProof",
+    "ExtraConfig",
+    "ExtraKind",
+    "ExtraPaths",
+    "TracedChannel",
+    "shortest_segment",
+    "trace_small_box",
+]

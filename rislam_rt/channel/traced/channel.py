@@ -6,6 +6,7 @@ from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.traced.antennas import Antennas
 from rislam_rt.channel.traced.course import refined_course, traced_course
+from rislam_rt.channel.traced.extras import ExtraConfig, ExtraPaths, trace_extras
 from rislam_rt.channel.traced.limits import room_center
 from rislam_rt.channel.traced.problem import Batch, Found, Problem, build_batch, join_found
 from rislam_rt.channel.traced.rows import Rows, in_blocks
@@ -77,6 +78,10 @@ class TracedChannel:
     def respond(self, paths: Paths, code: RisCode) -> Paths:
         """The same paths under another code, without tracing again."""
         return rephase(paths, code)
+
+    def extra_paths(self, trajectory: Trajectory, config: ExtraConfig) -> ExtraPaths:
+        """Diffuse scattering and diffraction, if switched on: paths without an analytic twin, apart from `paths`."""
+        return trace_extras(self.scene, self.radio, trajectory, config)
 
     def _trace(self, problems: Sequence[Problem]) -> list[Legs]:
         """Solve all problems together, block by block."""

@@ -81,7 +81,9 @@ def build_stage(walls: Walls, carrier: float, origin: Floats) -> Stage:
     members = [np.flatnonzero(material_of_triangle == m) for m in range(len(materials))]
     objects = [
         rt.SceneObject(
-            _mesh(f"walls-{m}", walls.triangles[rows] - origin), f"walls-{m}", radio_material=_material(material, m)
+            build_mesh(f"walls-{m}", walls.triangles[rows] - origin),
+            f"walls-{m}",
+            radio_material=_material(material, m),
         )
         for m, (material, rows) in enumerate(zip(materials, members, strict=True))
     ]
@@ -140,7 +142,7 @@ def as_points(points: Floats) -> mi.Point3f:
     return mi.Point3f(*(mi.Float(np.ascontiguousarray(column, dtype=np.float32)) for column in points.T))
 
 
-def _mesh(name: str, triangles: Floats) -> mi.Mesh:
+def build_mesh(name: str, triangles: Floats) -> mi.Mesh:
     """A mesh of separate triangles (T, 3, 3), in their order."""
     mesh = mi.Mesh(
         name, vertex_count=3 * len(triangles), face_count=len(triangles), has_vertex_normals=False,

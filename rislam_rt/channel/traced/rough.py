@@ -1,0 +1,51 @@
+"""Walls that also scatter and whose edges diffract: radio materials for what has no analytic twin."""
+
+from typing import Any
+
+import mitsuba as mi
+import sionna.rt as rt
+from sionna.rt.utils import jones_matrix_from_real_imag
+
+from rislam_rt.errors import SceneError
+from rislam_rt.model import Material
+
+_LOSS = 0.1
+"""[S/m] Conductivity that keeps the back of a 10 m slab from being seen."""
+
+
+class RoughConstantReflection(rt.RadioMaterial):  # type: ignore[misc]
+    """A wall of constant R with Sionna's scattering and diffraction.
+
+    Specular and diffuse reflection share R as `sqrt(1 - S^2)` and `S`. Edges diffract like those of a lossy half-space
+    that reflects R at normal incidence: the theory of diffraction asks for Fresnel coefficients.
+    """
+
+    def __init__(self, name: str, reflection: float, scattering: float) -> None:
+        index = (1.0 + reflection) / max(1.0 - reflection, 1e-4)
+        super().__init__(
+            name,
+            thickness=10.0,
+            relative_permittivity=index**2,
+            conductivity=_LOSS * index,
+            scattering_coefficient=scattering,
+        )
+        self._reflection = reflection
+
+    def _event_probabilities(self, r_te: Any, r_tm: Any, t_te: Any, t_tm: Any, enabled_interactions: Any) -> Any:
+        """Nothing passes; the rest is Sionna's."""
+        r, t = mi.Complex2f(self._reflection), mi.Complex2f(0.0)  # type: ignore[operator]
+        return super()._event_probabilities(r, r, t, t, enabled_interactions)
+
+    def _specular_reflection_transmission_matrix(self, *_: Any) -> Any:
+        """R between the bases of the incident and the reflected ray, as `ConstantReflection` has it."""
+        return jones_matrix_from_real_imag(mi.Matrix2f(self._reflection), mi.Matrix2f(0.0))
+
+
+def rough_material(material: Material, number: int, scattering: float) -> rt.RadioMaterialBase:
+    """The radio material of a wall with scattering coefficient S in [0, 1]."""
+    if material.reflection is not None:
+        return RoughConstantReflection(f"rough-{number}", material.reflection, scattering)
+    try:
+        return rt.ITURadioMaterial(f"itu-{number}", material.itu, material.thickness, scattering_coefficient=scattering)
+    except ValueError as error:
+        raise SceneError(f"material.itu: '{material.itu}' received; {error}") from None
