@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.channel.cross_section import cross_section
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SPEED_OF_LIGHT
@@ -44,10 +45,11 @@ def compose_paths(
             assert scene.ris is not None
             ris_legs = _panel_responses(scene, radio, tx, rx)
         else:
-            join = np.sqrt(4.0 * np.pi * scene.scatterers[number].rcs) / radio.wavelength
-            gain_t = tx.gain(radio.wavelength)[:, block["tx_leg"]]
-            gain_r = rx.gain(radio.wavelength)[:, block["rx_leg"]]
-            block["gain"] = gain_t * gain_r * join * np.sqrt(radio.tx_gain * radio.rx_gain)
+            i, j = block["tx_leg"], block["rx_leg"]
+            rcs = cross_section(scene.scatterers[number], radio.wavelength, tx.at_far_end[:, i], rx.at_far_end[:, j])
+            join = np.sqrt(4.0 * np.pi * rcs) / radio.wavelength
+            gain = tx.gain(radio.wavelength)[:, i] * rx.gain(radio.wavelength)[:, j]
+            block["gain"] = gain * join * np.sqrt(radio.tx_gain * radio.rx_gain)
             block["tx_leg"] = np.full(len(block["kind"]), -1)
             block["rx_leg"] = np.full(len(block["kind"]), -1)
         blocks.append(block)

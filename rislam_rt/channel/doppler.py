@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.channel.cross_section import cross_section
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z, unit
@@ -74,20 +75,22 @@ def advance_paths(
     code
         The panel's code, level 0 if none is given.
 
-    Delays, directions, vertices, spreading loss and carrier phase are exact, those of the panel element by element.
+    Delays, directions, vertices, spreading loss, cross-sections and carrier phase are exact, those of the panel element
+    by element.
     Which paths exist, and reflection coefficients, are held: within a cycle an agent moves by millimetres. No trace.
     """
     walls, later = build_walls(scene), advance_trajectory(trajectory, elapsed)
     before, after = _rays(paths, scene, walls, trajectory), _rays(paths, scene, walls, later)
     turned = np.exp(-2j * np.pi / radio.wavelength * (after.length - before.length))
     valid, points = paths.valid, _vertices(paths, walls, later, after)
+    strength = _strength(paths, scene, walls, later, radio.wavelength, over=trajectory)
     moved = replace(
         paths,
         tau=np.where(valid, after.length / SPEED_OF_LIGHT, 0.0),
         departure=np.where(valid[..., None], after.departure, 0.0),
         arrival=np.where(valid[..., None], after.arrival, 0.0),
         vertices=np.where(valid[..., None, None], points, 0.0),
-        gain=paths.gain * turned * before.spreading / after.spreading,
+        gain=paths.gain * turned * strength * before.spreading / after.spreading,
         ris=None if paths.ris is None else _panel_legs(paths, scene, walls, radio, trajectory, later),
     )
     if scene.ris is None:
@@ -122,6 +125,23 @@ def _rays(paths: Paths, scene: Scene, walls: Walls, trajectory: Trajectory) -> _
         unit(ahead),
         unit(back),
     )
+
+
+def _strength(
+    paths: Paths, scene: Scene, walls: Walls, trajectory: Trajectory, wavelength: float, *, over: Trajectory
+) -> Floats:
+    """Factor (K, P) on the gain from cross-sections that depend on directions, against an earlier `over`."""
+    factor = np.ones(paths.valid.shape)
+    for number, scatterer in enumerate(scene.scatterers):
+        mine = np.flatnonzero(paths.landmark == number)
+        values = []
+        for motion in (over, trajectory):
+            ends = ((motion.tx, paths.tx_walls[mine]), (motion.rx, paths.rx_walls[mine, ::-1]))
+            images = [_mirrored(np.repeat(end[:, None], len(mine), axis=1), walls, seq) for end, seq in ends]
+            values.append(cross_section(scatterer, wavelength, *(unit(p - scatterer.position) for p in images)))
+        dark = values[0] == 0.0
+        factor[:, mine] = np.where(dark, 0.0, np.sqrt(values[1] / np.where(dark, 1.0, values[0])))
+    return factor
 
 
 def _vertices(paths: Paths, walls: Walls, trajectory: Trajectory, rays: _Rays) -> Floats:

@@ -9,16 +9,12 @@ from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.model import Scene
 
 
-def with_exact_spheres(scene: Scene, wavelength: float) -> Scene:
-    """The scene with every sphere's cross-section replaced by the exact one for backscatter at `wavelength` [m].
+def with_exact_spheres(scene: Scene) -> Scene:
+    """The scene with every sphere's cross-section left to the Mie series, as by `mie = true` in its file.
 
-    Scatterers given by a cross-section, not by a radius, stay as they are. One value serves all directions, as in
-    eq. `a2`; `sphere_rcs` gives the dependence on the angle.
+    Cylinders, and scatterers given by a cross-section without a radius, stay as they are.
     """
-    exact = tuple(
-        s if s.radius is None else replace(s, rcs=float(sphere_rcs(s.radius, wavelength, np.array(np.pi))[1]))
-        for s in scene.scatterers
-    )
+    exact = tuple(s if s.radius is None or s.height is not None else replace(s, law="mie") for s in scene.scatterers)
     return replace(scene, scatterers=exact)
 
 

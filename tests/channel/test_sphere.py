@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from rislam_rt.channel.cross_section import cross_section
+from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.sphere import mie_amplitudes, mie_coefficients, sphere_rcs, with_exact_spheres
-from rislam_rt.model import Scatterer
+from rislam_rt.model import RadioConfig, Scatterer
 
 BACK = np.array(np.pi)
+WAVELENGTH = 299_792_458.0 / 10e9
 
 
 def test_rayleigh_limit():
@@ -48,9 +51,21 @@ def test_energy_and_the_optical_theorem(size):
 
 
 def test_the_papers_sphere_is_within_half_a_decibel_of_physical_optics(rooms):
-    scene = with_exact_spheres(rooms.paper(), 299_792_458.0 / 10e9)
-    exact, optics = scene.scatterers[0].rcs, np.pi * 0.05**2
-    assert exact != optics
-    assert 10 * np.log10(exact / optics) == pytest.approx(0.0, abs=0.5)
+    scene = with_exact_spheres(rooms.paper())
+    exact = cross_section(scene.scatterers[0], WAVELENGTH, np.eye(3)[0], np.eye(3)[1])
+    assert exact == sphere_rcs(0.05, WAVELENGTH, BACK)[0]
+    assert exact != np.pi * 0.05**2
+    assert 10 * np.log10(exact / (np.pi * 0.05**2)) == pytest.approx(0.0, abs=0.5)
     plate = Scatterer("plate", np.array([1.0, 1.0, 1.0]), 0.02)
-    assert with_exact_spheres(rooms.scene([], [plate]), 0.03).scatterers[0] is plate
+    post = Scatterer("post", np.array([1.0, 1.0, 1.0]), 0.02, 0.05, height=0.3)
+    assert with_exact_spheres(rooms.scene([], [plate, post])).scatterers == (plate, post)
+
+
+def test_the_scene_decides_which_law_the_channel_takes(rooms):
+    """Gain over that of the nominal cross-section: the square root of the ratio, for every path of the sphere."""
+    room, poses, radio = rooms.paper(), rooms.at([1.13, 2.31, 1.2]), RadioConfig()
+    plain, exact = (ImageSourceChannel(s, radio, 1).paths(poses) for s in (room, with_exact_spheres(room)))
+    sphere = plain.landmark == 0
+    ratio = np.sqrt(sphere_rcs(0.05, radio.wavelength, BACK)[0] / (np.pi * 0.05**2))
+    np.testing.assert_allclose(exact.gain[:, sphere], ratio * plain.gain[:, sphere], rtol=1e-12)
+    np.testing.assert_array_equal(exact.gain[:, ~sphere], plain.gain[:, ~sphere])
