@@ -4,22 +4,46 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.geometry.angles import rotation_z, unit
 from rislam_rt.model import Body
+from rislam_rt.slam.associate import inverse_3x3
 from rislam_rt.slam.book import Book, enter
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.hypotheses import IMAGE, MOVING, POINT, Fit, History, first_guess, fit_feature
-from rislam_rt.slam.particles import Particles
-from rislam_rt.slam.returns import Poses, Returns, feature_jacobian
+from rislam_rt.slam.hypotheses import (
+    IMAGE,
+    MOVING,
+    POINT,
+    RECIPROCAL,
+    TWIN,
+    Fit,
+    History,
+    first_guess,
+    fit_feature,
+    fit_floor,
+    fit_reciprocal,
+    floor_height,
+    floor_image,
+)
+from rislam_rt.slam.match import Outlook, explained
+from rislam_rt.slam.particles import Particles, mean_features, moments, normalised, square_root
+from rislam_rt.slam.returns import TX, Poses, Returns, compact, feature_jacobian, leg_images, observe
 from rislam_rt.slam.tracks import Tracks
 
 STRIDE = 4
 """Tracks are examined every so many cycles, each at its own turn."""
-MAX_POINT_STD = 0.5
+MAX_POINT_STD = 0.4
 """Largest standard deviation [m] of a new point along its worst axis."""
-MAX_WALL_STD = 0.5
-"""The same for the image of the anchor in a new wall."""
+MAX_WALL_STD = 0.3
+"""The same for the image of the anchor in a new wall (the floor's tilt is known beforehand and does not count)."""
+MAX_FLOOR_DEPTH = 1.5
+"""Largest height [m] of the agent above the floor that it moves on."""
+WALL_CYCLES = 20
+"""Cycles of history that a wall needs: two legs leave more room for error than one."""
+PARENT_HITS = 10
+"""Measurements of a point before walls are found by it."""
+PARALLEL = 4.0
+"""Standard deviations (and 0.02) within which a track's direction is that of a known leg."""
 
 
 class Verdict(NamedTuple):
@@ -31,44 +55,70 @@ class Verdict(NamedTuple):
     fit: Fit
 
 
-def examine(
-    tracks: Tracks, particles: Particles, book: Book, headings: Floats, body: Body, cycle: int, config: SlamConfig
-) -> tuple[Booleans, Tracks, Particles, Book]:
-    """Look at the tracks whose turn it is.
+class Scene(NamedTuple):
+    """What a judgement is based on, at the mean of the belief."""
 
-    Returns which tracks became features (T,), the tracks (some now known for wall returns), particles and book.
+    features: Floats
+    """(F, 3)."""
+    book: Book
+    anchor: Floats
+    """(3,) where the agent is: the anchor of a wall born now."""
+    outlook: Outlook
+    config: SlamConfig
+
+
+def examine(
+    tracks: Tracks,
+    particles: Particles,
+    book: Book,
+    outlook: Outlook,
+    headings: Floats,
+    time: Floats,
+    body: Body,
+    cycle: int,
+    config: SlamConfig,
+) -> tuple[int, Tracks, Particles, Book]:
+    """Look at the tracks whose turn it is; at most one becomes a feature, as it may explain the others.
+
+    Returns the row of that track (-1 without one), the tracks (some now known for moving images), particles and book.
     """
-    born = np.zeros(len(tracks.misses), dtype=np.bool_)
-    for row in due_tracks(tracks, cycle, config):
-        history, rows = track_history(tracks, row, particles, headings, body)
-        mean_pose = particles.weight @ particles.position
-        verdict = judge(history, mean_pose, particles, book, config, full=len(rows) >= config.window - 1)
+    due = due_tracks(tracks, cycle, config)
+    scene = Scene(mean_features(particles), book, particles.weight @ particles.position, outlook, config)
+    moving = tracks.moving.copy()
+    for row in due:
+        history, rows = track_history(tracks, row, particles, headings, time, body, cycle)
+        if is_explained(tracks, row, history, scene):
+            continue
+        verdict = judge(history, scene)
         if verdict is None:
             continue
         if verdict.kind is MOVING:
-            tracks.specular[row] = True
+            moving[row] = True
             continue
-        particles, book = settle(verdict, rows, history, mean_pose, particles, book, headings, body)
-        born[row] = True
-    return born, tracks, particles, book
+        particles, book = settle(verdict, rows, history, scene, particles, headings, body)
+        return int(row), tracks._replace(moving=moving), particles, book
+    return -1, tracks._replace(moving=moving), particles, book
 
 
 def due_tracks(tracks: Tracks, cycle: int, config: SlamConfig) -> Integers:
     """Tracks to examine now, the shortest first: an image always lies behind its point."""
     ready = ~tracks.specular & (tracks.length >= config.birth_cycles) & (tracks.misses == 0)
-    turn = (tracks.length % STRIDE == 0) | (cycle % STRIDE == 0)
+    turn = tracks.length % STRIDE == cycle % STRIDE
     rows = np.flatnonzero(ready & turn)
     return rows[np.argsort(tracks.mean[rows, 0, 0])]
 
 
 def track_history(
-    tracks: Tracks, row: int, particles: Particles, headings: Floats, body: Body
+    tracks: Tracks, row: int, particles: Particles, headings: Floats, time: Floats, body: Body, cycle: int
 ) -> tuple[History, Integers]:
     """A track's measurements with the mean believed poses, and the trail rows they belong to."""
     rows = np.flatnonzero(tracks.cycle[row] >= 0)
     position = np.einsum("n,kni->ki", particles.weight, particles.trail[rows])
     poses = poses_of(position, headings[rows], body)
-    return History(tracks.seen[row, rows], tracks.std[row, rows], poses), rows
+    pose = np.concatenate([particles.position, particles.velocity], axis=1)
+    doubt = square_root(moments(particles.log_weight, pose)[1])
+    lag = time[cycle % len(time)] - time[rows]
+    return History(tracks.seen[row, rows], tracks.std[row, rows], poses, lag, doubt), rows
 
 
 def poses_of(position: Floats, heading: Floats, body: Body) -> Poses:
@@ -77,65 +127,170 @@ def poses_of(position: Floats, heading: Floats, body: Body) -> Poses:
     return Poses(position + rotation @ body.tx_offset, position + rotation @ body.rx_offset, np.asarray(heading))
 
 
-def judge(
-    history: History, anchor: Floats, particles: Particles, book: Book, config: SlamConfig, *, full: bool
-) -> Verdict | None:
+def is_explained(tracks: Tracks, row: int, history: History, scene: Scene) -> bool:
+    """Whether a return of the map runs along the track's whole history."""
+    covariance = np.diag(tracks.covariance[row, :, 0, 0] + np.mean(history.std**2, axis=0))
+    near = explained(scene.outlook, tracks.mean[row, :, 0], covariance, scene.config.gate)
+    if not len(near):
+        return False
+    returns = compact(scene.outlook.expected.returns, near)
+    seen = observe(returns, scene.features, scene.book.anchor, history.poses).seen
+    spread = scene.outlook.covariance[near][None] + _diagonal(history.std**2)[:, None]
+    gap = history.seen[:, None] - seen
+    distance = np.einsum("kri,krij,krj->r", gap, inverse_3x3(spread)[0], gap) / len(gap)
+    return bool(distance.min() < 6.0)
+
+
+def judge(history: History, scene: Scene) -> Verdict | None:
     """The hypothesis that explains the history, if one does and no other comes near."""
-    means = np.einsum("n,nfi->fi", particles.weight, particles.features)
-    trials = [(POINT, -1), (MOVING, -1), *((IMAGE, int(p)) for p in book.points)]
-    verdicts = []
-    for kind, parent in trials:
-        known = means[parent] if parent >= 0 else None
-        start = first_guess(kind, known, anchor, history)
-        if start is not None:
-            verdicts.append(Verdict(kind, parent, fit_feature(kind, start, known, anchor, history, 6)))
+    verdicts = [*_points(history, scene), *_images(history, scene)]
     verdicts.sort(key=lambda v: float(v.fit.chi2))
-    best, rest = verdicts[0], verdicts[1:]
-    dof = 3.0 * len(history.seen) - 3.0
-    fits = best.fit.chi2 < dof + 4.0 * np.sqrt(2.0 * dof)
-    margin = rest[0].fit.chi2 - best.fit.chi2 if rest else np.inf
+    best, margin = verdicts[0], scene.config.birth_margin
+    rival = _reciprocal_chi2(history, scene)
+    if rival < best.fit.chi2 + margin:
+        return _floor(history, scene, min(rival, float(best.fit.chi2)))
+    clear = min((float(v.fit.chi2 - best.fit.chi2) for v in verdicts[1:]), default=np.inf) > margin
+    if not clear or not _plausible(best.fit, 3 * len(history.seen) - 3):
+        return None
+    if best.kind is MOVING:
+        return best
     limit = MAX_POINT_STD if best.kind is POINT else MAX_WALL_STD
     sharp = np.sqrt(np.linalg.eigvalsh(best.fit.covariance)[-1]) < limit
-    clear = margin > config.birth_margin
-    return best if fits and sharp and clear else None
+    ready = best.kind is POINT or (len(history.seen) >= WALL_CYCLES and best.parent in _established(scene.book))
+    return best if sharp and ready else None
+
+
+def _plausible(fit: Fit, dof: int) -> bool:
+    """Whether chi^2 is within two and a half standard deviations of its mean."""
+    return bool(fit.chi2 < dof + 2.5 * np.sqrt(2.0 * dof))
+
+
+def _points(history: History, scene: Scene) -> list[Verdict]:
+    """A static point, and a moving image."""
+    verdicts = []
+    for kind in (POINT, MOVING):
+        start = first_guess(kind, None, scene.anchor, history)
+        if start is not None:
+            verdicts.append(Verdict(kind, -1, fit_feature(kind, start, None, scene.anchor, history, 6)))
+    return verdicts
+
+
+def _images(history: History, scene: Scene) -> list[Verdict]:
+    """The image of each known point in a new wall on the Rx leg."""
+    verdicts = []
+    for parent in scene.book.points:
+        known = scene.features[parent]
+        for kind in (IMAGE, TWIN):
+            start = first_guess(kind, known, scene.anchor, history)
+            if start is not None:
+                fit = fit_feature(kind, start, known, scene.anchor, history, 6)
+                if kind is IMAGE or _one_cell(fit, known, scene, history):
+                    verdicts.append(Verdict(kind, int(parent), fit))
+    return verdicts
+
+
+def _one_cell(fit: Fit, parent: Floats, scene: Scene, history: History) -> bool:
+    """Whether a wall would throw both its returns into one resolution cell, halfway through the history."""
+    middle = len(history.seen) // 2
+    poses = Poses(history.poses.tx[middle], history.poses.rx[middle], history.poses.heading[middle])
+    seen = observe(TWIN, np.stack([fit.feature, parent]), np.stack([scene.anchor, scene.anchor]), poses).seen
+    return bool(np.all(np.abs(seen[0] - seen[1]) < 1.1 * scene.outlook.cell))
+
+
+def _established(book: Book) -> Integers:
+    """Points that are known well enough to be looked for in mirrors."""
+    return book.points[book.hits[book.points] >= PARENT_HITS]
+
+
+def _reciprocal_chi2(history: History, scene: Scene) -> float:
+    """How well an unknown Tx leg to a known image fits, if the track comes from that image's direction.
+
+    What arrives from where something is already known to be, only later, is most likely the same thing over a wall.
+    """
+    returns = scene.outlook.expected.returns
+    rows = np.unique(returns.rx[returns.point != TX]) if len(returns.tx) else np.zeros(0, dtype=np.int64)
+    if not len(rows):
+        return np.inf
+    poses = history.poses
+    images = leg_images(returns, scene.features, scene.book.anchor, poses.tx.mean(axis=0))[rows]
+    fixed = Returns(np.stack([np.arange(len(rows)), np.full(len(rows), -1), np.full(len(rows), -1)], axis=1),
+                    np.arange(len(rows)), np.arange(len(rows)))  # fmt: skip
+    seen = observe(fixed, images, images, poses).seen[..., 1:].mean(axis=0)
+    weight = 1.0 / history.std[:, 1:] ** 2
+    mean = np.sum(weight * history.seen[:, 1:], axis=0) / weight.sum(axis=0)
+    spread = np.hypot(1.0 / np.sqrt(weight.sum(axis=0)), 0.02)
+    along = np.all(np.abs(seen - mean) < PARALLEL * spread, axis=1)
+    fits = [fit_reciprocal(image, scene.anchor, history) for image in images[along]]
+    return min((float(fit.chi2) for fit in fits if fit is not None), default=np.inf)
+
+
+def _floor(history: History, scene: Scene, rival: float) -> Verdict | None:
+    """The floor under a known point, if it fits as well as any wall that one could choose freely."""
+    level = np.abs(unit(scene.features - scene.book.anchor)[:, 2]) > 0.9
+    below = level & (scene.features[:, 2] < scene.anchor[2]) & scene.book.is_wall
+    if len(history.seen) < WALL_CYCLES or below.any():
+        return None
+    fits = [(int(p), fit_floor(scene.features[p], scene.anchor, history)) for p in _established(scene.book)]
+    verdicts = [Verdict(RECIPROCAL, parent, fit) for parent, fit in fits if fit is not None]
+    if not verdicts:
+        return None
+    best = min(verdicts, key=lambda v: float(v.fit.chi2))
+    as_good = best.fit.chi2 < rival + scene.config.birth_margin
+    depth = 0.5 * float(scene.anchor[2] - best.fit.feature[2])
+    sharp = best.fit.covariance[2, 2] < MAX_WALL_STD**2 and depth < MAX_FLOOR_DEPTH
+    return best if as_good and sharp and _plausible(best.fit, 3 * len(history.seen) - 1) else None
 
 
 def settle(
     verdict: Verdict,
     rows: Integers,
     history: History,
-    anchor: Floats,
+    scene: Scene,
     particles: Particles,
-    book: Book,
     headings: Floats,
     body: Body,
 ) -> tuple[Particles, Book]:
     """Enter a feature: every particle fits it along its own trail."""
     trail = np.swapaxes(particles.trail[rows], 0, 1)
-    own = history._replace(poses=poses_of(trail, headings[rows], body))
-    parent = particles.features[:, verdict.parent] if verdict.parent >= 0 else None
-    start = np.broadcast_to(verdict.fit.feature, particles.position.shape)
-    fit = fit_feature(verdict.kind, start, parent, anchor, own, 2)
-    size = particles.covariance.shape[0]
+    own = history._replace(poses=poses_of(trail, headings[rows], body), doubt=np.zeros((6, 0)))
+    size, parent = particles.covariance.shape[0], verdict.parent
     covariance = np.zeros((size + 3, size + 3))
     covariance[:size, :size] = particles.covariance
     covariance[size:, size:] = verdict.fit.covariance
-    if verdict.parent >= 0:
-        means = np.einsum("n,nfi->fi", particles.weight, particles.features)
-        lean = _parent_sensitivity(verdict, means[verdict.parent], anchor, history)
-        block = slice(3 * verdict.parent, 3 * verdict.parent + 3)
+    if verdict.kind is RECIPROCAL:
+        feature, chi2 = floor_image(floor_height(particles.features[:, parent], own)[0], scene.anchor), None
+    else:
+        known = particles.features[:, parent] if parent >= 0 else None
+        start = np.broadcast_to(verdict.fit.feature, particles.position.shape)
+        own_fit = fit_feature(verdict.kind, start, known, scene.anchor, own, 3)
+        feature, chi2 = own_fit.feature, own_fit.chi2
+    if parent >= 0:
+        lean = _parent_sensitivity(verdict, scene.features[parent], scene.anchor, history)
+        block = slice(3 * parent, 3 * parent + 3)
         covariance[size:, :size] = lean @ particles.covariance[block]
         covariance[:size, size:] = covariance[size:, :size].T
         covariance[size:, size:] += lean @ particles.covariance[block, block] @ lean.T
-    features = np.concatenate([particles.features, fit.feature[:, None]], axis=1)
-    particles = particles._replace(features=features, covariance=covariance)
-    return particles, enter(book, verdict.kind is not POINT, anchor, verdict.kind is POINT)
+    features = np.concatenate([particles.features, feature[:, None]], axis=1)
+    is_point = verdict.kind is POINT
+    founder = int(scene.book.ident[parent]) if parent >= 0 else -1
+    if chi2 is not None:
+        # the history speaks about the particles' trails as well; an excess of its best chi^2 is no particle's fault
+        excess = max(1.0, float(verdict.fit.chi2) / (3 * len(rows) - 3))
+        log_weight, _ = normalised(particles.log_weight - 0.5 * chi2 / excess)
+        particles = particles._replace(log_weight=log_weight)
+    book = enter(scene.book, not is_point, scene.anchor, founder)
+    return particles._replace(features=features, covariance=covariance), book
 
 
 def _parent_sensitivity(verdict: Verdict, parent: Floats, anchor: Floats, history: History) -> Floats:
     """How the fitted wall (3,) moves with its parent (3,): the implicit derivative of the normal equations."""
     known = np.stack([verdict.fit.feature, parent])[None]
-    jacobian = feature_jacobian(verdict.kind, known, np.stack([anchor, anchor]), history.poses)[..., 0, :, :, :]
+    jacobian = feature_jacobian(verdict.kind, known, np.stack([anchor, anchor]), history.poses).mean(axis=-4)
     weight = 1.0 / history.std**2
     pull = np.einsum("kia,ki,kib->ab", jacobian[..., 0, :], weight, jacobian[..., 1, :])
     return -verdict.fit.covariance @ pull
+
+
+def _diagonal(variance: Floats) -> Floats:
+    """(K, 3, 3) diagonal matrices."""
+    return variance[..., None] * np.eye(3)

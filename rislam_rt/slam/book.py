@@ -1,6 +1,6 @@
 """The book of landmarks: who they are, how often they were seen, how strong they are, and which one is the panel."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,10 +24,15 @@ class Book(NamedTuple):
     """(F,)."""
     anchor: Floats
     """(F, 3) [m] fixed point whose mirror image a wall's three numbers are; unused for points."""
+    founder: Integers
+    """(F,) ident of the point by which a wall was found, -1 without one."""
     hits: Integers
     """(F,) cycles with a measurement of it."""
-    misses: Floats
-    """(F,) cycles in which it should have shown and did not, forgotten as it shows again."""
+    shown: Floats
+    """(F, 2) running share of the cycles in which it showed, of those in which it should have: points in the first
+    column; walls by single bounces on the Rx leg and on the Tx leg."""
+    surprise: Floats
+    """(F,) running mean of the squared normalised innovations per degree of freedom: 1 when all is well."""
     log_grid: Floats
     """(F, G) log posterior of the strength on the grid; unused for walls."""
     log_ris: Floats
@@ -72,6 +77,8 @@ def empty_book() -> Book:
         np.zeros(0, dtype=np.bool_),
         np.zeros((0, 3)),
         np.zeros(0, dtype=np.int64),
+        np.zeros(0, dtype=np.int64),
+        np.zeros((0, 2)),
         np.zeros(0),
         np.zeros((0, len(STRENGTHS))),
         np.zeros(0),
@@ -83,17 +90,19 @@ def empty_book() -> Book:
     )
 
 
-def enter(book: Book, is_wall: bool, anchor: Floats, panel_possible: bool) -> Book:
+def enter(book: Book, is_wall: bool, anchor: Floats, founder: int) -> Book:
     """The book with one more feature, in the last row."""
     flat = np.full((1, len(STRENGTHS)), -np.log(len(STRENGTHS)))
     return book._replace(
         ident=np.append(book.ident, book.next_ident),
         is_wall=np.append(book.is_wall, is_wall),
         anchor=np.concatenate([book.anchor, anchor[None]]),
+        founder=np.append(book.founder, founder),
         hits=np.append(book.hits, 0),
-        misses=np.append(book.misses, 0.0),
+        shown=np.concatenate([book.shown, np.ones((1, 2))]),
+        surprise=np.append(book.surprise, 1.0),
         log_grid=np.concatenate([book.log_grid, flat]),
-        log_ris=np.append(book.log_ris, 0.0 if panel_possible else -np.inf),
+        log_ris=np.append(book.log_ris, -np.inf if is_wall else 0.0),
         ratio=np.append(book.ratio, UNSEEN_RATIO),
         ratio_variance=np.append(book.ratio_variance, RATIO_SPREAD**2),
         next_ident=book.next_ident + 1,
@@ -104,10 +113,8 @@ def strike(book: Book, keep: Booleans) -> Book:
     """The book without some of its features, and without their images."""
     gone = book.ident[~keep]
     stay = ~np.isin(book.images[:, :2], gone).any(axis=1)
-    fields = {
-        name: getattr(book, name)[keep]
-        for name in ("ident", "is_wall", "anchor", "hits", "misses", "log_grid", "log_ris", "ratio", "ratio_variance")
-    }
+    per_feature = book._fields[: book._fields.index("images")]
+    fields: dict[str, Any] = {name: getattr(book, name)[keep] for name in per_feature}
     return book._replace(**fields, images=book.images[stay], image_hits=book.image_hits[stay])
 
 

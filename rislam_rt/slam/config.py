@@ -42,8 +42,6 @@ class SlamConfig:
     """By how much chi^2 a hypothesis must win over the next one."""
     max_misses: int = 4
     """Cycles without a component after which a track dies."""
-    prune_misses: float = 40.0
-    """Cycles in which an expected landmark may fail to show before it is removed."""
     merge_distance: float = 9.0
     """Squared Mahalanobis distance below which two landmarks are one."""
     resample_below: float = 0.5

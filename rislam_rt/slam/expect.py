@@ -1,18 +1,22 @@
 """Which returns of the believed map should show now, and how strong."""
 
+from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec
 from rislam_rt.slam.book import Book
 from rislam_rt.slam.identity import point_amplitude, predicted_panel_gain
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, Sight, observe, reflect
+from rislam_rt.slam.returns import NONE, TX, Poses, Returns, Sight, compact, observe, reflect
 
-FAINT = 0.5
+FAINT = 0.35
 """Amplitude, in units of the detection threshold, down to which a return is still looked for."""
+DEPTH = 0.1
+"""Distance [m] from a wall below which a point counts as lying in it."""
 HORIZON = 0.02
 """Third direction cosine below which nothing is expected: the array looks up."""
 PANEL_AMPLITUDE_STD = 0.7
@@ -27,6 +31,8 @@ class Expected(NamedTuple):
     """(R,)."""
     log_amplitude_std: Floats
     """(R,)."""
+    twin: Integers
+    """(R,) row of the reciprocal, which has the legs exchanged; -1 without one."""
     likely: Booleans
     """(R,) strong enough to be seen for certain, unless something shades it."""
 
@@ -47,7 +53,7 @@ def expected_returns(
     belief: Belief, code: RisCode | None, max_bounces: int, detection_snr: float, use_vt: bool
 ) -> Expected:
     """All returns of up to `max_bounces` bounces that arrive from above and are not hopelessly faint."""
-    returns = enumerate_returns(belief.book, max_bounces, use_vt)
+    returns = enumerate_returns(tuple(belief.book.points), tuple(belief.book.walls), max_bounces, use_vt)
     anchor = belief.book.anchor
     sight = observe(returns, belief.features, anchor, belief.poses)
     amplitude, spread = predicted_amplitudes(belief, returns, sight, code)
@@ -55,16 +61,17 @@ def expected_returns(
     threshold = np.sqrt(detection_snr * radio.noise_psd / (radio.array.num_antennas * radio.energy))
     direct = bounces(returns) == 0
     faint = amplitude < FAINT * threshold
-    visible = (sight.up > HORIZON) & ~_degenerate(belief, returns) & (~faint | direct)
-    kept = Returns(returns.legs, returns.tx[visible], returns.rx[visible])
+    real = possible_legs(belief, returns)
+    visible = (sight.up > HORIZON) & real[returns.tx] & real[returns.rx] & (~faint | direct)
+    kept = compact(returns, np.flatnonzero(visible))
     amplitude = amplitude[visible]
     log_amplitude = np.log(np.maximum(amplitude, 1e-30))
-    return Expected(kept, log_amplitude, spread[visible], amplitude > 2.0 * threshold)
+    return Expected(kept, log_amplitude, spread[visible], twins(kept), amplitude > 2.0 * threshold)
 
 
-def enumerate_returns(book: Book, max_bounces: int, use_vt: bool) -> Returns:
+@lru_cache(maxsize=64)
+def enumerate_returns(points: tuple[int, ...], walls: tuple[int, ...], max_bounces: int, use_vt: bool) -> Returns:
     """Every point over every pair of legs, and with `use_vt` the images of the Tx."""
-    points, walls = book.points, book.walls
     single = [(int(w), NONE) for w in walls] if max_bounces >= 1 else []
     double = [(int(a), int(b)) for a, b in product(walls, walls) if a != b] if max_bounces >= 2 else []
     sequences = [(NONE, NONE), *single, *double]
@@ -79,7 +86,7 @@ def enumerate_returns(book: Book, max_bounces: int, use_vt: bool) -> Returns:
             if order[i] + order[j] <= max_bounces:
                 tx.append(base + i)
                 rx.append(base + j)
-    if use_vt and walls.size:
+    if use_vt and walls:
         base = len(legs)
         legs += [(TX, *sequence) for sequence in sequences]
         tx += [base] * (len(sequences) - 1)
@@ -91,6 +98,13 @@ def bounces(returns: Returns) -> Integers:
     """(R,) wall bounces of each return."""
     walls = np.sum(returns.legs[:, 1:] != NONE, axis=1)
     return walls[returns.tx] + walls[returns.rx]
+
+
+def twins(returns: Returns) -> Integers:
+    """(R,) row of each return's reciprocal, -1 where there is none or it is the return itself."""
+    row_of = {pair: row for row, pair in enumerate(zip(returns.tx.tolist(), returns.rx.tolist(), strict=True))}
+    pairs = zip(returns.rx.tolist(), returns.tx.tolist(), strict=True)
+    return np.array([row_of.get((rx, tx), -1) if rx != tx else -1 for rx, tx in pairs], dtype=np.int64)
 
 
 def predicted_amplitudes(belief: Belief, returns: Returns, sight: Sight, code: RisCode | None) -> tuple[Floats, Floats]:
@@ -150,12 +164,23 @@ def _leg_ratio(book: Book, returns: Returns) -> tuple[Floats, Floats]:
     return total, variance
 
 
-def _degenerate(belief: Belief, returns: Returns) -> Booleans:
-    """(R,) whether a leg bounces on a wall that the point itself lies in (within 0.1 m): the image is the point."""
+def possible_legs(belief: Belief, returns: Returns) -> Booleans:
+    """(G,) whether each bounce of a leg has both its ends on one side of the wall.
+
+    Mirroring takes a source away from the device then, by twice the smaller of both depths at least; an image that
+    comes nearer belongs to a wall that stands between. A point in the wall (the panel in its ceiling) has no image.
+    """
     legs = returns.legs
-    rows = np.flatnonzero((legs[:, 1] != NONE) & (legs[:, 0] != TX))
-    flat = np.zeros(len(legs), dtype=np.bool_)
-    point, wall = belief.features[legs[rows, 0]], legs[rows, 1]
-    image = reflect(point, belief.features[wall], belief.book.anchor[wall])
-    flat[rows] = np.linalg.norm(image - point, axis=-1) < 0.2
-    return flat[returns.tx] | flat[returns.rx]
+    base = np.where((legs[:, 0] == TX)[:, None], belief.poses.tx, belief.features[legs[:, 0]])
+    possible = np.ones(len(legs), dtype=np.bool_)
+    for column in (1, 2):
+        rows = np.flatnonzero(legs[:, column] != NONE)
+        walls = legs[rows, column]
+        wall, anchor = belief.features[walls], belief.book.anchor[walls]
+        normal = unit(wall - anchor)
+        middle = 0.5 * (wall + anchor)
+        depth = np.sum((base[rows] - middle) * normal, axis=-1)
+        own = np.sum((belief.poses.rx - middle) * normal, axis=-1)
+        possible[rows] &= (depth * own > 0.0) & (np.abs(depth) > DEPTH)
+        base[rows] = reflect(base[rows], wall, anchor)
+    return possible

@@ -9,21 +9,25 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import wrap
 from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec
-from rislam_rt.slam.associate import Candidates, associate
+from rislam_rt.slam.associate import associate
 from rislam_rt.slam.birth import examine, poses_of
 from rislam_rt.slam.book import Book, empty_book
 from rislam_rt.slam.config import SlamConfig, StartPrior
-from rislam_rt.slam.expect import Belief, Expected, expected_returns
-from rislam_rt.slam.learn import forget, learn, unite
-from rislam_rt.slam.particles import Particles, effective_size, propagate, resample
-from rislam_rt.slam.returns import feature_jacobian, observe
-from rislam_rt.slam.tracks import AMPLITUDE_WANDER, Glance, Tracks, advance, begin, extend, no_tracks
-from rislam_rt.slam.update import update
+from rislam_rt.slam.expect import Belief, bounces, expected_returns
+from rislam_rt.slam.learn import learn
+from rislam_rt.slam.match import Outlook, candidates, hidden_tracks, look_ahead
+from rislam_rt.slam.particles import Particles, effective_size, mean_features, propagate, resample
+from rislam_rt.slam.prune import prune
+from rislam_rt.slam.returns import compact, observe
+from rislam_rt.slam.tracks import Glance, Tracks, advance, begin, extend, no_tracks
+from rislam_rt.slam.update import Update, update
 
 LOS_MARGIN = 0.1
 """Length [m] beyond the baseline below which a component is the direct path: no landmark can be that near."""
-LANDMARK_ODDS, TRACK_ODDS = np.log(0.9), np.log(0.5)
-"""Log probability that an expected return, and that a track, shows in a cycle."""
+STRANGERS = np.array([1.3, 2.0, 3.0])
+"""Factor on the standard deviations of returns over 0, 1 and 2 walls, for paths in their cell that the map lacks."""
+STRAIN_RATE = 0.05
+"""Share of the latest cycle in the running mean of the NIS."""
 UNUSED, REMOVED = -1, -2
 """In `StepInfo.landmark`: clutter or not yet explained; taken for LOS or a wall return."""
 
@@ -115,53 +119,87 @@ def step(
 ) -> tuple[FilterState, StepInfo]:
     """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied."""
     state = _move(state, dt, heading, config, rng=rng)
-    particles, book, cycle = state.particles, state.book, state.cycle
     glance = glance_of(measurement, state.radio)
     landmark = np.where(is_los(glance, state.body), REMOVED, UNUSED)
     free = np.flatnonzero(landmark == UNUSED)
-    open_glance = Glance._make(field[free] for field in glance)
-
-    poses = poses_of(particles.position, np.asarray(heading), state.body)
-    mean_poses = poses_of(particles.weight @ particles.position, np.asarray(heading), state.body)
-    means = np.einsum("n,nfi->fi", particles.weight, particles.features)
-    belief = Belief(means, book, mean_poses, state.body, state.radio, state.ris)
+    glance = Glance._make(field[free] for field in glance)
+    belief = mean_belief(state, heading)
     expected = expected_returns(belief, code, config.max_bounces, config.detection_snr, config.use_vt)
-    predicted = observe(expected.returns, particles.features, book.anchor, poses).seen
-    jacobian = feature_jacobian(expected.returns, means, book.anchor, mean_poses)
-    tracks = advance(state.tracks, dt, cycle, _bend(state))
-    candidates = _candidates(expected, predicted, jacobian, particles, tracks)
-    picks = associate(candidates, open_glance, config.gate, config.clutter_density)
+    tracks = advance(state.tracks, dt, state.cycle, _bend(state))
+    outlook = look_ahead(belief, expected, state.particles, tracks)
+    hidden = hidden_tracks(outlook, tracks, config.gate)
+    picks = associate(candidates(outlook, tracks, hidden), glance, config.gate, config.clutter_density)
 
     num_returns = len(expected.log_amplitude)
     hit = np.flatnonzero(picks[:num_returns] >= 0)
     taken = picks[hit]
-    updated = update(particles, predicted[:, hit], jacobian[hit], open_glance.seen[taken], open_glance.std[taken])
-    particles = updated.particles
-    book, names = learn(belief, particles, expected, hit, open_glance, taken, measurement, free, code, rng=rng)
+    updated = _correct(state, outlook, hit, glance, taken, heading)
+    book, names = learn(
+        belief,
+        updated.particles,
+        outlook,
+        hit,
+        updated.surprise,
+        glance,
+        taken,
+        measurement,
+        free,
+        code,
+        rng=rng,
+    )
     landmark[free[taken]] = names
-
-    kept = np.flatnonzero(picks[num_returns:] >= 0)
-    tracks = extend(tracks, kept, open_glance, picks[num_returns:][kept], cycle)
-    landmark[free[picks[num_returns:][kept]]] = np.where(tracks.specular[kept], REMOVED, UNUSED)
-    spare = np.setdiff1d(np.arange(len(free)), picks)
-    specular = open_glance.ratio[spare] > config.specular_ratio
-    landmark[free[spare[specular]]] = REMOVED
-    tracks = begin(tracks, open_glance, spare, specular, _rates(state), cycle)
-    tracks = tracks.keep(tracks.misses <= config.max_misses)
-    born, tracks, particles, book = examine(tracks, particles, book, state.heading, state.body, cycle, config)
-    tracks = tracks.keep(~born)
-    particles, book = forget(particles, book, config.prune_misses)
-    particles, book = unite(particles, book, config.merge_distance)
+    tracks, removed = _follow(state, tracks, glance, picks, num_returns, config)
+    landmark[free[removed]] = REMOVED
+    row, tracks, particles, book = examine(
+        tracks, updated.particles, book, outlook, state.heading, state.time, state.body, state.cycle, config
+    )
+    tracks = tracks.keep(np.arange(len(tracks.misses)) != row)
+    particles, book = prune(particles, book, outlook, belief, config)
 
     ess = effective_size(particles.log_weight)
     low = ess < config.resample_below * len(particles.log_weight)
     if low:
-        particles = resample(particles, state.time[cycle % config.window] - state.time, rng=rng)
+        particles = resample(particles, state.time[state.cycle % config.window] - state.time, rng=rng)
     dof = 3 * len(hit)
-    strain = state.strain + 0.05 * (updated.nis / dof - state.strain) if dof else state.strain
+    strain = state.strain + STRAIN_RATE * (updated.nis / dof - state.strain) if dof else state.strain
     outcome = _outcome(len(measurement), len(book.ident), strain)
     info = StepInfo(landmark, ess, low, updated.nis, dof, updated.log_evidence, len(book.points), outcome)
     return state._replace(particles=particles, book=book, tracks=tracks, strain=strain), info
+
+
+def mean_belief(state: FilterState, heading: float) -> Belief:
+    """The mean of the particles, in which returns are enumerated and linearised."""
+    position = state.particles.weight @ state.particles.position
+    poses = poses_of(position, np.asarray(heading), state.body)
+    return Belief(mean_features(state.particles), state.book, poses, state.body, state.radio, state.ris)
+
+
+def _correct(
+    state: FilterState, outlook: Outlook, hit: Integers, glance: Glance, taken: Integers, heading: float
+) -> Update:
+    """Weights and maps after the returns `hit` were seen as measurements `taken`."""
+    partner = outlook.merger.partner[hit]
+    returns = compact(outlook.expected.returns, np.concatenate([hit, np.where(partner >= 0, partner, hit)]))
+    poses = poses_of(state.particles.position, np.asarray(heading), state.body)
+    predicted = observe(returns, state.particles.features, state.book.anchor, poses).seen
+    predicted = 0.5 * (predicted[:, : len(hit)] + predicted[:, len(hit) :])
+    strangers = STRANGERS[np.minimum(bounces(outlook.expected.returns)[hit], 2)]
+    std = np.hypot(glance.std[taken] * strangers[:, None], outlook.merger.disturbance[hit])
+    return update(state.particles, predicted, outlook.by_feature[hit], glance.seen[taken], std)
+
+
+def _follow(
+    state: FilterState, tracks: Tracks, glance: Glance, picks: Integers, num_returns: int, config: SlamConfig
+) -> tuple[Tracks, Integers]:
+    """Tracks extended, begun and ended; and which measurements were taken for wall returns."""
+    bright = glance.ratio > config.specular_ratio
+    kept = np.flatnonzero(picks[num_returns:] >= 0)
+    used = picks[num_returns:][kept]
+    tracks = extend(tracks, kept, glance, used, bright, state.cycle)
+    spare = np.setdiff1d(np.arange(len(bright)), picks)
+    removed = np.concatenate([used[tracks.specular[kept]], spare[bright[spare]]])
+    tracks = begin(tracks, glance, spare, bright, _rates(state), state.cycle)
+    return tracks.keep(tracks.misses <= config.max_misses), removed
 
 
 def glance_of(measurement: Measurement, radio: RadioConfig) -> Glance:
@@ -195,29 +233,6 @@ def _move(
     trail, headings, time = particles.trail.copy(), state.heading.copy(), state.time.copy()
     trail[slot], headings[slot], time[slot] = particles.position, wrap(np.asarray(heading)), state.time[last] + dt
     return state._replace(cycle=cycle, particles=particles._replace(trail=trail), heading=headings, time=time)
-
-
-def _candidates(
-    expected: Expected, predicted: Floats, jacobian: Floats, particles: Particles, tracks: Tracks
-) -> Candidates:
-    """Expected returns first, tracks behind them."""
-    weight = particles.weight
-    mean = np.einsum("n,nri->ri", weight, predicted)
-    centred = predicted - mean
-    spread = np.einsum("n,nri,nrj->rij", weight, centred, centred)
-    flat = jacobian.reshape(len(mean), 3, particles.covariance.shape[0])
-    spread += flat @ particles.covariance @ np.swapaxes(flat, 1, 2)
-    follow = np.zeros((len(tracks.misses), 3, 3))
-    follow[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
-    wander = np.where(tracks.specular, 0.15, AMPLITUDE_WANDER)
-    odds = np.concatenate([np.full(len(mean), LANDMARK_ODDS), np.full(len(follow), TRACK_ODDS)])
-    return Candidates(
-        np.concatenate([mean, tracks.mean[..., 0]]),
-        np.concatenate([spread, follow]),
-        np.concatenate([expected.log_amplitude, tracks.log_amplitude]),
-        np.concatenate([expected.log_amplitude_std, wander]),
-        odds,
-    )
 
 
 def _speed(state: FilterState) -> float:

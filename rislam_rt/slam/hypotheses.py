@@ -1,12 +1,12 @@
-"""What could a track be? Gauss-Newton fits of a static point, an image of a known point, and a moving image."""
+"""What could a track be? Least-squares fits of a static point, an image of a known point, a moving image, the floor."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, feature_jacobian, observe, reflect
+from rislam_rt.geometry.angles import rotation_z, unit
+from rislam_rt.slam.returns import NONE, TX, Poses, Returns, feature_jacobian, observe, pose_jacobian, reflect
 
 POINT = Returns(np.array([[0, NONE, NONE]]), np.array([0]), np.array([0]))
 """A static point; the feature sought is row 0."""
@@ -14,8 +14,17 @@ IMAGE = Returns(np.array([[1, NONE, NONE], [1, 0, NONE]]), np.array([0]), np.arr
 """Tx, point (row 1), wall (row 0, sought), Rx."""
 RECIPROCAL = Returns(np.array([[1, 0, NONE], [1, NONE, NONE]]), np.array([0]), np.array([1]))
 """Tx, wall (row 0, sought), point (row 1), Rx."""
+TWIN = Returns(IMAGE.legs, np.array([0, 1]), np.array([1, 0]))
+"""Both of them in one resolution cell: alike in length and strength, they come out as one, halfway between."""
 MOVING = Returns(np.array([[TX, NONE, NONE], [TX, 0, NONE]]), np.array([0]), np.array([1]))
 """Tx, wall (row 0, sought), Rx: the image of the Tx moves with the agent."""
+
+DAMPING = 1e-5
+"""Levenberg's damping in units of the information's trace: keeps steps along blind directions short."""
+RIDGE = 1e-4
+"""Prior information [1/m^2], (100 m)^-2, that keeps blind directions finite."""
+FLOOR_TILT = 0.05
+"""Standard deviation [rad] of the angle between the floor and the plane that the agent moves in."""
 
 
 class Fit(NamedTuple):
@@ -38,29 +47,55 @@ class History(NamedTuple):
     """(K, 3)."""
     poses: Poses
     """Tx and Rx (..., K, 3), heading (K,)."""
+    lag: Floats
+    """(K,) time [s] since each measurement."""
+    doubt: Floats
+    """(6, D) square root of the covariance of today's position and velocity, through which all poses err together;
+    no columns where the poses are taken as certain."""
 
 
 def fit_feature(
     kind: Returns, start: Floats, parent: Floats | None, anchor: Floats, history: History, steps: int
 ) -> Fit:
-    """Gauss-Newton from `start` (..., 3); `parent` (..., 3) is the known point of an image hypothesis."""
+    """Gauss-Newton from `start` (..., 3); `parent` (..., 3) is the known point of an image hypothesis.
+
+    With `history.doubt` the pose is fitted along, held by its own covariance: a wrong speed must not speak against a
+    hypothesis that is right.
+    """
     feature = np.array(start)
     anchors = np.stack([anchor, anchor])
-    weight = 1.0 / history.std**2
     for _ in range(steps):
-        known = _features(feature, parent)
-        residual = history.seen - observe(kind, known, anchors, history.poses).seen[..., 0, :]
-        jacobian = feature_jacobian(kind, known, anchors, history.poses)[..., 0, :, 0, :]
-        normal = _normal(jacobian, weight)
-        slope = np.einsum("...kia,ki,...ki->...a", jacobian, weight, residual)
-        step = np.linalg.solve(normal, slope[..., None])[..., 0]
+        normal, slope, _ = _normal_equations(kind, feature, parent, anchors, history)
+        damped = normal + DAMPING * np.trace(normal, axis1=-2, axis2=-1)[..., None, None] * np.eye(3)
+        step = np.linalg.solve(damped, slope[..., None])[..., 0]
         length = np.linalg.norm(step, axis=-1, keepdims=True)
-        feature = feature + step * np.minimum(1.0, 2.0 / np.maximum(length, 1e-12))
+        feature = feature + step * np.minimum(1.0, 1.0 / np.maximum(length, 1e-12))
+    normal, _, chi2 = _normal_equations(kind, feature, parent, anchors, history)
+    return Fit(feature, np.asarray(np.linalg.inv(normal), dtype=np.float64), chi2)
+
+
+def _normal_equations(
+    kind: Returns, feature: Floats, parent: Floats | None, anchors: Floats, history: History
+) -> tuple[Floats, Floats, Floats]:
+    """Information (..., 3, 3) on the feature, slope (..., 3) and chi^2 (...,), the pose's error eliminated."""
     known = _features(feature, parent)
-    residual = history.seen - observe(kind, known, anchors, history.poses).seen[..., 0, :]
-    jacobian = feature_jacobian(kind, known, anchors, history.poses)[..., 0, :, 0, :]
+    residual = history.seen - observe(kind, known, anchors, history.poses).seen.mean(axis=-2)
+    jacobian = feature_jacobian(kind, known, anchors, history.poses)[..., 0, :].mean(axis=-3)
+    weight = 1.0 / history.std**2
+    normal = np.einsum("...kia,ki,...kib->...ab", jacobian, weight, jacobian) + RIDGE * np.eye(3)
+    slope = np.einsum("...kia,ki,...ki->...a", jacobian, weight, residual)
     chi2 = np.einsum("...ki,ki->...", residual**2, weight)
-    return Fit(feature, np.asarray(np.linalg.inv(_normal(jacobian, weight)), dtype=np.float64), chi2)
+    if not history.doubt.shape[1]:
+        return normal, slope, chi2
+    by_pose = pose_jacobian(kind, known, anchors, history.poses).mean(axis=-3)
+    by_doubt = by_pose @ history.doubt[:3] - history.lag[:, None, None] * (by_pose @ history.doubt[3:])
+    cross = np.einsum("...kia,ki,...kib->...ab", jacobian, weight, by_doubt)
+    inner = np.einsum("...kia,ki,...kib->...ab", by_doubt, weight, by_doubt) + np.eye(history.doubt.shape[1])
+    pull = np.einsum("...kia,ki,...ki->...a", by_doubt, weight, residual)
+    solved = np.linalg.solve(inner, np.concatenate([np.swapaxes(cross, -1, -2), pull[..., None]], axis=-1))
+    normal = normal - cross @ solved[..., :3]
+    slope = slope - (cross @ solved[..., 3:])[..., 0]
+    return normal, slope, chi2 - np.sum(pull * solved[..., 3], axis=-1)
 
 
 def first_guess(kind: Returns, parent: Floats | None, anchor: Floats, history: History) -> Floats | None:
@@ -74,20 +109,75 @@ def first_guess(kind: Returns, parent: Floats | None, anchor: Floats, history: H
         base = tx - rx
         return rx + ray * (seen[0] ** 2 - base @ base) / (2.0 * (seen[0] - base @ ray))
     if kind is MOVING:
-        return _wall_between(tx, rx + seen[0] * ray, anchor)
+        return wall_between(tx, rx + seen[0] * ray, anchor)
     assert parent is not None
-    if kind is IMAGE:
-        reach = seen[0] - float(np.linalg.norm(tx - parent))
-        return _wall_between(parent, rx + reach * ray, anchor) if reach > 0.1 else None
-    return None
+    if kind is TWIN:
+        ray = 2.0 * ray - unit(parent - rx)
+        ray = unit(np.array([ray[0], ray[1], max(ray[2], 0.05)]))
+    reach = seen[0] - float(np.linalg.norm(tx - parent))
+    return wall_between(parent, rx + reach * ray, anchor) if reach > 0.1 else None
 
 
-def _wall_between(point: Floats, image: Floats, anchor: Floats) -> Floats | None:
+def fit_reciprocal(parent: Floats, anchor: Floats, history: History) -> Fit | None:
+    """The best wall on the Tx leg to a known point: only distances speak of it, so that many walls may fit as well."""
+    tx, rx = history.poses.tx, history.poses.rx
+    reach = float(np.mean(history.seen[:, 0] - np.linalg.norm(rx - parent, axis=-1)))
+    middle = tx.mean(axis=0)
+    if reach < float(np.linalg.norm(middle - parent)) + 0.05:
+        return None
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    starts = [wall_between(parent, middle + reach * axis, anchor) for axis in axes]
+    good = np.array([start for start in starts if start is not None])
+    if not len(good):
+        return None
+    fits = fit_feature(RECIPROCAL, good, parent, anchor, history, 6)
+    best = int(np.argmin(fits.chi2))
+    return Fit(fits.feature[best], fits.covariance[best], fits.chi2[best])
+
+
+def fit_floor(parent: Floats, anchor: Floats, history: History) -> Fit | None:
+    """A floor below: level as the agent's motion is, at the height that the lengths of the Tx leg tell.
+
+    The array is blind for what comes from below, so that the floor shows on Tx legs alone, and distances taken on a
+    straight line cannot tell below from beside. That floors are level is what the agent knows from driving on it.
+    """
+    height, information = floor_height(parent, history)
+    if not np.isfinite(height) or height > min(float(history.poses.tx[:, 2].min()), float(parent[2])) - 0.05:
+        return None
+    image = floor_image(height, anchor)
+    chi2 = _normal_equations(RECIPROCAL, image, parent, np.stack([anchor, anchor]), history)[2]
+    lever = 2.0 * (anchor[2] - height)
+    spread = np.array([lever * FLOOR_TILT, lever * FLOOR_TILT, 2.0 / np.sqrt(information)])
+    return Fit(image, np.diag(spread**2), chi2)
+
+
+def floor_height(parent: Floats, history: History) -> tuple[Floats, Floats]:
+    """Height (...,) [m] of a level mirror on the Tx leg to `parent` (..., 3), and its information [1/m^2]."""
+    tx, rx = history.poses.tx, history.poses.rx
+    to_parent = parent[..., None, :] - tx
+    reach = history.seen[:, 0] - np.linalg.norm(rx - parent[..., None, :], axis=-1)
+    drop = np.sqrt(np.clip(reach**2 - np.sum(to_parent[..., :2] ** 2, axis=-1), 0.0, None))
+    # reach^2 = across^2 + drop^2 and drop = tx_z + parent_z - 2 height, so d reach / d height = -2 drop / reach
+    weight = (2.0 * drop / np.maximum(reach, 1e-9) / history.std[:, 0]) ** 2
+    information = np.sum(weight, axis=-1)
+    height = 0.5 * (tx[..., 2] + parent[..., None, 2] - drop)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.sum(weight * height, axis=-1) / information, information
+
+
+def floor_image(height: Floats, anchor: Floats) -> Floats:
+    """The level mirror at heights (...,) as images (..., 3) of the anchor."""
+    height = np.asarray(height)
+    return np.stack(
+        [np.full(height.shape, anchor[0]), np.full(height.shape, anchor[1]), 2.0 * height - anchor[2]], axis=-1
+    )
+
+
+def wall_between(point: Floats, image: Floats, anchor: Floats) -> Floats | None:
     """The wall that mirrors `point` to `image`, as the image (3,) of the anchor; None if they nearly coincide."""
     span = image - point
     if np.linalg.norm(span) < 0.2:
         return None
-    # reflect() takes a wall as an image of an anchor: here the point itself is the anchor.
     wall = reflect(anchor, image, point)
     return wall if np.linalg.norm(wall - anchor) > 0.05 else None
 
@@ -96,8 +186,3 @@ def _features(feature: Floats, parent: Floats | None) -> Floats:
     """(..., 1, F, 3): the axis of ones broadcasts over the K measurements."""
     rows = [feature] if parent is None else [feature, np.broadcast_to(parent, feature.shape)]
     return np.stack(rows, axis=-2)[..., None, :, :]
-
-
-def _normal(jacobian: Floats, weight: Floats) -> Floats:
-    """(..., 3, 3) information, with a ridge of (100 m)^-2 that keeps blind directions finite."""
-    return np.einsum("...kia,ki,...kib->...ab", jacobian, weight, jacobian) + 1e-4 * np.eye(3)

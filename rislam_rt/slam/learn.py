@@ -1,32 +1,36 @@
-"""What associated measurements teach about the landmarks themselves: strength, identity, existence."""
+"""What associated measurements teach about the landmarks themselves: strength, identity, whether they exist."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.model import Measurement, RisCode
 from rislam_rt.slam.birth import poses_of
-from rislam_rt.slam.book import Book, image_ident, learn_ratio, strike
-from rislam_rt.slam.expect import Belief, Expected, bounces
+from rislam_rt.slam.book import Book, image_ident, learn_ratio
+from rislam_rt.slam.expect import Belief, bounces
 from rislam_rt.slam.identity import add_evidence, log_panel, log_scatterer, predicted_panel_gain
+from rislam_rt.slam.match import Outlook
 from rislam_rt.slam.particles import Particles, systematic_ancestors
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, observe, reflect
+from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, observe
 from rislam_rt.slam.tracks import Glance
 
 BELIEF_SAMPLES = 24
 """Samples of the belief over which the panel's predicted gain is averaged."""
 CERTAIN = 30.0
 """Log odds beyond which a point's identity is no longer in question."""
-FORGIVENESS = 0.8
-"""What is left of the count of misses after a hit."""
+SURPRISE_RATE = 0.03
+"""Share of the latest innovation in the running mean."""
+SHOWN_RATE = 0.06
+"""Share of the latest cycle in the running share of cycles in which a feature showed."""
 
 
 def learn(
     belief: Belief,
     particles: Particles,
-    expected: Expected,
+    outlook: Outlook,
     hit: Integers,
+    surprise: Floats,
     glance: Glance,
     taken: Integers,
     measurement: Measurement,
@@ -35,44 +39,76 @@ def learn(
     *,
     rng: np.random.Generator,
 ) -> tuple[Book, Integers]:
-    """The book after returns `hit` were seen as measurements `taken`; and the ident that each of them went to."""
+    """The book after returns `hit` were seen as measurements `taken`, and the ident that each of them went to.
+
+    `surprise` (A,) is each hit's squared innovation per degree of freedom.
+    """
     book = belief.book
-    book, names = _count(book, expected, hit, glance, taken)
-    returns = Returns(expected.returns.legs, expected.returns.tx[hit], expected.returns.rx[hit])
-    plain = (bounces(returns) == 0) & (returns.point != TX)
+    book, names = _count(book, outlook, hit, surprise, glance, taken)
+    returns = compact(outlook.expected.returns, hit)
+    # beside something of its strength an amplitude tells of the sum, not of the landmark
+    plain = (bounces(returns) == 0) & (returns.point != TX) & ~outlook.merger.outshone[hit]
     if plain.any():
-        direct = Returns(returns.legs, returns.tx[plain], returns.rx[plain])
+        direct = compact(returns, np.flatnonzero(plain))
         raw = free[taken[plain]]
         amplitude, std = measurement.amplitude[raw], np.maximum(measurement.amplitude_std[raw], 1e-30)
         book = _weigh(book, belief, particles, direct, amplitude, std, code, rng=rng)
     return book, names
 
 
-def _count(book: Book, expected: Expected, hit: Integers, glance: Glance, taken: Integers) -> tuple[Book, Integers]:
+def _count(
+    book: Book,
+    outlook: Outlook,
+    hit: Integers,
+    surprise: Floats,
+    glance: Glance,
+    taken: Integers,
+) -> tuple[Book, Integers]:
     """Hits and misses, names, and what the walls' returns say about their reflection."""
+    expected = outlook.expected
     returns = expected.returns
     number = bounces(returns)
     names = np.full(len(hit), -1)
     seen = np.zeros(len(book.ident), dtype=np.bool_)
+    shocks = book.surprise.copy()
     for place, (row, pick) in enumerate(zip(hit, taken, strict=True)):
         legs = returns.legs[[returns.tx[row], returns.rx[row]]]
         walls = np.unique(legs[:, 1:][legs[:, 1:] != NONE])
         point = int(returns.point[row])
         seen[walls] = True
+        blamed = walls if len(walls) else np.array([point])
+        shocks[blamed] += SURPRISE_RATE * (surprise[place] - shocks[blamed])
         if point == TX or number[row] == 0:
             name = point if number[row] == 0 else int(walls[0])
             seen[name] = True
             names[place] = book.ident[name]
         else:
             book, names[place] = image_ident(book, point, int(legs[1, 1] if legs[1, 1] != NONE else legs[0, 1]))
-        if number[row] == 1:
+        if number[row] == 1 and outlook.merger.partner[row] < 0 and not outlook.merger.outshone[row]:
             surplus = float(glance.log_amplitude[pick] - expected.log_amplitude[row])
             book = learn_ratio(book, int(walls[0]), float(book.ratio[walls[0]]) + surplus)
-    missing = np.zeros(len(book.ident), dtype=np.bool_)
-    lost = np.setdiff1d(np.flatnonzero((number == 0) & expected.likely), hit)
-    missing[returns.point[lost]] = True
-    misses = np.where(seen, book.misses * FORGIVENESS, book.misses + missing)
-    return book._replace(hits=book.hits + seen, misses=misses), names
+    return book._replace(hits=book.hits + seen, surprise=shocks, shown=_shown(book, outlook, hit)), names
+
+
+def _shown(book: Book, outlook: Outlook, hit: Integers) -> Floats:
+    """Who showed, of those that should have: strong enough, and not beside something stronger.
+
+    A wall is judged by the images of the point that it was found by: those of others may never have been there.
+    """
+    expected, returns = outlook.expected, outlook.expected.returns
+    number = bounces(returns)
+    on_tx = returns.legs[returns.tx, 1] != NONE
+    here = np.zeros(len(number), dtype=np.bool_)
+    here[hit] = True
+    shown = book.shown.copy()
+    for row in np.flatnonzero(expected.likely & ~outlook.merger.outshone & (number <= 1) & (returns.point != TX)):
+        legs = returns.legs[[returns.tx[row], returns.rx[row]]]
+        point, feature = int(legs[0, 0]), int(legs[:, 1].max()) if number[row] else int(legs[0, 0])
+        if number[row] and book.ident[point] != book.founder[feature]:
+            continue
+        column = int(on_tx[row])
+        shown[feature, column] += SHOWN_RATE * (here[row] - shown[feature, column])
+    return shown
 
 
 def _weigh(
@@ -116,42 +152,3 @@ def _sampled_gains(
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         centers[place] += rng.standard_normal((len(chosen), 3)) @ root.T
     return predicted_panel_gain(belief.ris, code, centers, poses.tx[None], poses.rx[None], np.ones(1), belief.radio)
-
-
-def forget(particles: Particles, book: Book, limit: float) -> tuple[Particles, Book]:
-    """Remove features that were expected and failed to show too often."""
-    return _drop(particles, book, book.misses < limit)
-
-
-def unite(particles: Particles, book: Book, distance: float) -> tuple[Particles, Book]:
-    """Remove the younger of two features of one kind that the belief cannot tell apart."""
-    means = np.einsum("n,nfi->fi", particles.weight, particles.features)
-    keep = np.ones(len(book.ident), dtype=np.bool_)
-    for kind in (book.points, book.walls):
-        for place, young in enumerate(kind[1:], start=1):
-            for old in kind[:place]:
-                if keep[old] and keep[young] and _apart(particles, means, book, int(old), int(young)) < distance:
-                    keep[young] = False
-    return _drop(particles, book, keep)
-
-
-def _apart(particles: Particles, means: Floats, book: Book, old: int, young: int) -> float:
-    """Squared Mahalanobis distance between two features; walls are compared as images of the older one's anchor."""
-    other = means[young]
-    if book.is_wall[young]:
-        other = reflect(book.anchor[old], means[young], book.anchor[young])
-    gap = means[old] - other
-    if gap @ gap > 1.0:
-        return np.inf
-    blocks = [particles.covariance[3 * row : 3 * row + 3, 3 * row : 3 * row + 3] for row in (old, young)]
-    spread = blocks[0] + blocks[1] + 0.02**2 * np.eye(3)
-    return float(gap @ np.linalg.solve(spread, gap))
-
-
-def _drop(particles: Particles, book: Book, keep: Booleans) -> tuple[Particles, Book]:
-    """Particles and book without some features."""
-    if keep.all():
-        return particles, book
-    wide = np.repeat(keep, 3)
-    covariance = particles.covariance[np.ix_(wide, wide)]
-    return particles._replace(features=particles.features[:, keep], covariance=covariance), strike(book, keep)

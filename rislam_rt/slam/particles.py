@@ -69,6 +69,20 @@ def moments(log_weight: Floats, values: Floats) -> tuple[Floats, Floats]:
     return mean, (centred * weight[:, None]).T @ centred
 
 
+def mean_features(particles: Particles) -> Floats:
+    """(F, 3) [m] mean map."""
+    return np.einsum("n,nfi->fi", particles.weight, particles.features)
+
+
+def joint_covariance(particles: Particles) -> Floats:
+    """(3 + 3F, 3 + 3F) of position and map together: the cloud's, and the map's own given a trajectory."""
+    count = len(particles.log_weight)
+    joint = np.concatenate([particles.position, particles.features.reshape(count, -1)], axis=1)
+    covariance = moments(particles.log_weight, joint)[1]
+    covariance[3:, 3:] += particles.covariance
+    return covariance
+
+
 def resample(particles: Particles, spans: Floats, *, rng: np.random.Generator) -> Particles:
     """Systematic resampling, then a smooth kernel about every survivor that keeps mean and covariance (Liu and West).
 
@@ -86,7 +100,7 @@ def resample(particles: Particles, spans: Floats, *, rng: np.random.Generator) -
     mean, covariance = moments(particles.log_weight, joint)
     ancestors = systematic_ancestors(particles.log_weight, count, rng=rng)
     chosen = joint[ancestors]
-    spread = _square_root(covariance)
+    spread = square_root(covariance)
     bandwidth = _bandwidth(count, spread.shape[1])
     shrink = np.sqrt(1.0 - bandwidth**2)
     moved = mean + shrink * (chosen - mean) + bandwidth * rng.standard_normal((count, spread.shape[1])) @ spread.T
@@ -102,7 +116,7 @@ def resample(particles: Particles, spans: Floats, *, rng: np.random.Generator) -
     )
 
 
-def _square_root(covariance: Floats) -> Floats:
+def square_root(covariance: Floats) -> Floats:
     """A factor (D, K) with `factor @ factor.T = covariance`, null directions left out."""
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))

@@ -97,17 +97,26 @@ def observe(returns: Returns, features: Floats, anchor: Floats, poses: Poses) ->
     return Sight(seen, tx_length, rx_length, arrival[..., 2])
 
 
-def feature_jacobian(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Floats:
-    """Derivatives (..., R, 3, F, 3) of `observe(...).seen` with respect to the features (..., F, 3)."""
-    image = leg_images(returns, features, anchor, poses.tx)
-    moved = _leg_jacobian(returns, features, anchor, poses.tx)
-    by_tx, by_rx = sight_jacobians(image, returns, poses)
-    jacobian = np.einsum("...ria,...rafb->...rifb", by_rx, moved[..., returns.rx, :, :, :])
-    jacobian[..., 0, :, :] += np.einsum("...ra,...rafb->...rfb", by_tx, moved[..., returns.tx, :, :, :])
+def pose_jacobian(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Floats:
+    """Derivatives (..., R, 3, 3) of `observe(...).seen` with respect to the agent's position."""
+    image, _, by_base = _leg_jacobian(returns, features, anchor, poses.tx)
+    by_tx, by_rx = _sight_jacobians(image, returns, poses)
+    moves = np.where((returns.legs[:, 0] == TX)[:, None, None], by_base, 0.0) - np.eye(3)
+    jacobian = by_rx @ moves[..., returns.rx, :, :]
+    jacobian[..., 0, :] += np.einsum("...ra,...rab->...rb", by_tx, moves[..., returns.tx, :, :])
     return jacobian
 
 
-def sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Floats, Floats]:
+def feature_jacobian(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Floats:
+    """Derivatives (..., R, 3, F, 3) of `observe(...).seen` with respect to the features (..., F, 3)."""
+    image, by_feature, _ = _leg_jacobian(returns, features, anchor, poses.tx)
+    by_tx, by_rx = _sight_jacobians(image, returns, poses)
+    jacobian = np.einsum("...ria,...rfab->...rifb", by_rx, by_feature[..., returns.rx, :, :, :])
+    jacobian[..., 0, :, :] += np.einsum("...ra,...rfab->...rfb", by_tx, by_feature[..., returns.tx, :, :, :])
+    return jacobian
+
+
+def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Floats, Floats]:
     """Derivatives of the length by the Tx leg's image (..., R, 3), and of all three by the Rx leg's (..., R, 3, 3)."""
     to_tx = image[..., returns.tx, :] - poses.tx[..., None, :]
     to_rx = image[..., returns.rx, :] - poses.rx[..., None, :]
@@ -120,27 +129,37 @@ def sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Floa
     return by_tx, np.concatenate([arrival[..., None, :], turn], axis=-2)
 
 
-def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -> Floats:
-    """Derivatives (..., G, 3, F, 3) of the legs' images with respect to the features."""
+def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -> tuple[Floats, Floats, Floats]:
+    """Images (..., G, 3) of the legs, their derivatives (..., G, F, 3, 3) by the features, and by the base."""
     legs = returns.legs
-    point = np.where((legs[:, 0] == TX)[:, None], tx[..., None, :], features[..., legs[:, 0], :])
-    jacobian = np.zeros((*point.shape, features.shape[-2], 3))
-    for leg in np.flatnonzero(legs[:, 0] != TX):
-        jacobian[..., leg, :, legs[leg, 0], :] = np.eye(3)
+    image = np.where((legs[:, 0] == TX)[:, None], tx[..., None, :], features[..., legs[:, 0], :])
+    by_feature = np.zeros((*image.shape[:-1], features.shape[-2], 3, 3))
+    by_base = np.zeros((*image.shape, 3)) + np.eye(3)
+    own = np.flatnonzero(legs[:, 0] != TX)
+    by_feature[..., own, legs[own, 0], :, :] = np.eye(3)
     for column in (1, 2):
-        for leg in np.flatnonzero(legs[:, column] != NONE):
-            row = legs[leg, column]
-            wall, start = features[..., row, :], point[..., leg, :]
-            span = wall - anchor[row]
-            square = np.sum(span * span, axis=-1)[..., None, None]
-            image = reflect(start, wall, anchor[row])
-            depth = np.sum(span * (start - 0.5 * (wall + anchor[row])), axis=-1)[..., None, None] / square
-            householder = np.eye(3) - 2.0 * span[..., :, None] * span[..., None, :] / square
-            jacobian[..., leg, :, :, :] = np.einsum("...ab,...bfc->...afc", householder, jacobian[..., leg, :, :, :])
-            by_wall = -2.0 * (depth * np.eye(3) + span[..., :, None] * (image - wall)[..., None, :] / square)
-            jacobian[..., leg, :, row, :] += by_wall
-            point[..., leg, :] = image
-    return jacobian
+        rows = np.flatnonzero(legs[:, column] != NONE)
+        if not len(rows):
+            continue
+        walls = legs[rows, column]
+        wall, start = features[..., walls, :], image[..., rows, :]
+        span = wall - anchor[walls]
+        square = np.sum(span * span, axis=-1)[..., None, None]
+        mirrored = reflect(start, wall, anchor[walls])
+        depth = np.sum(span * (start - 0.5 * (wall + anchor[walls])), axis=-1)[..., None, None] / square
+        householder = np.eye(3) - 2.0 * span[..., :, None] * span[..., None, :] / square
+        by_feature[..., rows, :, :, :] = householder[..., None, :, :] @ by_feature[..., rows, :, :, :]
+        by_base[..., rows, :, :] = householder @ by_base[..., rows, :, :]
+        by_wall = -2.0 * (depth * np.eye(3) + span[..., :, None] * (mirrored - wall)[..., None, :] / square)
+        by_feature[..., rows, walls, :, :] += by_wall
+        image[..., rows, :] = mirrored
+    return image, by_feature, by_base
+
+
+def compact(returns: Returns, rows: Integers) -> Returns:
+    """Some of the returns, with only the legs that they need."""
+    used, place = np.unique(np.concatenate([returns.tx[rows], returns.rx[rows]]), return_inverse=True)
+    return Returns(returns.legs[used], place[: len(rows)], place[len(rows) :])
 
 
 def _norm(vector: Floats) -> Floats:

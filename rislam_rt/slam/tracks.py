@@ -34,8 +34,10 @@ class Tracks(NamedTuple):
     """(T, 3, 2, 2)."""
     log_amplitude: Floats
     """(T,) of the last measurement."""
-    specular: Booleans
-    """(T,) whether it is a wall return."""
+    shine: Floats
+    """(T,) share of its measurements, the latest counting most, that were as strong as only a wall return is."""
+    moving: Booleans
+    """(T,) whether its history fits a moving image and nothing else."""
     misses: Integers
     """(T,) cycles since the last measurement."""
     seen: Floats
@@ -44,6 +46,11 @@ class Tracks(NamedTuple):
     """(T, W, 3)."""
     cycle: Integers
     """(T, W) cycle of each row, -1 where empty."""
+
+    @property
+    def specular(self) -> Booleans:
+        """(T,) whether it is taken for a wall return."""
+        return self.moving | (self.shine > 0.3)
 
     @property
     def length(self) -> Integers:
@@ -60,6 +67,7 @@ def no_tracks(window: int) -> Tracks:
     return Tracks(
         np.zeros((0, 3, 2)),
         np.zeros((0, 3, 2, 2)),
+        np.zeros(0),
         np.zeros(0),
         np.zeros(0, dtype=np.bool_),
         np.zeros(0, dtype=np.int64),
@@ -78,8 +86,8 @@ def advance(tracks: Tracks, dt: float, cycle: int, bend: Floats) -> Tracks:
     return tracks._replace(mean=tracks.mean @ transition.T, covariance=covariance, misses=tracks.misses + 1, cycle=kept)
 
 
-def extend(tracks: Tracks, rows: Integers, glance: Glance, picks: Integers, cycle: int) -> Tracks:
-    """Tracks `rows` (A,) updated by measurements `picks` (A,)."""
+def extend(tracks: Tracks, rows: Integers, glance: Glance, picks: Integers, bright: Booleans, cycle: int) -> Tracks:
+    """Tracks `rows` (A,) updated by measurements `picks` (A,); `bright` (M,) tells those as strong as wall returns."""
     if not len(rows):
         return tracks
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
@@ -87,8 +95,9 @@ def extend(tracks: Tracks, rows: Integers, glance: Glance, picks: Integers, cycl
     gain = spread[..., 0] / (spread[..., 0, 0] + glance.std[picks] ** 2)[..., None]
     mean[rows] = prior + gain * (glance.seen[picks] - prior[..., 0])[..., None]
     covariance[rows] = spread - gain[..., :, None] * spread[..., None, 0, :]
-    log_amplitude, misses = tracks.log_amplitude.copy(), tracks.misses.copy()
+    log_amplitude, misses, shine = tracks.log_amplitude.copy(), tracks.misses.copy(), tracks.shine.copy()
     log_amplitude[rows], misses[rows] = glance.log_amplitude[picks], 0
+    shine[rows] += 0.2 * (bright[picks] - shine[rows])
     seen, std, cycles = tracks.seen.copy(), tracks.std.copy(), tracks.cycle.copy()
     slot = cycle % cycles.shape[1]
     seen[rows, slot], std[rows, slot], cycles[rows, slot] = glance.seen[picks], glance.std[picks], cycle
@@ -97,13 +106,14 @@ def extend(tracks: Tracks, rows: Integers, glance: Glance, picks: Integers, cycl
         covariance=covariance,
         log_amplitude=log_amplitude,
         misses=misses,
+        shine=shine,
         seen=seen,
         std=std,
         cycle=cycles,
     )
 
 
-def begin(tracks: Tracks, glance: Glance, picks: Integers, specular: Booleans, rate: Floats, cycle: int) -> Tracks:
+def begin(tracks: Tracks, glance: Glance, picks: Integers, bright: Booleans, rate: Floats, cycle: int) -> Tracks:
     """One new track for each of the measurements `picks` (A,); `rate` (3,) is the spread of rates to expect."""
     if not len(picks):
         return tracks
@@ -118,6 +128,14 @@ def begin(tracks: Tracks, glance: Glance, picks: Integers, specular: Booleans, r
     slot = cycle % window
     seen[:, slot], std[:, slot], cycles[:, slot] = glance.seen[picks], glance.std[picks], cycle
     fresh = Tracks(
-        mean, covariance, glance.log_amplitude[picks], specular, np.zeros(count, dtype=np.int64), seen, std, cycles
+        mean,
+        covariance,
+        glance.log_amplitude[picks],
+        bright[picks].astype(np.float64),
+        np.zeros(count, dtype=np.bool_),
+        np.zeros(count, dtype=np.int64),
+        seen,
+        std,
+        cycles,
     )
     return Tracks._make(np.concatenate([old, new]) for old, new in zip(tracks, fresh, strict=True))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.geometry.planes import mirror, plane_between
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, feature_jacobian, observe, reflect
+from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, feature_jacobian, observe, pose_jacobian, reflect
 
 LEGS = np.array(
     [[0, NONE, NONE], [0, 2, NONE], [1, 2, 3], [1, 3, 2], [TX, 2, NONE], [TX, NONE, NONE], [TX, 2, 3], [1, 3, NONE]]
@@ -72,3 +72,23 @@ def test_shifting_agent_and_map_together_changes_nothing(world) -> None:
     shift = np.array([0.3, -0.2, 0.7])
     moved = observe(RETURNS, features + shift, anchor + shift, Poses(poses.tx + shift, poses.rx + shift, poses.heading))
     np.testing.assert_allclose(moved.seen, observe(RETURNS, features, anchor, poses).seen, atol=1e-12)
+
+
+def test_pose_derivatives_equal_central_differences(world) -> None:
+    features, anchor, poses = world
+    jacobian = pose_jacobian(RETURNS, features, anchor, poses)
+    width = 1e-6
+    for axis in range(3):
+        shift = width * np.eye(3)[axis]
+        ahead = observe(RETURNS, features, anchor, Poses(poses.tx + shift, poses.rx + shift, poses.heading)).seen
+        behind = observe(RETURNS, features, anchor, Poses(poses.tx - shift, poses.rx - shift, poses.heading)).seen
+        np.testing.assert_allclose(jacobian[..., axis], (ahead - behind) / (2 * width), atol=1e-7)
+
+
+def test_compact_returns_look_the_same(world) -> None:
+    features, anchor, poses = world
+    rows = np.array([5, 1])
+    few = compact(RETURNS, rows)
+    assert len(few.legs) == 4
+    want = observe(RETURNS, features, anchor, poses).seen[:, rows]
+    np.testing.assert_array_equal(observe(few, features, anchor, poses).seen, want)

@@ -1,0 +1,160 @@
+"""What this cycle's measurements may belong to: expected returns of the map first, tracks behind them."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.model import RadioConfig
+from rislam_rt.slam.associate import Candidates, inverse_3x3
+from rislam_rt.slam.expect import Belief, Expected
+from rislam_rt.slam.particles import Particles, joint_covariance
+from rislam_rt.slam.returns import feature_jacobian, observe, pose_jacobian
+from rislam_rt.slam.tracks import AMPLITUDE_WANDER, Tracks
+
+INSIDE, OUTSIDE = 0.9, 1.1
+"""Gap in units of the resolution cell below which two paths certainly, and above which they certainly do not, merge."""
+TWIN_GAIN, TWIN_SPREAD = 0.2, 0.6
+"""Mean and standard deviation of the log amplitude of two equal paths of random phase, over that of one."""
+LANDMARK_ODDS, TRACK_ODDS = np.log(0.9), np.log(0.5)
+"""Log probability that an expected return, and that a track, shows in a cycle."""
+
+
+class Merger(NamedTuple):
+    """What becomes of R returns that share resolution cells with others."""
+
+    partner: Integers
+    """(R,) the reciprocal that a return comes out as one with, -1 for none."""
+    absorbed: Booleans
+    """(R,) whether it comes out as part of something stronger, and not by itself."""
+    disturbance: Floats
+    """(R, 3) standard deviation by which others in its cell shift it."""
+    outshone: Booleans
+    """(R,) whether something at least half as strong is, or may be, in the same cell."""
+
+
+class Outlook(NamedTuple):
+    """R expected returns, linearised about the mean belief."""
+
+    expected: Expected
+    seen: Floats
+    """(R, 3)."""
+    covariance: Floats
+    """(R, 3, 3) from pose and map, without the measurement's noise."""
+    log_amplitude: Floats
+    """(R,) with the reciprocal's share where the two come out as one."""
+    log_amplitude_std: Floats
+    """(R,)."""
+    merger: Merger
+    cell: Floats
+    """(3,) resolution cell."""
+    by_feature: Floats
+    """(R, 3, F, 3)."""
+
+
+def look_ahead(belief: Belief, expected: Expected, particles: Particles, tracks: Tracks) -> Outlook:
+    """Predicted returns with their uncertainty."""
+    returns, book = expected.returns, belief.book
+    seen = observe(returns, belief.features, book.anchor, belief.poses).seen
+    by_feature = feature_jacobian(returns, belief.features, book.anchor, belief.poses)
+    by_pose = pose_jacobian(returns, belief.features, book.anchor, belief.poses)
+    cell = resolution_cell(belief.radio)
+    merger = merge_returns(seen, expected, tracks, cell)
+    both = np.flatnonzero(merger.partner >= 0)
+    log_amplitude, log_amplitude_std = expected.log_amplitude.copy(), expected.log_amplitude_std.copy()
+    log_amplitude[both] += TWIN_GAIN
+    log_amplitude_std[both] = np.hypot(log_amplitude_std[both], TWIN_SPREAD)
+    for field in (seen, by_feature, by_pose):
+        field[both] = 0.5 * (field[both] + field[merger.partner[both]])
+    flat = np.concatenate([by_pose, by_feature.reshape(len(seen), 3, 3 * len(book.ident))], axis=2)
+    covariance = flat @ joint_covariance(particles) @ np.swapaxes(flat, 1, 2)
+    return Outlook(expected, seen, covariance, log_amplitude, log_amplitude_std, merger, cell, by_feature)
+
+
+def resolution_cell(radio: RadioConfig) -> Floats:
+    """(3,) length c/B [m] and the array's beam in either cosine, within which paths come out as one."""
+    array = radio.array
+    beams = [1.0 / (count * array.spacing) if count > 1 else 2.0 for count in (array.rows, array.cols)]
+    return np.array([SPEED_OF_LIGHT / radio.bandwidth, *beams])
+
+
+def merge_returns(seen: Floats, expected: Expected, tracks: Tracks, cell: Floats) -> Merger:
+    """Foresee what the receiver cannot resolve: from the strongest down, each takes in all that is in its cell.
+
+    What comes out lies at `Re sum alpha_i conj(alpha) z_i / |alpha|^2`. With phases that change by a turn every half
+    wavelength of motion a weaker path shifts the stronger by its amplitude ratio times the gap, in root mean square
+    over sqrt(2). A reciprocal is as strong as its twin, so that the two come out halfway between, whatever the phases.
+    """
+    count, shiny = len(seen), np.flatnonzero(tracks.specular)
+    place = np.concatenate([seen, tracks.mean[shiny, :, 0]])
+    strength = np.concatenate([expected.log_amplitude, tracks.log_amplitude[shiny]])
+    partner, taken = np.full(count, -1), np.zeros(len(place), dtype=np.bool_)
+    disturbance, beside = np.zeros((count, 3)), np.zeros(count, dtype=np.bool_)
+    for leader in np.argsort(-strength, kind="stable"):
+        if taken[leader]:
+            continue
+        gap = place - place[leader]
+        reach = np.max(np.abs(gap) / cell, axis=1)
+        reach[leader] = np.inf
+        taken |= reach < INSIDE
+        near = np.flatnonzero((reach < OUTSIDE) & (strength <= strength[leader]))
+        beside[near[near < count]] = True
+        if leader >= count:
+            continue
+        ratio = np.exp(strength[near] - strength[leader])
+        twin = expected.twin[leader]
+        if twin >= 0 and reach[twin] < 1.0:
+            partner[leader], taken[twin] = twin, True
+            ratio = np.where(near == twin, 0.0, ratio)
+        disturbance[leader] = np.sqrt(0.5 * np.sum((ratio[:, None] * gap[near]) ** 2, axis=0))
+        beside[leader] |= bool(np.any(ratio > 0.5))
+    return Merger(partner, taken[:count], disturbance, beside | taken[:count])
+
+
+def candidates(outlook: Outlook, tracks: Tracks, hidden: Booleans) -> Candidates:
+    """Expected returns, then the tracks that are not `hidden` (T,) behind one."""
+    spread = outlook.covariance.copy()
+    spread[:, [0, 1, 2], [0, 1, 2]] += outlook.merger.disturbance**2
+    follow = track_covariance(tracks)
+    wander = np.where(tracks.specular, 0.3, AMPLITUDE_WANDER)
+    # A hidden track has no chance: it keeps its row, so that rows stay aligned.
+    odds = np.where(hidden, -1e6, TRACK_ODDS)
+    return Candidates(
+        np.concatenate([outlook.seen, tracks.mean[..., 0]]),
+        np.concatenate([spread, follow]),
+        np.concatenate([outlook.log_amplitude, tracks.log_amplitude]),
+        np.concatenate([outlook.log_amplitude_std, wander]),
+        np.concatenate([np.where(outlook.merger.absorbed, -1e6, LANDMARK_ODDS), odds]),
+    )
+
+
+def track_covariance(tracks: Tracks) -> Floats:
+    """(T, 3, 3) of the predicted measurement of each track."""
+    follow = np.zeros((len(tracks.misses), 3, 3))
+    follow[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
+    return follow
+
+
+def hidden_tracks(outlook: Outlook, tracks: Tracks, gate: float) -> Booleans:
+    """(T,) whether a track that is no wall return runs where the map expects a return of its strength.
+
+    Such a track would keep the measurements that prove the map right; it must give way.
+    """
+    if not len(outlook.seen) or not len(tracks.misses):
+        return np.zeros(len(tracks.misses), dtype=np.bool_)
+    spread = outlook.covariance[None] + track_covariance(tracks)[:, None]
+    spread[..., [0, 1, 2], [0, 1, 2]] += outlook.merger.disturbance**2
+    gap = tracks.mean[:, None, :, 0] - outlook.seen[None]
+    inverse, _ = inverse_3x3(spread)
+    distance = np.einsum("tri,trij,trj->tr", gap, inverse, gap)
+    fade = np.abs(tracks.log_amplitude[:, None] - outlook.log_amplitude)
+    near = (distance < gate) & (fade < 3.0 * np.hypot(outlook.log_amplitude_std, 0.3))
+    return near.any(axis=1) & ~tracks.specular
+
+
+def explained(outlook: Outlook, seen: Floats, covariance: Floats, gate: float) -> Integers:
+    """Returns within the gate of one prediction (3,) with covariance (3, 3), whatever their strength."""
+    gap = seen - outlook.seen
+    inverse, _ = inverse_3x3(outlook.covariance + covariance)
+    return np.flatnonzero(np.einsum("ri,rij,rj->r", gap, inverse, gap) < gate)
