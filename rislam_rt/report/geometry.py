@@ -22,6 +22,21 @@ def outline_edges(walls: Walls) -> Floats:
     return np.array(edges, dtype=np.float64).reshape(-1, 2, 3)
 
 
+def section(triangles: Floats, height: float) -> Floats:
+    """(S, 2, 2) [m] segments in which triangles (T, 3, 3) cut the horizontal plane at `height`."""
+    above = triangles[:, :, 2] - height
+    cut = triangles[(above.min(axis=1) < 0.0) & (above.max(axis=1) > 0.0)]
+    segments = []
+    for triangle in cut:
+        level = triangle[:, 2] - height
+        points = [corner[:2] for corner, z in zip(triangle, level, strict=True) if z == 0.0]
+        for a, b in ((0, 1), (1, 2), (2, 0)):
+            if level[a] * level[b] < 0.0:
+                points.append((triangle[a, :2] * level[b] - triangle[b, :2] * level[a]) / (level[b] - level[a]))
+        segments.append(points[:2])
+    return np.array(segments, dtype=np.float64).reshape(-1, 2, 2)
+
+
 def plane_trace(normal: Floats, offset: float, height: float, bounds: Floats) -> Floats | None:
     """Segment (2, 2) [m] in which a plane cuts the horizontal plane at `height`, inside a box; None if it misses."""
     flat, level = normal[:2], offset - normal[2] * height

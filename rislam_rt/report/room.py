@@ -12,7 +12,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import PathKind, Paths, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.summary import landmark_track, match_walls
-from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace
+from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace, section
 from rislam_rt.report.style import KIND, TRUTH, WALL, save_figure, scheme_colour, styled
 
 ZOOM = 0.25
@@ -78,10 +78,12 @@ def draw_scene(scene: Scene, path: Path) -> Path:
 
 
 def _draw_truth(axis: Axes, scene: Scene) -> None:
-    """Walls, path and landmarks as they are."""
-    for edge in outline_edges(build_walls(scene)):
-        axis.plot(edge[:, 0], edge[:, 1], color=WALL, lw=3.0, solid_capstyle="round", zorder=1)
-    path = scene.agent.position
+    """Walls (thick where they stand at the agent's height), path and landmarks as they are."""
+    walls, path = build_walls(scene), scene.agent.position
+    for edge in outline_edges(walls):
+        axis.plot(edge[:, 0], edge[:, 1], color="#dddddd", lw=0.8, zorder=0)
+    for cut in section(walls.triangles, float(path[-1, 2])):
+        axis.plot(cut[:, 0], cut[:, 1], color=WALL, lw=3.0, solid_capstyle="round", zorder=1)
     axis.plot(path[:, 0], path[:, 1], color=TRUTH, lw=4.0, alpha=0.25, zorder=2)
     axis.plot(path[0, 0], path[0, 1], "o", color=TRUTH, ms=5, zorder=3)
     axis.annotate("start", (path[0, 0], path[0, 1]), (6, -10), textcoords="offset points", fontsize=9)

@@ -12,7 +12,7 @@ from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.pipeline.summary import summarise
 from rislam_rt.report import draw_figures
 from rislam_rt.report.curves import strongest_db
-from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace
+from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace, section
 from rislam_rt.report.page import build_page
 from rislam_rt.report.room import path_points
 from rislam_rt.scene import load_scene
@@ -47,6 +47,19 @@ def test_trace_ends_at_the_box():
     normal, box = np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0), np.array([[0.0, 0.0, 0.0], [6.0, 4.0, 3.0]])
     segment = plane_trace(normal, 3.0 / np.sqrt(2.0), 0.0, box)
     np.testing.assert_allclose(segment[np.argsort(segment[:, 0])], [[0.0, 3.0], [3.0, 0.0]], atol=1e-12)
+
+
+def test_section_of_a_room_is_its_plan(result):
+    walls = build_walls(result.scene)
+    cut = section(walls.triangles, 0.5)
+    length = np.linalg.norm(cut[:, 1] - cut[:, 0], axis=1).sum()
+    assert length == pytest.approx(24.0)
+    assert len(section(walls.triangles, 5.0)) == 0
+
+
+def test_section_through_a_corner_is_kept():
+    triangle = np.array([[[0.0, 0.0, 1.0], [2.0, 0.0, 0.0], [2.0, 2.0, 2.0]]])
+    np.testing.assert_allclose(section(triangle, 1.0), [[[0.0, 0.0], [2.0, 1.0]]])
 
 
 def test_floors_and_distant_planes_have_no_trace():
