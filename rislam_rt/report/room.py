@@ -18,8 +18,8 @@ from rislam_rt.report.style import KIND, TRUTH, WALL, save_figure, scheme_colour
 ZOOM = 0.25
 """Half the width [m] of the close-up of the path's end, unless the error is larger."""
 
-LABEL = np.array([0.12, 0.0, 0.08])
-"""From an object to its name in the three-dimensional picture [m]."""
+LABEL = np.array([0.02, 0.0, 0.014])
+"""From an object to its name in the three-dimensional picture, in sizes of the room."""
 
 
 def draw_above(result: SlamResult) -> Figure:
@@ -196,15 +196,16 @@ def _draw_room_3d(axis: Any, scene: Scene) -> None:
 
 def _draw_objects_3d(axis: Any, scene: Scene, cycle: int) -> None:
     path = scene.agent.position
+    label = LABEL * float(np.max(scene.bounds[1] - scene.bounds[0]))
     axis.plot(*path.T, color=TRUTH, lw=2.0, alpha=0.3, zorder=3)
     axis.plot(*path[cycle], "o", color=TRUTH, ms=7, zorder=9)
-    axis.text(*(path[cycle] + np.array([0.0, 0.0, -0.25])), "agent", fontsize=9, zorder=10)
+    axis.text(*(path[cycle] - 3.0 * label * np.array([0.0, 0.0, 1.0])), "agent", fontsize=9, zorder=10)
     for scatterer in scene.scatterers:
         axis.plot(*scatterer.position, "o", color=KIND[PathKind.PS], mec=TRUTH, ms=9, zorder=9)
-        axis.text(*(scatterer.position + LABEL), scatterer.name, fontsize=9, zorder=10)
+        axis.text(*(scatterer.position + label), scatterer.name, fontsize=9, zorder=10)
     if scene.ris is not None:
         axis.plot(*scene.ris.center, "s", color=KIND[PathKind.RIS], mec=TRUTH, ms=10, zorder=9)
-        axis.text(*(scene.ris.center + LABEL), scene.ris.name, fontsize=9, zorder=10)
+        axis.text(*(scene.ris.center + label), scene.ris.name, fontsize=9, zorder=10)
 
 
 def _draw_class(axis: Any, scene: Scene, paths: Paths, gain: Floats, cycle: int, kind: PathKind) -> Line2D | None:
