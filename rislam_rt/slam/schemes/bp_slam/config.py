@@ -13,7 +13,7 @@ class BpSlamConfig:
 
     num_particles: int = 1024
     """Of the agent, and of every potential feature; a power of two lets the kernels follow thin clouds best."""
-    num_pairings: int = 8
+    num_pairings: int = 10
     """Feature particles that every agent particle meets in a message, and the other way round."""
     sigma_a: float = 0.0033
     """Standard deviation of the white acceleration [m/s^2]."""
@@ -29,7 +29,9 @@ class BpSlamConfig:
     """Features expected in the region before the first scan, Poisson."""
     birth_mean: float = 0.01
     """Features that appear in the region in one step, Poisson."""
-    feature_std: float = 0.002
+    coupled: bool = True
+    """Whether beliefs of agent and feature keep what they have in common, or are independent as published."""
+    feature_std: float = 0.001
     """Random walk of a feature in one step [m]: keeps old features from becoming blind to new evidence."""
     detection_threshold: float = 0.5
     """Existence probability above which a potential feature counts as detected."""

@@ -7,6 +7,14 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
 from rislam_rt.slam.schemes.bp_slam.ranges import RangeModel, random_directions
+from rislam_rt.slam.schemes.resampling import effective_fraction, normalised_rows, thin_out
+
+RESAMPLE_BELOW = 0.25
+"""Effective fraction of a feature's particles below which it is resampled."""
+SHARE = 0.7
+"""Power of the weights by which resampling draws; the rest stays with the particles."""
+KNOWN_FLOOR = 0.05
+"""An anchor that is hidden for long is still looked for with this probability."""
 
 
 class Scan(NamedTuple):
@@ -22,7 +30,11 @@ class Features(NamedTuple):
     """K potential features of all anchors together."""
 
     cloud: Floats
-    """(K, N, D) equally likely positions [m]."""
+    """(K, N, D) positions [m], where the agent is at its mean."""
+    log_weight: Floats
+    """(K, N), up to a constant a row."""
+    slope: Floats
+    """(K, 2D, D) by how much a feature moves with the agent's position and velocity; see `coupling`."""
     existence: Floats
     """(K,) probability."""
     anchor: Integers
@@ -33,25 +45,36 @@ class Features(NamedTuple):
     """(K,) an anchor of known position: neither moves nor dies."""
 
     @property
-    def mean(self) -> Floats:
-        """(K, D) [m]."""
-        return self.cloud.mean(axis=1)
+    def weight(self) -> Floats:
+        """(K, N), every row summing to one."""
+        return normalised_rows(self.log_weight)
 
-    @property
-    def covariance(self) -> Floats:
-        """(K, D, D) [m^2]."""
-        centred = self.cloud - self.cloud.mean(axis=1, keepdims=True)
-        return np.einsum("kni,knj->kij", centred, centred) / self.cloud.shape[1]
+    def moments(self) -> tuple[Floats, Floats]:
+        """Mean (K, D) [m] and covariance (K, D, D) [m^2]."""
+        weight = self.weight
+        mean = np.einsum("kn,knd->kd", weight, self.cloud)
+        centred = self.cloud - mean[:, None]
+        return mean, np.einsum("kn,kni,knj->kij", weight, centred, centred)
 
 
-KNOWN_FLOOR = 0.05
-"""An anchor that is hidden for long is still looked for with this probability."""
+def make_features(cloud: Floats, existence: Floats, anchor: Integers, ident: Integers, known: bool = False) -> Features:
+    """Features of equally likely particles that owe nothing to the agent's present state."""
+    count, particles, dims = cloud.shape
+    return Features(
+        cloud,
+        np.zeros((count, particles)),
+        np.zeros((count, 2 * dims, dims)),
+        existence,
+        anchor,
+        ident,
+        np.full(count, known),
+    )
 
 
 def no_features(num_particles: int, dims: int) -> Features:
     """None yet."""
     whole = np.zeros(0, dtype=np.int64)
-    return Features(np.zeros((0, num_particles, dims)), np.zeros(0), whole, whole, np.zeros(0, dtype=np.bool_))
+    return make_features(np.zeros((0, num_particles, dims)), np.zeros(0), whole, whole)
 
 
 def known_anchors(anchors: Floats, std: float, num_particles: int, *, rng: np.random.Generator) -> Features:
@@ -59,7 +82,7 @@ def known_anchors(anchors: Floats, std: float, num_particles: int, *, rng: np.ra
     count, dims = anchors.shape
     cloud = anchors[:, None] + std * rng.standard_normal((count, num_particles, dims))
     number = np.arange(count)
-    return Features(cloud, np.ones(count), number, number, np.ones(count, dtype=np.bool_))
+    return make_features(cloud, np.ones(count), number, number, known=True)
 
 
 def predict_features(features: Features, config: BpSlamConfig, *, rng: np.random.Generator) -> Features:
@@ -72,35 +95,38 @@ def predict_features(features: Features, config: BpSlamConfig, *, rng: np.random
     )
 
 
-def birth_ratio(
-    scan: Scan, undetected: float, model: RangeModel, dims: int, config: BpSlamConfig, max_range: float
-) -> Floats:
+def birth_ratio(scan: Scan, undetected: float, model: RangeModel, dims: int, config: BpSlamConfig) -> Floats:
     """(M,) expected density of first detections over that of clutter.
 
     `undetected` features are uniform over the region, whose measure is the integral of the model's shell.
     """
-    inside = (scan.length > 0.0) & (scan.length <= max_range)
-    length = np.where(inside, scan.length, 0.5 * max_range)
-    region = model.shell(np.array(max_range), dims) * max_range / dims
+    inside = (scan.length > 0.0) & (scan.length <= config.max_range)
+    length = np.where(inside, scan.length, 0.5 * config.max_range)
+    region = model.shell(np.array(config.max_range), dims) * config.max_range / dims
     density = undetected * config.detection_probability * model.shell(length, dims) / region
     return np.where(inside, density, 0.0) / config.clutter_density
 
 
 def born(
-    scan: Scan, anchor: int, position: Floats, existence: Floats, model: RangeModel, first: int,
-    upper_half: bool, *, rng: np.random.Generator,
+    scan: Scan, anchor: int, position: Floats, existence: Floats, model: RangeModel, first: int, *,
+    rng: np.random.Generator,
 ) -> Features:  # fmt: skip
-    """One new feature a measurement, spread over all directions from the agent particles (N, D)."""
+    """One new feature a measurement, numbered from `first`, spread over all directions from agents (N, D)."""
     shown, (count, dims) = len(scan.length), position.shape
     length = scan.length[:, None] + scan.std[:, None] * rng.standard_normal((shown, count))
-    direction = random_directions((shown, count), dims, upper_half, rng=rng)
-    return Features(
-        model.invert(position, direction, np.abs(length)),
-        existence,
-        np.full(shown, anchor),
-        first + np.arange(shown),
-        np.zeros(shown, dtype=np.bool_),
-    )
+    direction = random_directions((shown, count), dims, model.upper_half, rng=rng)
+    cloud = model.invert(position, direction, np.abs(length))
+    return make_features(cloud, existence, np.full(shown, anchor), first + np.arange(shown))
+
+
+def refresh(features: Features, *, rng: np.random.Generator) -> Features:
+    """Those features resampled whose weights rest on too few particles."""
+    rows = np.flatnonzero(effective_fraction(features.weight) < RESAMPLE_BELOW)
+    if not len(rows):
+        return features
+    cloud, log_weight = features.cloud.copy(), features.log_weight.copy()
+    cloud[rows], log_weight[rows] = thin_out(cloud[rows], log_weight[rows], SHARE, rng=rng)
+    return features._replace(cloud=cloud, log_weight=log_weight)
 
 
 def join(parts: list[Features]) -> Features:

@@ -10,6 +10,11 @@ from rislam_rt.arrays import Floats
 class RangeModel(Protocol):
     """How far a feature appears, and where features of a given range may be."""
 
+    @property
+    def upper_half(self) -> bool:
+        """Whether features lie above the agent only."""
+        ...
+
     def ranges(self, agent: Floats, feature: Floats) -> Floats:
         """Ranges (...,) [m] of features (..., D) from agents (..., D); both broadcast."""
         ...

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.errors import ConfigError
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
-from rislam_rt.slam.schemes.bp_slam.features import Scan, known_anchors
+from rislam_rt.slam.schemes.bp_slam.features import Scan, known_anchors, select
 from rislam_rt.slam.schemes.bp_slam.ranges import Direct
 from rislam_rt.slam.schemes.bp_slam.update import Belief, predict_belief, update_belief
 
@@ -78,8 +78,7 @@ def run_static(
     dims, count = points.shape[1], config.num_particles
     cloud = mean + std * rng.standard_normal((count, 2 * dims))
     belief = Belief(
-        cloud[:, :dims],
-        cloud[:, dims:],
+        cloud,
         known_anchors(points, anchor_std, count, rng=rng),
         np.full(len(points), config.initial_features),
         len(points),
@@ -89,10 +88,9 @@ def run_static(
     for step, scan in enumerate(scans):
         if step:
             belief = predict_belief(belief, dt, accelerate, config, rng=rng)
-        belief, info = update_belief(belief, scan, Direct(), False, config, config.max_range, rng=rng)
-        pose = np.concatenate([belief.position, belief.velocity], axis=1)
-        poses.append(pose.mean(axis=0))
-        moments.append(np.cov(pose, rowvar=False, bias=True))
+        belief, info = update_belief(belief, scan, Direct(), config, rng=rng)
+        poses.append(belief.state.mean(axis=0))
+        moments.append(np.cov(belief.state, rowvar=False, bias=True))
         effective.append(info.effective)
         tables.append(_detected(belief, step, config))
     pose = np.reshape(poses, (-1, 2 * dims))
@@ -101,17 +99,10 @@ def run_static(
 
 
 def _detected(belief: Belief, step: int, config: BpSlamConfig) -> FeatureTable:
-    features = belief.features
-    rows = np.flatnonzero(features.existence > config.detection_threshold)
-    spread = np.sqrt(features.cloud[rows].var(axis=1).mean(axis=1))
-    return FeatureTable(
-        np.full(len(rows), step),
-        features.anchor[rows],
-        features.ident[rows],
-        features.cloud[rows].mean(axis=1),
-        spread,
-        features.existence[rows],
-    )
+    found = select(belief.features, belief.features.existence > config.detection_threshold)
+    mean, covariance = found.moments()
+    spread = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / mean.shape[1])
+    return FeatureTable(np.full(len(mean), step), found.anchor, found.ident, mean, spread, found.existence)
 
 
 def _checked(
@@ -125,7 +116,9 @@ def _checked(
     mean, std = np.asarray(start, dtype=np.float64), np.asarray(start_std, dtype=np.float64)
     width = 2 * points.shape[1]
     if mean.shape != (width,) or std.shape != (width,) or not (np.isfinite(mean).all() and (std >= 0.0).all()):
-        raise ConfigError(f"start, start_std: shapes {mean.shape}, {std.shape} received; give ({width},) finite numbers")
+        raise ConfigError(
+            f"start, start_std: shapes {mean.shape}, {std.shape} received; give ({width},) finite numbers"
+        )
     if not len(ranges):
         raise ConfigError("ranges: no steps received; give at least one")
     scans = []

@@ -1,4 +1,4 @@
-"""One step of BP-SLAM on a factor graph: predict, evaluate ranges, associate, update agent and features, give birth.
+"""One step of BP-SLAM on its factor graph: predict, evaluate ranges, associate, update agent and features, give birth.
 
 Source: Leitinger, Meyer, Hlawatsch, Witrisal, Tufvesson and Win, "A belief propagation algorithm for multipath-based
 SLAM", IEEE TWC 2019 (arXiv 1801.04463), section V; undetected features as a Poisson field that thins as it is observed.
@@ -14,6 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.schemes.bp_slam.association import Association, associate
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
+from rislam_rt.slam.schemes.bp_slam.coupling import carry, regress
 from rislam_rt.slam.schemes.bp_slam.features import (
     Features,
     Scan,
@@ -22,11 +23,13 @@ from rislam_rt.slam.schemes.bp_slam.features import (
     join,
     predict_features,
     prune,
+    refresh,
     select,
 )
 from rislam_rt.slam.schemes.bp_slam.ranges import RangeModel
 from rislam_rt.slam.schemes.resampling import (
     cell_levels,
+    cell_order,
     effective_fraction,
     kernel_width,
     normalised_rows,
@@ -35,20 +38,23 @@ from rislam_rt.slam.schemes.resampling import (
 )
 
 GATE = 5.0
-"""Standard deviations beyond which the likelihood of a range counts as zero (3e-6 of its peak)."""
+"""Standard deviations beyond which the likelihood of a range counts as zero (4e-6 of its peak)."""
 
 
 class Belief(NamedTuple):
     """Agent of N equally likely particles, and potential features."""
 
-    position: Floats
-    """(N, D) [m]."""
-    velocity: Floats
-    """(N, D) [m/s]."""
+    state: Floats
+    """(N, 2D) position [m] and velocity [m/s]."""
     features: Features
     undetected: Floats
     """(A,) features per anchor that exist and were never seen, expected."""
     next_ident: int
+
+    @property
+    def position(self) -> Floats:
+        """(N, D) [m]."""
+        return self.state[:, : self.state.shape[1] // 2]
 
 
 class UpdateInfo(NamedTuple):
@@ -59,9 +65,18 @@ class UpdateInfo(NamedTuple):
     rounds: int
     """Of data association, the most of all anchors."""
     claimed: tuple[Floats, ...]
-    """Per anchor (K_a, M+1): marginals of the association, rows in the order of `claimants`."""
+    """Per anchor (K_a, M+1): marginals of the association; last column: missed."""
     claimants: tuple[Integers, ...]
-    """Per anchor (K_a,): numbers of the features before the update."""
+    """Per anchor (K_a,): numbers of the features of those rows."""
+
+
+class _Pairs(NamedTuple):
+    """Which particle meets which."""
+
+    agent: Integers
+    """(S, N) agent particle that feature particle n meets."""
+    feature: Integers
+    """(S, N) feature particle that agent particle n meets."""
 
 
 class _Evaluation(NamedTuple):
@@ -77,60 +92,66 @@ def predict_belief(
     belief: Belief, dt: float, accelerate: Floats, config: BpSlamConfig, *, rng: np.random.Generator
 ) -> Belief:
     """Discrete white-noise acceleration of standard deviations `accelerate` (D,) [m/s^2]; features survive or not."""
-    push = accelerate * rng.standard_normal(belief.position.shape)
-    survivors = config.survival_probability * (1.0 - config.detection_probability) * belief.undetected
+    before = rng.permutation(belief.state)
+    position, velocity = np.split(before, 2, axis=1)
+    push = accelerate * rng.standard_normal(position.shape)
+    after = np.concatenate([position + dt * velocity + 0.5 * dt**2 * push, velocity + dt * push], axis=1)
+    unseen = config.survival_probability * (1.0 - config.detection_probability) * belief.undetected
+    features = carry(belief.features, before, after)
     return belief._replace(
-        position=belief.position + dt * belief.velocity + 0.5 * dt**2 * push,
-        velocity=belief.velocity + dt * push,
-        features=predict_features(belief.features, config, rng=rng),
-        undetected=survivors + config.birth_mean,
+        state=after,
+        features=predict_features(features, config, rng=rng),
+        undetected=unseen + config.birth_mean,
     )
 
 
 def update_belief(
-    belief: Belief, scans: tuple[Scan, ...], model: RangeModel, upper_half: bool, config: BpSlamConfig,
-    max_range: float, *, rng: np.random.Generator,
-) -> tuple[Belief, UpdateInfo]:  # fmt: skip
+    belief: Belief, scans: tuple[Scan, ...], model: RangeModel, config: BpSlamConfig, *, rng: np.random.Generator
+) -> tuple[Belief, UpdateInfo]:
     """One scan of every anchor into the belief. The agent's message to every feature is its prediction, as published."""
+    state, features = rng.permutation(belief.state), belief.features
     count, dims = belief.position.shape
-    shuffled = rng.permutation(count)
-    position, velocity = belief.position[shuffled], belief.velocity[shuffled]
-    features = belief.features
-    shifts = (np.arange(config.num_pairings) * count) // config.num_pairings
-    partner = (np.arange(count) + shifts[:, None]) % count
-    reach = model.ranges(position[partner], features.cloud[:, None])
-    log_agent, log_feature = np.zeros(count), np.zeros((len(features.ident), count))
-    existence = features.existence.copy()
+    pairs = _pair_up(count, config.num_pairings)
+    lean = (state - state.mean(axis=0)) @ features.slope
+    candidates = features.cloud[:, None] + lean[:, pairs.agent]
+    reach = model.ranges(state[pairs.agent, :dims], candidates)
+    weight = features.weight
+    gains, existence = np.ones(reach.shape), features.existence.copy()
+    log_agent = np.zeros(count)
     newborn, associations, claimants = [], [], []
     next_ident = belief.next_ident
     for anchor, scan in enumerate(scans):
         rows = np.flatnonzero(features.anchor == anchor)
         seen = [_evaluate(reach[row], scan, config) for row in rows]
-        fresh = 1.0 + birth_ratio(scan, float(belief.undetected[anchor]), model, dims, config, max_range)
-        result = _associate(seen, features.existence[rows], fresh, config)
+        fresh = 1.0 + birth_ratio(scan, float(belief.undetected[anchor]), model, dims, config)
+        result = _associate(seen, weight[rows], existence[rows], fresh, config)
         for number, row in enumerate(rows):
-            gain = _message(seen[number], result.to_feature[number], config)
-            agent_gain = gain[np.arange(len(shifts))[:, None], (np.arange(count) - shifts[:, None]) % count]
-            prior = features.existence[row]
-            log_agent += np.log(prior * agent_gain.mean(axis=0) + 1.0 - prior)
-            over = gain.mean(axis=0)
-            log_feature[row] = np.log(over)
-            existence[row] = prior * over.mean() / (prior * over.mean() + 1.0 - prior)
+            gain, prior = _message(seen[number], result.to_feature[number], config), features.existence[row]
+            log_agent += np.log(prior * _to_agent(gain, weight[row], pairs) + 1.0 - prior)
+            over = float(weight[row] @ gain.mean(axis=0))
+            existence[row] = prior * over / (prior * over + 1.0 - prior)
+            gains[row] = gain
         alive = result.unclaimed * (fresh - 1.0) / fresh
-        newborn.append(born(scan, anchor, position, alive, model, next_ident, upper_half, rng=rng))
+        newborn.append(born(scan, anchor, state[:, :dims], alive, model, next_ident, rng=rng))
         next_ident += len(scan.length)
         associations.append(result)
         claimants.append(features.ident[rows])
-    position, velocity, effective = _resample_agent(position, velocity, log_agent, rng=rng)
-    old = _resample_features(features._replace(existence=existence), log_feature, config, rng=rng)
+    after, effective = _resample_agent(state, log_agent, rng=rng)
+    old = features._replace(existence=existence)
+    old = _update_features(old, candidates, gains, state[pairs.agent], after.mean(axis=0), config, rng=rng)
     info = UpdateInfo(
         effective,
         max((result.rounds for result in associations), default=0),
         tuple(result.feature for result in associations),
         tuple(claimants),
     )
-    kept = prune(join([old, *newborn]), config)
-    return Belief(position, velocity, kept, belief.undetected, next_ident), info
+    return Belief(after, prune(join([old, *newborn]), config), belief.undetected, next_ident), info
+
+
+def _pair_up(count: int, pairings: int) -> _Pairs:
+    """Shifts spread evenly over the particles; agents come in random order, features in that of their cells."""
+    shift = ((np.arange(pairings) * count) // pairings)[:, None]
+    return _Pairs((np.arange(count) + shift) % count, (np.arange(count) - shift) % count)
 
 
 def _evaluate(reach: Floats, scan: Scan, config: BpSlamConfig) -> _Evaluation:
@@ -144,11 +165,13 @@ def _evaluate(reach: Floats, scan: Scan, config: BpSlamConfig) -> _Evaluation:
     return _Evaluation(near, np.exp(scaled, out=scaled) * peak[:, None, None])
 
 
-def _associate(seen: list[_Evaluation], existence: Floats, fresh: Floats, config: BpSlamConfig) -> Association:
+def _associate(
+    seen: list[_Evaluation], weight: Floats, existence: Floats, fresh: Floats, config: BpSlamConfig
+) -> Association:
     """Loopy association of one anchor's features (K,) and measurements (M,)."""
     pair = np.zeros((len(seen), len(fresh)))
     for row, evaluation in enumerate(seen):
-        pair[row, evaluation.measurement] = evaluation.ratio.mean(axis=(1, 2)) * existence[row]
+        pair[row, evaluation.measurement] = existence[row] * (evaluation.ratio.mean(axis=1) @ weight[row])
     missed = 1.0 - existence * config.detection_probability
     return associate(missed, pair, fresh, config.iterations, config.tolerance)
 
@@ -159,34 +182,46 @@ def _message(seen: _Evaluation, to_feature: Floats, config: BpSlamConfig) -> Flo
     return (1.0 - config.detection_probability) + np.einsum("g,gsn->sn", weight, seen.ratio)
 
 
-def _resample_agent(
-    position: Floats, velocity: Floats, log_weight: Floats, *, rng: np.random.Generator
-) -> tuple[Floats, Floats, float]:
-    """Equally likely particles of position and velocity together, widened where many share an ancestor."""
-    joint = np.concatenate([position, velocity], axis=1)[None]
+def _to_agent(gain: Floats, weight: Floats, pairs: _Pairs) -> Floats:
+    """Mean (N,) of a feature's factors over the particles that each agent particle meets."""
+    met = weight[pairs.feature]
+    rows = np.arange(len(gain))[:, None]
+    total = met.sum(axis=0)
+    mean = np.sum(met * gain[rows, pairs.feature], axis=0) / np.where(total > 0.0, total, 1.0)
+    return np.where(total > 0.0, mean, gain[rows, pairs.feature].mean(axis=0))
+
+
+def _resample_agent(state: Floats, log_weight: Floats, *, rng: np.random.Generator) -> tuple[Floats, float]:
+    """Equally likely states (N, 2D), widened where many share an ancestor."""
     weight = normalised_rows(log_weight[None])
     effective = effective_fraction(weight)
-    ancestors = systematic_rows(weight, rng=rng)
-    chosen = np.take_along_axis(joint, ancestors[..., None], axis=1)
-    width = kernel_width(joint.shape[1], joint.shape[2], effective)
-    moved = smooth(chosen, width, 0, rng=rng)[0]
-    dims = position.shape[1]
-    return moved[:, :dims], moved[:, dims:], float(effective[0])
+    scale = np.maximum(state.std(axis=0), 1e-12)
+    order = cell_order((state / scale)[None], cell_levels(len(state)))
+    chosen = state[order[0, systematic_rows(weight[:, order[0]], rng=rng)[0]]]
+    width = kernel_width(*state.shape, effective)
+    return smooth(chosen[None], width, 0, rng=rng)[0], float(effective[0])
 
 
-def _resample_features(
-    features: Features, log_weight: Floats, config: BpSlamConfig, *, rng: np.random.Generator
-) -> Features:
-    """Equally likely particles of every feature; known anchors stay as they are."""
-    free = np.flatnonzero(~features.known & (features.existence >= config.pruning_threshold))
-    rest = select(features, features.known)
-    if not len(free):
-        return rest
-    moving = select(features, free)
-    weight = normalised_rows(log_weight[free])
-    effective = effective_fraction(weight)
-    ancestors = systematic_rows(weight, rng=rng)
-    chosen = np.take_along_axis(moving.cloud, ancestors[..., None], axis=1)
-    levels = cell_levels(chosen.shape[1])
-    width = kernel_width(chosen.shape[1] >> levels, chosen.shape[2], effective)
-    return join([rest, moving._replace(cloud=smooth(chosen, width, levels, rng=rng))])
+def _update_features(
+    features: Features, candidates: Floats, gains: Floats, states: Floats, mean_after: Floats, config: BpSlamConfig, *,
+    rng: np.random.Generator,
+) -> Features:  # fmt: skip
+    """Weights by the mean factor of every particle; line through the agent's states by one pair a particle."""
+    kept = features.known | (features.existence >= config.pruning_threshold)
+    features, candidates, gains = select(features, kept), candidates[kept], gains[kept]
+    log_weight = features.log_weight + np.log(gains.mean(axis=1))
+    log_weight -= log_weight.max(axis=1, keepdims=True)
+    cloud, slope = features.cloud, features.slope
+    if config.coupled:
+        edges = np.cumsum(gains, axis=1)
+        mark = edges[:, -1:] * rng.random((len(gains), 1, gains.shape[2]))
+        pick = (mark > edges).sum(axis=1)
+        met = np.take_along_axis(candidates, pick[:, None, :, None], axis=1)[:, 0]
+        own = states[pick, np.arange(gains.shape[2])]
+        cloud, slope = regress(own, met, normalised_rows(log_weight), mean_after)
+    updated = features._replace(
+        cloud=np.where(features.known[:, None, None], features.cloud, cloud),
+        log_weight=np.where(features.known[:, None], features.log_weight, log_weight),
+        slope=np.where(features.known[:, None, None], features.slope, slope),
+    )
+    return refresh(updated, rng=rng)
