@@ -59,7 +59,8 @@ class TracedChannel:
         self.antennas = antennas
         self.walls = build_walls(scene)
         self._sides = wall_sides(self.walls)
-        self.stage = build_stage(self.walls, radio.carrier, room_center(scene))
+        shades = {n: s.shade.triangles for n, s in enumerate(scene.scatterers) if s.shade is not None}
+        self.stage = build_stage(self.walls, radio.carrier, room_center(scene), shades)
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Every path of every cycle, with the panel at level 0."""
@@ -68,8 +69,9 @@ class TracedChannel:
         for number, point in enumerate(self.scene.landmark_positions):
             panel = self.scene.ris if number == len(self.scene.scatterers) else None
             behind, front = (self.walls.host, panel.spec.normal) if panel is not None else (-1, None)
-            problems.append(Problem(tx, point[None], heading, host=behind, front=front))
-            problems.append(Problem(rx, point[None], heading, from_rx=True, host=behind, front=front))
+            spared = number if number in self.stage.shades else -1
+            for from_rx, device in ((False, tx), (True, rx)):
+                problems.append(Problem(device, point[None], heading, from_rx, False, behind, front, spared))
         direct, *legs = self._trace(problems)
         tx_legs, rx_legs = legs[0::2], legs[1::2]
         source = "traced, refined" if self.refine else "traced"
@@ -84,17 +86,23 @@ class TracedChannel:
         return trace_extras(self.scene, self.radio, trajectory, config)
 
     def _trace(self, problems: Sequence[Problem]) -> list[Legs]:
-        """Solve all problems together, block by block."""
-        batch = build_batch(problems, self.walls, self._sides, self.depth if len(self.walls) else 0)
-        blocks = in_blocks(batch.candidates(self.stage), BLOCK_ROWS)
-        return batch.legs(join_found([self._solve(batch, rows) for rows in blocks]))
+        """Solve problems of one view of the room together, block by block."""
+        legs: dict[int, Legs] = {}
+        for spared in dict.fromkeys(problem.spared for problem in problems):
+            chosen = [number for number, problem in enumerate(problems) if problem.spared == spared]
+            depth = self.depth if len(self.walls) else 0
+            batch = build_batch([problems[number] for number in chosen], self.walls, self._sides, depth)
+            blocks = in_blocks(batch.candidates(self.stage), BLOCK_ROWS)
+            found = join_found([self._solve(batch, rows, spared) for rows in blocks])
+            legs |= dict(zip(chosen, batch.legs(found), strict=True))
+        return [legs[number] for number in range(len(problems))]
 
-    def _solve(self, batch: Batch, candidates: Rows) -> Found:
+    def _solve(self, batch: Batch, candidates: Rows, spared: int) -> Found:
         """Ask the tracer which candidates exist, and what their walls do to the signal."""
         from rislam_rt.channel.traced.fields import leg_coefficients
         from rislam_rt.channel.traced.visibility import visible_rows
 
-        rows, vertices = visible_rows(self.stage, batch.all_sequences, batch.far, batch.device, candidates)
+        rows, vertices = visible_rows(self.stage, batch.all_sequences, batch.far, batch.device, candidates, spared)
         sequences, ends = batch.all_sequences[rows.sequence], batch.ends(rows)
         exact = refined_course(self.walls, sequences, ends.device, ends.far)
         coefficient = leg_coefficients(self.stage, sequences, ends, exact, self.antennas)

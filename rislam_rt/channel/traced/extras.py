@@ -13,7 +13,7 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats, Integers, freeze
 from rislam_rt.channel.traced.limits import room_center
 from rislam_rt.channel.traced.start import start_tracer
-from rislam_rt.channel.walls import Walls, build_walls
+from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import RadioConfig, Scene, Trajectory
@@ -110,7 +110,7 @@ def trace_extras(scene: Scene, radio: RadioConfig, trajectory: Trajectory, confi
     if config.scattering > 0.0 or config.diffraction:
         start_tracer()
         origin = room_center(scene)
-        stage = _rough_stage(build_walls(scene), radio.carrier, origin, config.scattering)
+        stage = _rough_stage(scene, radio.carrier, origin, config.scattering)
         for cycle, (tx, rx) in enumerate(zip(trajectory.tx - origin, trajectory.rx - origin, strict=True)):
             solved.append(_solve(stage, tx, rx, origin, config))
             cycles.append(np.full(len(solved[-1].kind), cycle))
@@ -119,7 +119,7 @@ def trace_extras(scene: Scene, radio: RadioConfig, trajectory: Trajectory, confi
     return ExtraPaths(np.concatenate(cycles), **columns._replace(gain=columns.gain * antennas)._asdict())
 
 
-def _rough_stage(walls: Walls, carrier: float, origin: Floats, scattering: float) -> Any:
+def _rough_stage(scene: Scene, carrier: float, origin: Floats, scattering: float) -> Any:
     """The room with scattering walls; corners of one material are joined, so that their edges are known."""
     import sionna.rt as rt
 
@@ -129,7 +129,12 @@ def _rough_stage(walls: Walls, carrier: float, origin: Floats, scattering: float
     stage = rt.load_scene()
     stage.frequency = carrier
     stage.tx_array = stage.rx_array = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
+    walls, absorber = build_walls(scene), rt.AbsorberRadioMaterial("shade")
     objects = []
+    for scatterer in scene.scatterers:
+        if scatterer.shade is not None:
+            mesh = build_mesh(f"shade-{scatterer.name}", scatterer.shade.triangles - origin)
+            objects.append(rt.SceneObject(mesh, f"shade-{scatterer.name}", radio_material=absorber))
     for number, material in enumerate(dict.fromkeys(walls.material)):
         wanted = np.array([m == material for m in walls.material])[walls.wall_of_triangle]
         mesh = build_mesh(f"walls-{number}", walls.triangles[wanted] - origin)

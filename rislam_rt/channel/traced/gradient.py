@@ -45,9 +45,13 @@ def length_gradients(
     if not paths.valid[cycle, path].all():
         raise TraceError("path lengths: a gradient was asked for where there is no path; ask where `valid` holds")
     tx, rx = _tx_legs(channel, trajectory, paths, cycle, path), _rx_legs(channel, trajectory, paths, cycle, path)
-    gradient = _differentiate(channel, tx)
-    joined = np.flatnonzero(paths.landmark[path] >= 0)
-    gradient[joined] += _differentiate(channel, rx.only(joined))
+    landmark = paths.landmark[path]
+    spared = np.where(np.isin(landmark, list(channel.stage.shades)), landmark, -1)
+    gradient = np.zeros((len(path), 3))
+    for shade in np.unique(spared):
+        every, joined = np.flatnonzero(spared == shade), np.flatnonzero((spared == shade) & (landmark >= 0))
+        gradient[every] += _differentiate(channel, tx.only(every), int(shade))
+        gradient[joined] += _differentiate(channel, rx.only(joined), int(shade))
     return gradient
 
 
@@ -73,7 +77,7 @@ def _rx_legs(
     return MovingLegs(walls, trajectory.rx[cycle], far, np.zeros(len(path), dtype=np.bool_))
 
 
-def _differentiate(channel: TracedChannel, legs: MovingLegs) -> Floats:
+def _differentiate(channel: TracedChannel, legs: MovingLegs, spared: int) -> Floats:
     """Derivative (N, 3) of the legs' lengths by the agent's position."""
     import drjit as dr
     import mitsuba as mi
@@ -90,7 +94,7 @@ def _differentiate(channel: TracedChannel, legs: MovingLegs) -> Floats:
     device = as_points(legs.device - origin) + shift
     far = as_points(legs.far - origin) + dr.select(mi.Bool(legs.far_moves), shift, mi.Point3f(0.0))
     index = np.arange(count)
-    points = attached_vertices(channel.stage, legs.sequences, far, device, Rows(index, index, index))
+    points = attached_vertices(channel.stage, legs.sequences, far, device, Rows(index, index, index), spared)
     bounces = (legs.sequences != NO_WALL).sum(axis=1)
     length, last = mi.Float(0.0), far
     for number, point in enumerate(points):

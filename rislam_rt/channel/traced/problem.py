@@ -33,6 +33,8 @@ class Problem(NamedTuple):
     """Wall behind a panel at the far end: no bounce on it next to the panel."""
     front: Floats | None = None
     """(3,) normal of that panel, which sees only what lies before it."""
+    spared: int = -1
+    """Number of the scatterer at the far end, if it has a shade: that does not hide its own centre."""
 
     @property
     def paired(self) -> bool:

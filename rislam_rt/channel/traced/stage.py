@@ -1,5 +1,6 @@
 """The room as Sionna RT sees it: one mesh a material, triangle numbers kept, so that every hit names its wall."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,6 +14,9 @@ from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.errors import SceneError
 from rislam_rt.model import Material
+
+NO_SHADE = -1
+"""Key of the view with everything in it."""
 
 
 class Sieve(NamedTuple):
@@ -50,6 +54,10 @@ class Stage:
     wall_of_primitive: Integers
     """(T,) walls, shape by shape."""
     sieve: Sieve
+    views: dict[int, mi.Scene]
+    """Everything (`NO_SHADE`), and for each scatterer with a shade everything but that shade."""
+    shades: dict[int, mi.Scene]
+    """The shade of each scatterer that has one, alone."""
 
     @property
     def wavelength(self) -> float:
@@ -64,8 +72,13 @@ class Stage:
         return np.where(known, self.wall_of_primitive[index], NO_WALL)
 
 
-def build_stage(walls: Walls, carrier: float, origin: Floats) -> Stage:
-    """Put the walls on stage at the carrier [Hz]: meshes built in memory about `origin`, in the order of their faces.
+def build_stage(walls: Walls, carrier: float, origin: Floats, shades: Mapping[int, Floats]) -> Stage:
+    """Put walls and shades on stage at the carrier [Hz]: meshes built in memory about `origin`, faces in their order.
+
+    Parameters
+    ----------
+    shades
+        Triangles (T, 3, 3) [m] of what hides and reflects nothing, by the number of its scatterer.
 
     Raises
     ------
@@ -87,15 +100,35 @@ def build_stage(walls: Walls, carrier: float, origin: Floats) -> Stage:
         )
         for m, (material, rows) in enumerate(zip(materials, members, strict=True))
     ]
+    absorber = rt.AbsorberRadioMaterial("shade")
+    dark = {
+        number: rt.SceneObject(build_mesh(f"shade-{number}", part - origin), f"shade-{number}", radio_material=absorber)
+        for number, part in shades.items()
+    }
     try:
-        scene.add(objects)
+        scene.add([*objects, *dark.values()])
     except ValueError as error:
         raise SceneError(f"material: {error}; give an ITU material that is specified at {carrier:g} Hz") from None
     ids = np.array([int(o.object_id) for o in objects], dtype=np.int64)
-    return _numbered(scene, origin, walls, ids, members)
+    views = {number: _part([*objects, *(o for n, o in dark.items() if n != number)]) for number in dark}
+    alone = {number: _part([shade]) for number, shade in dark.items()}
+    return _numbered(scene, origin, walls, ids, members, {NO_SHADE: scene.mi_scene} | views, alone)
 
 
-def _numbered(scene: rt.Scene, origin: Floats, walls: Walls, ids: Integers, members: list[Integers]) -> Stage:
+def _part(objects: list[rt.SceneObject]) -> mi.Scene:
+    """A Mitsuba scene of some of the meshes."""
+    return mi.load_dict({"type": "scene"} | {o.name: o.mi_mesh for o in objects})
+
+
+def _numbered(
+    scene: rt.Scene,
+    origin: Floats,
+    walls: Walls,
+    ids: Integers,
+    members: list[Integers],
+    views: dict[int, mi.Scene],
+    shades: dict[int, mi.Scene],
+) -> Stage:
     """Number the triangles of all shapes (M,) and pick each wall's largest."""
     order = np.argsort(ids)
     rows = np.concatenate([members[m] for m in order] or [np.zeros(0, dtype=np.int64)])
@@ -118,6 +151,8 @@ def _numbered(scene: rt.Scene, origin: Floats, walls: Walls, ids: Integers, memb
         first,
         walls.wall_of_triangle[rows],
         _sieve(walls, origin),
+        views,
+        shades,
     )
 
 

@@ -16,13 +16,14 @@ import numpy as np
 from sionna.rt.path_solvers import image_method
 from sionna.rt.path_solvers.image_method import ImageMethod
 from sionna.rt.path_solvers.paths_buffer import PathsBuffer
+from sionna.rt.utils import spawn_ray_to
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.traced.buffer import fill_buffer, read_vertices
 from rislam_rt.channel.traced.limits import SEGMENT_LIMIT
 from rislam_rt.channel.traced.rows import Rows
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
-from rislam_rt.channel.traced.stage import Stage, as_points
+from rislam_rt.channel.traced.stage import NO_SHADE, Stage, as_points
 from rislam_rt.errors import TraceError
 
 
@@ -44,7 +45,9 @@ class SingleRays:
         return self._scene.ray_intersect(*args, **{**options, "coherent": False})
 
 
-def visible_rows(stage: Stage, sequences: Integers, far: Floats, device: Floats, rows: Rows) -> tuple[Rows, Floats]:
+def visible_rows(
+    stage: Stage, sequences: Integers, far: Floats, device: Floats, rows: Rows, spared: int = NO_SHADE
+) -> tuple[Rows, Floats]:
     """The candidates that exist, and their bounce points (N, D, 3) [m] from device to far end.
 
     Parameters
@@ -53,20 +56,39 @@ def visible_rows(stage: Stage, sequences: Integers, far: Floats, device: Floats,
         (S, D) from device to far end.
     far, device
         Positions (F, 3) and (N, 3) [m]. Rays run from the device back to the far end, which may lie on a face.
+    spared
+        Number of the scatterer at the far ends, if it has a shade: that shade does not hide its own centre from the
+        last bounce, but does hide the bounces from each other.
     """
     if len(rows.far) == 0:
         return rows, np.zeros((0, sequences.shape[1], 3))
     candidates = sequences[rows.sequence]
     sources, targets = as_points(far - stage.origin), as_points(device - stage.origin)
-    traced = _trace(stage, candidates, sources, targets, rows, ImageMethod())
+    traced = _trace(stage, candidates, sources, targets, rows, ImageMethod(), spared)
     traced.schedule()  # one pass through the scene for all that is read below
     dr.eval()
     keep = _confirmed(stage, candidates, traced)
-    return rows.only(keep), read_vertices(stage, traced, keep, candidates[keep])
+    rows, vertices = rows.only(keep), read_vertices(stage, traced, keep, candidates[keep])
+    if spared == NO_SHADE:
+        return rows, vertices
+    clear = _clear_of_shade(stage, spared, candidates[keep], device[rows.device], vertices)
+    return rows.only(clear), vertices[clear]
+
+
+def _clear_of_shade(stage: Stage, spared: int, sequences: Integers, device: Floats, vertices: Floats) -> Integers:
+    """Legs whose segments up to the last bounce miss a scatterer's shade."""
+    clear = np.ones(len(device), dtype=np.bool_)
+    last = device
+    for bounce, wall in enumerate(sequences.T):
+        point = np.where((wall != NO_WALL)[:, None], vertices[:, bounce], last)
+        ray = spawn_ray_to(as_points(last - stage.origin), as_points(point - stage.origin))
+        clear &= ~np.array(stage.shades[spared].ray_test(ray), dtype=np.bool_)
+        last = point
+    return np.flatnonzero(clear)
 
 
 def attached_vertices(
-    stage: Stage, sequences: Integers, far: mi.Point3f, device: mi.Point3f, rows: Rows
+    stage: Stage, sequences: Integers, far: mi.Point3f, device: mi.Point3f, rows: Rows, spared: int
 ) -> list[mi.Point3f]:
     """Bounce points from far end to device, bounce by bounce, that keep their dependence on the ends' positions.
 
@@ -78,7 +100,7 @@ def attached_vertices(
     method = ImageMethod()
     method.loop_mode = "evaluated"
     candidates = sequences[rows.sequence]
-    traced = _trace(stage, candidates, far, device, rows, method)
+    traced = _trace(stage, candidates, far, device, rows, method, spared)
     if len(_confirmed(stage, candidates, traced)) < len(candidates):
         raise TraceError("legs: one that was found before is denied now; were paths and channel made for one scene?")
     depth = traced.depth_dim_size
@@ -88,12 +110,18 @@ def attached_vertices(
 
 
 def _trace(
-    stage: Stage, candidates: Integers, far: mi.Point3f, device: mi.Point3f, rows: Rows, method: ImageMethod
+    stage: Stage,
+    candidates: Integers,
+    far: mi.Point3f,
+    device: mi.Point3f,
+    rows: Rows,
+    method: ImageMethod,
+    spared: int,
 ) -> PathsBuffer:
-    """Run the image method on candidates (N, D)."""
+    """Run the image method on candidates (N, D), a shade taken out of the room."""
     with _short_segments():
         return method(
-            scene=SingleRays(stage.scene.mi_scene),
+            scene=SingleRays(stage.views[spared]),
             paths=fill_buffer(stage, candidates, rows),
             diffraction=False,
             diffraction_lit_region=False,
