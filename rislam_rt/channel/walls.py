@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.channel.shades import Shades, build_shades
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.triangles import planar_groups, triangle_planes
 from rislam_rt.model import Material, Scene
@@ -28,6 +29,8 @@ class Walls:
     """(T,)."""
     host: int
     """The wall behind the panel, -1 without one."""
+    shades: Shades
+    """What hides but is no wall: it never reflects."""
 
     def __len__(self) -> int:
         return len(self.names)
@@ -66,4 +69,5 @@ def build_walls(scene: Scene) -> Walls:
         np.concatenate(triangles) if triangles else np.zeros((0, 3, 3)),
         np.concatenate(owner) if owner else np.zeros(0, dtype=np.int64),
         host,
+        build_shades(scene),
     )

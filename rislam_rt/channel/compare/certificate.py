@@ -159,6 +159,17 @@ class Certifier:
             where = "inside" if solid > 0.0 else "outside"
             text = f"{self.names[wall]} across a segment, {abs(solid):.2e} m {where} its outline"
             found.append(Condition("occluded", text, -min(solid, float(crossed))))
+        return found + self._unshaded(leg, number)
+
+    def _unshaded(self, leg: Leg, number: int) -> list[Condition]:
+        """No scatterer's shade stands across segment `number`; the far end's own does not hide it."""
+        shades, found = self.facets.shades, []
+        for shade, landmark in enumerate(shades.landmark):
+            if number == len(leg.walls) and np.array_equal(leg.points[-1], self.scene.landmark_positions[landmark]):
+                continue
+            margin = shades.margin(leg.points[number], leg.points[number + 1], shade)
+            text = f"shade of {self.scene.landmarks[landmark]}, {abs(margin):.2e} m {'in' if margin < 0 else 'out'}side"
+            found.append(Condition("occluded", text, margin))
         return found
 
     def _outline_distance(self, point: Floats, wall: int) -> float:

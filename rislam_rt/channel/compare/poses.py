@@ -27,10 +27,11 @@ def random_poses(
         Too little of the room's bounding box is free.
     """
     facets = build_facets(build_walls(scene))
+    surfaces = np.concatenate([facets.corners, facets.shades.triangles])
     free = np.zeros((0, 3))
     for _ in range(_ROUNDS):
         batch = rng.uniform(scene.bounds[0], scene.bounds[1], size=(2 * count + 64, 3))
-        free = np.concatenate([free, batch[distance_to_triangles(batch, facets.corners) >= clearance]])
+        free = np.concatenate([free, batch[distance_to_triangles(batch, surfaces) >= clearance]])
         inside = free[_reachable(facets, scene.agent.position[0], free)]
         if len(inside) >= count:
             return _as_trajectory(inside[:count], baseline, rng)
@@ -59,7 +60,8 @@ def _reachable(facets: Facets, start: Floats, points: Floats) -> Booleans:
         station = stations.pop()
         rows = np.flatnonzero(~reached)
         origin = np.broadcast_to(station, (len(rows), 3))
-        free = rows[facets.hidden_by(origin, points[rows], walls, np.full(len(rows), -1)) < 0]
+        walled = facets.hidden_by(origin, points[rows], walls, np.full(len(rows), -1)) >= 0
+        free = rows[~walled & ~facets.shades.hides(origin, points[rows])]
         reached[free] = True
         stations += list(points[free])
     return reached

@@ -65,7 +65,7 @@ class ImageSourceChannel:
         panel = self.scene.ris if number == len(self.scene.scatterers) else None
         point = self.scene.landmark_positions[number : number + 1]
         if panel is None:
-            return find_legs(self.facets, self.coatings, device, point, self.depth)
+            return find_legs(self.facets, self.coatings, device, point, self.depth, landmark=number)
         return find_legs(
             self.facets, self.coatings, device, point, self.depth, host=self.walls.host, front=panel.spec.normal
         )

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.shades import Shades
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.geometry.triangles import edge_planes
@@ -39,6 +40,8 @@ class Facets:
     """(2, W, 3) [m] lowest and highest corner of each wall."""
     extent: Floats
     """(2, W) [m] lowest and highest signed distance of all walls' corners from wall w's plane."""
+    shades: Shades
+    """What hides but is no wall."""
 
     def __len__(self) -> int:
         return len(self.offset)
@@ -137,6 +140,7 @@ def build_facets(walls: Walls) -> Facets:
         edge_offset=edge_offset,
         box=np.stack(box),
         extent=extent,
+        shades=walls.shades,
     )
 
 

@@ -36,6 +36,7 @@ def find_legs(
     *,
     host: int = -1,
     front: Floats | None = None,
+    landmark: int = -1,
 ) -> Legs:
     """Every specular leg of up to `depth` bounces from device positions (K, 3) to far ends (K, 3) or (1, 3) [m].
 
@@ -45,11 +46,13 @@ def find_legs(
         Wall behind a panel at the far end: no bounce on it next to the panel, and it does not hide the panel.
     front
         (3,) normal of the panel at the far end, which only sees what lies before it.
+    landmark
+        Number of the landmark at the far end, which its own shade does not hide; -1 for none.
     """
     found = [_direct_rays(device, far)]
     found += [_reflected_rays(facets, walls, device, far) for walls in wall_sequences(facets, device, far, depth, host)]
     blockers = facets.possible_blockers(np.concatenate([device, far]))
-    visible = [_visible(facets, rays, device, far, blockers, host, front) for rays in found]
+    visible = [_visible(facets, rays, device, far, blockers, host, front, landmark) for rays in found]
     return _legs(facets, coatings, [rays for rays in visible if len(rays.cycle)], device, far, depth)
 
 
@@ -101,7 +104,14 @@ def _plane_crossing(
 
 
 def _visible(
-    facets: Facets, rays: Rays, device: Floats, far: Floats, blockers: Integers, host: int, front: Floats | None
+    facets: Facets,
+    rays: Rays,
+    device: Floats,
+    far: Floats,
+    blockers: Integers,
+    host: int,
+    front: Floats | None,
+    landmark: int,
 ) -> Rays:
     """The legs that nothing hides and that reach a panel at the far end from its front."""
     count, bounces = rays.walls.shape
@@ -115,6 +125,9 @@ def _visible(
         spared = np.full(len(rows), host if segment == bounces else -1)
         blocker = facets.hidden_by(points[rows, segment], points[rows, segment + 1], blockers, spared)
         keep[rows[blocker >= 0]] = False
+        rows = np.flatnonzero(keep)
+        own = landmark if segment == bounces else -1
+        keep[rows] = ~facets.shades.hides(points[rows, segment], points[rows, segment + 1], own)
     return rays.only(keep)
 
 
