@@ -26,7 +26,7 @@ class Grid(NamedTuple):
     cosines: Floats
     """(G, 2) within the unit disc."""
     antennas: Complexes
-    """(G, L) conjugate antenna vectors."""
+    """(G, L) conjugate antenna vectors, in single precision: the grid only says where to look."""
     delays: Integers
     """(T,) indices of delays within the window, in steps of 1 / `OVERSAMPLING` cells."""
     tones: int
@@ -40,7 +40,7 @@ def build_grid(sounding: Sounding, window: tuple[float, float]) -> Grid:
     cosines = np.column_stack([u[inside], v[inside]])
     cosines = cosines / np.maximum(np.linalg.norm(cosines, axis=1, keepdims=True), 1.0)
     x, y = (part.ravel() for part in np.meshgrid(sounding.row, sounding.col, indexing="ij"))
-    antennas = np.exp(-2j * np.pi * (cosines[:, :1] * x + cosines[:, 1:] * y))
+    antennas = np.exp(-2j * np.pi * (cosines[:, :1] * x + cosines[:, 1:] * y)).astype(np.complex64)
     first, last = np.floor(window[0] * OVERSAMPLING), np.ceil(window[1] * OVERSAMPLING)
     count = OVERSAMPLING * len(sounding.frequency)
     delays = np.unique(np.arange(first, last + 1, dtype=np.int64) % count)
@@ -49,7 +49,7 @@ def build_grid(sounding: Sounding, window: tuple[float, float]) -> Grid:
 
 def spectrum(grid: Grid, residual: Complexes) -> Complexes:
     """Matched filter's output (G, T), up to a phase, for samples (L, M)."""
-    return _delay_spectrum(grid, grid.antennas @ residual)
+    return _delay_spectrum(grid, grid.antennas @ residual.astype(np.complex64))
 
 
 def _delay_spectrum(grid: Grid, beams: Complexes) -> Complexes:
@@ -83,7 +83,7 @@ def pick_peaks(
         lowest = max(lowest, BATCH_RANGE * snr * sounding.num_samples)
         signal = amplitude * parts.delay[0].T
         residual = residual - antennas * signal
-        output -= (grid.antennas @ antennas) * _delay_spectrum(grid, signal)
+        output -= (grid.antennas @ antennas.astype(np.complex64)) * _delay_spectrum(grid, signal.astype(np.complex64))
     return np.array(picked).reshape(-1, 3)
 
 

@@ -90,21 +90,19 @@ def _prune(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float) -
     Only paths whose amplitude is uncertain by more than that are tried, the most uncertain first.
     """
     tried = np.zeros((0, 3))
-    while len(fit.parameters):
+    while True:
         certainty = np.abs(fit.amplitude) ** 2 / accuracy(fit).amplitude ** 2
-        certainty[_among(fit.parameters, tried)] = np.inf
-        weakest = int(np.argmin(certainty))
-        if certainty[weakest] >= threshold:
-            return fit
-        rest = np.delete(fit.parameters, weakest, axis=0)
+        doubtful = np.flatnonzero((certainty < threshold) & ~_among(fit.parameters, tried))
         enough = fit.cost + threshold
-        trial = fit_amplitudes(sounding, rest, samples)
-        trial = refine(sounding, trial, samples, steps=TRIAL_STEPS, enough=enough)
-        if trial.cost < enough:
-            fit = trial
+        for row in doubtful[np.argsort(certainty[doubtful])]:
+            trial = fit_amplitudes(sounding, np.delete(fit.parameters, row, axis=0), samples)
+            trial = refine(sounding, trial, samples, steps=TRIAL_STEPS, enough=enough)
+            if trial.cost < enough:
+                fit = trial
+                break
+            tried = np.concatenate([tried, fit.parameters[row : row + 1]])
         else:
-            tried = np.concatenate([tried, fit.parameters[weakest : weakest + 1]])
-    return fit
+            return fit
 
 
 def _inside(parameters: Floats, window: tuple[float, float]) -> Booleans:
