@@ -1,11 +1,15 @@
 """`rislam-rt run PIPELINE`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rislam_rt.cli.options import JsonFile, PipelineFile, SceneOption, Settings, write_json
+from rislam_rt.cli.study import Given
+
+if TYPE_CHECKING:
+    from rislam_rt.pipeline import PipelineSpec
 
 
 def command(
@@ -24,20 +28,36 @@ def command(
     """Run a pipeline in a room: trace, then design, measure, localise and map, cycle by cycle.
 
     An interrupted run goes on where it stopped when the same command is given again; a completed one is replaced.
+    A file of another kind is a study: 'compare_channels' (exit code 1 if a path is unexplained) or 'fig4a'.
     """
+    from rislam_rt.cli.study import run_compare_channels, run_gain_curves
+    from rislam_rt.pipeline.studies import CompareSpec, Fig4aSpec, load_any
+
+    spec = load_any(pipeline, set_ or ())
+    given = Given(pipeline, scene, out, jobs, json, page)
+    if isinstance(spec, CompareSpec):
+        run_compare_channels(spec, given)
+    elif isinstance(spec, Fig4aSpec):
+        run_gain_curves(spec, given)
+    else:
+        run_main_job(spec, given)
+
+
+def run_main_job(spec: "PipelineSpec", given: Given) -> None:
+    """All schemes over all cycles of a room."""
     import os
 
     import numpy as np
 
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene, scene_of
-    from rislam_rt.pipeline import load_spec, run_slam
+    from rislam_rt.pipeline import run_slam
     from rislam_rt.pipeline.run import check_run, prepare_channel
     from rislam_rt.pipeline.store import PartialRun, check_folder, run_folder, run_identity
     from rislam_rt.pipeline.summary import summarise
     from rislam_rt.report.tables import print_summary
 
-    spec = load_spec(pipeline, set_ or ())
+    pipeline, scene, out, jobs, json, page = given
     opened = open_scene(scene_of(scene, spec, pipeline))
     room = opened.scene
     check_run(room, spec)

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
     from rislam_rt.model import Scene
     from rislam_rt.pipeline import PipelineSpec
+    from rislam_rt.pipeline.studies import Fig4aSpec
 
 
 class Opened(NamedTuple):
@@ -38,7 +39,7 @@ def open_scene(path: Path) -> Opened:
     return Opened(load_scene(path), tuple(finding.line for finding in findings))
 
 
-def scene_of(option: Path | None, spec: "PipelineSpec", pipeline: Path) -> Path:
+def scene_of(option: Path | None, spec: "PipelineSpec | Fig4aSpec", pipeline: Path) -> Path:
     """The folder of `--scene`, or the one that the pipeline names, relative to its file.
 
     Raises

@@ -1,10 +1,10 @@
 """Read a pipeline file, with settings of the command line put over it."""
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
@@ -15,6 +15,18 @@ MAX_BYTES = 1_000_000
 """A pipeline file is written by people; anything larger is another file by mistake."""
 
 
+Spec = TypeVar("Spec", bound=BaseModel)
+
+
+class Table(NamedTuple):
+    """What a pipeline file and the command line say, not yet looked at."""
+
+    path: Path
+    content: dict[str, Any]
+    changed: tuple[str, ...]
+    """Keys that the command line set."""
+
+
 def load_spec(path: str | Path, overrides: Sequence[str] = ()) -> PipelineSpec:
     """The specification of a file, `key=value` settings (dotted keys) put over it first.
 
@@ -23,23 +35,45 @@ def load_spec(path: str | Path, overrides: Sequence[str] = ()) -> PipelineSpec:
     ConfigError
         The file cannot be read or is not TOML; a key is unknown, a value of the wrong type or out of range. One line.
     """
+    return build_spec(read_table(path, overrides), PipelineSpec, build_settings)
+
+
+def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
+    """A pipeline file of any kind, `key=value` settings (dotted keys) put over it.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read or is not TOML; a setting has no such form.
+    """
     path = Path(path)
-    table = _read_table(path)
-    changed = [_override(table, setting) for setting in overrides]
+    content = _read_toml(path)
+    return Table(path, content, tuple(_override(content, setting) for setting in overrides))
+
+
+def build_spec(table: Table, model: type[Spec], check: Callable[[Spec], object]) -> Spec:
+    """The table as a specification; `check` tries what it becomes, with errors that begin with the field.
+
+    Raises
+    ------
+    ConfigError
+        A key is unknown, a value of the wrong type or out of range. One line that names file and field.
+    """
+    path, content, changed = table
     try:
-        spec = PipelineSpec.model_validate(table)
+        spec = model.model_validate(content)
     except ValidationError as error:
         items = error.errors(include_url=False, include_context=False)
         more = f" (and {len(items) - 1} more)" if len(items) > 1 else ""
-        raise ConfigError(f"{_source(path, _place(items[0]), changed)}: {_remark(items[0])}{more}") from None
+        raise ConfigError(f"{_source(path, _place(items[0]), changed)}: {_remark(items[0], model)}{more}") from None
     try:
-        build_settings(spec)
+        check(spec)
     except ConfigError as error:
         raise ConfigError(f"{_source(path, str(error).partition(':')[0], changed)}: {error}") from None
     return spec
 
 
-def _read_table(path: Path) -> dict[str, Any]:
+def _read_toml(path: Path) -> dict[str, Any]:
     try:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
@@ -87,13 +121,13 @@ def _place(item: Any) -> str:
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"]).lstrip(".")[:100]
 
 
-def _remark(item: Any) -> str:
+def _remark(item: Any, model: type[BaseModel]) -> str:
     """One bad field: where, what was received, how to mend it."""
     place = _place(item)
     if item["type"] == "missing":
         return f"{place}: missing; add it"
     if item["type"] == "extra_forbidden":
-        near = get_close_matches(str(item["loc"][-1]), _keys(PipelineSpec), n=1)
+        near = get_close_matches(str(item["loc"][-1]), _keys(model), n=1)
         return f"{place}: unknown key; " + (f"did you mean '{near[0]}'?" if near else "remove it or mend its name")
     message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
     if isinstance(item["input"], dict):
@@ -106,6 +140,7 @@ def _keys(section: type[BaseModel]) -> list[str]:
     keys = []
     for name, field in section.model_fields.items():
         keys.append(name)
-        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
-            keys += _keys(field.annotation)
+        for part in (field.annotation, *get_args(field.annotation)):
+            if isinstance(part, type) and issubclass(part, BaseModel):
+                keys += _keys(part)
     return keys

@@ -74,10 +74,15 @@ class RadioSection(Section):
         return self
 
 
-class DesignSection(_Designers):  # type: ignore[misc, valid-type]
-    """How the scheme `optimized` chooses codes."""
+class DesignerSection(_Designers):  # type: ignore[misc, valid-type]
+    """A designer and its settings."""
 
     method: Literal[tuple(DESIGNERS)] = "genetic"  # type: ignore[valid-type]
+
+
+class DesignSection(DesignerSection):
+    """How the scheme `optimized` chooses codes."""
+
     samples: Annotated[int, Field(ge=1, le=10_000)] = 4
     """Positions of the belief over which the objective is averaged; 1 designs on the mean."""
     landmark_uncertainty: bool = False
@@ -121,8 +126,9 @@ class StartSection(Section):
 
 
 class PipelineSpec(Section):
-    """A whole pipeline file."""
+    """A whole pipeline file of the main job."""
 
+    kind: Literal["slam"] = "slam"
     name: Name
     description: str = ""
     scene: str | None = None
@@ -166,7 +172,22 @@ def build_settings(spec: PipelineSpec) -> Settings:
     ConfigError
         A value is out of the range that the record itself checks.
     """
-    section = spec.radio
+    return Settings(
+        build_radio(spec.radio),
+        ReceiverConfig(**spec.receiver.model_dump()),
+        SlamConfig(**spec.slam.model_dump()),
+        build_design(spec.design),
+    )
+
+
+def build_radio(section: RadioSection) -> RadioConfig:
+    """The radio in SI units and linear ratios.
+
+    Raises
+    ------
+    ConfigError
+        A value is out of the range that the record itself checks.
+    """
     array = RxArray(section.array.rows, section.array.cols, section.array.spacing_wavelengths, section.array.pattern)
     radio = RadioConfig(
         carrier=section.carrier_ghz * 1e9,
@@ -179,13 +200,18 @@ def build_settings(spec: PipelineSpec) -> Settings:
     )
     if section.noise_psd is None:
         radio = with_reference_snr(radio, 13.0 if section.reference_snr_db is None else section.reference_snr_db)
-    designers = {name: getattr(spec.design, name) for name in _Designers.model_fields}
-    return Settings(
-        radio,
-        ReceiverConfig(**spec.receiver.model_dump()),
-        SlamConfig(**spec.slam.model_dump()),
-        DesignConfig(**designers, certify=False),
-    )
+    return radio
+
+
+def build_design(section: DesignerSection) -> DesignConfig:
+    """The designer's settings; no certificate, which takes longer than a cycle has.
+
+    Raises
+    ------
+    ConfigError
+        A value is out of the range that the record itself checks.
+    """
+    return DesignConfig(**{name: getattr(section, name) for name in _Designers.model_fields}, certify=False)
 
 
 def _linear(decibel: float) -> float:

@@ -11,7 +11,7 @@ from rislam_rt.model import PathKind, Paths, Scene
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
-    from rislam_rt.channel.compare import PathReport
+    from rislam_rt.channel.compare import PathReport, Validation
     from rislam_rt.design import Design
     from rislam_rt.pipeline.sweep import Row
 
@@ -94,6 +94,20 @@ def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> Non
     for report in (refined, raw):
         for path in [p for p in report.one_sided if not p.reason][:10]:
             print(f"unexplained: cycle {path.cycle}, {path.label}, only {path.side}")
+
+
+def print_validation(rows: Sequence["Validation"]) -> None:
+    """One line a room and kind of numbers: counts and largest errors; unexplained paths after them."""
+    table = Table("room, depth", "numbers", "matched", "explained", "unexplained", "length \\[m]", "gain \\[dB]")
+    for scene, depth, numbers, report in rows:
+        content = report.as_dict()
+        counts = (report.matched, sum(report.explained.values()), report.unexplained)
+        errors = (content[f"max_{name}"] for name in ("length_error_m", "gain_error_db"))
+        table.add_row(f"{scene}, {depth}", numbers, *map(str, counts), *(f"{error:.0e}" for error in errors))
+    _show("traced against analytic", table)
+    for scene, _, numbers, report in rows:
+        for path in [p for p in report.one_sided if not p.reason][:10]:
+            print(f"unexplained: {scene}, {numbers}, pose {path.cycle}, {path.label}, only {path.side}")
 
 
 def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"]) -> None:

@@ -53,7 +53,12 @@ def validate_rooms(
     rows = []
     for scene, depth in rooms:
         for refine in (False, True):
-            rng = np.random.default_rng([seed, zlib.crc32(scene.name.encode())])
+            rng = room_rng(scene, seed)
             report = compare_channels(scene, radio, poses=poses, depth=depth, rng=rng, refine=refine)
             rows.append(Validation(scene.name, depth, "refined" if refine else "traced", report))
     return rows
+
+
+def room_rng(scene: Scene, seed: int) -> np.random.Generator:
+    """The generator of a room's poses in `validate_rooms`."""
+    return np.random.default_rng([seed, zlib.crc32(scene.name.encode())])

@@ -1,0 +1,123 @@
+"""The path certificate as a picture: both path sets of one pose, what only one side has, and the errors."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from rislam_rt.channel.compare import OneSided
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.model import PathKind, Paths
+from rislam_rt.pipeline.studies.compare import Certificate
+from rislam_rt.report.geometry import outline_edges
+from rislam_rt.report.room import path_points
+from rislam_rt.report.style import KIND, TRUTH, WALL, styled
+
+ALONE = "#CC79A7"
+"""Colour of a path that only one side has."""
+FLOOR = 1e-16
+"""Smallest error that is drawn: a tenth of the spacing of float64 at 1."""
+MOST_LISTED = 6
+"""One-sided paths whose proofs are written out."""
+
+
+def draw_certificate(certificate: Certificate) -> Figure:
+    """Four parts: traced paths, analytic paths, one-sided ones with their proofs, and errors of the matched ones."""
+    scene, report = certificate.scene, certificate.report
+    low, high = scene.bounds
+    aspect = float((high[1] - low[1]) / (high[0] - low[0]))
+    with styled():
+        figure = Figure(figsize=(11.0, 2.0 * 5.2 * aspect + 2.2))
+        (left, right), (alone, errors) = figure.subplots(2, 2)
+        for axis, paths, name in ((left, certificate.traced, "traced"), (right, certificate.analytic, "analytic")):
+            _draw_side(axis, certificate, paths, name)
+        _draw_alone(alone, certificate)
+        _draw_errors(errors, certificate)
+        figure.suptitle(
+            f"Path certificate: {scene.name}, pose {certificate.pose}: {report.matched} matched, "
+            f"{sum(report.explained.values())} explained, {report.unexplained} unexplained",
+            weight="bold", fontsize=12,
+        )  # fmt: skip
+        kinds = [kind for kind in PathKind if kind in report.kind]
+        lines = [Line2D([], [], color=KIND[kind], lw=2.0, label=kind.name) for kind in kinds]
+        lines.append(Line2D([], [], color=ALONE, lw=3.0, label="only one side has it"))
+        figure.legend(handles=lines, loc="outside lower center", ncols=len(lines), fontsize=9)
+    return figure
+
+
+def _draw_side(axis: Axes, certificate: Certificate, paths: Paths, name: str) -> None:
+    """All paths of one side, from above; those that the other side lacks on top."""
+    _draw_plan(axis, certificate)
+    columns = np.flatnonzero(paths.valid[0])
+    only = {path.label for path in certificate.report.one_sided if path.side == name}
+    for column in columns[np.argsort(-paths.kind[columns], kind="stable")]:
+        path, points = int(column), path_points(certificate.scene, paths, 0, int(column))
+        if paths.label(path) in only:
+            axis.plot(points[:, 0], points[:, 1], color=ALONE, lw=3.0, zorder=6)
+        else:
+            axis.plot(points[:, 0], points[:, 1], color=KIND[PathKind(paths.kind[path])], lw=0.8, alpha=0.6, zorder=3)
+    counts = f"{len(columns)} paths" + (f", {len(only)} of them alone" if only else "")
+    axis.set_title(f"{name}: {counts}", weight="bold")
+
+
+def _draw_alone(axis: Axes, certificate: Certificate) -> None:
+    """What only one side has, from above, and the proof of each below."""
+    _draw_plan(axis, certificate)
+    sides = {"traced": certificate.traced, "analytic": certificate.analytic}
+    one_sided = certificate.report.one_sided
+    for path in one_sided:
+        paths = sides[path.side]
+        column = next(p for p in np.flatnonzero(paths.valid[0]) if paths.label(int(p)) == path.label)
+        points = path_points(certificate.scene, paths, 0, int(column))
+        axis.plot(points[:, 0], points[:, 1], color=ALONE, lw=2.5, ls="-" if path.reason else ":", zorder=6)
+        axis.plot(points[1:-1, 0], points[1:-1, 1], "o", color=ALONE, ms=5, zorder=7)
+    axis.set_title("what only one side has, and why", weight="bold")
+    axis.text(0.0, -0.1, _proofs(one_sided), transform=axis.transAxes, va="top", fontsize=8.5)
+
+
+def _proofs(one_sided: Sequence[OneSided]) -> str:
+    """One line a path, the first few of them."""
+    if not one_sided:
+        return "nothing: both sides have the same paths"
+    lines = [f"{p.label}\n  only {p.side}: {p.reason or 'UNEXPLAINED'}, {p.proof}" for p in one_sided[:MOST_LISTED]]
+    more = len(one_sided) - MOST_LISTED
+    return "\n".join(lines + ([f"and {more} more"] if more > 0 else []))
+
+
+def _draw_errors(axis: Axes, certificate: Certificate) -> None:
+    """Errors of the matched paths, the tracer's float32 against float64: one row of dots a quantity and class."""
+    report = certificate.report
+    rows = (
+        ("length [m]", report.length_error), ("gain [dB]", report.gain_error_db), ("phase [rad]", report.phase_error),
+        ("AoD [rad]", report.aod_error), ("AoA [rad]", report.aoa_error),
+    )  # fmt: skip
+    kinds = [kind for kind in PathKind if kind in report.kind]
+    for row, (_, error) in enumerate(rows):
+        for number, kind in enumerate(kinds):
+            mine = np.sort(np.maximum(error[report.kind == kind], FLOOR))
+            height = row + 0.8 * (number + 0.5) / len(kinds) - 0.4
+            axis.plot(mine, np.full(len(mine), height), "|", color=KIND[kind], ms=6, mew=1.2, alpha=0.8)
+    axis.set_xscale("log")
+    axis.set_yticks(range(len(rows)), [name for name, _ in rows])
+    axis.invert_yaxis()
+    axis.grid(False, axis="y")
+    axis.set_xlabel("difference between the tracer's float32 and the analytic float64")
+    axis.set_title("matched paths: how far apart", weight="bold")
+
+
+def _draw_plan(axis: Axes, certificate: Certificate) -> None:
+    """Walls from above, landmarks, Tx and Rx."""
+    scene = certificate.scene
+    for edge in outline_edges(build_walls(scene)):
+        axis.plot(edge[:, 0], edge[:, 1], color=WALL, lw=1.6, solid_capstyle="round", zorder=2)
+    for scatterer in scene.scatterers:
+        axis.plot(*scatterer.position[:2], "o", ms=9, mfc="none", mec=TRUTH, mew=1.5, zorder=8)
+    if scene.ris is not None:
+        axis.plot(*scene.ris.center[:2], "s", ms=9, mfc="none", mec=TRUTH, mew=1.5, zorder=8)
+    axis.plot(*scene.agent.position[0, :2], "*", color=TRUTH, ms=11, zorder=9)
+    axis.set_aspect("equal")
+    axis.grid(False)
+    axis.set_xlabel("x [m]")
+    axis.set_ylabel("y [m]")

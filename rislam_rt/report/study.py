@@ -1,0 +1,62 @@
+"""The files of a study: page, data and figures, each there whole or not at all."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rislam_rt.channel.compare import validation_page
+from rislam_rt.pipeline.files import write_atomic
+from rislam_rt.pipeline.studies.compare import Comparison
+from rislam_rt.pipeline.studies.fig4a import Fig4a
+from rislam_rt.pipeline.studies.spec import CompareSpec, Fig4aSpec
+from rislam_rt.report.certificate import draw_certificate
+from rislam_rt.report.fig4a import draw_fig4a, fig4a_csv, fig4a_page
+from rislam_rt.report.style import to_png
+
+COMPARISON, CERTIFICATE = "channel_validation", "figures/path_certificate.png"
+CURVES, CURVES_FIGURE = "fig4a", "figures/fig4a.png"
+
+
+def write_comparison(
+    found: Comparison, spec: CompareSpec, content: Mapping[str, Any], folder: Path, *, figures: bool = True
+) -> Path:
+    """Write page, JSON and certificate of a comparison of channels; returns the page.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    files = {f"{COMPARISON}.md": validation_page(found.rows, seed=spec.seed).encode()}
+    if figures and found.certificate is not None:
+        files[CERTIFICATE] = to_png(draw_certificate(found.certificate))
+    return _write(files | {f"{COMPARISON}.json": _json(content)}, folder)
+
+
+def write_fig4a(
+    found: Fig4a, spec: Fig4aSpec, scene: str, content: Mapping[str, Any], folder: Path, *, figures: bool = True
+) -> Path:
+    """Write page, CSV, JSON and figure of the gain curves; returns the page.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    page = fig4a_page(found, spec, scene, CURVES_FIGURE if figures else None)
+    files = {f"{CURVES}.md": page.encode(), f"{CURVES}.csv": fig4a_csv(found).encode()}
+    if figures:
+        files[CURVES_FIGURE] = to_png(draw_fig4a(found, spec))
+    return _write(files | {f"{CURVES}.json": _json(content)}, folder)
+
+
+def _write(files: Mapping[str, bytes], folder: Path) -> Path:
+    """Write all files, the first of which is the page."""
+    for name, content in files.items():
+        write_atomic(folder / name, content)
+    return folder / next(iter(files))
+
+
+def _json(content: Mapping[str, Any]) -> bytes:
+    return (json.dumps(content, indent=1, allow_nan=False) + "\n").encode()
