@@ -99,8 +99,8 @@ def _mark(axis: Axes, point: Floats, name: str, marker: str) -> None:
     """A true landmark, its name and height beside it."""
     axis.plot(point[0], point[1], marker, ms=13, mfc="none", mec=TRUTH, mew=1.6, zorder=5)
     paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
-    axis.annotate(f"{name}, z = {point[2]:.1f} m", (point[0], point[1]), (12, -3), textcoords="offset points",
-                  fontsize=9, zorder=7, bbox=paper)  # fmt: skip
+    axis.annotate(f"{name}\nz = {point[2]:.1f} m", (point[0], point[1]), (12, 0), textcoords="offset points",
+                  va="center", fontsize=9, zorder=7, bbox=paper)  # fmt: skip
 
 
 def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
