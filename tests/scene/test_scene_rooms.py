@@ -121,3 +121,18 @@ def test_agent_loses_a_landmark_behind_a_wall(name: str, landmark: str, lost: in
     hidden = crossings(scene.agent.position, np.tile(below, (600, 1)), triangles)[0]
     assert hidden.min() > 300
     assert set(range(600 - lost, 600)) <= set(hidden.tolist())
+
+
+def test_shaded_room_has_a_landmark_hidden_and_found_again() -> None:
+    scene = load_scene(SCENES / "shaded_room")
+    ball, column, rod = scene.scatterers
+    assert (ball.law, column.law, rod.law) == ("mie", "constant", "cylinder")
+    assert ball.shade is not None
+    assert column.shade is not None
+    assert rod.shade is None
+    at = np.tile(ball.position, (600, 1))
+    hidden = np.unique(crossings(scene.agent.position, at, column.shade.triangles)[0])
+    assert 50 < len(hidden) < 150
+    assert hidden.min() > 300
+    assert hidden.max() < 590
+    assert np.array_equal(hidden, np.arange(hidden.min(), hidden.max() + 1))

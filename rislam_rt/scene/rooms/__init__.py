@@ -7,6 +7,7 @@ from rislam_rt.scene.rooms.furnished import imported_glb, office
 from rislam_rt.scene.rooms.hall import large_hall
 from rislam_rt.scene.rooms.plain import empty_box, itu_room, paper_room, two_scatterers
 from rislam_rt.scene.rooms.room import Room
+from rislam_rt.scene.rooms.shaded import shaded_room
 
 ROOMS: dict[str, Callable[[], Room]] = {
     room.__name__: room
@@ -20,6 +21,7 @@ ROOMS: dict[str, Callable[[], Room]] = {
         itu_room,
         large_hall,
         imported_glb,
+        shaded_room,
     )
 }
 """Name of the template -> its builder."""
