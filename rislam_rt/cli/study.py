@@ -74,7 +74,7 @@ def run_gain_curves(spec: "Fig4aSpec", given: Given) -> None:
         found = run_fig4a(scene, spec, rng=np.random.default_rng(spec.seed), progress=progress)
     content = {**study_record(spec, [scene]), **fig4a_table(found)}
     for element in found.curves:
-        typer.echo("\n".join(verdict(found, element)))
+        typer.echo("\n".join([*verdict(found, element), ""]))
     typer.echo(f"page: {write_fig4a(found, spec, scene.name, content, folder, figures=given.page)}")
     write_json(given.json, content)
 

@@ -43,6 +43,9 @@ def draw_certificate(certificate: Certificate) -> Figure:
         kinds = [kind for kind in PathKind if kind in report.kind]
         lines = [Line2D([], [], color=KIND[kind], lw=2.0, label=kind.name) for kind in kinds]
         lines.append(Line2D([], [], color=ALONE, lw=3.0, label="only one side has it"))
+        for marker, size, label in (("*", 11, "agent"), ("o", 9, "scatterer"), ("s", 9, "panel")):
+            filled = TRUTH if marker == "*" else "none"
+            lines.append(Line2D([], [], ls="", marker=marker, ms=size, mfc=filled, mec=TRUTH, label=label))
         figure.legend(handles=lines, loc="outside lower center", ncols=len(lines), fontsize=9)
     return figure
 
@@ -74,7 +77,8 @@ def _draw_alone(axis: Axes, certificate: Certificate) -> None:
         axis.plot(points[:, 0], points[:, 1], color=ALONE, lw=2.5, ls="-" if path.reason else ":", zorder=6)
         axis.plot(points[1:-1, 0], points[1:-1, 1], "o", color=ALONE, ms=5, zorder=7)
     axis.set_title("what only one side has, and why", weight="bold")
-    axis.text(0.0, -0.1, _proofs(one_sided), transform=axis.transAxes, va="top", fontsize=8.5)
+    axis.set_xlabel("")
+    axis.text(0.0, -0.09, _proofs(one_sided), transform=axis.transAxes, va="top", fontsize=8.5)
 
 
 def _proofs(one_sided: Sequence[OneSided]) -> str:
@@ -103,7 +107,7 @@ def _draw_errors(axis: Axes, certificate: Certificate) -> None:
     axis.set_yticks(range(len(rows)), [name for name, _ in rows])
     axis.invert_yaxis()
     axis.grid(False, axis="y")
-    axis.set_xlabel("difference between the tracer's float32 and the analytic float64")
+    axis.set_xlabel(f"tracer's float32 against analytic float64 (equal or less: at {FLOOR:.0e})")
     axis.set_title("matched paths: how far apart", weight="bold")
 
 
