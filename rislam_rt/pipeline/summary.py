@@ -157,7 +157,10 @@ def surface_rms(walls: Walls, number: int, normal: Floats, offset: float) -> flo
 
 
 def component_labels(paths: Paths, scheme: SchemeResult) -> tuple[Integers, Integers]:
-    """What the agent took each component for, and which landmark or image it truly was; -1 for none, in time order."""
+    """What the agent took each component for, and which landmark or image it truly was; -1 for none, in time order.
+
+    As in the map, a path with walls belongs to the image in the wall next to the landmark, on the Rx leg if it has one.
+    """
     shown = scheme.component_path != NOTHING
     label = np.maximum(scheme.component_landmark[shown], -1)
     numbers: dict[Any, int] = {}
@@ -165,7 +168,8 @@ def component_labels(paths: Paths, scheme: SchemeResult) -> tuple[Integers, Inte
     for path in range(paths.num_paths):
         kind, landmark, tx, rx = paths.identity(path)
         if kind not in (PathKind.LOS, PathKind.VT):
-            identity[path] = numbers.setdefault((landmark, frozenset((*tx, *rx))), len(numbers))
+            wall = rx[0] if rx else tx[-1] if tx else -1
+            identity[path] = numbers.setdefault((landmark, wall), len(numbers))
     return label, identity[scheme.component_path[shown]]
 
 

@@ -95,8 +95,11 @@ def test_true_identity_joins_reciprocals_and_leaves_wall_returns_out(short_resul
         if landmark < 0:
             assert number == -1
             continue
-        twins = [q for q in range(paths.num_paths) if paths.identity(q) == (kind, landmark, rx, tx)]
-        assert all(identity[q] == number for q in twins)
+        same = [(kind, landmark, rx[:1], ()), (kind, landmark, (), rx[:1])] if rx else [(kind, landmark, (), tx[-1:])]
+        assert all(identity[q] == number for q in range(paths.num_paths) if paths.identity(q) in same)
+    assert (
+        len(np.unique(identity[identity >= 0])) == 2 * (1 + 6) - 1
+    )  # two landmarks with their images; none of the panel in its host
 
 
 def test_summary_is_plain_and_complete(short_result):
