@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import rotation_z, unit
 from rislam_rt.model import Body
 from rislam_rt.slam.associate import inverse_3x3
@@ -24,22 +24,27 @@ from rislam_rt.slam.hypotheses import (
     fit_reciprocal,
     floor_height,
     floor_image,
+    plausible,
 )
 from rislam_rt.slam.match import Outlook, explained
 from rislam_rt.slam.particles import Particles, mean_features, moments, normalised, square_root
-from rislam_rt.slam.returns import TX, Poses, Returns, compact, feature_jacobian, leg_images, observe
+from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, linearise, observe
 from rislam_rt.slam.tracks import Tracks
 
 STRIDE = 4
-"""Tracks are examined every so many cycles, each at its own turn."""
+"""Tracks are examined every so many measurements, and four times less often once their history is full."""
 MAX_POINT_STD = 0.4
 """Largest standard deviation [m] of a new point along its worst axis."""
 MAX_WALL_STD = 0.3
 """The same for the image of the anchor in a new wall (the floor's tilt is known beforehand and does not count)."""
 MAX_FLOOR_DEPTH = 1.5
 """Largest height [m] of the agent above the floor that it moves on."""
+MOVING_RATIO, MOVING_SPREAD = np.log(0.6), 0.7
+"""Log amplitude, over that of free space, expected of wall returns, and its standard deviation."""
 WALL_CYCLES = 20
 """Cycles of history that a wall needs: two legs leave more room for error than one."""
+ELDER_CYCLES = 6
+"""Cycles of history from which on a track keeps longer and weaker ones waiting."""
 PARENT_HITS = 10
 """Measurements of a point before walls are found by it."""
 PARALLEL = 4.0
@@ -72,21 +77,23 @@ def examine(
     particles: Particles,
     book: Book,
     outlook: Outlook,
+    hidden: Booleans,
     headings: Floats,
     time: Floats,
     body: Body,
     cycle: int,
+    free_space: float,
     config: SlamConfig,
 ) -> tuple[int, Tracks, Particles, Book]:
     """Look at the tracks whose turn it is; at most one becomes a feature, as it may explain the others.
 
     Returns the row of that track (-1 without one), the tracks (some now known for moving images), particles and book.
     """
-    due = due_tracks(tracks, cycle, config)
+    due = due_tracks(tracks, hidden, cycle, config)
     scene = Scene(mean_features(particles), book, particles.weight @ particles.position, outlook, config)
     moving = tracks.moving.copy()
     for row in due:
-        history, rows = track_history(tracks, row, particles, headings, time, body, cycle)
+        history, rows = track_history(tracks, row, particles, headings, time, body, cycle, free_space)
         if is_explained(tracks, row, history, scene):
             continue
         verdict = judge(history, scene)
@@ -100,25 +107,44 @@ def examine(
     return -1, tracks._replace(moving=moving), particles, book
 
 
-def due_tracks(tracks: Tracks, cycle: int, config: SlamConfig) -> Integers:
-    """Tracks to examine now, the shortest first: an image always lies behind its point."""
+def due_tracks(tracks: Tracks, hidden: Booleans, cycle: int, config: SlamConfig) -> Integers:
+    """Tracks to examine now, the shortest first: an image lies behind its point, and is weaker.
+
+    So a track has to wait while another that is shorter and stronger is still unexplained.
+    """
     ready = ~tracks.specular & (tracks.length >= config.birth_cycles) & (tracks.misses == 0)
-    turn = tracks.length % STRIDE == cycle % STRIDE
-    rows = np.flatnonzero(ready & turn)
+    growing = tracks.length < config.window - 1
+    turn = np.where(growing, tracks.length % STRIDE == 0, (np.arange(len(ready)) + cycle) % (4 * STRIDE) == 0)
+    alive = ~tracks.specular & ~hidden & (tracks.length >= ELDER_CYCLES) & (tracks.misses <= 1)
+    length = tracks.mean[:, 0, 0]
+    elder = (length[None] < length[:, None] - 0.05) & (tracks.log_amplitude[None] > tracks.log_amplitude[:, None] + 0.1)
+    waits = (elder & alive[None]).any(axis=1) & growing
+    rows = np.flatnonzero(ready & turn & ~waits)
     return rows[np.argsort(tracks.mean[rows, 0, 0])]
 
 
 def track_history(
-    tracks: Tracks, row: int, particles: Particles, headings: Floats, time: Floats, body: Body, cycle: int
+    tracks: Tracks,
+    row: int,
+    particles: Particles,
+    headings: Floats,
+    time: Floats,
+    body: Body,
+    cycle: int,
+    free_space: float,
 ) -> tuple[History, Integers]:
-    """A track's measurements with the mean believed poses, and the trail rows they belong to."""
+    """A track's measurements with the mean believed poses, and the trail rows they belong to.
+
+    `free_space` is the log amplitude after 1 m.
+    """
     rows = np.flatnonzero(tracks.cycle[row] >= 0)
     position = np.einsum("n,kni->ki", particles.weight, particles.trail[rows])
     poses = poses_of(position, headings[rows], body)
     pose = np.concatenate([particles.position, particles.velocity], axis=1)
     doubt = square_root(moments(particles.log_weight, pose)[1])
     lag = time[cycle % len(time)] - time[rows]
-    return History(tracks.seen[row, rows], tracks.std[row, rows], poses, lag, doubt), rows
+    ratio = float(tracks.log_amplitude[row] - free_space + np.log(tracks.mean[row, 0, 0]))
+    return History(tracks.seen[row, rows], tracks.std[row, rows], poses, lag, ratio, doubt), rows
 
 
 def poses_of(position: Floats, heading: Floats, body: Body) -> Poses:
@@ -144,13 +170,16 @@ def is_explained(tracks: Tracks, row: int, history: History, scene: Scene) -> bo
 def judge(history: History, scene: Scene) -> Verdict | None:
     """The hypothesis that explains the history, if one does and no other comes near."""
     verdicts = [*_points(history, scene), *_images(history, scene)]
-    verdicts.sort(key=lambda v: float(v.fit.chi2))
+    verdicts.sort(key=lambda v: float(v.fit.cost))
     best, margin = verdicts[0], scene.config.birth_margin
-    rival = _reciprocal_chi2(history, scene)
-    if rival < best.fit.chi2 + margin:
-        return _floor(history, scene, min(rival, float(best.fit.chi2)))
-    clear = min((float(v.fit.chi2 - best.fit.chi2) for v in verdicts[1:]), default=np.inf) > margin
-    if not clear or not _plausible(best.fit, 3 * len(history.seen) - 3):
+    clear = min((float(v.fit.cost - best.fit.cost) for v in verdicts[1:]), default=np.inf) > margin
+    clear &= plausible(best.fit, len(history.seen), 3)
+    if not clear and not _floor_wanted(history, scene):
+        return None
+    rival = _reciprocal_cost(history, scene)
+    if rival < best.fit.cost + margin:
+        return _floor(history, scene, min(rival, float(best.fit.cost)))
+    if not clear:
         return None
     if best.kind is MOVING:
         return best
@@ -160,18 +189,15 @@ def judge(history: History, scene: Scene) -> Verdict | None:
     return best if sharp and ready else None
 
 
-def _plausible(fit: Fit, dof: int) -> bool:
-    """Whether chi^2 is within two and a half standard deviations of its mean."""
-    return bool(fit.chi2 < dof + 2.5 * np.sqrt(2.0 * dof))
-
-
 def _points(history: History, scene: Scene) -> list[Verdict]:
     """A static point, and a moving image."""
     verdicts = []
     for kind in (POINT, MOVING):
         start = first_guess(kind, None, scene.anchor, history)
         if start is not None:
-            verdicts.append(Verdict(kind, -1, fit_feature(kind, start, None, scene.anchor, history, 6)))
+            fit = fit_feature(kind, start, None, scene.anchor, history, 6)
+            surplus = ((history.ratio - MOVING_RATIO) / MOVING_SPREAD) ** 2 if kind is MOVING else 0.0
+            verdicts.append(Verdict(kind, -1, fit._replace(cost=fit.cost + surplus)))
     return verdicts
 
 
@@ -202,7 +228,7 @@ def _established(book: Book) -> Integers:
     return book.points[book.hits[book.points] >= PARENT_HITS]
 
 
-def _reciprocal_chi2(history: History, scene: Scene) -> float:
+def _reciprocal_cost(history: History, scene: Scene) -> float:
     """How well an unknown Tx leg to a known image fits, if the track comes from that image's direction.
 
     What arrives from where something is already known to be, only later, is most likely the same thing over a wall.
@@ -221,24 +247,29 @@ def _reciprocal_chi2(history: History, scene: Scene) -> float:
     spread = np.hypot(1.0 / np.sqrt(weight.sum(axis=0)), 0.02)
     along = np.all(np.abs(seen - mean) < PARALLEL * spread, axis=1)
     fits = [fit_reciprocal(image, scene.anchor, history) for image in images[along]]
-    return min((float(fit.chi2) for fit in fits if fit is not None), default=np.inf)
+    return min((float(fit.cost) for fit in fits if fit is not None), default=np.inf)
+
+
+def _floor_wanted(history: History, scene: Scene) -> bool:
+    """Whether the map has no floor yet and the history is long enough to give one."""
+    level = np.abs(unit(scene.features - scene.book.anchor)[:, 2]) > 0.9
+    below = level & (scene.features[:, 2] < scene.anchor[2]) & scene.book.is_wall
+    return len(history.seen) >= WALL_CYCLES and not below.any()
 
 
 def _floor(history: History, scene: Scene, rival: float) -> Verdict | None:
     """The floor under a known point, if it fits as well as any wall that one could choose freely."""
-    level = np.abs(unit(scene.features - scene.book.anchor)[:, 2]) > 0.9
-    below = level & (scene.features[:, 2] < scene.anchor[2]) & scene.book.is_wall
-    if len(history.seen) < WALL_CYCLES or below.any():
+    if not _floor_wanted(history, scene):
         return None
     fits = [(int(p), fit_floor(scene.features[p], scene.anchor, history)) for p in _established(scene.book)]
     verdicts = [Verdict(RECIPROCAL, parent, fit) for parent, fit in fits if fit is not None]
     if not verdicts:
         return None
-    best = min(verdicts, key=lambda v: float(v.fit.chi2))
-    as_good = best.fit.chi2 < rival + scene.config.birth_margin
+    best = min(verdicts, key=lambda v: float(v.fit.cost))
+    as_good = best.fit.cost < rival + scene.config.birth_margin
     depth = 0.5 * float(scene.anchor[2] - best.fit.feature[2])
     sharp = best.fit.covariance[2, 2] < MAX_WALL_STD**2 and depth < MAX_FLOOR_DEPTH
-    return best if as_good and sharp and _plausible(best.fit, 3 * len(history.seen) - 1) else None
+    return best if as_good and sharp and plausible(best.fit, len(history.seen), 1) else None
 
 
 def settle(
@@ -258,12 +289,12 @@ def settle(
     covariance[:size, :size] = particles.covariance
     covariance[size:, size:] = verdict.fit.covariance
     if verdict.kind is RECIPROCAL:
-        feature, chi2 = floor_image(floor_height(particles.features[:, parent], own)[0], scene.anchor), None
+        feature, cost = floor_image(floor_height(particles.features[:, parent], own)[0], scene.anchor), np.zeros(1)
     else:
         known = particles.features[:, parent] if parent >= 0 else None
         start = np.broadcast_to(verdict.fit.feature, particles.position.shape)
         own_fit = fit_feature(verdict.kind, start, known, scene.anchor, own, 3)
-        feature, chi2 = own_fit.feature, own_fit.chi2
+        feature, cost = own_fit.feature, own_fit.cost
     if parent >= 0:
         lean = _parent_sensitivity(verdict, scene.features[parent], scene.anchor, history)
         block = slice(3 * parent, 3 * parent + 3)
@@ -273,10 +304,9 @@ def settle(
     features = np.concatenate([particles.features, feature[:, None]], axis=1)
     is_point = verdict.kind is POINT
     founder = int(scene.book.ident[parent]) if parent >= 0 else -1
-    if chi2 is not None:
-        # the history speaks about the particles' trails as well; an excess of its best chi^2 is no particle's fault
-        excess = max(1.0, float(verdict.fit.chi2) / (3 * len(rows) - 3))
-        log_weight, _ = normalised(particles.log_weight - 0.5 * chi2 / excess)
+    if verdict.kind is POINT:
+        # the history speaks about the particles' trails as well
+        log_weight, _ = normalised(particles.log_weight - 0.5 * cost)
         particles = particles._replace(log_weight=log_weight)
     book = enter(scene.book, not is_point, scene.anchor, founder)
     return particles._replace(features=features, covariance=covariance), book
@@ -285,7 +315,7 @@ def settle(
 def _parent_sensitivity(verdict: Verdict, parent: Floats, anchor: Floats, history: History) -> Floats:
     """How the fitted wall (3,) moves with its parent (3,): the implicit derivative of the normal equations."""
     known = np.stack([verdict.fit.feature, parent])[None]
-    jacobian = feature_jacobian(verdict.kind, known, np.stack([anchor, anchor]), history.poses).mean(axis=-4)
+    jacobian = linearise(verdict.kind, known, np.stack([anchor, anchor]), history.poses).by_feature.mean(axis=-4)
     weight = 1.0 / history.std**2
     pull = np.einsum("kia,ki,kib->ab", jacobian[..., 0, :], weight, jacobian[..., 1, :])
     return -verdict.fit.covariance @ pull

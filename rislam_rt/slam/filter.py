@@ -150,8 +150,19 @@ def step(
     landmark[free[taken]] = names
     tracks, removed = _follow(state, tracks, glance, picks, num_returns, config)
     landmark[free[removed]] = REMOVED
+    hidden = hidden_tracks(outlook, tracks, config.gate)
     row, tracks, particles, book = examine(
-        tracks, updated.particles, book, outlook, state.heading, state.time, state.body, state.cycle, config
+        tracks,
+        updated.particles,
+        book,
+        outlook,
+        hidden,
+        state.heading,
+        state.time,
+        state.body,
+        state.cycle,
+        free_space(state.radio),
+        config,
     )
     tracks = tracks.keep(np.arange(len(tracks.misses)) != row)
     particles, book = prune(particles, book, outlook, belief, config)
@@ -206,7 +217,7 @@ def glance_of(measurement: Measurement, radio: RadioConfig) -> Glance:
     """A measurement in the filter's units; standard deviations are kept off zero."""
     length = SPEED_OF_LIGHT * measurement.tau
     amplitude = np.maximum(measurement.amplitude, 1e-30)
-    free = radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * np.maximum(length, 1e-3))
+    free = np.exp(free_space(radio)) / np.maximum(length, 1e-3)
     std = np.concatenate([SPEED_OF_LIGHT * measurement.tau_std[:, None], measurement.cosines_std], axis=1)
     return Glance(
         np.concatenate([length[:, None], measurement.cosines], axis=1),
@@ -215,6 +226,11 @@ def glance_of(measurement: Measurement, radio: RadioConfig) -> Glance:
         np.minimum(measurement.amplitude_std / amplitude, 1.0),
         amplitude / free,
     )
+
+
+def free_space(radio: RadioConfig) -> float:
+    """Log amplitude of a path of 1 m in free space."""
+    return float(np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi)))
 
 
 def is_los(glance: Glance, body: Body) -> Booleans:

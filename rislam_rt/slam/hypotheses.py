@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z, unit
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, feature_jacobian, observe, pose_jacobian, reflect
+from rislam_rt.slam.returns import NONE, TX, Poses, Returns, linearise, reflect
 
 POINT = Returns(np.array([[0, NONE, NONE]]), np.array([0]), np.array([0]))
 """A static point; the feature sought is row 0."""
@@ -21,6 +21,12 @@ MOVING = Returns(np.array([[TX, NONE, NONE], [TX, 0, NONE]]), np.array([0]), np.
 
 DAMPING = 1e-5
 """Levenberg's damping in units of the information's trace: keeps steps along blind directions short."""
+CONVERGED = 1e-3
+"""Length [m] of a step after which a fit has settled."""
+TAIL = 4.0
+"""Degrees of freedom of Student's t: paths that nobody expected, in the same cell, make the errors' tails heavy."""
+COST_MEAN, COST_STD = 3.56, 2.17
+"""Mean and standard deviation of `(TAIL + 3) log(1 + chi^2 / TAIL)` for chi^2 with 3 degrees of freedom."""
 RIDGE = 1e-4
 """Prior information [1/m^2], (100 m)^-2, that keeps blind directions finite."""
 FLOOR_TILT = 0.05
@@ -34,8 +40,8 @@ class Fit(NamedTuple):
     """(..., 3) [m]."""
     covariance: Floats
     """(..., 3, 3) [m^2]."""
-    chi2: Floats
-    """(...,) sum of squared normalised residuals; 3K - 3 on average for the right hypothesis."""
+    cost: Floats
+    """(...,) twice the negative log likelihood under Student's t, without its constants."""
 
 
 class History(NamedTuple):
@@ -49,6 +55,8 @@ class History(NamedTuple):
     """Tx and Rx (..., K, 3), heading (K,)."""
     lag: Floats
     """(K,) time [s] since each measurement."""
+    ratio: float
+    """Log of the amplitude over that of free space of the same length."""
     doubt: Floats
     """(6, D) square root of the covariance of today's position and velocity, through which all poses err together;
     no columns where the poses are taken as certain."""
@@ -57,45 +65,73 @@ class History(NamedTuple):
 def fit_feature(
     kind: Returns, start: Floats, parent: Floats | None, anchor: Floats, history: History, steps: int
 ) -> Fit:
-    """Gauss-Newton from `start` (..., 3); `parent` (..., 3) is the known point of an image hypothesis.
+    """Gauss-Newton from `start` (..., 3), measurements far off counting for less (Student's t).
 
-    With `history.doubt` the pose is fitted along, held by its own covariance: a wrong speed must not speak against a
-    hypothesis that is right.
+    `parent` (..., 3) is the known point of an image hypothesis. With `history.doubt` the pose is fitted along, held by
+    its own covariance: a wrong speed must not speak against a hypothesis that is right.
     """
-    feature = np.array(start)
     anchors = np.stack([anchor, anchor])
+    solution = _solve(kind, np.array(start), parent, anchors, history, None)
     for _ in range(steps):
-        normal, slope, _ = _normal_equations(kind, feature, parent, anchors, history)
-        damped = normal + DAMPING * np.trace(normal, axis1=-2, axis2=-1)[..., None, None] * np.eye(3)
-        step = np.linalg.solve(damped, slope[..., None])[..., 0]
+        damping = DAMPING * np.trace(solution.normal, axis1=-2, axis2=-1)[..., None, None] * np.eye(3)
+        step = np.linalg.solve(solution.normal + damping, solution.slope[..., None])[..., 0]
         length = np.linalg.norm(step, axis=-1, keepdims=True)
-        feature = feature + step * np.minimum(1.0, 1.0 / np.maximum(length, 1e-12))
-    normal, _, chi2 = _normal_equations(kind, feature, parent, anchors, history)
-    return Fit(feature, np.asarray(np.linalg.inv(normal), dtype=np.float64), chi2)
+        feature = solution.feature + step * np.minimum(1.0, 1.0 / np.maximum(length, 1e-12))
+        solution = _solve(kind, feature, parent, anchors, history, solution.trust)
+        if length.max() < CONVERGED:
+            break
+    return Fit(solution.feature, np.asarray(np.linalg.inv(solution.normal), dtype=np.float64), solution.cost)
 
 
-def _normal_equations(
-    kind: Returns, feature: Floats, parent: Floats | None, anchors: Floats, history: History
-) -> tuple[Floats, Floats, Floats]:
-    """Information (..., 3, 3) on the feature, slope (..., 3) and chi^2 (...,), the pose's error eliminated."""
+class _Solution(NamedTuple):
+    """The normal equations at one place, the pose's error eliminated."""
+
+    feature: Floats
+    normal: Floats
+    """(..., 3, 3)."""
+    slope: Floats
+    """(..., 3)."""
+    cost: Floats
+    """(...,)."""
+    trust: Floats
+    """(..., K) weight that Student's t gives each measurement."""
+
+
+def _solve(
+    kind: Returns,
+    feature: Floats,
+    parent: Floats | None,
+    anchors: Floats,
+    history: History,
+    trust: Floats | None,
+) -> _Solution:
     known = _features(feature, parent)
-    residual = history.seen - observe(kind, known, anchors, history.poses).seen.mean(axis=-2)
-    jacobian = feature_jacobian(kind, known, anchors, history.poses)[..., 0, :].mean(axis=-3)
-    weight = 1.0 / history.std**2
-    normal = np.einsum("...kia,ki,...kib->...ab", jacobian, weight, jacobian) + RIDGE * np.eye(3)
-    slope = np.einsum("...kia,ki,...ki->...a", jacobian, weight, residual)
-    chi2 = np.einsum("...ki,ki->...", residual**2, weight)
-    if not history.doubt.shape[1]:
-        return normal, slope, chi2
-    by_pose = pose_jacobian(kind, known, anchors, history.poses).mean(axis=-3)
+    linear = linearise(kind, known, anchors, history.poses)
+    residual = (history.seen - linear.seen.mean(axis=-2)) / history.std
+    jacobian = linear.by_feature[..., 0, :].mean(axis=-3) / history.std[..., None]
+    by_pose = linear.by_pose.mean(axis=-3) / history.std[..., None]
     by_doubt = by_pose @ history.doubt[:3] - history.lag[:, None, None] * (by_pose @ history.doubt[3:])
-    cross = np.einsum("...kia,ki,...kib->...ab", jacobian, weight, by_doubt)
-    inner = np.einsum("...kia,ki,...kib->...ab", by_doubt, weight, by_doubt) + np.eye(history.doubt.shape[1])
-    pull = np.einsum("...kia,ki,...ki->...a", by_doubt, weight, residual)
-    solved = np.linalg.solve(inner, np.concatenate([np.swapaxes(cross, -1, -2), pull[..., None]], axis=-1))
-    normal = normal - cross @ solved[..., :3]
-    slope = slope - (cross @ solved[..., 3:])[..., 0]
-    return normal, slope, chi2 - np.sum(pull * solved[..., 3], axis=-1)
+    columns = np.concatenate([jacobian, by_doubt, residual[..., None]], axis=-1)
+    weighted = columns if trust is None else columns * trust[..., None, None]
+    gram = np.einsum("...kia,...kib->...ab", weighted, columns)
+    size = history.doubt.shape[1]
+    inner = gram[..., 3:-1, 3:-1] + np.eye(size)
+    outer = np.concatenate([gram[..., 3:-1, :3], gram[..., 3:-1, -1:]], axis=-1)
+    solved = np.linalg.solve(inner, outer)
+    normal = gram[..., :3, :3] - gram[..., :3, 3:-1] @ solved[..., :3] + RIDGE * np.eye(3)
+    slope = gram[..., :3, -1] - (gram[..., :3, 3:-1] @ solved[..., 3:])[..., 0]
+    pose_error = solved[..., 3]
+    left = residual - (by_doubt @ pose_error[..., None, :, None])[..., 0]
+    squared = np.einsum("...ki,...ki->...k", left, left)
+    cost = np.sum((TAIL + 3.0) * np.log1p(squared / TAIL), axis=-1) + np.sum(pose_error**2, axis=-1)
+    return _Solution(feature, normal, slope, cost, (TAIL + 3.0) / (TAIL + squared))
+
+
+def plausible(fit: Fit, count: int, parameters: int) -> bool:
+    """Whether a fit to `count` measurements is no worse than 2.5 standard deviations above what it should cost."""
+    # each parameter takes out about as much as one of the 3 count squared residuals contributes
+    expected = COST_MEAN * (count - parameters / 3.0)
+    return bool(fit.cost < expected + 2.5 * COST_STD * np.sqrt(count))
 
 
 def first_guess(kind: Returns, parent: Floats | None, anchor: Floats, history: History) -> Floats | None:
@@ -131,8 +167,8 @@ def fit_reciprocal(parent: Floats, anchor: Floats, history: History) -> Fit | No
     if not len(good):
         return None
     fits = fit_feature(RECIPROCAL, good, parent, anchor, history, 6)
-    best = int(np.argmin(fits.chi2))
-    return Fit(fits.feature[best], fits.covariance[best], fits.chi2[best])
+    best = int(np.argmin(fits.cost))
+    return Fit(fits.feature[best], fits.covariance[best], fits.cost[best])
 
 
 def fit_floor(parent: Floats, anchor: Floats, history: History) -> Fit | None:
@@ -145,10 +181,10 @@ def fit_floor(parent: Floats, anchor: Floats, history: History) -> Fit | None:
     if not np.isfinite(height) or height > min(float(history.poses.tx[:, 2].min()), float(parent[2])) - 0.05:
         return None
     image = floor_image(height, anchor)
-    chi2 = _normal_equations(RECIPROCAL, image, parent, np.stack([anchor, anchor]), history)[2]
+    cost = _solve(RECIPROCAL, image, parent, np.stack([anchor, anchor]), history, None).cost
     lever = 2.0 * (anchor[2] - height)
     spread = np.array([lever * FLOOR_TILT, lever * FLOOR_TILT, 2.0 / np.sqrt(information)])
-    return Fit(image, np.diag(spread**2), chi2)
+    return Fit(image, np.diag(spread**2), cost)
 
 
 def floor_height(parent: Floats, history: History) -> tuple[Floats, Floats]:

@@ -10,7 +10,7 @@ from rislam_rt.model import RadioConfig
 from rislam_rt.slam.associate import Candidates, inverse_3x3
 from rislam_rt.slam.expect import Belief, Expected
 from rislam_rt.slam.particles import Particles, joint_covariance
-from rislam_rt.slam.returns import feature_jacobian, observe, pose_jacobian
+from rislam_rt.slam.returns import linearise
 from rislam_rt.slam.tracks import AMPLITUDE_WANDER, Tracks
 
 INSIDE, OUTSIDE = 0.9, 1.1
@@ -56,9 +56,7 @@ class Outlook(NamedTuple):
 def look_ahead(belief: Belief, expected: Expected, particles: Particles, tracks: Tracks) -> Outlook:
     """Predicted returns with their uncertainty."""
     returns, book = expected.returns, belief.book
-    seen = observe(returns, belief.features, book.anchor, belief.poses).seen
-    by_feature = feature_jacobian(returns, belief.features, book.anchor, belief.poses)
-    by_pose = pose_jacobian(returns, belief.features, book.anchor, belief.poses)
+    seen, by_feature, by_pose = linearise(returns, belief.features, book.anchor, belief.poses)
     cell = resolution_cell(belief.radio)
     merger = merge_returns(seen, expected, tracks, cell)
     both = np.flatnonzero(merger.partner >= 0)
@@ -89,27 +87,24 @@ def merge_returns(seen: Floats, expected: Expected, tracks: Tracks, cell: Floats
     count, shiny = len(seen), np.flatnonzero(tracks.specular)
     place = np.concatenate([seen, tracks.mean[shiny, :, 0]])
     strength = np.concatenate([expected.log_amplitude, tracks.log_amplitude[shiny]])
-    partner, taken = np.full(count, -1), np.zeros(len(place), dtype=np.bool_)
-    disturbance, beside = np.zeros((count, 3)), np.zeros(count, dtype=np.bool_)
+    weaker = strength[None] <= strength[:, None]
+    gap = place[None] - place[:, None]
+    reach = np.max(np.abs(gap) / cell, axis=2)
+    np.fill_diagonal(reach, np.inf)
+    inside, around = reach < INSIDE, (reach < OUTSIDE) & weaker
+    partner, taken, leads = np.full(count, -1), np.zeros(len(place), bool), np.zeros(len(place), bool)
     for leader in np.argsort(-strength, kind="stable"):
-        if taken[leader]:
-            continue
-        gap = place - place[leader]
-        reach = np.max(np.abs(gap) / cell, axis=1)
-        reach[leader] = np.inf
-        taken |= reach < INSIDE
-        near = np.flatnonzero((reach < OUTSIDE) & (strength <= strength[leader]))
-        beside[near[near < count]] = True
-        if leader >= count:
-            continue
-        ratio = np.exp(strength[near] - strength[leader])
-        twin = expected.twin[leader]
-        if twin >= 0 and reach[twin] < 1.0:
-            partner[leader], taken[twin] = twin, True
-            ratio = np.where(near == twin, 0.0, ratio)
-        disturbance[leader] = np.sqrt(0.5 * np.sum((ratio[:, None] * gap[near]) ** 2, axis=0))
-        beside[leader] |= bool(np.any(ratio > 0.5))
-    return Merger(partner, taken[:count], disturbance, beside | taken[:count])
+        if not taken[leader]:
+            leads[leader] = True
+            taken |= inside[leader]
+            twin = expected.twin[leader] if leader < count else -1
+            if twin >= 0 and reach[leader, twin] < 1.0:
+                partner[leader], taken[twin] = twin, True
+    ratio = np.where(around & leads[:, None], np.exp(np.minimum(strength[None] - strength[:, None], 0.0)), 0.0)
+    ratio[np.flatnonzero(partner >= 0), partner[partner >= 0]] = 0.0
+    disturbance = np.sqrt(0.5 * np.sum((ratio[..., None] * gap) ** 2, axis=1))[:count]
+    outshone = (ratio > 0.5).any(axis=1) | (around & leads[:, None]).any(axis=0) | taken
+    return Merger(partner, taken[:count], disturbance, outshone[:count])
 
 
 def candidates(outlook: Outlook, tracks: Tracks, hidden: Booleans) -> Candidates:

@@ -97,36 +97,41 @@ def observe(returns: Returns, features: Floats, anchor: Floats, poses: Poses) ->
     return Sight(seen, tx_length, rx_length, arrival[..., 2])
 
 
-def pose_jacobian(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Floats:
-    """Derivatives (..., R, 3, 3) of `observe(...).seen` with respect to the agent's position."""
-    image, _, by_base = _leg_jacobian(returns, features, anchor, poses.tx)
-    by_tx, by_rx = _sight_jacobians(image, returns, poses)
+class Linear(NamedTuple):
+    """Returns and their derivatives."""
+
+    seen: Floats
+    """(..., R, 3)."""
+    by_feature: Floats
+    """(..., R, 3, F, 3)."""
+    by_pose: Floats
+    """(..., R, 3, 3) with respect to the agent's position."""
+
+
+def linearise(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Linear:
+    """`observe(...).seen` with its derivatives by the features (..., F, 3) and by the agent's position."""
+    image, by_feature, by_base = _leg_jacobian(returns, features, anchor, poses.tx)
+    seen, by_tx, by_rx = _sight_jacobians(image, returns, poses)
+    features_jacobian = np.einsum("...ria,...rfab->...rifb", by_rx, by_feature[..., returns.rx, :, :, :])
+    features_jacobian[..., 0, :, :] += np.einsum("...ra,...rfab->...rfb", by_tx, by_feature[..., returns.tx, :, :, :])
     moves = np.where((returns.legs[:, 0] == TX)[:, None, None], by_base, 0.0) - np.eye(3)
-    jacobian = by_rx @ moves[..., returns.rx, :, :]
-    jacobian[..., 0, :] += np.einsum("...ra,...rab->...rb", by_tx, moves[..., returns.tx, :, :])
-    return jacobian
+    pose_jacobian = by_rx @ moves[..., returns.rx, :, :]
+    pose_jacobian[..., 0, :] += np.einsum("...ra,...rab->...rb", by_tx, moves[..., returns.tx, :, :])
+    return Linear(seen, features_jacobian, pose_jacobian)
 
 
-def feature_jacobian(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Floats:
-    """Derivatives (..., R, 3, F, 3) of `observe(...).seen` with respect to the features (..., F, 3)."""
-    image, by_feature, _ = _leg_jacobian(returns, features, anchor, poses.tx)
-    by_tx, by_rx = _sight_jacobians(image, returns, poses)
-    jacobian = np.einsum("...ria,...rfab->...rifb", by_rx, by_feature[..., returns.rx, :, :, :])
-    jacobian[..., 0, :, :] += np.einsum("...ra,...rfab->...rfb", by_tx, by_feature[..., returns.tx, :, :, :])
-    return jacobian
-
-
-def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Floats, Floats]:
-    """Derivatives of the length by the Tx leg's image (..., R, 3), and of all three by the Rx leg's (..., R, 3, 3)."""
+def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Floats, Floats, Floats]:
+    """What is seen (..., R, 3); the length's derivative by the Tx leg's image (..., R, 3); all by the Rx leg's."""
     to_tx = image[..., returns.tx, :] - poses.tx[..., None, :]
     to_rx = image[..., returns.rx, :] - poses.rx[..., None, :]
     tx_length, rx_length = _norm(to_tx)[..., None], np.maximum(_norm(to_rx), 1e-9)[..., None]
-    by_tx = to_tx / np.maximum(tx_length, 1e-9)
-    arrival = to_rx / rx_length
+    by_tx, arrival = to_tx / np.maximum(tx_length, 1e-9), to_rx / rx_length
     body = np.swapaxes(rotation_z(poses.heading), -1, -2)[..., None, :2, :]
-    cosines = np.sum(body * arrival[..., None, :], axis=-1, keepdims=True)
-    turn = (body - cosines * arrival[..., None, :]) / rx_length[..., None]
-    return by_tx, np.concatenate([arrival[..., None, :], turn], axis=-2)
+    cosines = (body @ arrival[..., None])[..., 0]
+    by_rx = np.empty((*arrival.shape, 3))
+    by_rx[..., 0, :] = arrival
+    by_rx[..., 1:, :] = (body - cosines[..., None] * arrival[..., None, :]) / rx_length[..., None]
+    return np.concatenate([tx_length + rx_length, cosines], axis=-1), by_tx, by_rx
 
 
 def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -> tuple[Floats, Floats, Floats]:
