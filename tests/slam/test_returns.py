@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.geometry.planes import mirror, plane_between
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, feature_jacobian, observe, pose_jacobian, reflect
+from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
 
 LEGS = np.array(
     [[0, NONE, NONE], [0, 2, NONE], [1, 2, 3], [1, 3, 2], [TX, 2, NONE], [TX, NONE, NONE], [TX, 2, 3], [1, 3, NONE]]
@@ -54,7 +54,7 @@ def test_heading_turns_the_cosines(world) -> None:
 
 def test_derivatives_equal_central_differences(world) -> None:
     features, anchor, poses = world
-    jacobian = feature_jacobian(RETURNS, features, anchor, poses)
+    jacobian = linearise(RETURNS, features, anchor, poses).by_feature
     width = 1e-6
     for feature in range(4):
         for axis in range(3):
@@ -76,7 +76,9 @@ def test_shifting_agent_and_map_together_changes_nothing(world) -> None:
 
 def test_pose_derivatives_equal_central_differences(world) -> None:
     features, anchor, poses = world
-    jacobian = pose_jacobian(RETURNS, features, anchor, poses)
+    linear = linearise(RETURNS, features, anchor, poses)
+    np.testing.assert_allclose(linear.seen, observe(RETURNS, features, anchor, poses).seen, atol=1e-12)
+    jacobian = linear.by_pose
     width = 1e-6
     for axis in range(3):
         shift = width * np.eye(3)[axis]
