@@ -287,7 +287,8 @@ def settle(
     size, parent = particles.covariance.shape[0], verdict.parent
     covariance = np.zeros((size + 3, size + 3))
     covariance[:size, :size] = particles.covariance
-    covariance[size:, size:] = verdict.fit.covariance
+    spread = _spread_given_trail(verdict, scene, history)
+    covariance[size:, size:] = spread
     if verdict.kind is RECIPROCAL:
         feature, cost = floor_image(floor_height(particles.features[:, parent], own)[0], scene.anchor), np.zeros(1)
     else:
@@ -296,7 +297,7 @@ def settle(
         own_fit = fit_feature(verdict.kind, start, known, scene.anchor, own, 3)
         feature, cost = own_fit.feature, own_fit.cost
     if parent >= 0:
-        lean = _parent_sensitivity(verdict, scene.features[parent], scene.anchor, history)
+        lean = -spread @ _parent_pull(verdict, scene.features[parent], scene.anchor, history)
         block = slice(3 * parent, 3 * parent + 3)
         covariance[size:, :size] = lean @ particles.covariance[block]
         covariance[:size, size:] = covariance[size:, :size].T
@@ -312,13 +313,21 @@ def settle(
     return particles._replace(features=features, covariance=covariance), book
 
 
-def _parent_sensitivity(verdict: Verdict, parent: Floats, anchor: Floats, history: History) -> Floats:
-    """How the fitted wall (3,) moves with its parent (3,): the implicit derivative of the normal equations."""
+def _spread_given_trail(verdict: Verdict, scene: Scene, history: History) -> Floats:
+    """Covariance (3, 3) of the feature for one particle, whose trail and parent are certain."""
+    if verdict.kind is RECIPROCAL:
+        return verdict.fit.covariance
+    known = scene.features[verdict.parent] if verdict.parent >= 0 else None
+    certain = history._replace(doubt=np.zeros((6, 0)))
+    return fit_feature(verdict.kind, verdict.fit.feature, known, scene.anchor, certain, 0).covariance
+
+
+def _parent_pull(verdict: Verdict, parent: Floats, anchor: Floats, history: History) -> Floats:
+    """Mixed information (3, 3) of wall and parent: minus the covariance times it is how the wall follows its parent."""
     known = np.stack([verdict.fit.feature, parent])[None]
     jacobian = linearise(verdict.kind, known, np.stack([anchor, anchor]), history.poses).by_feature.mean(axis=-4)
     weight = 1.0 / history.std**2
-    pull = np.einsum("kia,ki,kib->ab", jacobian[..., 0, :], weight, jacobian[..., 1, :])
-    return -verdict.fit.covariance @ pull
+    return np.asarray(np.einsum("kia,ki,kib->ab", jacobian[..., 0, :], weight, jacobian[..., 1, :]))
 
 
 def _diagonal(variance: Floats) -> Floats:
