@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
 
 
@@ -39,26 +40,52 @@ class BpSlamConfig:
     """Existence probability below which a potential feature is dropped."""
     max_features: int = 60
     """Potential features that are kept per anchor, the most probable ones."""
+    height: str = "known"
+    """Moving form: `known` keeps the height and the vertical velocity of the start, `estimated` filters them."""
+    specular_ratio: float | None = 0.35
+    """Moving form: amplitude over that of free space of the same length, above which a component is a wall return and
+    is set aside; None keeps all."""
+    smallest_std: float = 0.005
+    """Moving form: smallest standard deviation of a range that is believed [m]."""
+    num_samples: int = 32
+    """Moving form: positions handed to the phase design."""
     iterations: int = 100
     """Largest number of rounds of loopy data association."""
     tolerance: float = 1e-6
     """Relative change of the messages at which the rounds end."""
 
     def __post_init__(self) -> None:
-        for name in ("num_particles", "num_pairings", "max_features", "iterations"):
+        for name in ("num_particles", "num_pairings", "max_features", "num_samples", "iterations"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"bp_slam.{name}: {getattr(self, name)} received; give at least 1")
-        for name in ("sigma_a", "range_std", "clutter_mean", "max_range", "initial_features", "birth_mean"):
+        for name in (
+            "sigma_a",
+            "range_std",
+            "clutter_mean",
+            "max_range",
+            "initial_features",
+            "birth_mean",
+            "smallest_std",
+        ):
             _check(name, getattr(self, name), 0.0, np.inf, "a positive number")
         for name in ("survival_probability", "detection_threshold", "pruning_threshold"):
             _check(name, getattr(self, name), 0.0, 1.0 + 1e-12, "a number in (0, 1]")
         _check("detection_probability", self.detection_probability, 0.0, 1.0, "a number in (0, 1)")
+        if self.height not in ("known", "estimated"):
+            raise ConfigError(f"bp_slam.height: '{self.height}' received; give 'known' or 'estimated'")
+        if self.specular_ratio is not None:
+            _check("specular_ratio", self.specular_ratio, 0.0, np.inf, "a positive number, or none")
         if not self.feature_std >= 0.0:
             raise ConfigError(f"bp_slam.feature_std: {self.feature_std} received; give a number that is not negative")
         if self.num_pairings > self.num_particles:
             raise ConfigError(
                 f"bp_slam.num_pairings: {self.num_pairings} received; give at most num_particles, {self.num_particles}"
             )
+
+    @property
+    def axes(self) -> Floats:
+        """(3,) ones for the axes that the moving form filters."""
+        return np.array([1.0, 1.0, 1.0 if self.height == "estimated" else 0.0])
 
     @property
     def clutter_density(self) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
 from rislam_rt.slam.schemes.bp_slam.ranges import RangeModel, random_directions
-from rislam_rt.slam.schemes.resampling import effective_fraction, normalised_rows, thin_out
+from rislam_rt.slam.schemes.resampling import cell_levels, cell_order, effective_fraction, normalised_rows, thin_out
 
 RESAMPLE_BELOW = 0.25
 """Effective fraction of a feature's particles below which it is resampled."""
@@ -24,6 +24,10 @@ class Scan(NamedTuple):
     """(M,) ranges [m], in no particular order."""
     std: Floats
     """(M,) standard deviations [m]."""
+
+    def take(self, rows: Integers) -> "Scan":
+        """Some of the ranges."""
+        return Scan(self.length[rows], self.std[rows])
 
 
 class Features(NamedTuple):
@@ -49,12 +53,13 @@ class Features(NamedTuple):
         """(K, N), every row summing to one."""
         return normalised_rows(self.log_weight)
 
-    def moments(self) -> tuple[Floats, Floats]:
-        """Mean (K, D) [m] and covariance (K, D, D) [m^2]."""
+    def moments(self, agent: Floats) -> tuple[Floats, Floats]:
+        """Mean (K, D) [m] and covariance (K, D, D) [m^2], given the covariance (2D, 2D) of the agent's state."""
         weight = self.weight
         mean = np.einsum("kn,knd->kd", weight, self.cloud)
         centred = self.cloud - mean[:, None]
-        return mean, np.einsum("kn,kni,knj->kij", weight, centred, centred)
+        covariance = np.einsum("kn,kni,knj->kij", weight, centred, centred)
+        return mean, covariance + np.swapaxes(self.slope, 1, 2) @ agent @ self.slope
 
 
 def make_features(cloud: Floats, existence: Floats, anchor: Integers, ident: Integers, known: bool = False) -> Features:
@@ -108,15 +113,23 @@ def birth_ratio(scan: Scan, undetected: float, model: RangeModel, dims: int, con
 
 
 def born(
-    scan: Scan, anchor: int, position: Floats, existence: Floats, model: RangeModel, first: int, *,
-    rng: np.random.Generator,
+    scan: Scan, anchor: int, position: Floats, existence: Floats, model: RangeModel, first: int,
+    config: BpSlamConfig, *, rng: np.random.Generator,
 ) -> Features:  # fmt: skip
-    """One new feature a measurement, numbered from `first`, spread over all directions from agents (N, D)."""
+    """One new feature a measurement, numbered from `first`, spread over all directions from agents (N, D).
+
+    A new feature moves with the agent's position one to one: the ring is drawn about wherever the agent is.
+    """
     shown, (count, dims) = len(scan.length), position.shape
     length = scan.length[:, None] + scan.std[:, None] * rng.standard_normal((shown, count))
     direction = random_directions((shown, count), dims, model.upper_half, rng=rng)
-    cloud = model.invert(position, direction, np.abs(length))
-    return make_features(cloud, existence, np.full(shown, anchor), first + np.arange(shown))
+    center = position.mean(axis=0) if config.coupled else position
+    cloud = model.invert(center, direction, np.abs(length))
+    if dims > 2:
+        cloud = np.take_along_axis(cloud, cell_order(cloud, cell_levels(count))[..., None], axis=1)
+    new = make_features(cloud, existence, np.full(shown, anchor), first + np.arange(shown))
+    new.slope[:, :dims] = np.eye(dims) if config.coupled else 0.0
+    return new
 
 
 def refresh(features: Features, *, rng: np.random.Generator) -> Features:

@@ -79,12 +79,18 @@ def length_of(vector: Floats) -> Floats:
     """Euclidean lengths (...,) of vectors (..., D), D = 2 or 3, without the temporaries of a norm."""
     square = vector[..., 0] ** 2
     for axis in range(1, vector.shape[-1]):
-        square += vector[..., axis] ** 2
-    return np.sqrt(square, out=square)
+        square = square + vector[..., axis] ** 2
+    return np.sqrt(square)
 
 
-def random_directions(shape: tuple[int, ...], dims: int, upper_half: bool, *, rng: np.random.Generator) -> Floats:
-    """Unit vectors (..., D), uniform on circle or sphere; with `upper_half` the last coordinate is not negative."""
+def random_directions(shape: tuple[int, int], dims: int, upper_half: bool, *, rng: np.random.Generator) -> Floats:
+    """Unit vectors (K, N, D), uniform on circle or sphere; with `upper_half` the last coordinate is not negative.
+
+    In two dimensions every row goes once round, one random angle in each of N equal parts.
+    """
+    if dims == 2:
+        angle = (np.arange(shape[1]) + rng.random(shape)) * (np.pi if upper_half else 2.0 * np.pi) / shape[1]
+        return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     vector = rng.standard_normal((*shape, dims))
     if upper_half:
         vector[..., -1] = np.abs(vector[..., -1])

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.errors import ConfigError
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
-from rislam_rt.slam.schemes.bp_slam.features import Scan, known_anchors, select
+from rislam_rt.slam.schemes.bp_slam.features import Features, Scan, known_anchors, select
 from rislam_rt.slam.schemes.bp_slam.ranges import Direct
 from rislam_rt.slam.schemes.bp_slam.update import Belief, predict_belief, update_belief
 
@@ -92,15 +92,15 @@ def run_static(
         poses.append(belief.state.mean(axis=0))
         moments.append(np.cov(belief.state, rowvar=False, bias=True))
         effective.append(info.effective)
-        tables.append(_detected(belief, step, config))
+        tables.append(_detected(belief.features, moments[-1], step, config))
     pose = np.reshape(poses, (-1, 2 * dims))
     table = FeatureTable(*(np.concatenate(columns) for columns in zip(*tables, strict=True)))
     return StaticResult(pose[:, :dims], pose[:, dims:], np.array(moments), table, np.array(effective))
 
 
-def _detected(belief: Belief, step: int, config: BpSlamConfig) -> FeatureTable:
-    found = select(belief.features, belief.features.existence > config.detection_threshold)
-    mean, covariance = found.moments()
+def _detected(features: Features, agent: Floats, step: int, config: BpSlamConfig) -> FeatureTable:
+    found = select(features, features.existence > config.detection_threshold)
+    mean, covariance = found.moments(agent)
     spread = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / mean.shape[1])
     return FeatureTable(np.full(len(mean), step), found.anchor, found.ident, mean, spread, found.existence)
 

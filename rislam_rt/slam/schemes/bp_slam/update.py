@@ -14,7 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.schemes.bp_slam.association import Association, associate
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
-from rislam_rt.slam.schemes.bp_slam.coupling import carry, regress
+from rislam_rt.slam.schemes.bp_slam.coupling import carry, correct_slopes
 from rislam_rt.slam.schemes.bp_slam.features import (
     Features,
     Scan,
@@ -68,15 +68,10 @@ class UpdateInfo(NamedTuple):
     """Per anchor (K_a, M+1): marginals of the association; last column: missed."""
     claimants: tuple[Integers, ...]
     """Per anchor (K_a,): numbers of the features of those rows."""
-
-
-class _Pairs(NamedTuple):
-    """Which particle meets which."""
-
-    agent: Integers
-    """(S, N) agent particle that feature particle n meets."""
-    feature: Integers
-    """(S, N) feature particle that agent particle n meets."""
+    predicted: tuple[Floats, ...]
+    """Per anchor (K_a, 2): mean and standard deviation [m] of the range predicted for each."""
+    log_evidence: float
+    """Logarithm of the mean weight of the agent's particles; clutter alone counts as 0."""
 
 
 class _Evaluation(NamedTuple):
@@ -108,50 +103,85 @@ def predict_belief(
 def update_belief(
     belief: Belief, scans: tuple[Scan, ...], model: RangeModel, config: BpSlamConfig, *, rng: np.random.Generator
 ) -> tuple[Belief, UpdateInfo]:
-    """One scan of every anchor into the belief. The agent's message to every feature is its prediction, as published."""
+    """One scan of every anchor into the belief; the agent's message to every feature is its prediction, as published."""
     state, features = rng.permutation(belief.state), belief.features
-    count, dims = belief.position.shape
-    pairs = _pair_up(count, config.num_pairings)
-    lean = (state - state.mean(axis=0)) @ features.slope
-    candidates = features.cloud[:, None] + lean[:, pairs.agent]
-    reach = model.ranges(state[pairs.agent, :dims], candidates)
+    dims = belief.position.shape[1]
+    shifts = (np.arange(config.num_pairings) * len(state)) // config.num_pairings
+    reach = _reach(state, features, shifts, model)
+    gains = np.ones(reach.shape)
     weight = features.weight
-    gains, existence = np.ones(reach.shape), features.existence.copy()
-    log_agent = np.zeros(count)
-    newborn, associations, claimants = [], [], []
+    newborn, results, claimants = [], [], []
     next_ident = belief.next_ident
     for anchor, scan in enumerate(scans):
         rows = np.flatnonzero(features.anchor == anchor)
         seen = [_evaluate(reach[row], scan, config) for row in rows]
         fresh = 1.0 + birth_ratio(scan, float(belief.undetected[anchor]), model, dims, config)
-        result = _associate(seen, weight[rows], existence[rows], fresh, config)
+        result = _associate(seen, weight[rows], features.existence[rows], fresh, config)
         for number, row in enumerate(rows):
-            gain, prior = _message(seen[number], result.to_feature[number], config), features.existence[row]
-            log_agent += np.log(prior * _to_agent(gain, weight[row], pairs) + 1.0 - prior)
-            over = float(weight[row] @ gain.mean(axis=0))
-            existence[row] = prior * over / (prior * over + 1.0 - prior)
-            gains[row] = gain
+            gains[row] = _message(seen[number], result.to_feature[number], config)
         alive = result.unclaimed * (fresh - 1.0) / fresh
-        newborn.append(born(scan, anchor, state[:, :dims], alive, model, next_ident, rng=rng))
-        next_ident += len(scan.length)
-        associations.append(result)
+        new = np.flatnonzero(alive >= config.pruning_threshold)
+        newborn.append(born(scan.take(new), anchor, state[:, :dims], alive[new], model, next_ident, config, rng=rng))
+        next_ident += len(new)
+        results.append(result)
         claimants.append(features.ident[rows])
+    over = np.einsum("kn,ksn->k", weight, gains) / len(shifts)
+    existence = features.existence * over / (features.existence * over + 1.0 - features.existence)
+    log_agent = _to_agent(gains, weight, features.existence, shifts)
     after, effective = _resample_agent(state, log_agent, rng=rng)
-    old = features._replace(existence=existence)
-    old = _update_features(old, candidates, gains, state[pairs.agent], after.mean(axis=0), config, rng=rng)
+    noise = np.concatenate([scan.std for scan in scans]) if scans else np.zeros(0)
+    thickness = float(noise.mean()) if len(noise) else config.range_std
+    old = _update_features(
+        features._replace(existence=existence), gains, state, shifts, after.mean(axis=0), thickness, config, rng=rng
+    )
+    new_features = prune(join([old, _moved(join(newborn), state, after)]), config)
+    rounds = max((result.rounds for result in results), default=0)
+    predicted = _predicted(reach, weight)
     info = UpdateInfo(
         effective,
-        max((result.rounds for result in associations), default=0),
-        tuple(result.feature for result in associations),
+        rounds,
+        tuple(result.feature for result in results),
         tuple(claimants),
+        tuple(predicted[features.anchor == anchor] for anchor in range(len(scans))),
+        float(np.logaddexp.reduce(log_agent) - np.log(len(log_agent))),
     )
-    return Belief(after, prune(join([old, *newborn]), config), belief.undetected, next_ident), info
+    return Belief(after, new_features, belief.undetected, next_ident), info
 
 
-def _pair_up(count: int, pairings: int) -> _Pairs:
-    """Shifts spread evenly over the particles; agents come in random order, features in that of their cells."""
-    shift = ((np.arange(pairings) * count) // pairings)[:, None]
-    return _Pairs((np.arange(count) + shift) % count, (np.arange(count) - shift) % count)
+def _reach(state: Floats, features: Features, shifts: Integers, model: RangeModel) -> Floats:
+    """Ranges (K, S, N): feature particle n meets agent particle n + shift, round the end."""
+    count, dims = state.shape[0], state.shape[1] // 2
+    lean = (state - state.mean(axis=0)) @ features.slope
+    twice, lean_twice = np.concatenate([state, state]), np.concatenate([lean, lean], axis=1)
+    reach = np.empty((len(features.ident), len(shifts), count))
+    for row, shift in enumerate(shifts):
+        window = slice(shift, shift + count)
+        reach[:, row] = model.ranges(twice[window, :dims], features.cloud + lean_twice[:, window])
+    return reach
+
+
+def _predicted(reach: Floats, weight: Floats) -> Floats:
+    """Mean and standard deviation (K, 2) of the ranges (K, S, N)."""
+    mean = np.einsum("kn,ksn->k", weight, reach) / reach.shape[1]
+    square = np.einsum("kn,ksn->k", weight, (reach - mean[:, None, None]) ** 2) / reach.shape[1]
+    return np.stack([mean, np.sqrt(square)], axis=1)
+
+
+def _to_agent(gains: Floats, weight: Floats, existence: Floats, shifts: Integers) -> Floats:
+    """Log weights (N,) of the agent: of every feature, the mean factor over the particles that each agent met."""
+    mean, total = np.zeros(weight.shape), np.zeros(weight.shape)
+    for row, shift in enumerate(shifts):
+        mean += np.roll(weight * gains[:, row], shift, axis=1)
+        total += np.roll(weight, shift, axis=1)
+    floor = 1e-12 / weight.shape[1]
+    factor = (mean + floor) / (total + floor)
+    return np.log(existence[:, None] * factor + 1.0 - existence[:, None]).sum(axis=0)
+
+
+def _moved(newborn: Features, before: Floats, after: Floats) -> Features:
+    """New features, about the agent's mean after the update."""
+    shift = (after.mean(axis=0) - before.mean(axis=0)) @ newborn.slope
+    return newborn._replace(cloud=newborn.cloud + shift[:, None])
 
 
 def _evaluate(reach: Floats, scan: Scan, config: BpSlamConfig) -> _Evaluation:
@@ -182,15 +212,6 @@ def _message(seen: _Evaluation, to_feature: Floats, config: BpSlamConfig) -> Flo
     return (1.0 - config.detection_probability) + np.einsum("g,gsn->sn", weight, seen.ratio)
 
 
-def _to_agent(gain: Floats, weight: Floats, pairs: _Pairs) -> Floats:
-    """Mean (N,) of a feature's factors over the particles that each agent particle meets."""
-    met = weight[pairs.feature]
-    rows = np.arange(len(gain))[:, None]
-    total = met.sum(axis=0)
-    mean = np.sum(met * gain[rows, pairs.feature], axis=0) / np.where(total > 0.0, total, 1.0)
-    return np.where(total > 0.0, mean, gain[rows, pairs.feature].mean(axis=0))
-
-
 def _resample_agent(state: Floats, log_weight: Floats, *, rng: np.random.Generator) -> tuple[Floats, float]:
     """Equally likely states (N, 2D), widened where many share an ancestor."""
     weight = normalised_rows(log_weight[None])
@@ -203,25 +224,21 @@ def _resample_agent(state: Floats, log_weight: Floats, *, rng: np.random.Generat
 
 
 def _update_features(
-    features: Features, candidates: Floats, gains: Floats, states: Floats, mean_after: Floats, config: BpSlamConfig, *,
-    rng: np.random.Generator,
+    features: Features, gains: Floats, state: Floats, shifts: Integers, mean_after: Floats, thickness: float,
+    config: BpSlamConfig, *, rng: np.random.Generator,
 ) -> Features:  # fmt: skip
     """Weights by the mean factor of every particle; line through the agent's states by one pair a particle."""
     kept = features.known | (features.existence >= config.pruning_threshold)
-    features, candidates, gains = select(features, kept), candidates[kept], gains[kept]
-    log_weight = features.log_weight + np.log(gains.mean(axis=1))
-    log_weight -= log_weight.max(axis=1, keepdims=True)
+    features, gains = select(features, kept), gains[kept]
+    free = ~features.known[:, None]
+    log_weight = features.log_weight + np.where(free, np.log(gains.mean(axis=1)), 0.0)
+    log_weight -= log_weight.max(axis=1, keepdims=True, initial=-np.inf)
     cloud, slope = features.cloud, features.slope
     if config.coupled:
         edges = np.cumsum(gains, axis=1)
-        mark = edges[:, -1:] * rng.random((len(gains), 1, gains.shape[2]))
-        pick = (mark > edges).sum(axis=1)
-        met = np.take_along_axis(candidates, pick[:, None, :, None], axis=1)[:, 0]
-        own = states[pick, np.arange(gains.shape[2])]
-        cloud, slope = regress(own, met, normalised_rows(log_weight), mean_after)
-    updated = features._replace(
-        cloud=np.where(features.known[:, None, None], features.cloud, cloud),
-        log_weight=np.where(features.known[:, None], features.log_weight, log_weight),
-        slope=np.where(features.known[:, None, None], features.slope, slope),
-    )
-    return refresh(updated, rng=rng)
+        pick = (edges[:, -1:] * rng.random((len(gains), 1, len(state))) > edges).sum(axis=1)
+        own = state[(np.arange(len(state)) + shifts[pick]) % len(state)]
+        line = np.where(free[..., None], correct_slopes(features, gains, state, shifts, thickness), slope)
+        met = cloud + (own - state.mean(axis=0)) @ slope
+        cloud, slope = met - (own - mean_after) @ line, line
+    return refresh(features._replace(cloud=cloud, log_weight=log_weight, slope=slope), rng=rng)
