@@ -113,19 +113,20 @@ def draw(gap: Floats, held: Outcome, alternated: Outcome, file: str) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 3.8), layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.2), layout="constrained")
     for outcome, name in ((held, "code held"), (alternated, "code alternated with its twin")):
         left.plot(RADII, outcome.found, "o-", label=name)
-        right.semilogy(RADII, np.where(np.isfinite(outcome.rms), outcome.rms, np.nan), "o-", label=name)
-    left.set(xlabel="distance from the nadir [m]", ylabel="share in which the panel is found", ylim=(-0.03, 1.03))
-    right.axhline(1.5, color="0.6", linestyle=":")
-    right.annotate("1.5", (1.7, 1.55), color="0.4")
-    right.set(xlabel="distance from the nadir [m]", ylabel="delay RMS error / single-path bound, where found")
+        right.plot(RADII, np.where(np.isfinite(outcome.rms), outcome.rms, np.nan), "o-", label=name)
     one_cell = np.interp(1.0, gap, RADII)
     for axes in (left, right):
         axes.axvline(one_cell, color="0.8", linestyle="--")
-    left.annotate(" panel and ceiling\n c/B apart", (one_cell, 0.45), color="0.4")
+        axes.set(xlabel="distance from the nadir [m]")
+    left.set(title="Share in which the panel is found", ylim=(-0.03, 1.03))
+    left.annotate(" panel and ceiling c/B apart", (one_cell, 0.1), color="0.4")
     left.legend(frameon=False, loc="center right")
+    right.set(title="Delay error where found: RMS / single-path bound", ylim=(0.0, None))
+    right.axhline(1.5, color="0.6", linestyle=":")
+    right.annotate("1.5", (0.0, 1.6), color="0.4")
     figure.savefig(file, dpi=130)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Complexes, Floats
 from rislam_rt.measurement.atoms import Sounding
 from rislam_rt.measurement.detect import Grid, into_range, pick_peaks
-from rislam_rt.measurement.refine import Accuracy, Fit, accuracy, fit_amplitudes, refine, removal_loss
+from rislam_rt.measurement.refine import Accuracy, Fit, accuracy, contribution, fit_amplitudes, refine, removal_loss
 
 BATCH = 16
 """Most paths that are added between two refinements."""
@@ -26,6 +26,8 @@ FINAL_TOLERANCE = 0.01
 """Noise energy that the last step may leave: a tenth of a standard deviation."""
 TRIAL_STEPS = 6
 """Most refinements of the other paths after one was taken out, before the costs are compared."""
+COUPLED = 0.1
+"""Correlation of two signals from which on one can stand in for the other's loss."""
 SLACK = 0.1
 """How far (B tau, u, v) may leave the window and the sky during the search, so that paths on the edge do not stick."""
 
@@ -93,16 +95,28 @@ def _prune(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float) -
     while True:
         certainty = np.abs(fit.amplitude) ** 2 / accuracy(fit).amplitude ** 2
         doubtful = np.flatnonzero((certainty < threshold) & ~_among(fit.parameters, tried))
-        enough = fit.cost + threshold
         for row in doubtful[np.argsort(certainty[doubtful])]:
-            trial = fit_amplitudes(sounding, np.delete(fit.parameters, row, axis=0), samples)
-            trial = refine(sounding, trial, samples, steps=TRIAL_STEPS, enough=enough)
-            if trial.cost < enough:
-                fit = trial
+            rest = _neighbours_instead(sounding, fit, int(row), fit.cost + threshold)
+            if rest is not None:
+                fit = fit_amplitudes(sounding, rest, samples)
                 break
             tried = np.concatenate([tried, fit.parameters[row : row + 1]])
         else:
             return fit
+
+
+def _neighbours_instead(sounding: Sounding, fit: Fit, row: int, enough: float) -> Floats | None:
+    """Parameters (P - 1, 3) without a path, its neighbours refined, if the cost stays below `enough`."""
+    near = np.flatnonzero(np.abs(fit.inner.signal[row]) > COUPLED * sounding.num_samples)
+    local = near[near != row]
+    samples = fit.residual + contribution(fit, near)
+    trial = fit_amplitudes(sounding, fit.parameters[local], samples)
+    trial = refine(sounding, trial, samples, steps=TRIAL_STEPS, enough=enough)
+    if trial.cost >= enough:
+        return None
+    rest = fit.parameters.copy()
+    rest[local] = trial.parameters
+    return np.delete(rest, row, axis=0)
 
 
 def _inside(parameters: Floats, window: tuple[float, float]) -> Booleans:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.measurement.atoms import Factors, Grams, Sounding, correlate, factors, inner_products, synthesise
 from rislam_rt.measurement.waves import correlate_waves, wave_signals
 
@@ -94,6 +94,13 @@ def refine(
         else:
             return fit
     return fit
+
+
+def contribution(fit: Fit, rows: Integers) -> Complexes:
+    """What some of the fitted paths add to the samples (L, M)."""
+    if fit.waves is not None:
+        return (fit.waves[:, rows] @ fit.amplitude[rows]).reshape(fit.residual.shape)
+    return synthesise(Factors(*(part[..., rows] for part in fit.parts)), fit.amplitude[rows])
 
 
 def _slopes(sounding: Sounding, fit: Fit) -> Complexes:
