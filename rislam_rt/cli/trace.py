@@ -1,40 +1,154 @@
 """`rislam-rt trace SCENE`."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from rislam_rt.cli.options import ChannelName, Depth, JsonFile, SceneFolder, write_json
+
+if TYPE_CHECKING:
+    from rislam_rt.model import Paths, Scene
+
+SignalSettings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="With --signals: seed, code (focused, random, zero), radio.* and receiver.* as in a pipeline; repeatable.",
+    ),
+]
+
+AT_REST = "at level 0"
+
+
+class Traced(NamedTuple):
+    """What a trace leaves behind."""
+
+    paths: "Paths"
+    seconds: float
+    panel: str
+    """What the panel was set to."""
+    content: dict[str, Any]
+    """For the machine-readable copy."""
 
 
 def command(
     scene: SceneFolder,
     depth: Depth = 2,
     channel: ChannelName = "traced",
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write all paths to a NetCDF file.")] = None,
+    signals: Annotated[
+        bool, typer.Option("--signals", help="Write samples, true paths and estimates: a data set of signals.")
+    ] = False,
+    cycles: Annotated[int | None, typer.Option(min=1, help="Only the first so many cycles.")] = None,
+    stride: Annotated[int, typer.Option(min=1, help="Of those, every so manieth alone.")] = 1,
+    set_: SignalSettings = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write NetCDF: all paths; <scene>-signals.nc by default with --signals."),
+    ] = None,
     json: JsonFile = None,
 ) -> None:
     """Trace a scene along the agent's trajectory and print what was found, class by class."""
-    from time import perf_counter
-
     from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.model import RadioConfig
-    from rislam_rt.pipeline.dataset import paths_to_dataset, write_dataset
-    from rislam_rt.pipeline.run import build_channel, prepare_channel
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.report.tables import path_table, print_paths
 
+    if set_ and not signals:
+        raise ConfigError(f"--set {set_[0][:60]}: settings are for --signals; add it, or leave them out")
     opened = open_scene(scene)
-    room = opened.scene
+    room = thinned(opened.scene, cycles, stride)
     prepare_channel(channel)
-    opened.warn()
+    if signals:
+        traced = trace_signals(room, channel, depth, set_ or (), out or Path(f"{room.name}-signals.nc"), opened.warn)
+    else:
+        opened.warn()
+        traced = trace_paths(room, channel, depth, out)
+    table = path_table(traced.paths)
+    print_paths(room.name, traced.paths, table, traced.seconds, traced.panel)
+    for kind, file in traced.content.get("files", {}).items():
+        typer.echo(f"{kind}: {file}")
+    content = {"scene": room.name, "depth": depth, "cycles": len(room.agent), "source": traced.paths.source}
+    write_json(json, {**content, "seconds": traced.seconds, "classes": table, **traced.content})
+
+
+def thinned(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
+    """The scene with a part of its trajectory's cycles.
+
+    Raises
+    ------
+    ConfigError
+        The trajectory has fewer cycles.
+    """
+    from dataclasses import replace
+
+    from rislam_rt.errors import ConfigError
+
+    if cycles is not None and cycles > len(scene.agent):
+        raise ConfigError(f"--cycles: {cycles} received; the scene has {len(scene.agent)}, give no more")
+    return replace(scene, agent=scene.agent[:cycles:stride])
+
+
+def trace_paths(scene: "Scene", channel: str, depth: int, file: Path | None) -> Traced:
+    """All paths with the panel at level 0, written to a file if one is given."""
+    from time import perf_counter
+
+    from rislam_rt.model import RadioConfig
+    from rislam_rt.pipeline.dataset import paths_to_dataset, write_dataset
+    from rislam_rt.pipeline.run import build_channel
+
     begin = perf_counter()
-    paths = build_channel(channel, room, RadioConfig(), depth).paths(room.agent)
+    paths = build_channel(channel, scene, RadioConfig(), depth).paths(scene.agent)
     seconds = perf_counter() - begin
-    table = path_table(paths)
-    print_paths(room.name, paths, table, seconds)
-    if out is not None:
-        write_dataset(paths_to_dataset(paths, room.agent), out)
-        typer.echo(f"paths: {out}")
-    content = {"scene": room.name, "depth": depth, "cycles": len(room.agent), "source": paths.source}
-    write_json(json, {**content, "seconds": seconds, "classes": table})
+    if file is None:
+        return Traced(paths, seconds, AT_REST, {})
+    write_dataset(paths_to_dataset(paths, scene.agent), file)
+    return Traced(paths, seconds, AT_REST, {"files": {"paths": str(file)}})
+
+
+def trace_signals(
+    scene: "Scene", channel: str, depth: int, settings: Sequence[str], file: Path, warn: Callable[[], None]
+) -> Traced:
+    """All paths under the codes asked for, their samples, and what the receiver finds in them, written to a file."""
+    from itertools import count
+    from time import perf_counter
+
+    import numpy as np
+
+    from rislam_rt.cli.progress import show_progress
+    from rislam_rt.pipeline.dataset import write_dataset
+    from rislam_rt.pipeline.signals import (
+        build_signals,
+        check_space,
+        coded_paths,
+        load_signals_spec,
+        mean_components,
+        signals_size,
+    )
+
+    spec = load_signals_spec(settings)
+    size = signals_size(scene, spec)
+    check_space(file, size)
+    warn()
+    typer.echo(f"samples: {size}", err=True)
+    codes, noise = np.random.default_rng(spec.seed).spawn(2)
+    with show_progress() as tell:
+        tell("trace", 0, 1)
+        begin = perf_counter()
+        paths = coded_paths(scene, channel, depth, spec, rng=codes)
+        seconds = perf_counter() - begin
+        tell("trace", 1, 1)
+        done = count(1)
+        data = build_signals(
+            scene, paths, spec, rng=noise, on_cycle=lambda: tell("estimate", next(done), paths.num_cycles)
+        )
+    write_dataset(data, file)
+    shape = {**size._asdict(), "file_bytes": file.stat().st_size, "mean_components": mean_components(data)}
+    return Traced(
+        paths,
+        seconds,
+        AT_REST if spec.code == "zero" else spec.code,
+        {"files": {"signals": str(file)}, "signals": shape},
+    )

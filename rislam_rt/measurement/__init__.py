@@ -2,7 +2,7 @@
 
 from rislam_rt.measurement.bound import detection_probability
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.dataset import load_signals, signals_dataset
+from rislam_rt.measurement.dataset import NO_COMPONENT, load_signals, signals_dataset
 from rislam_rt.measurement.false_alarms import detection_threshold, expected_false_alarms
 from rislam_rt.measurement.measure import measure
 from rislam_rt.measurement.noise import (
@@ -14,11 +14,12 @@ from rislam_rt.measurement.noise import (
 )
 from rislam_rt.measurement.parts import path_std
 from rislam_rt.measurement.received import Received, receive, twin
-from rislam_rt.measurement.signal import pulse_samples, to_samples, to_tones, tones
+from rislam_rt.measurement.signal import num_tones, pulse_samples, to_samples, to_tones, tones
 from rislam_rt.measurement.tracking import TrackInfo, TrackingConfig, TrackState, init_tracks, step_tracks
 from rislam_rt.measurement.waveform import Capture, Components, capture, find_components
 
 __all__ = [
+    "NO_COMPONENT",
     "Capture",
     "Components",
     "Received",
@@ -34,6 +35,7 @@ __all__ = [
     "init_tracks",
     "load_signals",
     "measure",
+    "num_tones",
     "paper_snr_db",
     "path_snr_db",
     "path_std",

@@ -23,7 +23,9 @@ NO_COMPONENT = -9
 """Fills the integer variables where a cycle has fewer components than the fullest one."""
 
 SCHEMA: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "samples": (("cycle", "capture", "antenna", "tone"), "sqrt(J)", "received tones, noise of variance noise_psd"),
+    "samples": (("cycle", "capture", "antenna", "tone"), "sqrt(J)", "received tones, noise of variance noise_variance"),
+    "noise_variance": (("cycle", "capture"), "J", "variance of the noise in a tone, converters included"),
+    "heard": (("cycle", "path"), "1", "truth: whether the array hears the path, 1 or 0"),
     "capture": (("capture",), "1", "0 as received (or the sum of both codes), 1 difference of code and twin"),
     "frequency": (("tone",), "Hz", "baseband frequency of each tone"),
     "antenna_position": (("antenna", "xyz"), "m", "element positions in the body frame, about the array's centre"),
@@ -54,7 +56,8 @@ def signals_dataset(
 
     Variables as in `SCHEMA`; the radio and the receiver are in the attributes. `on_cycle` is called after each cycle.
     """
-    samples, found, labels, truth = [], [], [], []
+    samples, noise, found, labels, truth = [], [], [], [], []
+    heard = np.zeros((paths.num_cycles, paths.num_paths), dtype=np.int8)
     tracks, last = init_tracks(), trajectory.time[0]
     for cycle in range(paths.num_cycles):
         received = receive(paths, cycle, float(trajectory.heading[cycle]), radio, config)
@@ -63,14 +66,18 @@ def signals_dataset(
         step = float(trajectory.time[cycle] - last)
         tracks, info = step_tracks(tracks, to_measurement(components, config), step, TrackingConfig())
         last = trajectory.time[cycle]
-        samples.append([one.samples for one in captures])
+        samples.append(np.array([one.samples for one in captures], dtype=np.complex64))
+        noise.append([one.noise_psd for one in captures])
+        heard[cycle, received.path] = 1
         found.append(components)
         labels.append(info.label)
         truth.append(identify(components.tau, components.cosines, components.gain, received, radio))
         if on_cycle is not None:
             on_cycle()
     values: dict[str, Any] = {
-        "samples": np.array(samples, dtype=np.complex64),
+        "samples": np.array(samples),
+        "noise_variance": np.array(noise),
+        "heard": heard,
         "capture": np.arange(len(samples[0])),
         "frequency": subcarrier_frequencies(samples[0][0].shape[1], radio.bandwidth),
         "antenna_position": radio.array.positions(radio.wavelength),

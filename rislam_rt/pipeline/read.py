@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_args
@@ -49,6 +50,18 @@ def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
     path = Path(path)
     content = _read_toml(path)
     return Table(path, content, tuple(_override(content, setting) for setting in overrides))
+
+
+def settings_table(overrides: Sequence[str], defaults: dict[str, Any]) -> Table:
+    """A table of `key=value` settings (dotted keys) alone, put over defaults.
+
+    Raises
+    ------
+    ConfigError
+        A setting has no such form.
+    """
+    content = deepcopy(defaults)
+    return Table(Path("--set"), content, tuple(_override(content, setting) for setting in overrides))
 
 
 def build_spec(table: Table, model: type[Spec], check: Callable[[Spec], object]) -> Spec:

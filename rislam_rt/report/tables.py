@@ -64,9 +64,9 @@ def path_table(paths: Paths) -> list[dict[str, Any]]:
     return rows
 
 
-def print_paths(name: str, paths: Paths, rows: list[dict[str, Any]], seconds: float) -> None:
-    """The table of `path_table`."""
-    title = f"{name}: {paths.num_cycles} cycles, {paths.source}, {seconds:.2f} s (panel at level 0)"
+def print_paths(name: str, paths: Paths, rows: list[dict[str, Any]], seconds: float, panel: str) -> None:
+    """The table of `path_table`; `panel` says what the panel was set to."""
+    title = f"{name}: {paths.num_cycles} cycles, {paths.source}, {seconds:.2f} s (panel {panel})"
     table = Table("class", "identities", "a cycle", "gain \\[dB]")
     for row in rows:
         gains = f"{row['lowest_gain_db']:.1f} to {row['highest_gain_db']:.1f}"

@@ -1,0 +1,156 @@
+"""Data sets of received signals: paths under stated codes, the samples that they make, and what is found in them."""
+
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from rislam_rt.design import exact_code
+from rislam_rt.errors import ConfigError, StoreError
+from rislam_rt.measurement import NO_COMPONENT, ReceiverConfig, num_tones, signals_dataset, twin
+from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene
+from rislam_rt.pipeline.dataset import paths_to_dataset
+from rislam_rt.pipeline.read import build_spec, settings_table
+from rislam_rt.pipeline.run import build_channel
+from rislam_rt.pipeline.spec import RadioSection, ReceiverSection, Section, build_radio
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+BYTES_PER_SAMPLE = 8
+"""Real and imaginary part in single precision."""
+
+
+class SignalsSpec(Section):
+    """What may be set for a data set of signals."""
+
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 7
+    code: Literal["focused", "random", "zero"] = "focused"
+    """What the panel does: focus on the agent anew in every cycle, a random code in every cycle, or level 0."""
+    radio: RadioSection = RadioSection()
+    receiver: ReceiverSection = ReceiverSection(estimator="waveform")
+
+
+class SignalsSize(NamedTuple):
+    """Shape of a data set's samples."""
+
+    cycles: int
+    captures: int
+    antennas: int
+    tones: int
+
+    @property
+    def num_bytes(self) -> int:
+        """Of the samples alone."""
+        return self.cycles * self.captures * self.antennas * self.tones * BYTES_PER_SAMPLE
+
+    def __str__(self) -> str:
+        return (
+            f"{self.cycles} cycles x {self.captures} captures x {self.antennas} antennas x {self.tones} tones, "
+            f"{self.num_bytes / 1e6:.1f} MB"
+        )
+
+
+def load_signals_spec(overrides: Sequence[str]) -> SignalsSpec:
+    """The defaults with `key=value` settings (dotted keys) put over them.
+
+    Raises
+    ------
+    ConfigError
+        A key is unknown, or a value of the wrong type or out of range. One line.
+    """
+    table = settings_table(overrides, {"receiver": {"estimator": "waveform"}})
+    return build_spec(table, SignalsSpec, signal_settings)
+
+
+def signal_settings(spec: SignalsSpec) -> tuple[RadioConfig, ReceiverConfig]:
+    """Radio and receiver in SI units and linear ratios.
+
+    Raises
+    ------
+    ConfigError
+        A value is out of the range that the record itself checks, or the receiver makes no samples.
+    """
+    receiver = ReceiverConfig(**spec.receiver.model_dump())
+    if receiver.estimator != "waveform":
+        raise ConfigError(f"receiver.estimator: '{receiver.estimator}' received; samples need 'waveform'")
+    return build_radio(spec.radio), receiver
+
+
+def signals_size(scene: Scene, spec: SignalsSpec) -> SignalsSize:
+    """How large the samples will be."""
+    radio, receiver = signal_settings(spec)
+    captures = 1 + int(receiver.alternation)
+    return SignalsSize(len(scene.agent), captures, radio.array.num_antennas, num_tones(radio, receiver))
+
+
+def check_space(file: Path, size: SignalsSize) -> None:
+    """Make sure that the samples fit on the disk, before an hour's work is lost.
+
+    Raises
+    ------
+    StoreError
+        They do not.
+    """
+    folder = next(part for part in file.absolute().parents if part.is_dir())
+    free = shutil.disk_usage(folder).free
+    if size.num_bytes > free:
+        raise StoreError(
+            f"{file}: {size.num_bytes / 1e9:.1f} GB needed, {free / 1e9:.1f} GB free; give fewer --cycles, a --stride "
+            "or another disk"
+        )
+
+
+def coded_paths(scene: Scene, channel: str, depth: int, spec: SignalsSpec, *, rng: np.random.Generator) -> Paths:
+    """The room's paths with the panel under the code of each cycle.
+
+    Raises
+    ------
+    ConfigError
+        The receiver is to alternate and the panel has no level of half a turn.
+    TraceError, SetupError
+        The traced channel failed, or the machine lacks what it needs.
+    """
+    radio, receiver = signal_settings(spec)
+    if scene.ris is not None and receiver.alternation:
+        twin(RisCode(np.zeros((1, 1), dtype=np.int64), scene.ris.spec.levels))
+    tracer = build_channel(channel, scene, radio, depth)
+    paths = tracer.paths(scene.agent)
+    chosen = panel_codes(scene, paths, spec.code, rng=rng)
+    return paths if chosen is None else tracer.respond(paths, chosen)
+
+
+def panel_codes(scene: Scene, paths: Paths, kind: str, *, rng: np.random.Generator) -> RisCode | None:
+    """Codes (K, N, M), one a cycle; None without a panel, or where its level 0 is asked for."""
+    if scene.ris is None or kind == "zero":
+        return None
+    panel = scene.ris.spec
+    shape = (paths.num_cycles, panel.rows, panel.cols)
+    direct = np.flatnonzero(paths.kind == PathKind.RIS)
+    if kind == "random" or paths.ris is None or not len(direct):
+        return RisCode(rng.integers(panel.levels, size=shape), panel.levels)
+    legs, row = paths.ris, int(direct[0])
+    response = legs.tx[:, legs.tx_leg[row]] * legs.rx[:, legs.rx_leg[row]]
+    index, _ = exact_code(response.reshape(paths.num_cycles, -1), panel.levels)
+    return RisCode(index.reshape(shape), panel.levels)
+
+
+def build_signals(
+    scene: Scene, paths: Paths, spec: SignalsSpec, *, rng: np.random.Generator, on_cycle: Callable[[], None]
+) -> "xr.Dataset":
+    """True trajectory and paths, samples, and what the receiver found in them, in one data set."""
+    radio, receiver = signal_settings(spec)
+    signals = signals_dataset(paths, scene.agent, radio, receiver, rng=rng, on_cycle=on_cycle)
+    truth = paths_to_dataset(paths, scene.agent)
+    for part in ("gain_real", "gain_imag"):
+        truth[part].attrs["long_name"] = "complex gain, carrier phase included, under the cycle's code"
+    joined = truth.assign(signals.data_vars).assign_coords(signals.coords)
+    return joined.assign_attrs({**signals.attrs, "scene": scene.name, "code": spec.code, "seed": spec.seed})
+
+
+def mean_components(data: "xr.Dataset") -> float:
+    """Components a cycle."""
+    return float((data["found_path"] != NO_COMPONENT).sum()) / max(data.sizes["cycle"], 1)
