@@ -1,7 +1,22 @@
-"""Floor 6: the four-step cycle, the run over a trajectory, its specification, and the store of results."""
+"""Floor 6: the four-step cycle, the run over a trajectory, its specification, and the store of results.
 
-from rislam_rt.pipeline.read import load_spec
-from rislam_rt.pipeline.run import run_slam
-from rislam_rt.pipeline.spec import PipelineSpec
+Names are loaded when first used: a sweep's workers start with what their cells need.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rislam_rt.pipeline.read import load_spec
+    from rislam_rt.pipeline.run import run_slam
+    from rislam_rt.pipeline.spec import PipelineSpec
 
 __all__ = ["PipelineSpec", "load_spec", "run_slam"]
+
+_HOME = {"load_spec": "read", "run_slam": "run", "PipelineSpec": "spec"}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(import_module(f"rislam_rt.pipeline.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'rislam_rt.pipeline' has no attribute '{name}'")

@@ -1,0 +1,54 @@
+"""A cell's result as plain data and as bytes: the same result gives the same bytes, on every machine, at every time."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.errors import RislamError
+
+
+def plain_result(result: Any, reserved: Sequence[str] = ()) -> dict[str, Any]:
+    """A function's result as JSON has it: arrays as lists, NaN and infinity as null.
+
+    Raises
+    ------
+    RislamError
+        It is no mapping of names to numbers, text, lists and mappings of these, or has a name that is taken.
+    """
+    if not isinstance(result, Mapping):
+        raise RislamError(f"the cell returned {type(result).__name__}; return a mapping of names to values")
+    taken = sorted(set(reserved) & {name for name, _ in flatten(result)})
+    if taken:
+        raise RislamError(f"the cell returned '{taken[0]}', which names a column of the table; choose another name")
+    return {name: _plain(str(name), value) for name, value in result.items()}
+
+
+def flatten(result: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """All values with dotted names."""
+    for name, value in result.items():
+        if isinstance(value, Mapping):
+            yield from flatten(value, f"{above}{name}.")
+        else:
+            yield f"{above}{name}", value
+
+
+def json_bytes(content: Any) -> bytes:
+    """JSON in one spelling."""
+    return (json.dumps(content, sort_keys=True, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
+
+
+def _plain(name: str, value: Any) -> Any:
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, list | tuple):
+        return [_plain(name, part) for part in value]
+    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+        return {key: _plain(f"{name}.{key}", part) for key, part in value.items()}
+    raise RislamError(f"the cell returned {name} = {type(value).__name__}; return numbers, text, lists or mappings")
