@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.geometry.angles import rotation_z, unit
+from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Body
 from rislam_rt.slam.associate import inverse_3x3
 from rislam_rt.slam.book import Book, enter
@@ -22,21 +22,21 @@ from rislam_rt.slam.hypotheses import (
     fit_feature,
     fit_floor,
     fit_reciprocal,
-    floor_height,
-    floor_image,
     plausible,
 )
 from rislam_rt.slam.match import Outlook, explained
-from rislam_rt.slam.particles import Particles, mean_features, moments, normalised, square_root
-from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, linearise, observe
+from rislam_rt.slam.moments import Moments, poses_of, square_root
+from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe
 from rislam_rt.slam.tracks import Tracks
 
 STRIDE = 4
 """Tracks are examined every so many measurements, and four times less often once their history is full."""
-MAX_POINT_STD = 0.4
+MAX_POINT_STD = 0.2
 """Largest standard deviation [m] of a new point along its worst axis."""
 MAX_WALL_STD = 0.3
 """The same for the image of the anchor in a new wall (the floor's tilt is known beforehand and does not count)."""
+BROAD = 10.0
+"""Standard deviation [m] of a feature before its measurements."""
 MAX_FLOOR_DEPTH = 1.5
 """Largest height [m] of the agent above the floor that it moves on."""
 MOVING_RATIO, MOVING_SPREAD = np.log(0.6), 0.7
@@ -72,28 +72,68 @@ class Scene(NamedTuple):
     config: SlamConfig
 
 
+class Past(NamedTuple):
+    """The last W poses at the mean of the belief; cycle k at row k % W."""
+
+    position: Floats
+    """(W, 3) [m]."""
+    heading: Floats
+    """(W,) [rad]."""
+    time: Floats
+    """(W,) [s]."""
+    body: Body
+    cycle: int
+    """The present one."""
+
+
+class Birth(NamedTuple):
+    """A track that becomes a feature."""
+
+    verdict: Verdict
+    anchor: Floats
+    """(3,) of the feature, if it is a wall."""
+    slots: Integers
+    """(K,) rows of the past that its measurements come from."""
+    seen: Floats
+    """(K, 3)."""
+    std: Floats
+    """(K, 3)."""
+
+    @property
+    def prior(self) -> Floats:
+        """(3, 3) [m^2] what is known of it without its measurements: a floor is level, the rest is anywhere."""
+        if self.verdict.kind is not RECIPROCAL:
+            return BROAD**2 * np.eye(3)
+        tilt = np.diag(self.verdict.fit.covariance)[:2]
+        return np.diag([*tilt, BROAD**2])
+
+    def enter(self, book: Book) -> Book:
+        """The book with the feature in its last row."""
+        parent = self.verdict.parent
+        founder = int(book.ident[parent]) if parent >= 0 else -1
+        return enter(book, self.verdict.kind is not POINT, self.anchor, founder)
+
+
 def examine(
     tracks: Tracks,
-    particles: Particles,
+    moments: Moments,
     book: Book,
     outlook: Outlook,
     hidden: Booleans,
-    headings: Floats,
-    time: Floats,
-    body: Body,
-    cycle: int,
+    past: Past,
     free_space: float,
     config: SlamConfig,
-) -> tuple[int, Tracks, Particles, Book]:
+) -> tuple[int, Tracks, Birth | None]:
     """Look at the tracks whose turn it is; at most one becomes a feature, as it may explain the others.
 
-    Returns the row of that track (-1 without one), the tracks (some now known for moving images), particles and book.
+    Returns the row of that track (-1 without one), the tracks (some now known for moving images), and the birth.
     """
-    due = due_tracks(tracks, hidden, cycle, config)
-    scene = Scene(mean_features(particles), book, particles.weight @ particles.position, outlook, config)
+    due = due_tracks(tracks, hidden, past.cycle, config)
+    scene = Scene(moments.features, book, moments.position, outlook, config)
     moving = tracks.moving.copy()
+    doubt = square_root(moments.covariance[:6, :6])
     for row in due:
-        history, rows = track_history(tracks, row, particles, headings, time, body, cycle, free_space)
+        history, slots = track_history(tracks, row, past, doubt, free_space)
         if is_explained(tracks, row, history, scene):
             continue
         verdict = judge(history, scene)
@@ -102,9 +142,9 @@ def examine(
         if verdict.kind is MOVING:
             moving[row] = True
             continue
-        particles, book = settle(verdict, rows, history, scene, particles, headings, body)
-        return int(row), tracks._replace(moving=moving), particles, book
-    return -1, tracks._replace(moving=moving), particles, book
+        birth = Birth(verdict, scene.anchor, slots, history.seen, history.std)
+        return int(row), tracks._replace(moving=moving), birth
+    return -1, tracks._replace(moving=moving), None
 
 
 def due_tracks(tracks: Tracks, hidden: Booleans, cycle: int, config: SlamConfig) -> Integers:
@@ -123,34 +163,16 @@ def due_tracks(tracks: Tracks, hidden: Booleans, cycle: int, config: SlamConfig)
     return rows[np.argsort(tracks.mean[rows, 0, 0])]
 
 
-def track_history(
-    tracks: Tracks,
-    row: int,
-    particles: Particles,
-    headings: Floats,
-    time: Floats,
-    body: Body,
-    cycle: int,
-    free_space: float,
-) -> tuple[History, Integers]:
-    """A track's measurements with the mean believed poses, and the trail rows they belong to.
+def track_history(tracks: Tracks, row: int, past: Past, doubt: Floats, free_space: float) -> tuple[History, Integers]:
+    """A track's measurements with the mean believed poses, and the rows of the past that they belong to.
 
-    `free_space` is the log amplitude after 1 m.
+    `doubt` (6, D) is the square root of the pose's covariance, `free_space` the log amplitude after 1 m.
     """
     rows = np.flatnonzero(tracks.cycle[row] >= 0)
-    position = np.einsum("n,kni->ki", particles.weight, particles.trail[rows])
-    poses = poses_of(position, headings[rows], body)
-    pose = np.concatenate([particles.position, particles.velocity], axis=1)
-    doubt = square_root(moments(particles.log_weight, pose)[1])
-    lag = time[cycle % len(time)] - time[rows]
+    poses = poses_of(past.position[rows], past.heading[rows], past.body)
+    lag = past.time[past.cycle % len(past.time)] - past.time[rows]
     ratio = float(tracks.log_amplitude[row] - free_space + np.log(tracks.mean[row, 0, 0]))
     return History(tracks.seen[row, rows], tracks.std[row, rows], poses, lag, ratio, doubt), rows
-
-
-def poses_of(position: Floats, heading: Floats, body: Body) -> Poses:
-    """Ends of agents at positions (..., 3) with headings that broadcast against the leading axes."""
-    rotation = rotation_z(heading)
-    return Poses(position + rotation @ body.tx_offset, position + rotation @ body.rx_offset, np.asarray(heading))
 
 
 def is_explained(tracks: Tracks, row: int, history: History, scene: Scene) -> bool:
@@ -270,64 +292,6 @@ def _floor(history: History, scene: Scene, rival: float) -> Verdict | None:
     depth = 0.5 * float(scene.anchor[2] - best.fit.feature[2])
     sharp = best.fit.covariance[2, 2] < MAX_WALL_STD**2 and depth < MAX_FLOOR_DEPTH
     return best if as_good and sharp and plausible(best.fit, len(history.seen), 1) else None
-
-
-def settle(
-    verdict: Verdict,
-    rows: Integers,
-    history: History,
-    scene: Scene,
-    particles: Particles,
-    headings: Floats,
-    body: Body,
-) -> tuple[Particles, Book]:
-    """Enter a feature: every particle fits it along its own trail."""
-    trail = np.swapaxes(particles.trail[rows], 0, 1)
-    own = history._replace(poses=poses_of(trail, headings[rows], body), doubt=np.zeros((6, 0)))
-    size, parent = particles.covariance.shape[0], verdict.parent
-    covariance = np.zeros((size + 3, size + 3))
-    covariance[:size, :size] = particles.covariance
-    spread = _spread_given_trail(verdict, scene, history)
-    covariance[size:, size:] = spread
-    if verdict.kind is RECIPROCAL:
-        feature, cost = floor_image(floor_height(particles.features[:, parent], own)[0], scene.anchor), np.zeros(1)
-    else:
-        known = particles.features[:, parent] if parent >= 0 else None
-        start = np.broadcast_to(verdict.fit.feature, particles.position.shape)
-        own_fit = fit_feature(verdict.kind, start, known, scene.anchor, own, 3)
-        feature, cost = own_fit.feature, own_fit.cost
-    if parent >= 0:
-        lean = -spread @ _parent_pull(verdict, scene.features[parent], scene.anchor, history)
-        block = slice(3 * parent, 3 * parent + 3)
-        covariance[size:, :size] = lean @ particles.covariance[block]
-        covariance[:size, size:] = covariance[size:, :size].T
-        covariance[size:, size:] += lean @ particles.covariance[block, block] @ lean.T
-    features = np.concatenate([particles.features, feature[:, None]], axis=1)
-    is_point = verdict.kind is POINT
-    founder = int(scene.book.ident[parent]) if parent >= 0 else -1
-    if verdict.kind is POINT:
-        # the history speaks about the particles' trails as well
-        log_weight, _ = normalised(particles.log_weight - 0.5 * cost)
-        particles = particles._replace(log_weight=log_weight)
-    book = enter(scene.book, not is_point, scene.anchor, founder)
-    return particles._replace(features=features, covariance=covariance), book
-
-
-def _spread_given_trail(verdict: Verdict, scene: Scene, history: History) -> Floats:
-    """Covariance (3, 3) of the feature for one particle, whose trail and parent are certain."""
-    if verdict.kind is RECIPROCAL:
-        return verdict.fit.covariance
-    known = scene.features[verdict.parent] if verdict.parent >= 0 else None
-    certain = history._replace(doubt=np.zeros((6, 0)))
-    return fit_feature(verdict.kind, verdict.fit.feature, known, scene.anchor, certain, 0).covariance
-
-
-def _parent_pull(verdict: Verdict, parent: Floats, anchor: Floats, history: History) -> Floats:
-    """Mixed information (3, 3) of wall and parent: minus the covariance times it is how the wall follows its parent."""
-    known = np.stack([verdict.fit.feature, parent])[None]
-    jacobian = linearise(verdict.kind, known, np.stack([anchor, anchor]), history.poses).by_feature.mean(axis=-4)
-    weight = 1.0 / history.std**2
-    return np.asarray(np.einsum("kia,ki,kib->ab", jacobian[..., 0, :], weight, jacobian[..., 1, :]))
 
 
 def _diagonal(variance: Floats) -> Floats:

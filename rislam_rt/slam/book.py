@@ -31,8 +31,8 @@ class Book(NamedTuple):
     shown: Floats
     """(F, 2) running share of the cycles in which it showed, of those in which it should have: points in the first
     column; walls by single bounces on the Rx leg and on the Tx leg."""
-    surprise: Floats
-    """(F,) running mean of the squared normalised innovations per degree of freedom: 1 when all is well."""
+    drift: Floats
+    """(F, 3) running mean of the whitened innovations: 0 when all is well, whatever the noise."""
     log_grid: Floats
     """(F, G) log posterior of the strength on the grid; unused for walls."""
     log_ris: Floats
@@ -79,7 +79,7 @@ def empty_book() -> Book:
         np.zeros(0, dtype=np.int64),
         np.zeros(0, dtype=np.int64),
         np.zeros((0, 2)),
-        np.zeros(0),
+        np.zeros((0, 3)),
         np.zeros((0, len(STRENGTHS))),
         np.zeros(0),
         np.zeros(0),
@@ -100,7 +100,7 @@ def enter(book: Book, is_wall: bool, anchor: Floats, founder: int) -> Book:
         founder=np.append(book.founder, founder),
         hits=np.append(book.hits, 0),
         shown=np.concatenate([book.shown, np.ones((1, 2))]),
-        surprise=np.append(book.surprise, 1.0),
+        drift=np.concatenate([book.drift, np.zeros((1, 3))]),
         log_grid=np.concatenate([book.log_grid, flat]),
         log_ris=np.append(book.log_ris, -np.inf if is_wall else 0.0),
         ratio=np.append(book.ratio, UNSEEN_RATIO),

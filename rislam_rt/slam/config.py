@@ -16,12 +16,18 @@ class SlamConfig:
     """Everything that the filter is free to choose. SI units."""
 
     filter: str = "rao_blackwellised"
-    num_particles: int = 500
+    num_particles: int = 1
+    """Gaussian particles that the start prior is split into: more where it is too wide to be linear in."""
+    particle_share: float = 0.5
+    """Share of the start's variance that lies between the particles, if there are several; the rest is within them."""
     sigma_a: float = 0.01
     """Standard deviation of the white acceleration [m/s^2]."""
     use_vt: bool = False
     """Whether wall returns (virtual transmitters) join the map as planes, or are thrown away as in the paper."""
     heading: str = "known"
+    """`known` by a compass, along the `velocity`, or `estimated` as a random walk."""
+    turn_std: float = 0.01
+    """Random walk of an estimated heading [rad/sqrt(s)]."""
     height: str = "known"
     """`known` keeps the height and the vertical velocity of the start, `estimated` filters them."""
     max_bounces: int = 2
@@ -52,7 +58,7 @@ class SlamConfig:
     def __post_init__(self) -> None:
         for name, value, allowed in (
             ("filter", self.filter, FILTERS),
-            ("heading", self.heading, ("known",)),
+            ("heading", self.heading, ("known", "velocity", "estimated")),
             ("height", self.height, ("known", "estimated")),
         ):
             if value not in allowed:
@@ -66,10 +72,19 @@ class SlamConfig:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise ConfigError(f"slam.{name}: {value} received; give a positive number")
+        for name in ("particle_share", "turn_std"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and 0.0 <= value < (1.0 if name == "particle_share" else np.inf)):
+                raise ConfigError(f"slam.{name}: {value} received; give a share below 1, a spread of at least 0")
         if not 0.0 < self.resample_below <= 1.0:
             raise ConfigError(f"slam.resample_below: {self.resample_below} received; give a number in (0, 1]")
         if not 0 <= self.max_bounces <= 2:
             raise ConfigError(f"slam.max_bounces: {self.max_bounces} received; give 0, 1 or 2")
+
+    @property
+    def axes(self) -> Floats:
+        """(3,) ones for the axes that are filtered."""
+        return np.array([1.0, 1.0, 1.0 if self.height == "estimated" else 0.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,12 +101,12 @@ class StartPrior:
     """[m], each axis; the height is exact when it is known."""
     velocity_std: float = 0.01
     """[m/s], each axis."""
+    heading_std: float = 0.0
+    """[rad], where the heading is estimated."""
 
     def __post_init__(self) -> None:
         freeze(self, "position", np.float64, (3,))
         freeze(self, "velocity", np.float64, (3,))
-        if not (self.position_std >= 0.0 and self.velocity_std >= 0.0):
-            raise ConfigError(
-                f"start.position_std, start.velocity_std: {self.position_std}, {self.velocity_std} received; "
-                "give numbers that are not negative"
-            )
+        for name in ("position_std", "velocity_std", "heading_std"):
+            if not getattr(self, name) >= 0.0:
+                raise ConfigError(f"start.{name}: {getattr(self, name)} received; give a number that is not negative")

@@ -31,6 +31,12 @@ class Expected(NamedTuple):
     """(R,)."""
     log_amplitude_std: Floats
     """(R,)."""
+    bounces: Integers
+    """(R,) wall bounces."""
+    owner: Integers
+    """(R,) the feature that a return speaks about: the point of a direct one, else the wall next to the point."""
+    founding: Booleans
+    """(R,) whether it is direct, or over one wall and from the point that the wall was found by."""
     twin: Integers
     """(R,) row of the reciprocal, which has the legs exchanged; -1 without one."""
     likely: Booleans
@@ -66,7 +72,9 @@ def expected_returns(
     kept = compact(returns, np.flatnonzero(visible))
     amplitude = amplitude[visible]
     log_amplitude = np.log(np.maximum(amplitude, 1e-30))
-    return Expected(kept, log_amplitude, spread[visible], twins(kept), amplitude > 2.0 * threshold)
+    number, owner, founding = _roles(belief.book, kept)
+    likely = amplitude > 2.0 * threshold
+    return Expected(kept, log_amplitude, spread[visible], number, owner, founding, twins(kept), likely)
 
 
 @lru_cache(maxsize=64)
@@ -98,6 +106,18 @@ def bounces(returns: Returns) -> Integers:
     """(R,) wall bounces of each return."""
     walls = np.sum(returns.legs[:, 1:] != NONE, axis=1)
     return walls[returns.tx] + walls[returns.rx]
+
+
+def _roles(book: Book, returns: Returns) -> tuple[Integers, Integers, Booleans]:
+    """Bounces, owner, and whether founding, (R,) each."""
+    number, point = bounces(returns), returns.point
+    walls = returns.legs[:, 1]
+    first = np.where(walls[returns.rx] != NONE, walls[returns.rx], walls[returns.tx])
+    owner = np.where(number == 0, point, first)
+    if not len(book.ident):
+        return number, owner, np.zeros(len(owner), dtype=np.bool_)
+    ident = np.where(point == TX, -1, book.ident[point])
+    return number, owner, (number == 0) | ((number == 1) & (book.founder[owner] == ident))
 
 
 def twins(returns: Returns) -> Integers:

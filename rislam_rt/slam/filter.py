@@ -1,7 +1,7 @@
 """One cycle of localisation and mapping: predict, associate, update, learn who is who, grow and prune the map."""
 
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,17 +10,17 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import wrap
 from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec
 from rislam_rt.slam.associate import associate
-from rislam_rt.slam.birth import examine, poses_of
-from rislam_rt.slam.book import Book, empty_book
+from rislam_rt.slam.birth import Past, examine
+from rislam_rt.slam.book import Book, empty_book, strike
 from rislam_rt.slam.config import SlamConfig, StartPrior
-from rislam_rt.slam.expect import Belief, bounces, expected_returns
-from rislam_rt.slam.learn import learn
+from rislam_rt.slam.engine import Told, engine_of
+from rislam_rt.slam.expect import Belief, expected_returns
+from rislam_rt.slam.learn import Hits, learn
 from rislam_rt.slam.match import Outlook, candidates, hidden_tracks, look_ahead
-from rislam_rt.slam.particles import Particles, effective_size, mean_features, propagate, resample
-from rislam_rt.slam.prune import prune
-from rislam_rt.slam.returns import compact, observe
+from rislam_rt.slam.moments import Moments, poses_of
+from rislam_rt.slam.prune import keepers
+from rislam_rt.slam.returns import Poses, compact
 from rislam_rt.slam.tracks import Glance, Tracks, advance, begin, extend, no_tracks
-from rislam_rt.slam.update import Update, update
 
 LOS_MARGIN = 0.1
 """Length [m] beyond the baseline below which a component is the direct path: no landmark can be that near."""
@@ -45,11 +45,11 @@ class FilterState(NamedTuple):
     """All that the filter knows."""
 
     cycle: int
-    particles: Particles
+    config: SlamConfig
+    particles: Any
+    """The engine's belief over pose, recent poses and features."""
     book: Book
     tracks: Tracks
-    heading: Floats
-    """(W,) headings of the last W cycles [rad], cycle k at row k % W."""
     time: Floats
     """(W,) times [s] of the last W cycles."""
     strain: float
@@ -85,20 +85,12 @@ def init(
     rng: np.random.Generator,
 ) -> FilterState:
     """Particles drawn from the start prior, and an empty map."""
-    shape, axes = (config.num_particles, 3), _axes(config)
-    position = start.position + rng.standard_normal(shape) * start.position_std * axes
-    velocity = start.velocity + rng.standard_normal(shape) * start.velocity_std * axes
-    log_weight = np.full(config.num_particles, -np.log(config.num_particles))
-    trail = np.zeros((config.window, *shape))
-    particles = Particles(position, velocity, log_weight, np.zeros((shape[0], 0, 3)), np.zeros((0, 0)), trail)
-    trail[:] = position
-    heading = np.full(config.window, start.heading)
     return FilterState(
         0,
-        particles,
+        config,
+        engine_of(config).begin(start, config, rng=rng),
         empty_book(),
         no_tracks(config.window),
-        heading,
         np.zeros(config.window),
         1.0,
         body,
@@ -123,93 +115,103 @@ def step(
     landmark = np.where(is_los(glance, state.body), REMOVED, UNUSED)
     free = np.flatnonzero(landmark == UNUSED)
     glance = Glance._make(field[free] for field in glance)
-    belief = mean_belief(state, heading)
+    moments = believed(state)
+    belief = Belief(moments.features, state.book, _poses(state, moments), state.body, state.radio, state.ris)
     expected = expected_returns(belief, code, config.max_bounces, config.detection_snr, config.use_vt)
-    tracks = advance(state.tracks, dt, state.cycle, _bend(state))
-    outlook = look_ahead(belief, expected, state.particles, tracks)
+    tracks = advance(state.tracks, dt, state.cycle, _bend(moments))
+    outlook = look_ahead(belief, expected, moments, tracks)
     hidden = hidden_tracks(outlook, tracks, config.gate)
     picks = associate(candidates(outlook, tracks, hidden), glance, config.gate, config.clutter_density)
 
     num_returns = len(expected.log_amplitude)
     hit = np.flatnonzero(picks[:num_returns] >= 0)
     taken = picks[hit]
-    updated = _correct(state, outlook, hit, glance, taken, heading)
-    book, names = learn(
-        belief,
-        updated.particles,
-        outlook,
-        hit,
-        updated.surprise,
-        glance,
-        taken,
-        measurement,
-        free,
-        code,
-        rng=rng,
-    )
+    used = outlook.measures[hit]
+    updated = _correct(state, outlook, hit[used], glance, taken[used], rng=rng)
+    state = state._replace(particles=updated.particles)
+    white = np.zeros((len(hit), 3))
+    white[used] = updated.white
+    book, names = learn(belief, believed(state), outlook, Hits(hit, taken, white), glance, code, rng=rng)
     landmark[free[taken]] = names
-    tracks, removed = _follow(state, tracks, glance, picks, num_returns, config)
+    tracks, removed = _follow(_rates(moments), tracks, glance, picks, num_returns, state.cycle, config)
     landmark[free[removed]] = REMOVED
-    hidden = hidden_tracks(outlook, tracks, config.gate)
-    row, tracks, particles, book = examine(
-        tracks,
-        updated.particles,
-        book,
-        outlook,
-        hidden,
-        state.heading,
-        state.time,
-        state.body,
-        state.cycle,
-        free_space(state.radio),
-        config,
-    )
-    tracks = tracks.keep(np.arange(len(tracks.misses)) != row)
-    particles, book = prune(particles, book, outlook, belief, config)
+    state = _tidy(state._replace(tracks=tracks, book=book), outlook, belief, config, rng=rng)
 
-    ess = effective_size(particles.log_weight)
-    low = ess < config.resample_below * len(particles.log_weight)
-    if low:
-        particles = resample(particles, state.time[state.cycle % config.window] - state.time, rng=rng)
-    dof = 3 * len(hit)
+    engine = engine_of(config)
+    ess = engine.effective_size(state.particles)
+    particles, resampled = engine.thin(state.particles, config, rng=rng)
+    dof = 3 * int(used.sum())
     strain = state.strain + STRAIN_RATE * (updated.nis / dof - state.strain) if dof else state.strain
-    outcome = _outcome(len(measurement), len(book.ident), strain)
-    info = StepInfo(landmark, ess, low, updated.nis, dof, updated.log_evidence, len(book.points), outcome)
-    return state._replace(particles=particles, book=book, tracks=tracks, strain=strain), info
+    outcome = _outcome(len(measurement), len(state.book.ident), strain)
+    count = len(state.book.points)
+    info = StepInfo(landmark, ess, resampled, updated.nis, dof, updated.log_evidence, count, outcome)
+    return state._replace(particles=particles, strain=strain), info
 
 
-def mean_belief(state: FilterState, heading: float) -> Belief:
-    """The mean of the particles, in which returns are enumerated and linearised."""
-    position = state.particles.weight @ state.particles.position
-    poses = poses_of(position, np.asarray(heading), state.body)
-    return Belief(mean_features(state.particles), state.book, poses, state.body, state.radio, state.ris)
+def believed(state: FilterState) -> Moments:
+    """Mean and covariance of pose and map."""
+    return engine_of(state.config).moments(state.particles)
+
+
+def _poses(state: FilterState, moments: Moments) -> Poses:
+    return poses_of(moments.position, np.asarray(moments.heading), state.body)
 
 
 def _correct(
-    state: FilterState, outlook: Outlook, hit: Integers, glance: Glance, taken: Integers, heading: float
-) -> Update:
-    """Weights and maps after the returns `hit` were seen as measurements `taken`."""
+    state: FilterState,
+    outlook: Outlook,
+    hit: Integers,
+    glance: Glance,
+    taken: Integers,
+    *,
+    rng: np.random.Generator,
+) -> Told:
+    """The belief after the returns `hit` were seen as measurements `taken`."""
     partner = outlook.merger.partner[hit]
-    returns = compact(outlook.expected.returns, np.concatenate([hit, np.where(partner >= 0, partner, hit)]))
-    poses = poses_of(state.particles.position, np.asarray(heading), state.body)
-    predicted = observe(returns, state.particles.features, state.book.anchor, poses).seen
-    predicted = 0.5 * (predicted[:, : len(hit)] + predicted[:, len(hit) :])
-    strangers = STRANGERS[np.minimum(bounces(outlook.expected.returns)[hit], 2)]
+    returns = compact(outlook.expected.returns, hit)
+    twin = compact(outlook.expected.returns, np.where(partner >= 0, partner, hit))
+    strangers = STRANGERS[np.minimum(outlook.expected.bounces[hit], 2)]
     std = np.hypot(glance.std[taken] * strangers[:, None], outlook.merger.disturbance[hit])
-    return update(state.particles, predicted, outlook.by_feature[hit], glance.seen[taken], std)
+    anchor, seen = state.book.anchor, glance.seen[taken]
+    engine = engine_of(state.config)
+    return engine.update(state.particles, returns, twin, anchor, state.body, seen, std, rng=rng)
+
+
+def _tidy(
+    state: FilterState, outlook: Outlook, belief: Belief, config: SlamConfig, *, rng: np.random.Generator
+) -> FilterState:
+    """Births and deaths: at most one track becomes a feature; features that should not be there go."""
+    moments, book, particles, engine = believed(state), state.book, state.particles, engine_of(config)
+    hidden = hidden_tracks(outlook, state.tracks, config.gate)
+    past = Past(*engine.trail(particles, np.arange(config.window)), state.time, state.body, state.cycle)
+    row, tracks, birth = examine(state.tracks, moments, book, outlook, hidden, past, free_space(state.radio), config)
+    if birth is not None:
+        particles = engine.settle(particles, birth, state.body, rng=rng)
+        book = birth.enter(book)
+    tracks = tracks.keep(np.arange(len(tracks.misses)) != row)
+    keep = keepers(engine.moments(particles), book, outlook, belief, config)
+    if not keep.all():
+        particles, book = engine.drop(particles, keep), strike(book, keep)
+    return state._replace(particles=particles, book=book, tracks=tracks)
 
 
 def _follow(
-    state: FilterState, tracks: Tracks, glance: Glance, picks: Integers, num_returns: int, config: SlamConfig
+    rates: Floats,
+    tracks: Tracks,
+    glance: Glance,
+    picks: Integers,
+    num_returns: int,
+    cycle: int,
+    config: SlamConfig,
 ) -> tuple[Tracks, Integers]:
     """Tracks extended, begun and ended; and which measurements were taken for wall returns."""
     bright = glance.ratio > config.specular_ratio
     kept = np.flatnonzero(picks[num_returns:] >= 0)
     used = picks[num_returns:][kept]
-    tracks = extend(tracks, kept, glance, used, bright, state.cycle)
+    tracks = extend(tracks, kept, glance, used, bright, cycle)
     spare = np.setdiff1d(np.arange(len(bright)), picks)
     removed = np.concatenate([used[tracks.specular[kept]], spare[bright[spare]]])
-    tracks = begin(tracks, glance, spare, bright, _rates(state), state.cycle)
+    tracks = begin(tracks, glance, spare, bright, rates, cycle)
     return tracks.keep(tracks.misses <= config.max_misses), removed
 
 
@@ -224,6 +226,7 @@ def glance_of(measurement: Measurement, radio: RadioConfig) -> Glance:
         np.maximum(std, 1e-5),
         np.log(amplitude),
         np.minimum(measurement.amplitude_std / amplitude, 1.0),
+        np.maximum(measurement.amplitude_std, 1e-30),
         amplitude / free,
     )
 
@@ -242,35 +245,31 @@ def is_los(glance: Glance, body: Body) -> Booleans:
 def _move(
     state: FilterState, dt: float, heading: float, config: SlamConfig, *, rng: np.random.Generator
 ) -> FilterState:
-    """The belief carried to the next cycle, whose poses join the trail."""
+    """The belief carried to the next cycle, whose pose joins the trail."""
     cycle = state.cycle + 1
     slot, last = cycle % config.window, state.cycle % config.window
-    particles = propagate(state.particles, dt, config.sigma_a * _axes(config), rng=rng)
-    trail, headings, time = particles.trail.copy(), state.heading.copy(), state.time.copy()
-    trail[slot], headings[slot], time[slot] = particles.position, wrap(np.asarray(heading)), state.time[last] + dt
-    return state._replace(cycle=cycle, particles=particles._replace(trail=trail), heading=headings, time=time)
+    accelerate = config.sigma_a * config.axes
+    course, engine = float(wrap(np.asarray(heading))), engine_of(config)
+    particles = engine.propagate(state.particles, dt, accelerate, course, slot, config, rng=rng)
+    time = state.time.copy()
+    time[slot] = state.time[last] + dt
+    return state._replace(cycle=cycle, particles=particles, time=time)
 
 
-def _speed(state: FilterState) -> float:
-    velocity = state.particles.weight @ state.particles.velocity
-    return float(np.linalg.norm(velocity)) + 0.02
+def _speed(moments: Moments) -> float:
+    return float(np.linalg.norm(moments.velocity)) + 0.02
 
 
-def _rates(state: FilterState) -> Floats:
+def _rates(moments: Moments) -> Floats:
     """Spread (3,) of a new track's rates: both legs may shorten by the speed; half a metre is near for a landmark."""
-    speed = _speed(state)
+    speed = _speed(moments)
     return np.array([2.0 * speed, speed / 0.5, speed / 0.5])
 
 
-def _bend(state: FilterState) -> Floats:
+def _bend(moments: Moments) -> Floats:
     """Standard deviation (3,) of the drift of a track's rates [1/s^2] at the speed of the agent."""
-    speed = _speed(state)
+    speed = _speed(moments)
     return np.array([0.02 + speed**2, 0.02 + speed**2, 0.02 + speed**2])
-
-
-def _axes(config: SlamConfig) -> Floats:
-    """(3,) ones for the axes that are filtered."""
-    return np.array([1.0, 1.0, 1.0 if config.height == "estimated" else 0.0])
 
 
 def _outcome(num_measurements: int, num_features: int, strain: float) -> Outcome:

@@ -1,13 +1,17 @@
-"""From particles to the estimate that others read: pose, landmarks, images, walls."""
+"""From moments to the estimate that others read: pose, landmarks, images, walls."""
+
+from functools import lru_cache
 
 import numpy as np
+from scipy.stats import norm
+from scipy.stats.qmc import Halton
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
 from rislam_rt.slam.book import Book
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.filter import FilterState
-from rislam_rt.slam.particles import Particles, moments
+from rislam_rt.slam.filter import FilterState, believed
+from rislam_rt.slam.moments import POSE, Moments, square_root
 from rislam_rt.slam.returns import reflect
 
 IMAGE_HITS = 3
@@ -16,35 +20,47 @@ IMAGE_HITS = 3
 
 def predict(state: FilterState, dt: float, config: SlamConfig) -> SlamEstimate:
     """The belief carried over `dt` [s] without noise: where the next cycle will find the agent."""
-    particles = state.particles
-    return estimate(
-        state._replace(particles=particles._replace(position=particles.position + dt * particles.velocity)), config
-    )
+    moments = believed(state)
+    mean = moments.mean.copy()
+    mean[:3] += dt * moments.velocity
+    return estimate(state, config, moments._replace(mean=mean))
 
 
-def estimate(state: FilterState, config: SlamConfig) -> SlamEstimate:
+def estimate(state: FilterState, config: SlamConfig, moments: Moments | None = None) -> SlamEstimate:
     """Mean and covariance of the pose, equally likely samples of it, and the map."""
-    particles = state.particles
-    pose = np.concatenate([particles.position, particles.velocity], axis=1)
-    mean, covariance = moments(particles.log_weight, pose)
+    moments = believed(state) if moments is None else moments
+    root = square_root(moments.covariance[:3, :3])
     return SlamEstimate(
-        mean[:3],
-        mean[3:],
-        float(state.heading[state.cycle % len(state.heading)]),
-        covariance,
-        particles.position[_even_rows(particles.log_weight, config.num_samples)],
+        moments.position,
+        moments.velocity,
+        moments.heading,
+        moments.covariance[:6, :6],
+        moments.position + even_draws(config.num_samples, root.shape[1]) @ root.T,
         state.body,
-        build_map(particles, state.book),
+        build_map(moments, state.book),
     )
 
 
-def build_map(particles: Particles, book: Book) -> MapEstimate:
+@lru_cache(maxsize=16)
+def even_draws(count: int, dims: int) -> Floats:
+    """(count, dims) equally likely draws of a standard normal without a random number: mean 0, covariance 1.
+
+    Halton's sequence through the normal quantile.
+    """
+    if not dims:
+        return np.zeros((count, 0))
+    draws = norm.ppf(Halton(dims, scramble=False).random(count + 1)[1:])
+    if count <= dims + 1:
+        return np.zeros((count, dims)) if count == 1 else np.asarray(draws - draws.mean(axis=0))
+    draws -= draws.mean(axis=0)
+    return np.asarray(np.linalg.solve(np.linalg.cholesky(draws.T @ draws / count), draws.T).T)
+
+
+def build_map(moments: Moments, book: Book) -> MapEstimate:
     """Points, first-order images that were seen, and walls."""
     if not len(book.ident):
         return empty_map()
-    count, size = len(particles.log_weight), len(book.ident)
-    mean, covariance = moments(particles.log_weight, particles.features.reshape(count, -1))
-    mean, covariance = mean.reshape(size, 3), covariance + particles.covariance
+    mean, covariance = moments.features, moments.covariance[POSE:, POSE:]
     points, row = book.points, {int(ident): place for place, ident in enumerate(book.ident)}
     images = book.images[book.image_hits >= IMAGE_HITS]
     places, spreads = [mean[points]], [_blocks(covariance, points)]
@@ -99,9 +115,3 @@ def _image(mean: Floats, covariance: Floats, book: Book, point: int, wall: int) 
 def _blocks(covariance: Floats, rows: Integers) -> Floats:
     """Diagonal blocks (R, 3, 3) of some features."""
     return np.array([covariance[3 * r : 3 * r + 3, 3 * r : 3 * r + 3] for r in rows]).reshape(-1, 3, 3)
-
-
-def _even_rows(log_weight: Floats, count: int) -> Integers:
-    """Rows (count,) at even quantiles of the weights: equally likely samples without a random number."""
-    edges = np.cumsum(np.exp(log_weight))
-    return np.minimum(np.searchsorted(edges, (np.arange(count) + 0.5) / count * edges[-1]), len(log_weight) - 1)

@@ -9,7 +9,7 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import RadioConfig
 from rislam_rt.slam.associate import Candidates, inverse_3x3
 from rislam_rt.slam.expect import Belief, Expected
-from rislam_rt.slam.particles import Particles, joint_covariance
+from rislam_rt.slam.moments import POSE, Moments
 from rislam_rt.slam.returns import linearise
 from rislam_rt.slam.tracks import AMPLITUDE_WANDER, Tracks
 
@@ -17,6 +17,8 @@ INSIDE, OUTSIDE = 0.9, 1.1
 """Gap in units of the resolution cell below which two paths certainly, and above which they certainly do not, merge."""
 TWIN_GAIN, TWIN_SPREAD = 0.2, 0.6
 """Mean and standard deviation of the log amplitude of two equal paths of random phase, over that of one."""
+PROVEN_HITS = 80
+"""Measurements of a wall by the point it was found by, before it is looked for by other points."""
 LANDMARK_ODDS, TRACK_ODDS = np.log(0.9), np.log(0.5)
 """Log probability that an expected return, and that a track, shows in a cycle."""
 
@@ -46,28 +48,32 @@ class Outlook(NamedTuple):
     """(R,) with the reciprocal's share where the two come out as one."""
     log_amplitude_std: Floats
     """(R,)."""
+    measures: Booleans
+    """(R,) whether it may move the belief; the others only explain what is seen."""
     merger: Merger
     cell: Floats
     """(3,) resolution cell."""
-    by_feature: Floats
-    """(R, 3, F, 3)."""
 
 
-def look_ahead(belief: Belief, expected: Expected, particles: Particles, tracks: Tracks) -> Outlook:
+def look_ahead(belief: Belief, expected: Expected, moments: Moments, tracks: Tracks) -> Outlook:
     """Predicted returns with their uncertainty."""
     returns, book = expected.returns, belief.book
-    seen, by_feature, by_pose = linearise(returns, belief.features, book.anchor, belief.poses)
+    linear = linearise(returns, belief.features, book.anchor, belief.poses)
+    seen, by_feature = linear.seen, linear.by_feature
+    flat = np.zeros((len(seen), 3, len(moments.mean)))
+    flat[..., :3], flat[..., 6] = linear.by_pose, linear.by_heading(belief.poses, moments.position)
+    flat[..., POSE:] = by_feature.reshape(len(seen), 3, 3 * len(book.ident))
     cell = resolution_cell(belief.radio)
     merger = merge_returns(seen, expected, tracks, cell)
     both = np.flatnonzero(merger.partner >= 0)
     log_amplitude, log_amplitude_std = expected.log_amplitude.copy(), expected.log_amplitude_std.copy()
     log_amplitude[both] += TWIN_GAIN
     log_amplitude_std[both] = np.hypot(log_amplitude_std[both], TWIN_SPREAD)
-    for field in (seen, by_feature, by_pose):
+    for field in (seen, flat):
         field[both] = 0.5 * (field[both] + field[merger.partner[both]])
-    flat = np.concatenate([by_pose, by_feature.reshape(len(seen), 3, 3 * len(book.ident))], axis=2)
-    covariance = flat @ joint_covariance(particles) @ np.swapaxes(flat, 1, 2)
-    return Outlook(expected, seen, covariance, log_amplitude, log_amplitude_std, merger, cell, by_feature)
+    covariance = flat @ moments.covariance @ np.swapaxes(flat, 1, 2)
+    measures = expected.founding | ((expected.bounces == 1) & (book.hits[expected.owner] >= PROVEN_HITS))
+    return Outlook(expected, seen, covariance, log_amplitude, log_amplitude_std, measures, merger, cell)
 
 
 def resolution_cell(radio: RadioConfig) -> Floats:

@@ -3,15 +3,17 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.book import Book, strike
+from rislam_rt.slam.book import Book
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.expect import Belief
 from rislam_rt.slam.match import Outlook
-from rislam_rt.slam.particles import Particles, mean_features
+from rislam_rt.slam.moments import Moments
 from rislam_rt.slam.returns import NONE, TX, reflect
 
-MAX_SURPRISE = 4.0
-"""Running mean of normalised squared innovations per degree of freedom beyond which a feature is not believed."""
+MAX_DRIFT = 0.8
+"""Running mean of whitened innovations beyond which a feature is not believed: five times its own spread."""
+OLD_HITS, OLD_DRIFT = 100, 1.2
+"""The same for features of long standing: more must speak against them."""
 MAX_RATIO, MIN_RATIO = 0.25, -2.5
 """Bounds on the log amplitude ratio of a wall: it cannot amplify, and one that swallows all is none."""
 ORPHAN_HITS = 40
@@ -24,32 +26,22 @@ SLACK = 0.03
 """Standard deviation [m] added when two descriptions of one thing are compared."""
 
 
-def prune(
-    particles: Particles, book: Book, outlook: Outlook, belief: Belief, config: SlamConfig
-) -> tuple[Particles, Book]:
-    """Particles and book without the features that should not be there."""
+def keepers(moments: Moments, book: Book, outlook: Outlook, belief: Belief, config: SlamConfig) -> Booleans:
+    """(F,) the features that should stay."""
     if not len(book.ident):
-        return particles, book
-    keep = (book.shown > MIN_SHOWN).all(axis=1) & (book.surprise < MAX_SURPRISE)
+        return np.zeros(0, dtype=np.bool_)
+    old = np.where(book.hits >= OLD_HITS, OLD_DRIFT, MAX_DRIFT)
+    keep = (book.shown > MIN_SHOWN).all(axis=1) & (np.abs(book.drift).max(axis=1) < old)
     keep &= ~(book.is_wall & ((book.ratio > MAX_RATIO) | (book.ratio < MIN_RATIO)))
-    keep &= ~_doubles(particles, book, config.merge_distance)
-    keep[: len(belief.book.ident)] &= ~_derived(particles, outlook, belief, config.merge_distance)
+    keep &= ~_doubles(moments, book, config.merge_distance)
+    keep[: len(belief.book.ident)] &= ~_derived(moments, outlook, belief, config.merge_distance)
     keep &= ~(book.is_wall & (book.hits < ORPHAN_HITS) & np.isin(book.founder, book.ident[~keep]))
-    return drop(particles, book, keep)
+    return keep
 
 
-def drop(particles: Particles, book: Book, keep: Booleans) -> tuple[Particles, Book]:
-    """Particles and book with only some features."""
-    if keep.all():
-        return particles, book
-    wide = np.repeat(keep, 3)
-    covariance = particles.covariance[np.ix_(wide, wide)]
-    return particles._replace(features=particles.features[:, keep], covariance=covariance), strike(book, keep)
-
-
-def _doubles(particles: Particles, book: Book, distance: float) -> Booleans:
+def _doubles(moments: Moments, book: Book, distance: float) -> Booleans:
     """(F,) the younger of any two features of one kind that the belief cannot tell apart."""
-    means = mean_features(particles)
+    means = moments.features
     double = np.zeros(len(book.ident), dtype=np.bool_)
     for kind in (book.points, book.walls):
         for place, young in enumerate(kind[1:], start=1):
@@ -57,13 +49,13 @@ def _doubles(particles: Particles, book: Book, distance: float) -> Booleans:
                 other = means[young]
                 if book.is_wall[young]:
                     other = reflect(book.anchor[old], means[young], book.anchor[young])
-                spread = _block(particles, old) + _block(particles, young)
+                spread = moments.block(int(old)) + moments.block(int(young))
                 if not double[old] and _same(means[old] - other, spread, distance):
                     double[young] = True
     return double
 
 
-def _derived(particles: Particles, outlook: Outlook, belief: Belief, distance: float) -> Booleans:
+def _derived(moments: Moments, outlook: Outlook, belief: Belief, distance: float) -> Booleans:
     """(F,) points that are images of other points, and walls whose images other walls make together.
 
     A corner throws an image that a single slanted wall would throw as well, and walls on both legs make a static
@@ -75,13 +67,13 @@ def _derived(particles: Particles, outlook: Outlook, belief: Belief, distance: f
     walled = legs[(legs[:, 0] != TX) & (legs[:, 1] != NONE)]
     if not len(walled):
         return derived
-    image, spread = _images(particles, belief, walled)
+    image, spread = _images(moments, belief, walled)
     reach = np.linalg.norm(belief.features - belief.poses.rx, axis=1)
     for point in book.points:
         # an image lies farther away than what it is an image of
         others = (walled[:, 0] != point) & (reach[walled[:, 0]] < reach[point])
         gaps = image[others] - belief.features[point]
-        spreads = spread[others] + _block(particles, int(point))
+        spreads = spread[others] + moments.block(int(point))
         derived[point] = any(_same(g, s, distance) for g, s in zip(gaps, spreads, strict=True))
     single = walled[:, 2] == NONE
     for leg, place, own in zip(walled[single], image[single], spread[single], strict=True):
@@ -91,17 +83,17 @@ def _derived(particles: Particles, outlook: Outlook, belief: Belief, distance: f
     return derived
 
 
-def _images(particles: Particles, belief: Belief, legs: Integers) -> tuple[Floats, Floats]:
+def _images(moments: Moments, belief: Belief, legs: Integers) -> tuple[Floats, Floats]:
     """Images (G, 3) of the legs at the mean belief, with a covariance (G, 3, 3) from their features one by one."""
     image = belief.features[legs[:, 0]]
-    spread = np.array([_block(particles, int(row)) for row in legs[:, 0]])
+    spread = np.array([moments.block(int(row)) for row in legs[:, 0]])
     for column in (1, 2):
         rows = np.flatnonzero(legs[:, column] != NONE)
         walls = legs[rows, column]
         wall, anchor = belief.features[walls], belief.book.anchor[walls]
         lever = np.linalg.norm(image[rows] - anchor, axis=-1) / np.linalg.norm(wall - anchor, axis=-1)
         image[rows] = reflect(image[rows], wall, anchor)
-        blocks = np.array([_block(particles, int(w)) for w in walls]).reshape(-1, 3, 3)
+        blocks = np.array([moments.block(int(w)) for w in walls]).reshape(-1, 3, 3)
         spread[rows] += (1.0 + lever)[:, None, None] ** 2 * blocks
     return image, spread
 
@@ -111,7 +103,3 @@ def _same(gap: Floats, spread: Floats, distance: float) -> bool:
     if gap @ gap > CLOSE**2:
         return False
     return bool(gap @ np.linalg.solve(spread + SLACK**2 * np.eye(3), gap) < distance)
-
-
-def _block(particles: Particles, row: int) -> Floats:
-    return particles.covariance[3 * row : 3 * row + 3, 3 * row : 3 * row + 3]

@@ -104,20 +104,38 @@ class Linear(NamedTuple):
     """(..., R, 3)."""
     by_feature: Floats
     """(..., R, 3, F, 3)."""
-    by_pose: Floats
-    """(..., R, 3, 3) with respect to the agent's position."""
+    by_tx: Floats
+    """(..., R, 3, 3) with respect to the position of the Tx."""
+    by_rx: Floats
+    """(..., R, 3, 3) with respect to the position of the Rx."""
+
+    @property
+    def by_pose(self) -> Floats:
+        """(..., R, 3, 3) with respect to the agent's position, which moves both ends."""
+        return self.by_tx + self.by_rx
+
+    def by_heading(self, poses: Poses, position: Floats) -> Floats:
+        """(..., R, 3) with respect to the heading, which turns both ends about the agent's position, and the array."""
+        turned = np.zeros(self.seen.shape)
+        turned[..., 1], turned[..., 2] = self.seen[..., 2], -self.seen[..., 1]
+        for jacobian, end in ((self.by_tx, poses.tx), (self.by_rx, poses.rx)):
+            arm = end - position
+            swing = np.stack([-arm[..., 1], arm[..., 0], np.zeros(arm.shape[:-1])], axis=-1)
+            turned += (jacobian @ swing[..., None, :, None])[..., 0]
+        return turned
 
 
 def linearise(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Linear:
-    """`observe(...).seen` with its derivatives by the features (..., F, 3) and by the agent's position."""
+    """`observe(...).seen` with its derivatives by the features (..., F, 3) and by the agent's ends."""
     image, by_feature, by_base = _leg_jacobian(returns, features, anchor, poses.tx)
     seen, by_tx, by_rx = _sight_jacobians(image, returns, poses)
     features_jacobian = np.einsum("...ria,...rfab->...rifb", by_rx, by_feature[..., returns.rx, :, :, :])
     features_jacobian[..., 0, :, :] += np.einsum("...ra,...rfab->...rfb", by_tx, by_feature[..., returns.tx, :, :, :])
-    moves = np.where((returns.legs[:, 0] == TX)[:, None, None], by_base, 0.0) - np.eye(3)
-    pose_jacobian = by_rx @ moves[..., returns.rx, :, :]
-    pose_jacobian[..., 0, :] += np.einsum("...ra,...rab->...rb", by_tx, moves[..., returns.tx, :, :])
-    return Linear(seen, features_jacobian, pose_jacobian)
+    moves = np.where((returns.legs[:, 0] == TX)[:, None, None], by_base, 0.0)
+    tx_jacobian = by_rx @ moves[..., returns.rx, :, :]
+    own = moves[..., returns.tx, :, :] - np.eye(3)
+    tx_jacobian[..., 0, :] += np.einsum("...ra,...rab->...rb", by_tx, own)
+    return Linear(seen, features_jacobian, tx_jacobian, -by_rx)
 
 
 def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Floats, Floats, Floats]:

@@ -21,6 +21,8 @@ class Glance(NamedTuple):
     """(M,)."""
     log_amplitude_std: Floats
     """(M,)."""
+    amplitude_std: Floats
+    """(M,)."""
     ratio: Floats
     """(M,) amplitude over that of free space of the same length."""
 

@@ -12,7 +12,7 @@ from rislam_rt.cli import main
 ROOT = Path(__file__).parents[2]
 SCENE = ROOT / "scenes" / "paper_room"
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
-SHORT = ("--set", "channel=image_source", "--set", "cycles=6", "--set", "slam.num_particles=40")
+SHORT = ("--set", "channel=image_source", "--set", "cycles=6")
 HEAVY = ("numpy", "scipy", "sionna", "mitsuba", "drjit", "matplotlib", "xarray", "trimesh")
 
 

@@ -10,7 +10,7 @@ from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
-SHORT = ("channel=image_source", "cycles=8", "slam.num_particles=60", "design.iterations=5")
+SHORT = ("channel=image_source", "cycles=8", "design.iterations=5")
 
 
 @pytest.fixture(scope="session")
