@@ -1,11 +1,16 @@
 """`rislam-rt sweep PIPELINE`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rislam_rt.cli.options import JsonFile, PipelineFile, SceneOption, Settings, write_json
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rislam_rt.pipeline.sweeps import Effort, Report, Row, Sweep
 
 
 def command(
@@ -15,8 +20,19 @@ def command(
     axis: Annotated[
         list[str] | None, typer.Option(metavar="KEY=V1,V2", help="Values of a setting to go through; repeatable.")
     ] = None,
-    repeat: Annotated[int, typer.Option(min=1, max=10_000, help="Runs with different seeds at every point.")] = 5,
+    repeat: Annotated[
+        int | None,
+        typer.Option(min=1, max=10_000, help="Runs with different seeds at every point; the pipeline's own, or 5."),
+    ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Runs at a time; one a core by default.")] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster that does the runs instead.")
+    ] = None,
+    time_limit: Annotated[
+        float | None, typer.Option(metavar="S", help="Stop a run after so many seconds; it counts as failed.")
+    ] = None,
+    retry: Annotated[bool, typer.Option("--retry", help="Do failed runs again.")] = False,
+    estimate: Annotated[bool, typer.Option("--estimate", help="Say what it will cost, and stop there.")] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder; sweeps/<pipeline>-<scene> by default.")
     ] = None,
@@ -24,27 +40,49 @@ def command(
 ) -> None:
     """Run a pipeline over settings and seeds. What is there already is not run again. Exit code 1 if a run failed."""
     import os
+    import signal
 
-    from rislam_rt.cli.progress import show_progress
-    from rislam_rt.cli.scenes import open_scene, scene_of
-    from rislam_rt.pipeline import load_spec
-    from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.sweep import build_cells, parse_axes, run_sweep
-    from rislam_rt.report.tables import print_sweep
+    # A queue that ends the process is answered as a keyboard that does: workers are stopped, the table is written.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        from rislam_rt.pipeline.sweeps import Effort
+        from rislam_rt.pipeline.sweeps.slam import load_section, score_rows, slam_sweep
+        from rislam_rt.report.tables import print_sweep
 
-    axes = parse_axes(axis or ())
-    spec = load_spec(pipeline, set_ or ())
-    folder = scene_of(scene, spec, pipeline)
-    opened = open_scene(folder)
-    cells = build_cells(pipeline, folder, set_ or (), axes, repeat)
-    for kind in {cell.spec.channel for cell in cells}:
-        prepare_channel(kind)
-    opened.warn()
-    target = out or Path("sweeps") / f"{spec.name}-{opened.scene.name}"
-    with show_progress() as progress:
-        rows = run_sweep(cells, folder, target, jobs or os.cpu_count() or 1, progress)
-    print_sweep(rows)
+        sweep = slam_sweep(pipeline, set_ or (), axis or (), scene=scene, repeat=repeat)
+        limit = time_limit if time_limit is not None else load_section(pipeline, set_ or ()).time_limit_s
+        effort = Effort(jobs or os.cpu_count() or 1, dask, limit, retry, estimate)
+        target = out or Path("sweeps") / f"{sweep.name}-{Path(sweep.base['scene']).name}"
+        report = _run(sweep, target, effort)
+    except KeyboardInterrupt:
+        typer.echo("interrupted: what is done is kept; the same command goes on from there", err=True)
+        raise typer.Exit(130) from None
+    if estimate and report.cost.cells:
+        return
+    scores = score_rows(report.rows)
+    print_sweep(scores)
     typer.echo(f"sweep folder: {target}")
-    write_json(json, {"rows": [{**row._asdict(), "overall_rmse_m": row.overall if row.rmse else None} for row in rows]})
-    if any(row.failed for row in rows):
+    write_json(json, {"rows": [score.as_dict() for score in scores], "failed": len(report.failed)})
+    if report.failed:
         raise typer.Exit(1)
+
+
+def _run(sweep: "Sweep", target: Path, effort: "Effort") -> "Report":
+    """The sweep with its bar; scores and their picture grow beside the table."""
+    from rislam_rt.cli.progress import show_sweep
+    from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.sweeps import build_cells, run_sweep
+    from rislam_rt.pipeline.sweeps.slam import score_rows, write_scores
+    from rislam_rt.report.sweep import draw_scores
+
+    if effort.dask is None:
+        for kind in {cell.settings["channel"] for cell in build_cells(sweep)}:
+            prepare_channel(kind)
+
+    def grow(rows: "Sequence[Row]") -> None:
+        scores = score_rows(rows)
+        write_scores(scores, target)
+        draw_scores(scores, target / "scores.png")
+
+    with show_sweep() as tell:
+        return run_sweep(sweep, target, effort, tell=tell, grow=grow)

@@ -26,6 +26,8 @@ class Table(NamedTuple):
     content: dict[str, Any]
     changed: tuple[str, ...]
     """Keys that the command line set."""
+    sweep: dict[str, Any] | None = None
+    """The table `[sweep]`, which is no part of the experiment itself."""
 
 
 def load_spec(path: str | Path, overrides: Sequence[str] = ()) -> PipelineSpec:
@@ -49,7 +51,8 @@ def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
     """
     path = Path(path)
     content = _read_toml(path)
-    return Table(path, content, tuple(_override(content, setting) for setting in overrides))
+    changed = tuple(_override(content, setting) for setting in overrides)
+    return Table(path, content, changed, content.pop("sweep", None))
 
 
 def settings_table(overrides: Sequence[str], defaults: dict[str, Any]) -> Table:
@@ -72,7 +75,7 @@ def build_spec(table: Table, model: type[Spec], check: Callable[[Spec], object])
     ConfigError
         A key is unknown, a value of the wrong type or out of range. One line that names file and field.
     """
-    path, content, changed = table
+    path, content, changed = table.path, table.content, table.changed
     try:
         spec = model.model_validate(content)
     except ValidationError as error:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
     from rislam_rt.channel.compare import PathReport, Validation
     from rislam_rt.design import Design
-    from rislam_rt.pipeline.sweep import Row
+    from rislam_rt.pipeline.sweeps.slam import Score
 
 
 def print_summary(summary: Mapping[str, Any]) -> None:
@@ -123,15 +123,16 @@ def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"]) -
     _show(title, table)
 
 
-def print_sweep(rows: Sequence["Row"]) -> None:
+def print_sweep(scores: Sequence["Score"]) -> None:
     """One line a point of the axes and a scheme."""
-    keys = [setting.partition("=")[0].rpartition(".")[2] for setting in rows[0].settings]
+    keys = [key.rpartition(".")[2] for key in scores[0].point if key != "schemes"]
     table = Table(*keys, "scheme", "agent RMSE", "95 %", "runs", "diverged", "failed")
-    for row in rows:
-        interval = f"{row.interval[0]:.3f}-{row.interval[1]:.3f}" if row.interval else ""
-        overall = f"{row.overall:.3f} m" if row.rmse else "none"
-        counts = (str(len(row.rmse)), str(row.diverged), str(row.failed))
-        table.add_row(*(setting.partition("=")[2] for setting in row.settings), row.scheme, overall, interval, *counts)
+    for score in scores:
+        interval = f"{score.interval[0]:.3f}-{score.interval[1]:.3f}" if score.interval else ""
+        overall = f"{score.overall:.3f} m" if score.overall is not None else "none"
+        counts = (str(len(score.rmse)), str(score.diverged), str(score.failed))
+        point = (str(value) for key, value in score.point.items() if key != "schemes")
+        table.add_row(*point, score.scheme, overall, interval, *counts)
     _show("sweep", table)
 
 

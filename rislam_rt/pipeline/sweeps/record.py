@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,19 +10,16 @@ import numpy as np
 from rislam_rt.errors import RislamError
 
 
-def plain_result(result: Any, reserved: Sequence[str] = ()) -> dict[str, Any]:
+def plain_result(result: Any) -> dict[str, Any]:
     """A function's result as JSON has it: arrays as lists, NaN and infinity as null.
 
     Raises
     ------
     RislamError
-        It is no mapping of names to numbers, text, lists and mappings of these, or has a name that is taken.
+        It is no mapping of names to numbers, text, lists and mappings of these.
     """
     if not isinstance(result, Mapping):
         raise RislamError(f"the cell returned {type(result).__name__}; return a mapping of names to values")
-    taken = sorted(set(reserved) & {name for name, _ in flatten(result)})
-    if taken:
-        raise RislamError(f"the cell returned '{taken[0]}', which names a column of the table; choose another name")
     return {name: _plain(str(name), value) for name, value in result.items()}
 
 

@@ -13,7 +13,6 @@ from rislam_rt.pipeline.sweeps.cost import Cost, estimate_cost
 from rislam_rt.pipeline.sweeps.crew import Run, crew_here
 from rislam_rt.pipeline.sweeps.store import (
     DONE,
-    FIXED,
     MISSING,
     Row,
     append_timing,
@@ -162,9 +161,8 @@ class _Board:
     ) -> None:
         self.sweep, self.folder, self.effort, self.tell, self.grow = sweep, folder, effort, tell, grow
         self.rows = {cell.ident: read_row(folder, cell) for cell in cells}
-        reserved = (*(axis.key for axis in sweep.axes), *FIXED)
         self.left = {
-            cell.ident: Task(sweep.function, {**cell.settings, **sweep.local}, cell.seed, reserved)
+            cell.ident: Task(sweep.function, {**cell.settings, **sweep.local}, cell.seed)
             for cell in cells
             if self.rows[cell.ident].state in (MISSING, LOST) or (effort.retry and self.rows[cell.ident].failed)
         }

@@ -159,19 +159,23 @@ def write_table(folder: Path, rows: Sequence[Row]) -> None:
     """
     flat = [{name: value for name, value in flatten(row.result) if not isinstance(value, list)} for row in rows]
     results = sorted({name for result in flat for name in result})
-    entries = []
+    entries: list[dict[str, Any]] = []
     for row, result in zip(rows, flat, strict=True):
         fixed = (row.cell.repetition, row.cell.seed, row.state, row.message)
-        point = {key: ";".join(map(str, v)) if isinstance(v, list) else v for key, v in row.cell.point.items()}
-        entries.append(
-            {**point, **dict(zip(FIXED, fixed, strict=True)), **{name: result.get(name) for name in results}}
-        )
+        known = {**row.cell.point, **dict(zip(FIXED, fixed, strict=True))}
+        entries.append(known | {f"result.{name}" if name in known else name: result.get(name) for name in results})
+    write_atomic(folder / "table.csv", csv_bytes(entries))
+    write_atomic(folder / "table.json", json_bytes(entries))
+
+
+def csv_bytes(entries: Sequence[Mapping[str, Any]]) -> bytes:
+    """A table whose columns are those of the first row, in its order; lists with semicolons."""
     text = io.StringIO()
-    table = csv.DictWriter(text, [*(rows[0].cell.point if rows else ()), *FIXED, *results], lineterminator="\n")
-    table.writeheader()
-    table.writerows(entries)
-    write_atomic(folder / "table.csv", text.getvalue().encode())
-    write_atomic(folder / "table.json", (json.dumps(entries, indent=1, ensure_ascii=False) + "\n").encode())
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(entries[0] if entries else ())
+    for entry in entries:
+        table.writerow([";".join(map(str, v)) if isinstance(v, list) else v for v in entry.values()])
+    return text.getvalue().encode()
 
 
 def _file(folder: Path, cell: Cell) -> Path:

@@ -1,0 +1,80 @@
+"""The picture of a sweep: RMSE of the agent along one axis, a line for every scheme and value of the other axes."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from rislam_rt.pipeline.sweeps.slam import Score
+from rislam_rt.report.style import save_figure, scheme_colour, styled
+
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+LINES = ("-", "--", ":", "-.")
+
+
+def draw_scores(scores: Sequence[Score], path: Path) -> Path | None:
+    """Draw what there is; None, and no picture, before the first run has ended.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    shown = [score for score in scores if score.rmse]
+    return save_figure(scores_figure(shown), path) if shown else None
+
+
+def scores_figure(scores: Sequence[Score]) -> Figure:
+    """RMSE with its interval, and how many runs each point rests on."""
+    along = main_axis(scores)
+    ticks = list(dict.fromkeys(str(score.point.get(along, score.scheme)) for score in scores))
+    numeric = all(_is_number(score.point.get(along)) for score in scores)
+    groups: dict[tuple[str, str], list[Score]] = {}
+    for score in scores:
+        groups.setdefault((score.scheme, _others(score.point, along)), []).append(score)
+    kinds = list(dict.fromkeys(others for _, others in groups))
+    with styled():
+        figure = Figure(figsize=(7.0, 4.6))
+        axis = figure.subplots()
+        for number, ((scheme, others), group) in enumerate(groups.items()):
+            shift = 0.0 if numeric else 0.12 * (number - 0.5 * (len(groups) - 1))
+            line = "none" if not numeric else LINES[kinds.index(others) % len(LINES)]
+            style: Mapping[str, Any] = {"ls": line, "marker": MARKERS[number % len(MARKERS)], "ms": 5, "capsize": 3}
+            x = [_place(score, along, ticks, numeric) + shift for score in group]
+            middle = np.array([score.overall for score in group])
+            ends = np.array([score.interval or (score.overall, score.overall) for score in group])
+            label = ", ".join(part for part in (scheme, others) if part)
+            axis.errorbar(x, middle, np.abs(ends.T - middle), color=scheme_colour(scheme), label=label, **style)
+        if not numeric:
+            axis.set_xticks(range(len(ticks)), ticks)
+        axis.set_yscale("log")
+        axis.set_xlabel(along or "scheme")
+        axis.set_ylabel("RMSE of the agent's position [m]")
+        runs = sorted({len(score.rmse) for score in scores})
+        axis.set_title(
+            f"{' to '.join(map(str, runs[:: max(len(runs) - 1, 1)]))} runs a point, 95 % bootstrap intervals"
+        )
+        figure.legend(loc="outside lower center", ncols=3, fontsize=9)
+    return figure
+
+
+def main_axis(scores: Sequence[Score]) -> str:
+    """The first axis of numbers, else the first one but that of the schemes; empty without any."""
+    keys = [key for key in scores[0].point if key != "schemes"]
+    numbers = [key for key in keys if _is_number(scores[0].point[key])]
+    return next(iter((*numbers, *keys)), "")
+
+
+def _others(point: Mapping[str, Any], along: str) -> str:
+    kept = {key: value for key, value in point.items() if key not in (along, "schemes")}
+    return ", ".join(f"{key.rpartition('.')[2]} = {value}" for key, value in kept.items())
+
+
+def _place(score: Score, along: str, ticks: Sequence[str], numeric: bool) -> float:
+    return float(score.point[along]) if numeric else float(ticks.index(str(score.point.get(along, score.scheme))))  # type: ignore[arg-type]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
