@@ -104,3 +104,5 @@ class SlamResult:
     """Of this package, of Python and of the libraries that numbers depend on."""
     seconds: Mapping[str, float] = field(default_factory=dict)
     """Time [s] of the stages that all schemes share."""
+    warnings: tuple[str, ...] = ()
+    """Where a formula left its range, one line each."""

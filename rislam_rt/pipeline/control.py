@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import RisCode, RisSpec
 from rislam_rt.pipeline.spec import ControlSection
-from rislam_rt.ris import zero_code
+from rislam_rt.ris import flip_bits, zero_code
 
 
 class Link(NamedTuple):
@@ -17,8 +17,8 @@ class Link(NamedTuple):
     """What the panel is set to."""
     believed: RisCode
     """What the agent holds it to be: it knows the delay, but not that a message was lost."""
-    waiting: tuple[tuple[RisCode, bool], ...] = ()
-    """Codes on their way, oldest first, and whether each will arrive."""
+    waiting: tuple[tuple[RisCode, RisCode | None], ...] = ()
+    """Codes on their way, oldest first, and what will arrive of each; None if nothing will."""
 
 
 def open_link(spec: RisSpec) -> Link:
@@ -27,14 +27,24 @@ def open_link(spec: RisSpec) -> Link:
     return Link(start, start)
 
 
-def send_code(link: Link, code: RisCode, control: ControlSection, *, rng: np.random.Generator) -> Link:
-    """The link one cycle later, after `code` was sent."""
+def send_code(
+    link: Link, code: RisCode, control: ControlSection, *, rng: np.random.Generator, bit_flip: float = 0.0
+) -> Link:
+    """The link one cycle later, after `code` was sent over a link that turns bits over with a probability."""
     arrives = bool(rng.random() >= control.loss_probability)
-    waiting = (*link.waiting, (quantise(code, control.levels), arrives))
+    sent = quantise(code, control.levels)
+    heard = _damaged(sent, control.levels or code.levels, bit_flip, rng=rng) if bit_flip else sent
+    waiting = (*link.waiting, (sent, heard if arrives else None))
     if len(waiting) <= control.delay_cycles:
         return link._replace(waiting=waiting)
     (due, came), *rest = waiting
-    return Link(due if came else link.applied, due, tuple(rest))
+    return Link(link.applied if came is None else came, due, tuple(rest))
+
+
+def _damaged(code: RisCode, levels: int, bit_flip: float, *, rng: np.random.Generator) -> RisCode:
+    """What arrives of a code whose message names `levels` levels."""
+    step = code.levels // levels
+    return RisCode(flip_bits(RisCode(code.index // step, levels), bit_flip, rng=rng).index * step, code.levels)
 
 
 def quantise(code: RisCode, levels: int | None) -> RisCode:
@@ -51,14 +61,17 @@ def message_seconds(spec: RisSpec, control: ControlSection) -> float:
     return bits / control.rate_bits_s
 
 
-def check_control(spec: RisSpec, control: ControlSection) -> None:
+def check_control(spec: RisSpec, control: ControlSection, bit_flip: float = 0.0) -> None:
     """Check the message against the panel.
 
     Raises
     ------
     ConfigError
-        The message's levels do not divide the panel's.
+        The message's levels do not divide the panel's; or bits are turned over and its levels are no power of two.
     """
+    levels = control.levels or spec.levels
+    if bit_flip and levels & (levels - 1):
+        raise ConfigError(f"panel.bit_flip: {bit_flip:g} received with {levels} levels; bits need a power of two")
     if control.levels is not None and spec.levels % control.levels:
         raise ConfigError(
             f"control.levels: {control.levels} received; give a divisor of the panel's {spec.levels} levels"

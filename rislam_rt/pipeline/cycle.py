@@ -13,9 +13,9 @@ import numpy as np
 from rislam_rt.measurement import measure
 from rislam_rt.model import Measurement, Paths, PathTruth, RisCode, RisLegs, RisSpec, SlamEstimate, Trajectory
 from rislam_rt.pipeline.control import Link, message_seconds, send_code
-from rislam_rt.pipeline.spec import ControlSection, Settings
-from rislam_rt.ris import rephase
-from rislam_rt.slam import estimate, predict, step
+from rislam_rt.pipeline.estimators import Estimator
+from rislam_rt.pipeline.spec import PipelineSpec, Settings
+from rislam_rt.ris import PanelErrors, rephase
 
 
 class Rng(NamedTuple):
@@ -32,6 +32,8 @@ class Room(NamedTuple):
 
     paths: Paths
     trajectory: Trajectory
+    faults: PanelErrors | None = None
+    """What the panel does wrong; None without a panel."""
 
     def at(self, cycle: int) -> Paths:
         """The paths of one cycle alone."""
@@ -50,6 +52,16 @@ class Agent(NamedTuple):
     state: Any
     link: Link | None
     """None without a panel."""
+
+
+class Means(NamedTuple):
+    """What leads a scheme through its cycles, the same in all of them."""
+
+    panel: RisSpec | None
+    designer: "Designer | None"
+    estimator: Estimator
+    spec: PipelineSpec
+    settings: Settings
 
 
 class Cycle(NamedTuple):
@@ -74,48 +86,41 @@ class Designer(Protocol):
         ...
 
 
-def run_cycle(
-    agent: Agent,
-    room: Room,
-    cycle: int,
-    panel: RisSpec | None,
-    designer: Designer | None,
-    settings: Settings,
-    control: ControlSection,
-    *,
-    rng: Rng,
-) -> tuple[Agent, Cycle]:
+def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -> tuple[Agent, Cycle]:
     """One cycle of one scheme."""
-    motion = room.trajectory
+    motion, control, estimator = room.trajectory, means.spec.control, means.estimator
+    config = estimator.config(means.settings)
     dt = float(motion.time[cycle] - motion.time[cycle - 1]) if cycle else 0.0
     heading = float(motion.heading[cycle])
     clock = [perf_counter()]
 
     link, sent = agent.link, None
-    if link is not None and designer is not None:
+    if link is not None and means.designer is not None:
         ahead = dt + control.delay_cycles * _nominal_step(motion)
-        sent = designer(predict(agent.state, ahead, settings.slam), cycle, rng=rng.design)
+        sent = means.designer(estimator.predict(agent.state, ahead, config), cycle, rng=rng.design)
     clock.append(perf_counter())
 
     air = 0.0
-    if link is not None and sent is not None and panel is not None:
-        link = send_code(link, sent, control, rng=rng.control)
-        air = message_seconds(panel, control)
+    if link is not None and sent is not None and means.panel is not None:
+        link = send_code(link, sent, control, rng=rng.control, bit_flip=means.spec.panel.bit_flip)
+        air = message_seconds(means.panel, control)
     clock.append(perf_counter())
 
-    paths = room.at(cycle)
+    paths, applied = room.at(cycle), None
     if link is not None:
-        paths = rephase(paths, link.applied)
-    measurement, truth = measure(paths, 0, heading, settings.radio, settings.receiver, rng=rng.noise)
+        applied = link.applied if room.faults is None else room.faults.settle(link.applied)
+        paths = rephase(paths, applied, 1.0 if room.faults is None else room.faults.weight)
+    measurement, truth = measure(
+        paths, 0, heading, means.settings.radio, means.settings.receiver, rng=rng.noise
+    )  # fmt: skip
     clock.append(perf_counter())
 
     believed = link.believed if link is not None else None
-    state, info = step(agent.state, measurement, believed, dt, heading, settings.slam, rng=rng.filter)
-    belief = estimate(state, settings.slam)
+    state, info = estimator.step(agent.state, measurement, believed, dt, heading, config, rng=rng.filter)
+    belief = estimator.estimate(state, config)
     clock.append(perf_counter())
 
     optimise, communicate, acquire, localise = np.diff(clock)
-    applied = link.applied if link is not None else None
     outcome = Cycle(
         belief, info, measurement, truth, paths.gain[0], sent, applied,
         (optimise, communicate + air, acquire, localise),

@@ -1,7 +1,7 @@
 """A run: trace the room once, then lead every scheme through all cycles under the same noise."""
 
 import platform
-from collections.abc import Callable, MutableMapping
+from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from time import perf_counter
@@ -23,12 +23,15 @@ from rislam_rt.model import (
 )
 from rislam_rt.pipeline.choose import build_designer
 from rislam_rt.pipeline.control import check_control, open_link
-from rislam_rt.pipeline.cycle import Agent, Cycle, Rng, Room, run_cycle
+from rislam_rt.pipeline.cycle import Agent, Cycle, Means, Rng, Room, run_cycle
+from rislam_rt.pipeline.estimators import ESTIMATORS
+from rislam_rt.pipeline.motion import draw_motion
 from rislam_rt.pipeline.record import gather
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.spec import PipelineSpec, Settings, build_settings
+from rislam_rt.pipeline.spec import PipelineSpec, Settings, build_radio, build_settings
 from rislam_rt.pipeline.workers import run_side_by_side
-from rislam_rt.slam import StartPrior, init
+from rislam_rt.ris import delay_spread_warnings, draw_panel
+from rislam_rt.slam import StartPrior
 
 Progress = Callable[[str, int, int], None]
 """Told the stage (`trace` or a scheme), how much of it is done, and how much there is."""
@@ -38,13 +41,47 @@ LIBRARIES = ("numpy", "scipy", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-c
 
 
 class Seeds(NamedTuple):
-    """Every scheme draws the same start, noise, losses and filter numbers: only its codes differ."""
+    """Every scheme draws the same motion, start, noise, losses and filter numbers: only its codes differ."""
 
     start: np.random.SeedSequence
     noise: np.random.SeedSequence
     control: np.random.SeedSequence
     filter: np.random.SeedSequence
     design: np.random.SeedSequence
+    motion: np.random.SeedSequence
+    panel: np.random.SeedSequence
+
+
+class Stage(NamedTuple):
+    """What all schemes of a run share."""
+
+    scene: Scene
+    """With the true motion of this run."""
+    paths: Paths
+    """Panel at level 0."""
+    seeds: Seeds
+    seconds: float
+    """Time [s] that the channel took."""
+
+
+def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> Stage:
+    """Draw the true motion and find all paths along it. None of it depends on the noise, so that one stage serves many.
+
+    Raises
+    ------
+    ConfigError
+        Scene and specification do not fit (see `check_run`).
+    TraceError, SetupError
+        The traced channel failed, or the machine lacks what it needs.
+    """
+    check_run(scene, spec)
+    seeds = Seeds(*rng.bit_generator.seed_seq.spawn(len(Seeds._fields)))  # type: ignore[attr-defined]
+    scene = cut_scene(scene, spec.cycles)
+    motion = draw_motion(scene, spec.motion.sigma_a_m_s2, rng=np.random.default_rng(seeds.motion))
+    scene = replace(scene, agent=motion)
+    begin = perf_counter()
+    paths = build_channel(spec.channel, scene, build_radio(spec.radio), spec.depth).paths(motion)
+    return Stage(scene, paths, seeds, perf_counter() - begin)
 
 
 def run_slam(
@@ -76,53 +113,57 @@ def run_slam(
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
-    check_run(scene, spec)
-    settings = build_settings(spec)
-    scene = cut_scene(scene, spec.cycles)
     done = {} if done is None else done
     tell = progress or (lambda stage, at, total: None)
-    seeds = Seeds(*rng.bit_generator.seed_seq.spawn(len(Seeds._fields)))  # type: ignore[attr-defined]
-
     tell("trace", 0, 1)
-    begin = perf_counter()
-    paths = build_channel(spec.channel, scene, settings.radio, spec.depth).paths(scene.agent)
-    seconds = {"trace": perf_counter() - begin}
+    stage = set_stage(scene, spec, rng=rng)
     tell("trace", 1, 1)
     todo = [name for name in spec.schemes if name not in done]
-    for name, scheme in run_side_by_side(run_scheme, todo, (scene, paths, spec, seeds), jobs, tell):
+    for name, scheme in run_side_by_side(run_scheme, todo, (stage, spec), jobs, tell):
         if isinstance(scheme, RislamError):
             raise scheme
         done[name] = scheme
+    return result_of(stage, spec, {name: done[name] for name in spec.schemes}, seed=_seed_of(rng))
+
+
+def result_of(stage: Stage, spec: PipelineSpec, schemes: Mapping[str, SchemeResult], *, seed: int | None) -> SlamResult:
+    """Schemes that ran on one stage, as a run."""
     return SlamResult(
         name=spec.name,
-        scene=scene,
-        paths=replace(paths, ris=None),
-        schemes={name: done[name] for name in spec.schemes},
+        scene=stage.scene,
+        paths=replace(stage.paths, ris=None),
+        schemes=schemes,
         config=spec.model_dump(mode="json"),
-        seed=_seed_of(rng),
+        seed=seed,
         versions=library_versions(),
-        seconds=seconds,
+        seconds={"trace": stage.seconds},
+        warnings=panel_warnings(stage.scene, spec),
     )
 
 
-def run_scheme(name: str, scene: Scene, paths: Paths, spec: PipelineSpec, seeds: Seeds, tell: Progress) -> SchemeResult:
+def run_scheme(name: str, stage: Stage, spec: PipelineSpec, tell: Progress) -> SchemeResult:
     """One scheme over all cycles."""
-    settings = build_settings(spec)
-    scheme, motion = SCHEMES[name], scene.agent
-    panel = scene.ris.spec if scene.ris is not None and scheme.method is not None else None
-    room = Room(paths if panel is not None else without_panel(paths), motion)
-    designer = build_designer(scheme, panel, room, spec, settings) if panel is not None else None
+    settings, scheme, seeds = build_settings(spec), SCHEMES[name], stage.seeds
+    motion, ris = stage.scene.agent, stage.scene.ris
+    panel = ris.spec if ris is not None and scheme.panel else None
+    room = Room(without_panel(stage.paths), motion)
+    designer = None
+    if panel is not None:
+        tolerance = spec.panel.tolerance
+        room = Room(stage.paths, motion, draw_panel(panel, tolerance, rng=np.random.default_rng(seeds.panel)))
+        designer = build_designer(scheme, panel, room, spec, settings)
+    estimator = ESTIMATORS[scheme.estimator]
+    means = Means(panel, designer, estimator, spec, settings)
     filter_rng, design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
-    state = init(
-        _start(motion, spec, seeds, settings), motion.body, panel, settings.radio, settings.slam, rng=filter_rng
-    )
+    start, config = _start(motion, spec, seeds, settings), estimator.config(settings)
+    state = estimator.init(start, motion.body, panel, settings.radio, config, rng=filter_rng)
     agent = Agent(state, open_link(panel) if panel is not None else None)
     noise, control = (_children(s, len(motion)) for s in (seeds.noise, seeds.control))
     cycles: list[Cycle] = []
     tell(name, 0, len(motion))
     for cycle in range(len(motion)):
         rng = Rng(design_rng, control[cycle], noise[cycle], filter_rng)
-        agent, outcome = run_cycle(agent, room, cycle, panel, designer, settings, spec.control, rng=rng)
+        agent, outcome = run_cycle(agent, room, cycle, means, rng=rng)
         cycles.append(outcome)
         tell(name, cycle + 1, len(motion))
     return gather(name, cycles, panel.levels if panel is not None else 0)
@@ -144,11 +185,11 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     if abs(total - step) > 1e-9:
         raise ConfigError(f"budget: the four steps sum to {total:g} s; make them the scene's cycle of {step:g} s")
     if scene.ris is None:
-        need = [name for name in spec.schemes if SCHEMES[name].method is not None]
+        need = [name for name in spec.schemes if SCHEMES[name].panel]
         if need:
             raise ConfigError(f"schemes: '{need[0]}' needs a panel and scene '{scene.name}' has none; give 'no_ris'")
     else:
-        check_control(scene.ris.spec, spec.control)
+        check_control(scene.ris.spec, spec.control, spec.panel.bit_flip)
 
 
 def prepare_channel(kind: str) -> None:
@@ -183,6 +224,18 @@ def without_panel(paths: Paths) -> Paths:
     """The paths of a plain wall where the panel hangs: identities stay, panel paths are never there."""
     panel = np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS))
     return replace(paths, valid=paths.valid & ~panel, gain=np.where(panel, 0.0, paths.gain), ris=None)
+
+
+def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
+    """Where the panel's formulas leave their range along the true motion; one line each, empty if nowhere.
+
+    Gains are element by element, so that the far field's limit binds nothing; a path over the panel is one delay, which
+    a panel larger than the band resolves would not be.
+    """
+    if scene.ris is None or not any(SCHEMES[name].panel for name in spec.schemes):
+        return ()
+    bandwidth = spec.radio.bandwidth_ghz * 1e9
+    return delay_spread_warnings(scene.ris.spec, scene.ris.center, scene.agent.tx, scene.agent.rx, bandwidth)
 
 
 def library_versions() -> dict[str, str]:

@@ -10,13 +10,16 @@ from rislam_rt.design import DESIGNERS, DesignConfig
 from rislam_rt.measurement import ReceiverConfig, with_reference_snr
 from rislam_rt.model import RadioConfig, RxArray
 from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.ris import PanelTolerance
 from rislam_rt.slam import SlamConfig
+from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=64)]
 Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, le=1e12, allow_inf_nan=False)]
 Decibel = Annotated[float, Field(ge=-300.0, le=300.0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
+Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Section(BaseModel):
@@ -33,11 +36,16 @@ def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()
 
 _Filter = _section("_Filter", SlamConfig, "Fields of `SlamConfig`.")
 _Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.")
+_BpSlam = _section("_BpSlam", BpSlamConfig, "Fields of `BpSlamConfig`.")
 _Designers = _section("_Designers", DesignConfig, "Fields of `DesignConfig`.", without=("certify",))
 
 
 class SlamSection(_Filter):  # type: ignore[misc, valid-type]
     """The filter's settings, SI units."""
+
+
+class BpSlamSection(_BpSlam):  # type: ignore[misc, valid-type]
+    """Settings of the scheme `bp_slam`, SI units."""
 
 
 class ReceiverSection(_Receiver):  # type: ignore[misc, valid-type]
@@ -112,7 +120,7 @@ class ControlSection(Section):
     levels: Annotated[int, Field(ge=2, le=65536)] | None = None
     """Phase levels that the message can name, a divisor of the panel's; all of them by default."""
     rate_bits_s: Positive = 1e6
-    loss_probability: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    loss_probability: Probability = 0.0
     """Probability that a message is lost; the panel then keeps its code and the agent does not know."""
     delay_cycles: Annotated[int, Field(ge=0, le=1000)] = 0
     """Cycles from sending to effect, known to the agent."""
@@ -123,6 +131,33 @@ class StartSection(Section):
 
     position_std_m: NotNegative = 0.01
     velocity_std_m_s: NotNegative = 0.01
+
+
+class MotionSection(Section):
+    """How the true motion departs from the scene's trajectory."""
+
+    sigma_a_m_s2: NotNegative = 0.0
+    """White acceleration in the horizontal plane, drawn anew for every seed (see `pipeline.motion`); 0 leaves the
+    trajectory as it is. Estimators whose own `sigma_a` is not given are told this one."""
+
+
+class PanelSection(Section):
+    """What the real panel does wrong; the agent knows nothing of it."""
+
+    amplitude_std: NotNegative = 0.0
+    """Of an element's amplitude, relative."""
+    phase_std_deg: NotNegative = 0.0
+    dead: Probability = 0.0
+    """Probability that an element reflects nothing."""
+    stuck: Probability = 0.0
+    """Probability that an element stays at a level of its own."""
+    bit_flip: Probability = 0.0
+    """Probability that a bit of a message arrives turned over."""
+
+    @property
+    def tolerance(self) -> PanelTolerance:
+        """In radians."""
+        return PanelTolerance(self.amplitude_std, float(np.radians(self.phase_std_deg)), self.dead, self.stuck)
 
 
 class PipelineSpec(Section):
@@ -145,14 +180,46 @@ class PipelineSpec(Section):
     design: DesignSection = DesignSection()
     budget: BudgetSection = BudgetSection()
     control: ControlSection = ControlSection()
+    panel: PanelSection = PanelSection()
+    motion: MotionSection = MotionSection()
     start: StartSection = StartSection()
     slam: SlamSection = SlamSection()
+    bp_slam: BpSlamSection = BpSlamSection()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _tell_all_estimators(cls, content: Any) -> Any:
+        """What no file says of one estimator is as for the others: process noise and what is known of the height."""
+        return share_settings(content) if isinstance(content, dict) else content
 
     @model_validator(mode="after")
     def _each_scheme_once(self) -> "PipelineSpec":
         if len(set(self.schemes)) < len(self.schemes):
             raise ValueError("schemes: each at most once")
         return self
+
+
+ESTIMATOR_SECTIONS = ("bp_slam",)
+"""Sections of the estimators that are not the project's own."""
+
+
+def share_settings(content: dict[str, Any]) -> dict[str, Any]:
+    """The content of a file with `sigma_a` and `height` handed on to every estimator that is not told its own.
+
+    The motion's acceleration goes to the filter, and the filter's to the others. What is not a table is left for the
+    validation to complain about.
+    """
+    motion, slam = content.get("motion", {}), content.get("slam", {})
+    if not isinstance(motion, dict) or not isinstance(slam, dict):
+        return content
+    told = {"sigma_a": motion.get("sigma_a_m_s2") or _Filter.model_fields["sigma_a"].default}
+    slam = {**told, **slam}
+    shared = {"sigma_a": slam["sigma_a"], "height": slam.get("height", _Filter.model_fields["height"].default)}
+    found = {**content, "slam": slam}
+    for name in ESTIMATOR_SECTIONS:
+        section = content.get(name, {})
+        found[name] = {**shared, **section} if isinstance(section, dict) else section
+    return found
 
 
 class Settings(NamedTuple):
@@ -162,6 +229,7 @@ class Settings(NamedTuple):
     receiver: ReceiverConfig
     slam: SlamConfig
     design: DesignConfig
+    bp_slam: BpSlamConfig
 
 
 def build_settings(spec: PipelineSpec) -> Settings:
@@ -177,6 +245,7 @@ def build_settings(spec: PipelineSpec) -> Settings:
         ReceiverConfig(**spec.receiver.model_dump()),
         SlamConfig(**spec.slam.model_dump()),
         build_design(spec.design),
+        BpSlamConfig(**spec.bp_slam.model_dump()),
     )
 
 

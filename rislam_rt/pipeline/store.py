@@ -153,6 +153,7 @@ def write_exports(result: SlamResult, summary: dict[str, Any], folder: Path) -> 
         "schemes": list(result.schemes),
         "versions": dict(result.versions),
         "seconds": dict(result.seconds),
+        "warnings": list(result.warnings),
         "config": dict(result.config),
     }
     write_atomic(folder / SUMMARY_FILE, _json(summary))
@@ -193,6 +194,7 @@ def read_run(folder: Path) -> SlamResult:
             seed=about["seed"],
             versions=about["versions"],
             seconds=about["seconds"],
+            warnings=tuple(about["warnings"]),
         )
     except StoreError:
         raise

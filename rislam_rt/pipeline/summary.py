@@ -8,8 +8,18 @@ from scipy.optimize import linear_sum_assignment
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.walls import Walls, build_walls
-from rislam_rt.evaluate import association_score, match_points, normalised_squares, position_errors, trajectory_error
+from rislam_rt.evaluate import (
+    association_score,
+    gospa,
+    match_points,
+    normalised_squares,
+    position_errors,
+    root_mean_square,
+    trajectory_error,
+)
 from rislam_rt.model import NOTHING, STEPS, MapEstimate, PathKind, Paths, Scene, SchemeResult, SlamResult
+from rislam_rt.pipeline.bound import scheme_bound
+from rislam_rt.pipeline.schemes import SCHEMES
 
 DIVERGED = 0.5
 """Position error [m] that no run may ever reach: far above any bound here, a fraction of the room."""
@@ -37,6 +47,7 @@ def summarise(result: SlamResult) -> dict[str, Any]:
         "scene": result.scene.name,
         "source": result.paths.source,
         "trace_seconds": result.seconds.get("trace", 0.0),
+        "warnings": list(result.warnings),
         "schemes": {name: summarise_scheme(result, scheme) for name, scheme in result.schemes.items()},
     }
 
@@ -45,6 +56,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     """The scores of one scheme."""
     scene, truth = result.scene, result.scene.agent.position
     errors = position_errors(scheme.position, truth)
+    rmse, bound = root_mean_square(errors), bound_rmse(result, scheme)
     motion = trajectory_error(scheme.position, truth) if len(truth) > 1 else None
     axes = np.flatnonzero(np.einsum("kii->ki", scheme.covariance[:, :3, :3]).min(axis=0) > 0.0)
     nees = None
@@ -55,7 +67,9 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     largest = float(errors.max())
     seconds = dict(zip(STEPS, scheme.seconds.mean(axis=0).tolist(), strict=True))
     return {
-        "rmse_m": float(np.sqrt(np.mean(errors**2))),
+        "rmse_m": rmse,
+        "bound_m": bound,
+        "over_bound": rmse / bound if bound else None,
         "final_m": float(errors[-1]),
         "largest_m": largest,
         "rmse_aligned_m": motion.rmse_aligned if motion else None,
@@ -64,11 +78,27 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "outcomes": {name: scheme.outcome.count(name) for name in sorted(set(scheme.outcome))},
         "landmarks": landmark_scores(scene, scheme),
         "walls": wall_scores(scene, scheme.map),
+        "map": map_score(scene, scheme.map),
         "association": {"accuracy": score.accuracy, "precision": score.precision, "recall": score.recall},
         "step_seconds": seconds,
         "over_budget": over_budget(seconds, result.config["budget"]),
         "seconds": float(scheme.seconds.sum()),
     }
+
+
+def bound_rmse(result: SlamResult, scheme: SchemeResult) -> float | None:
+    """Root mean square over the cycles of the posterior bound [m]; None where the scheme's name says nothing."""
+    if scheme.scheme not in SCHEMES:
+        return None
+    return root_mean_square(scheme_bound(result.scene, result.paths, scheme.gain, scheme.scheme, result.config))
+
+
+def map_score(scene: Scene, estimate: MapEstimate) -> dict[str, Any]:
+    """GOSPA of the last map's points (images left out) against all landmarks, cut off at `NEAR_LANDMARK`, order 2."""
+    points = estimate.position[estimate.parent < 0]
+    found = gospa(points, scene.landmark_positions, cutoff=NEAR_LANDMARK)
+    names = ("gospa_m", "localisation_m", "missed", "false")
+    return dict(zip(names, found, strict=True))
 
 
 def over_budget(seconds: Mapping[str, float], budget: Mapping[str, float]) -> list[str]:

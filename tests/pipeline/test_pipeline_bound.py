@@ -1,0 +1,115 @@
+"""The bound that a run is held against: the benchmark's own figures, what may lower it, and what must not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.information import MotionPrior, build_landmark_model, posterior_bound
+from rislam_rt.information.landmarks import Rows
+from rislam_rt.model import PathKind
+from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline.bound import fewer_rows, heard_paths, scheme_bound
+from rislam_rt.pipeline.run import set_stage, without_panel
+from rislam_rt.pipeline.spec import build_settings
+from rislam_rt.pipeline.summary import map_score, summarise
+
+PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
+SHORT = ["channel=image_source", "cycles=40", "depth=1"]
+SEEN = "radio.reference_snr_db=60.0"
+"""At which even a panel at level 0 throughout is heard."""
+
+
+@pytest.fixture(scope="module")
+def stage(room):
+    return set_stage(room, load_spec(PIPELINE, SHORT), rng=np.random.default_rng(1))
+
+
+def bound(stage, scheme, *settings, gain=None):
+    config = load_spec(PIPELINE, [*SHORT, *settings]).model_dump(mode="json")
+    return scheme_bound(stage.scene, stage.paths, stage.paths.gain if gain is None else gain, scheme, config)
+
+
+def test_it_is_the_recursion_over_all_paths_that_are_heard(stage):
+    """The same without dropping columns or rows, where nothing is out of the array's sight or too late."""
+    settings = build_settings(load_spec(PIPELINE, SHORT))
+    walls, motion = build_walls(stage.scene), stage.scene.agent
+    gain = np.where(stage.paths.arrival[..., 2] >= 0.0, stage.paths.gain, 0.0)
+    model = build_landmark_model(
+        stage.paths.with_gain(gain), motion, stage.scene.landmark_positions, walls.normal, walls.offset, settings.radio
+    )
+    expected = posterior_bound(model.rows(10.0), motion.time, MotionPrior(), model.prior_std()).rms
+    np.testing.assert_allclose(bound(stage, "random"), expected, rtol=1e-6)
+
+
+def test_without_signals_it_is_the_start_carried_on(stage):
+    """No path is heard: variance `s_x^2 + t^2 s_v^2` an axis and the noise of the motion, which adds to it."""
+    found = bound(stage, "random", "radio.reference_snr_db=-200.0", "slam.sigma_a=1e-9")
+    time = stage.scene.agent.time
+    np.testing.assert_allclose(found, np.sqrt(2.0) * 0.01 * np.hypot(1.0, time), rtol=1e-6)
+
+
+def test_less_noise_and_more_signals_lower_it(stage):
+    loud, quiet = (bound(stage, "random", f"radio.reference_snr_db={snr}")[-1] for snr in (30.0, 0.0))
+    assert loud < quiet
+    plain = without_panel(stage.paths).gain
+    assert bound(stage, "random", SEEN)[-1] < bound(stage, "no_ris", SEEN, gain=plain)[-1]
+
+
+def test_delays_alone_and_images_apart_know_less(stage):
+    less, more = bound(stage, "bp_slam", SEEN), bound(stage, "random", SEEN)
+    # covariances of 100 m^2 beforehand beside information of 1e8 / m^2: rounding leaves some 1e-6 of a value
+    assert (less >= more * (1.0 - 1e-5)).all()
+    assert less[-1] > more[-1]
+
+
+def test_what_the_receiver_does_not_report_does_not_count(stage):
+    settings = build_settings(load_spec(PIPELINE, [*SHORT, "receiver.max_delay=25e-9"]))
+    heard = heard_paths(stage.paths, settings, 10.0, use_vt=True)
+    shown = heard.gain != 0.0
+    assert 0 < shown.sum() < stage.paths.valid.sum()
+    assert (heard.tau[shown] <= 25e-9).all()
+    assert (heard.arrival[shown][:, 2] >= 0.0).all()
+    assert (heard.kind != PathKind.LOS).all()
+    assert (heard_paths(stage.paths, settings, 10.0, use_vt=False).kind != PathKind.VT).all()
+
+
+def test_fewer_rows_hold_the_same_information():
+    rng = np.random.default_rng(2)
+    rows = Rows(rng.standard_normal((50, 3)), rng.standard_normal((50, 4)), rng.uniform(0.1, 2.0, 50))
+    short = fewer_rows(rows)
+    assert len(short.information) == 7
+    for first, second in ((rows, short), (rows, fewer_rows(short))):
+        matrices = [
+            (m := np.concatenate([r.agent, r.unknown], axis=1)).T @ (r.information[:, None] * m)
+            for r in (first, second)
+        ]
+        np.testing.assert_allclose(*matrices, atol=1e-12)
+
+
+def test_summary_holds_the_bound_and_the_map_score(short_result):
+    for name, scheme in summarise(short_result)["schemes"].items():
+        own = scheme_bound(
+            short_result.scene, short_result.paths, short_result.schemes[name].gain, name, short_result.config
+        )
+        assert scheme["bound_m"] == pytest.approx(np.sqrt(np.mean(own**2)))
+        assert scheme["over_bound"] == pytest.approx(scheme["rmse_m"] / scheme["bound_m"])
+        assert set(scheme["map"]) == {"gospa_m", "localisation_m", "missed", "false"}
+
+
+def test_map_score_counts_points_and_not_images(room, short_result):
+    """Nothing was found in so short a run: each of two landmarks is missed and costs half the squared cut-off."""
+    from dataclasses import replace
+
+    from rislam_rt.model.estimate import MapEstimate, empty_map
+
+    assert map_score(room, empty_map()) == {"gospa_m": 1.0, "localisation_m": 0.0, "missed": 2, "false": 0}
+    points = np.vstack([room.landmark_positions + np.array([0.0, 0.3, 0.0]), [[9.0, 9.0, 9.0]]])
+    found = MapEstimate(
+        np.arange(3), points, np.zeros((3, 3, 3)), np.array([-1, -1, 0]), np.zeros(3), np.zeros(3),
+        np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2)),
+    )  # fmt: skip
+    assert map_score(room, found)["gospa_m"] == pytest.approx(np.sqrt(2 * 0.3**2))
+    ghost = replace(found, parent=np.array([-1, -1, -1]))
+    assert map_score(room, ghost)["false"] == 1
