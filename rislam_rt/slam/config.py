@@ -6,8 +6,9 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, freeze
 from rislam_rt.errors import ConfigError
+from rislam_rt.slam.nested.config import ENGINES, WEIGHTINGS
 
-FILTERS = ("rao_blackwellised",)
+FILTERS = ("rao_blackwellised", "nested")
 """Filters with the same inputs and outputs."""
 
 
@@ -54,16 +55,28 @@ class SlamConfig:
     """Fraction of the particles that the effective sample size must not fall below."""
     num_samples: int = 32
     """Positions handed to the phase design."""
+    agent_particles: int = 2000
+    """Agent particles of the nested filter, the most of them while it is adaptive."""
+    landmark_particles: int = 6000
+    """Its landmark particles, of every landmark for each agent particle; also the most of them."""
+    adaptive: bool = True
+    """Whether the nested filter takes only as many particles as the spread of its belief needs."""
+    weighting: str = "crlb"
+    """How amplitudes count in the nested filter: `crlb`, `power`, or `paper`."""
+    machine: str = "auto"
+    """Where the nested filter runs: `drjit`, `numpy`, or `auto` for Dr.Jit if it can."""
 
     def __post_init__(self) -> None:
         for name, value, allowed in (
             ("filter", self.filter, FILTERS),
             ("heading", self.heading, ("known", "velocity", "estimated")),
             ("height", self.height, ("known", "estimated")),
+            ("weighting", self.weighting, WEIGHTINGS),
+            ("machine", self.machine, ENGINES),
         ):
             if value not in allowed:
                 raise ConfigError(f"slam.{name}: '{value}' received; give one of {', '.join(allowed)}")
-        for name in ("num_particles", "birth_cycles", "window", "num_samples"):
+        for name in ("num_particles", "birth_cycles", "window", "num_samples", "agent_particles", "landmark_particles"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"slam.{name}: {getattr(self, name)} received; give at least 1")
         if self.window < self.birth_cycles:

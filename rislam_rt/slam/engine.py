@@ -10,6 +10,7 @@ from rislam_rt.slam import gaussian
 from rislam_rt.slam.birth import Birth
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.moments import Moments
+from rislam_rt.slam.nested import operations as nested
 from rislam_rt.slam.returns import Returns
 
 
@@ -80,7 +81,7 @@ class Engine(Protocol):
         """Effective number of agent particles."""
 
 
-ENGINES: dict[str, Engine] = {"rao_blackwellised": gaussian}
+ENGINES: dict[str, Engine] = {"rao_blackwellised": gaussian, "nested": nested}
 """By the name of `SlamConfig.filter`."""
 
 
