@@ -39,7 +39,7 @@ def crew_there(address: str, limit: float | None) -> Iterator[tuple[Run, int]]:
 
     def run(tasks: Iterable[tuple[str, Task]]) -> Iterator[tuple[str, Outcome]]:
         futures = {client.submit(do_cell, task, limit, key=f"cell-{name}"): name for name, task in tasks}
-        for future in distributed.as_completed(futures):
+        for future in distributed.as_completed(futures, loop=client.loop):
             yield futures[future], _outcome(future, address)
             future.release()
 

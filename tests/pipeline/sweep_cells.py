@@ -1,0 +1,64 @@
+"""Cheap cells for the tests of the sweep engine; workers import this module by name."""
+
+import ctypes
+import os
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+
+def draw(settings, seed):
+    """A few numbers from the seed, some linear algebra (whose bits depend on the threads), and the clock apart."""
+    time.sleep(settings.get("sleep", 0.0))
+    x = np.random.default_rng(seed).standard_normal((60, 60))
+    return {
+        "offset": settings["x"] + settings["deep"]["y"],
+        "norm": np.linalg.norm(x @ x @ x),
+        "first": x[0, :3],
+        "words": sorted({"b", "a", settings["word"]}, key=hash),
+        "nan": float("nan"),
+        "timing": {"now": time.time()},
+    }
+
+
+def misbehave(settings, seed):
+    """One cell of each kind of trouble."""
+    kind = settings["kind"]
+    if kind == "abort":
+        os.abort()
+    if kind == "segfault":
+        ctypes.string_at(0)
+    if kind == "leave":
+        os._exit(0)
+    if kind == "exit":
+        sys.exit("gone")
+    if kind == "hang":
+        time.sleep(1e6)
+    if kind == "raise":
+        raise ValueError("no\nsuch luck")
+    if kind == "object":
+        return {"x": object()}
+    if kind == "list":
+        return [1]
+    print("a cell that talks")
+    return {"ok": True}
+
+
+def count(settings, seed):
+    """Leave a mark each time that the cell runs; killed from outside the first time, if asked to be."""
+    with Path(settings["marks"], str(settings["x"])).open("a") as file:
+        file.write("x")
+    if settings.get("blow") and Path(settings["marks"], str(settings["x"])).stat().st_size == 1:
+        os.kill(os.getpid(), 9)
+    return {"x": settings["x"]}
+
+
+if __name__ == "__main__":
+    # A sweep in a process of its own, for tests that kill it: FOLDER JOBS
+    from rislam_rt.pipeline.sweeps import Axis, Effort, Sweep, run_sweep
+
+    axes = (Axis("x", tuple(range(6))), Axis("word", ("one", "two")))
+    sweep = Sweep("sweep_cells:draw", axes, {"deep": {"y": 1}, "sleep": 0.05}, 2, paired=("word",))
+    run_sweep(sweep, Path(sys.argv[1]), Effort(jobs=int(sys.argv[2])), tell=lambda told: print(told.done, flush=True))
