@@ -37,6 +37,9 @@ def angle_between(a: Floats, b: Floats) -> Floats:
 def rotation_z(heading: Floats) -> Floats:
     """Rotation matrices (..., 3, 3) about z: body frame (x forward) to room frame."""
     heading = np.asarray(heading, dtype=np.float64)
-    c, s = np.cos(heading), np.sin(heading)
-    zero, one = np.zeros_like(c), np.ones_like(c)
-    return np.stack([np.stack([c, -s, zero], -1), np.stack([s, c, zero], -1), np.stack([zero, zero, one], -1)], -2)
+    rotation = np.zeros((*heading.shape, 3, 3))
+    rotation[..., 0, 0] = rotation[..., 1, 1] = np.cos(heading)
+    rotation[..., 1, 0] = np.sin(heading)
+    rotation[..., 0, 1] = -rotation[..., 1, 0]
+    rotation[..., 2, 2] = 1.0
+    return rotation

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Body
 from rislam_rt.slam.associate import inverse_3x3
@@ -24,7 +24,7 @@ from rislam_rt.slam.hypotheses import (
     fit_reciprocal,
     plausible,
 )
-from rislam_rt.slam.match import Outlook, explained
+from rislam_rt.slam.match import Outlook, explained, hidden_tracks
 from rislam_rt.slam.moments import Moments, poses_of, square_root
 from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe
 from rislam_rt.slam.tracks import Tracks
@@ -119,7 +119,6 @@ def examine(
     moments: Moments,
     book: Book,
     outlook: Outlook,
-    hidden: Booleans,
     past: Past,
     free_space: float,
     config: SlamConfig,
@@ -128,7 +127,9 @@ def examine(
 
     Returns the row of that track (-1 without one), the tracks (some now known for moving images), and the birth.
     """
-    due = due_tracks(tracks, hidden, past.cycle, config)
+    due = due_tracks(tracks, outlook, past.cycle, config)
+    if not len(due):
+        return -1, tracks, None
     scene = Scene(moments.features, book, moments.position, outlook, config)
     moving = tracks.moving.copy()
     doubt = square_root(moments.covariance[:6, :6])
@@ -147,7 +148,7 @@ def examine(
     return -1, tracks._replace(moving=moving), None
 
 
-def due_tracks(tracks: Tracks, hidden: Booleans, cycle: int, config: SlamConfig) -> Integers:
+def due_tracks(tracks: Tracks, outlook: Outlook, cycle: int, config: SlamConfig) -> Integers:
     """Tracks to examine now, the shortest first: an image lies behind its point, and is weaker.
 
     So a track has to wait while another that is shorter and stronger is still unexplained.
@@ -155,6 +156,9 @@ def due_tracks(tracks: Tracks, hidden: Booleans, cycle: int, config: SlamConfig)
     ready = ~tracks.specular & (tracks.length >= config.birth_cycles) & (tracks.misses == 0)
     growing = tracks.length < config.window - 1
     turn = np.where(growing, tracks.length % STRIDE == 0, (np.arange(len(ready)) + cycle) % (4 * STRIDE) == 0)
+    if not (ready & turn).any():
+        return np.zeros(0, dtype=np.int64)
+    hidden = hidden_tracks(outlook, tracks, config.gate)
     alive = ~tracks.specular & ~hidden & (tracks.length >= ELDER_CYCLES) & (tracks.misses <= 1)
     length = tracks.mean[:, 0, 0]
     elder = (length[None] < length[:, None] - 0.05) & (tracks.log_amplitude[None] > tracks.log_amplitude[:, None] + 0.1)
@@ -226,14 +230,16 @@ def _points(history: History, scene: Scene) -> list[Verdict]:
 def _images(history: History, scene: Scene) -> list[Verdict]:
     """The image of each known point in a new wall on the Rx leg."""
     verdicts = []
-    for parent in scene.book.points:
-        known = scene.features[parent]
-        for kind in (IMAGE, TWIN):
-            start = first_guess(kind, known, scene.anchor, history)
-            if start is not None:
-                fit = fit_feature(kind, start, known, scene.anchor, history, 6)
-                if kind is IMAGE or _one_cell(fit, known, scene, history):
-                    verdicts.append(Verdict(kind, int(parent), fit))
+    for kind in (IMAGE, TWIN):
+        starts = [(p, first_guess(kind, scene.features[p], scene.anchor, history)) for p in scene.book.points]
+        parents = np.array([p for p, start in starts if start is not None], dtype=np.int64)
+        if not len(parents):
+            continue
+        start = np.array([start for _, start in starts if start is not None])
+        fits = fit_feature(kind, start, scene.features[parents], scene.anchor, history, 6)
+        for parent, fit in zip(parents, map(Fit._make, zip(*fits, strict=True)), strict=True):
+            if kind is IMAGE or _one_cell(fit, scene.features[parent], scene, history):
+                verdicts.append(Verdict(kind, int(parent), fit))
     return verdicts
 
 

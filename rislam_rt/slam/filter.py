@@ -169,7 +169,8 @@ def _correct(
     """The belief after the returns `hit` were seen as measurements `taken`."""
     partner = outlook.merger.partner[hit]
     returns = compact(outlook.expected.returns, hit)
-    twin = compact(outlook.expected.returns, np.where(partner >= 0, partner, hit))
+    paired = (partner >= 0).any()
+    twin = compact(outlook.expected.returns, np.where(partner >= 0, partner, hit)) if paired else returns
     strangers = STRANGERS[np.minimum(outlook.expected.bounces[hit], 2)]
     std = np.hypot(glance.std[taken] * strangers[:, None], outlook.merger.disturbance[hit])
     anchor, seen = state.book.anchor, glance.seen[taken]
@@ -182,9 +183,8 @@ def _tidy(
 ) -> FilterState:
     """Births and deaths: at most one track becomes a feature; features that should not be there go."""
     moments, book, particles, engine = believed(state), state.book, state.particles, engine_of(config)
-    hidden = hidden_tracks(outlook, state.tracks, config.gate)
     past = Past(*engine.trail(particles, np.arange(config.window)), state.time, state.body, state.cycle)
-    row, tracks, birth = examine(state.tracks, moments, book, outlook, hidden, past, free_space(state.radio), config)
+    row, tracks, birth = examine(state.tracks, moments, book, outlook, past, free_space(state.radio), config)
     if birth is not None:
         particles = engine.settle(particles, birth, state.body, rng=rng)
         book = birth.enter(book)

@@ -5,7 +5,7 @@ over the belief); "is a scatterer" predicts one unknown cross-section for all cy
 """
 
 import numpy as np
-from scipy.special import ive, logsumexp
+from scipy.special import ive
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.model import RadioConfig, RisCode, RisSpec
@@ -49,7 +49,7 @@ def log_panel(amplitude: Floats, std: Floats, gain: Complexes) -> Floats:
     mean = np.abs(gain)
     spread = np.hypot(std[:, None], MODEL_ERROR * mean)
     each = log_rice(amplitude[:, None], mean, spread)
-    return logsumexp(each, axis=1) - np.log(gain.shape[1])
+    return np.logaddexp.reduce(each, axis=1) - np.log(gain.shape[1])
 
 
 def log_scatterer(amplitude: Floats, std: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig) -> Floats:
@@ -60,7 +60,7 @@ def log_scatterer(amplitude: Floats, std: Floats, tx_length: Floats, rx_length: 
 
 def strength_moments(log_grid: Floats) -> tuple[Floats, Floats]:
     """Mean and standard deviation (P,) of the log strength from grids (P, G) of log likelihoods."""
-    weight = np.exp(log_grid - logsumexp(log_grid, axis=1, keepdims=True))
+    weight = np.exp(log_grid - np.logaddexp.reduce(log_grid, axis=1, keepdims=True))
     mean = weight @ STRENGTHS
     step = STRENGTHS[1] - STRENGTHS[0]
     return mean, np.sqrt(weight @ STRENGTHS**2 - mean**2 + step**2 / 12.0)
@@ -68,9 +68,9 @@ def strength_moments(log_grid: Floats) -> tuple[Floats, Floats]:
 
 def add_evidence(log_grid: Floats, log_ris: Floats, scatterer: Floats, panel: Floats) -> tuple[Floats, Floats]:
     """One cycle's amplitudes for P points: new grids (P, G), and new log odds (P,) of panel against scatterer."""
-    before = logsumexp(log_grid, axis=1)
+    before = np.logaddexp.reduce(log_grid, axis=1)
     grid = log_grid + scatterer
-    after = logsumexp(grid, axis=1)
+    after = np.logaddexp.reduce(grid, axis=1)
     ratio = np.clip(panel - (after - before), -DOUBT, DOUBT)
     return grid - after[:, None], log_ris + ratio
 
@@ -79,4 +79,4 @@ def panel_probabilities(log_ris: Floats) -> Floats:
     """Probability (P,) of each point of being the one panel; "none of these" competes with prior one point's worth."""
     if not len(log_ris):
         return np.zeros(0)
-    return np.exp(log_ris - np.logaddexp(logsumexp(log_ris), 0.0))
+    return np.exp(log_ris - np.logaddexp(np.logaddexp.reduce(log_ris), 0.0))

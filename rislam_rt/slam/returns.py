@@ -129,8 +129,12 @@ def linearise(returns: Returns, features: Floats, anchor: Floats, poses: Poses) 
     """`observe(...).seen` with its derivatives by the features (..., F, 3) and by the agent's ends."""
     image, by_feature, by_base = _leg_jacobian(returns, features, anchor, poses.tx)
     seen, by_tx, by_rx = _sight_jacobians(image, returns, poses)
-    features_jacobian = np.einsum("...ria,...rfab->...rifb", by_rx, by_feature[..., returns.rx, :, :, :])
-    features_jacobian[..., 0, :, :] += np.einsum("...ra,...rfab->...rfb", by_tx, by_feature[..., returns.tx, :, :, :])
+    # features side by side, so that one product of matrices serves all of them
+    count = by_feature.shape[-3]
+    wide = np.swapaxes(by_feature, -3, -2).reshape(*image.shape, 3 * count)
+    features_jacobian = by_rx @ wide[..., returns.rx, :, :]
+    features_jacobian[..., 0, :] += (by_tx[..., None, :] @ wide[..., returns.tx, :, :])[..., 0, :]
+    features_jacobian = features_jacobian.reshape(*features_jacobian.shape[:-1], count, 3)
     moves = np.where((returns.legs[:, 0] == TX)[:, None, None], by_base, 0.0)
     tx_jacobian = by_rx @ moves[..., returns.rx, :, :]
     own = moves[..., returns.tx, :, :] - np.eye(3)

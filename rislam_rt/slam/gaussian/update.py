@@ -78,12 +78,13 @@ def predict_returns(
     count, rows = len(position), len(returns.tx)
     jacobian = np.zeros((count, rows, 3, 7 + 3 * features.shape[1]))
     predicted = np.zeros((count, rows, 3))
-    for side in (returns, twin):
-        linear = linearise(side, features, anchor, poses)
-        predicted += 0.5 * linear.seen
-        jacobian[..., :3] += 0.5 * linear.by_pose
-        jacobian[..., 6] += 0.5 * linear.by_heading(poses, position)
-        jacobian[..., 7:] += 0.5 * linear.by_feature.reshape(count, rows, 3, -1)
+    sides = (returns,) if twin is returns else (returns, twin)
+    for side in sides:
+        linear, share = linearise(side, features, anchor, poses), 1.0 / len(sides)
+        predicted += share * linear.seen
+        jacobian[..., :3] += share * linear.by_pose
+        jacobian[..., 6] += share * linear.by_heading(poses, position)
+        jacobian[..., 7:] += share * linear.by_feature.reshape(count, rows, 3, -1)
     return predicted, jacobian.reshape(count, 3 * rows, -1)
 
 
