@@ -1,4 +1,4 @@
-"""Weights and resampling of many clouds at once, with a kernel that keeps mean and covariance of every part of a cloud."""
+"""Weights and resampling of many clouds at once, with a kernel that keeps mean and covariance of parts of a cloud."""
 
 import numpy as np
 
@@ -63,7 +63,7 @@ def smooth(clouds: Floats, width: Floats, levels: int, *, rng: np.random.Generat
     """Clouds (K, N, D), sorted into cells, with every particle moved by a kernel of its cell.
 
     Each cell is shrunk towards its mean and widened by differences of its own members, so that mean and covariance of
-    every cell stay (Liu and West, 2001, cell by cell). A ring stays a ring: one kernel for the whole cloud would fill it.
+    every cell stay (Liu and West, 2001, cell by cell). A ring stays a ring; one kernel for all of it would fill it.
 
     Parameters
     ----------

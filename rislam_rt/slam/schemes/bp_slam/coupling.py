@@ -77,7 +77,9 @@ def _met_states(gains: Floats, lean: Floats, shifts: Integers) -> Floats:
 def _agent_moments(gains: Floats, weight: Floats, lean: Floats, shifts: Integers) -> Floats:
     """Covariance (K, 2D, 2D) of the agent's scaled state under the factors of each feature."""
     count, width = lean.shape
-    products = np.concatenate([np.ones((count, 1)), lean, (lean[:, :, None] * lean[:, None]).reshape(count, -1)], axis=1)
+    products = np.concatenate(
+        [np.ones((count, 1)), lean, (lean[:, :, None] * lean[:, None]).reshape(count, -1)], axis=1
+    )
     twice = np.concatenate([products, products])
     total = np.zeros((len(gains), products.shape[1]))
     for row, shift in enumerate(shifts):

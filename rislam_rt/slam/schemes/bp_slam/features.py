@@ -144,12 +144,12 @@ def refresh(features: Features, *, rng: np.random.Generator) -> Features:
 
 def join(parts: list[Features]) -> Features:
     """All of them in one."""
-    return Features(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    return Features._make(np.concatenate(columns) for columns in zip(*parts, strict=True))
 
 
 def select(features: Features, rows: Booleans | Integers) -> Features:
     """Some of them."""
-    return Features(*(column[rows] for column in features))
+    return Features._make(column[rows] for column in features)
 
 
 def prune(features: Features, config: BpSlamConfig) -> Features:

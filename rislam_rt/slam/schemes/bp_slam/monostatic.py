@@ -66,7 +66,7 @@ def step(
     state: BpSlamState, measurement: Measurement, code: RisCode | None, dt: float, heading: float,
     config: BpSlamConfig, *, rng: np.random.Generator,
 ) -> tuple[BpSlamState, StepInfo]:  # fmt: skip
-    """Advance by one cycle: `dt` [s] since the last, `heading` [rad]. `code` is taken for the interface and not used."""
+    """Advance by one cycle: `dt` [s] since the last, `heading` [rad]. `code` is there for the interface, not used."""
     belief = predict_belief(state.belief, dt, config.sigma_a * config.axes, config, rng=rng)
     scan, kept = usable_ranges(measurement, state.body, state.radio, config)
     body = rotation_z(np.asarray(heading))

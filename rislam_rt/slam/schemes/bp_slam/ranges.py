@@ -71,7 +71,7 @@ class Bistatic(NamedTuple):
         return agent + 0.5 * (self.tx + self.rx) + radius[..., None] * direction
 
     def shell(self, length: Floats, dims: int) -> Floats:
-        """That of a sphere of half the range: exact for ends that coincide, else to the square of baseline over range."""
+        """That of a sphere of half the range: exact for ends that coincide, else to (baseline / range)^2."""
         return 0.5 * Direct(upper_half=self.upper_half).shell(0.5 * length, dims)
 
 

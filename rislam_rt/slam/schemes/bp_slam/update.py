@@ -103,7 +103,7 @@ def predict_belief(
 def update_belief(
     belief: Belief, scans: tuple[Scan, ...], model: RangeModel, config: BpSlamConfig, *, rng: np.random.Generator
 ) -> tuple[Belief, UpdateInfo]:
-    """One scan of every anchor into the belief; the agent's message to every feature is its prediction, as published."""
+    """One scan of every anchor into the belief; the agent's message to features is its prediction, as published."""
     state, features = rng.permutation(belief.state), belief.features
     dims = belief.position.shape[1]
     shifts = (np.arange(config.num_pairings) * len(state)) // config.num_pairings
@@ -219,8 +219,22 @@ def _resample_agent(state: Floats, log_weight: Floats, *, rng: np.random.Generat
     scale = np.maximum(state.std(axis=0), 1e-12)
     order = cell_order((state / scale)[None], cell_levels(len(state)))
     chosen = state[order[0, systematic_rows(weight[:, order[0]], rng=rng)[0]]]
-    width = kernel_width(*state.shape, effective)
+    width = kernel_width(len(state), state.shape[1], effective)
     return smooth(chosen[None], width, 0, rng=rng)[0], float(effective[0])
+
+
+WANDER = 20.0
+
+
+def _patience(features: Features, state: Floats, noise: float) -> Floats:
+    """Powers (K,) of the factors that a feature learns from."""
+    dims = features.cloud.shape[2]
+    weight = features.weight
+    centre = np.einsum("kn,knd->kd", weight, features.cloud)
+    square = np.einsum("kn,knd->k", weight, (features.cloud - centre[:, None]) ** 2)
+    wide = square / (1.0 + square)
+    agent = state[:, :dims].var(axis=0).mean()
+    return 1.0 / (1.0 + WANDER * wide * agent / noise**2)
 
 
 def _update_features(
@@ -231,7 +245,8 @@ def _update_features(
     kept = features.known | (features.existence >= config.pruning_threshold)
     features, gains = select(features, kept), gains[kept]
     free = ~features.known[:, None]
-    log_weight = features.log_weight + np.where(free, np.log(gains.mean(axis=1)), 0.0)
+    power = _patience(features, state, thickness)
+    log_weight = features.log_weight + np.where(free, power[:, None] * np.log(gains.mean(axis=1)), 0.0)
     log_weight -= log_weight.max(axis=1, keepdims=True, initial=-np.inf)
     cloud, slope = features.cloud, features.slope
     if config.coupled:

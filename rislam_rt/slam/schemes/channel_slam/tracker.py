@@ -1,0 +1,89 @@
+"""The tracker in front of Channel-SLAM: ranges of one path over time, under one label.
+
+In the publication a Kalman enhanced super resolution tracker (KEST) follows the paths in the signal itself. Here the
+receiver's ranges are given, and a Kalman filter of range and rate a path, with one assignment a cycle, labels them.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+
+UNLABELLED = -1
+"""Label of a range that continues no track."""
+
+
+class Tracks(NamedTuple):
+    """T tracks."""
+
+    mean: Floats
+    """(T, 2) range [m] and its rate [m/s]."""
+    covariance: Floats
+    """(T, 2, 2)."""
+    label: Integers
+    """(T,) number for life."""
+    hits: Integers
+    """(T,) ranges so far."""
+    misses: Integers
+    """(T,) cycles since the last range."""
+
+    def keep(self, rows: Booleans) -> "Tracks":
+        """Some of the tracks."""
+        return Tracks._make(column[rows] for column in self)
+
+
+def no_tracks() -> Tracks:
+    """None yet."""
+    whole = np.zeros(0, dtype=np.int64)
+    return Tracks(np.zeros((0, 2)), np.zeros((0, 2, 2)), whole, whole, whole)
+
+
+def advance(tracks: Tracks, dt: float, acceleration: float) -> Tracks:
+    """Predict over `dt` [s], the rate drifting with white acceleration of standard deviation [m/s^2]."""
+    transition = np.array([[1.0, dt], [0.0, 1.0]])
+    noise = acceleration**2 * np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
+    covariance = transition @ tracks.covariance @ transition.T + noise
+    return tracks._replace(mean=tracks.mean @ transition.T, covariance=covariance)
+
+
+def assign(tracks: Tracks, length: Floats, std: Floats, gate: float) -> Integers:
+    """Track row (M,) that each range continues, -1 for none: the cheapest one-to-one assignment within the gate."""
+    variance = tracks.covariance[:, 0, 0][:, None] + std**2
+    square = (length - tracks.mean[:, :1]) ** 2 / variance
+    gain = np.where(square < gate, gate - square, 0.0)
+    row, column = linear_sum_assignment(-gain)
+    taken = gain[row, column] > 0.0
+    found = np.full(len(length), UNLABELLED)
+    found[column[taken]] = row[taken]
+    return found
+
+
+def follow(
+    tracks: Tracks, found: Integers, length: Floats, std: Floats, rate_std: float, first: int
+) -> tuple[Tracks, Integers]:
+    """Tracks after their ranges, with new ones (labels from `first`) for ranges that continue none, and labels (M,)."""
+    mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
+    hit = np.flatnonzero(found != UNLABELLED)
+    rows = found[hit]
+    gain = covariance[rows][:, :, 0] / (covariance[rows, 0, 0] + std[hit] ** 2)[:, None]
+    mean[rows] += gain * (length[hit] - tracks.mean[rows, 0])[:, None]
+    covariance[rows] -= gain[:, :, None] * tracks.covariance[rows][:, None, 0]
+    seen = np.zeros(len(tracks.label), dtype=np.int64)
+    seen[rows] = 1
+    old = Tracks(mean, covariance, tracks.label, tracks.hits + seen, np.where(seen > 0, 0, tracks.misses + 1))
+    spare = np.flatnonzero(found == UNLABELLED)
+    spread = np.zeros((len(spare), 2, 2))
+    spread[:, 0, 0], spread[:, 1, 1] = std[spare] ** 2, rate_std**2
+    fresh = first + np.arange(len(spare))
+    new = Tracks(
+        np.stack([length[spare], np.zeros(len(spare))], axis=1),
+        spread,
+        fresh,
+        np.ones(len(spare), dtype=np.int64),
+        np.zeros(len(spare), dtype=np.int64),
+    )
+    label = np.empty(len(length), dtype=np.int64)
+    label[hit], label[spare] = tracks.label[rows], fresh
+    return Tracks._make(np.concatenate(pair) for pair in zip(old, new, strict=True)), label
