@@ -16,6 +16,7 @@ from rislam_rt.slam.hypotheses import (
     POINT,
     RECIPROCAL,
     TWIN,
+    UPRIGHT_TILT,
     Fit,
     History,
     first_guess,
@@ -58,6 +59,8 @@ class Verdict(NamedTuple):
     parent: int
     """Feature row of the point, -1 without one."""
     fit: Fit
+    upright: bool = False
+    """Whether a wall is taken to be upright, as its returns do not tell."""
 
 
 class Scene(NamedTuple):
@@ -102,6 +105,8 @@ class Birth(NamedTuple):
     @property
     def prior(self) -> Floats:
         """(3, 3) [m^2] what is known of it without its measurements: a floor is level, the rest is anywhere."""
+        if self.verdict.kind is MOVING and self.verdict.upright:
+            return np.diag([BROAD**2, BROAD**2, upright_std(self.verdict.fit.feature, self.anchor) ** 2])
         if self.verdict.kind is not RECIPROCAL:
             return BROAD**2 * np.eye(3)
         tilt = np.diag(self.verdict.fit.covariance)[:2]
@@ -137,10 +142,12 @@ def examine(
         history, slots = track_history(tracks, row, past, doubt, free_space)
         if is_explained(tracks, row, history, scene):
             continue
-        verdict = judge(history, scene)
+        verdict = judge_wall(history, scene) if tracks.specular[row] else judge(history, scene)
         if verdict is None:
             continue
-        if verdict.kind is MOVING:
+        if verdict.kind is MOVING and config.use_vt and not tracks.specular[row]:
+            verdict = judge_wall(history, scene) or verdict
+        if verdict.kind is MOVING and not (config.use_vt and _sharp(verdict)):
             moving[row] = True
             continue
         birth = Birth(verdict, scene.anchor, slots, history.seen, history.std)
@@ -153,7 +160,7 @@ def due_tracks(tracks: Tracks, outlook: Outlook, cycle: int, config: SlamConfig)
 
     So a track has to wait while another that is shorter and stronger is still unexplained.
     """
-    ready = ~tracks.specular & (tracks.length >= config.birth_cycles) & (tracks.misses == 0)
+    ready = (~tracks.specular | config.use_vt) & (tracks.length >= config.birth_cycles) & (tracks.misses == 0)
     growing = tracks.length < config.window - 1
     turn = np.where(growing, tracks.length % STRIDE == 0, (np.arange(len(ready)) + cycle) % (4 * STRIDE) == 0)
     if not (ready & turn).any():
@@ -162,7 +169,7 @@ def due_tracks(tracks: Tracks, outlook: Outlook, cycle: int, config: SlamConfig)
     alive = ~tracks.specular & ~hidden & (tracks.length >= ELDER_CYCLES) & (tracks.misses <= 1)
     length = tracks.mean[:, 0, 0]
     elder = (length[None] < length[:, None] - 0.05) & (tracks.log_amplitude[None] > tracks.log_amplitude[:, None] + 0.1)
-    waits = (elder & alive[None]).any(axis=1) & growing
+    waits = (elder & alive[None]).any(axis=1) & growing & ~tracks.specular
     rows = np.flatnonzero(ready & turn & ~waits)
     return rows[np.argsort(tracks.mean[rows, 0, 0])]
 
@@ -209,10 +216,33 @@ def judge(history: History, scene: Scene) -> Verdict | None:
         return None
     if best.kind is MOVING:
         return best
-    limit = MAX_POINT_STD if best.kind is POINT else MAX_WALL_STD
-    sharp = np.sqrt(np.linalg.eigvalsh(best.fit.covariance)[-1]) < limit
     ready = best.kind is POINT or (len(history.seen) >= WALL_CYCLES and best.parent in _established(scene.book))
-    return best if sharp and ready else None
+    return best if _sharp(best) and ready else None
+
+
+def judge_wall(history: History, scene: Scene) -> Verdict | None:
+    """The wall that throws a wall return; upright, if that explains it as well as any lean would."""
+    start = first_guess(MOVING, None, scene.anchor, history)
+    if start is None:
+        return None
+    free = fit_feature(MOVING, start, None, scene.anchor, history, 6)
+    level = start * np.array([1.0, 1.0, 0.0]) + scene.anchor * np.array([0.0, 0.0, 1.0])
+    if np.linalg.norm(level - scene.anchor) > 0.1:
+        held = fit_feature(MOVING, level, None, scene.anchor, history, 6, upright_std(level, scene.anchor))
+        if held.cost < free.cost + scene.config.birth_margin and plausible(held, len(history.seen), 2):
+            return Verdict(MOVING, -1, held, upright=True)
+    return Verdict(MOVING, -1, free) if plausible(free, len(history.seen), 3) else None
+
+
+def upright_std(feature: Floats, anchor: Floats) -> float:
+    """Standard deviation [m] of the height of an upright wall's image of the anchor."""
+    return max(float(np.linalg.norm(feature - anchor)) * UPRIGHT_TILT, 1e-3)
+
+
+def _sharp(verdict: Verdict) -> bool:
+    """Whether the feature's worst axis is known well enough."""
+    limit = MAX_POINT_STD if verdict.kind is POINT else MAX_WALL_STD
+    return bool(np.sqrt(np.linalg.eigvalsh(verdict.fit.covariance)[-1]) < limit)
 
 
 def _points(history: History, scene: Scene) -> list[Verdict]:

@@ -19,6 +19,8 @@ DEPTH = 0.1
 """Distance [m] from a wall below which a point counts as lying in it."""
 HORIZON = 0.02
 """Third direction cosine below which nothing is expected: the array looks up."""
+LEVEL = 0.02
+"""Third direction cosine down to which wall returns are heard: those of upright walls arrive level."""
 PANEL_AMPLITUDE_STD = 0.7
 """Spread of the panel's predicted log amplitude: its gain depends on phases, hence on millimetres."""
 
@@ -68,7 +70,8 @@ def expected_returns(
     direct = bounces(returns) == 0
     faint = amplitude < FAINT * threshold
     real = possible_legs(belief, returns)
-    visible = (sight.up > HORIZON) & real[returns.tx] & real[returns.rx] & (~faint | direct)
+    heard = sight.up > np.where(returns.point == TX, -LEVEL, HORIZON)
+    visible = heard & real[returns.tx] & real[returns.rx] & (~faint | direct)
     kept = compact(returns, np.flatnonzero(visible))
     amplitude = amplitude[visible]
     log_amplitude = np.log(np.maximum(amplitude, 1e-30))

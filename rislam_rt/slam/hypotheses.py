@@ -29,6 +29,8 @@ COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(TAIL + 3) log(1 + chi^2 / TAIL)` for chi^2 with 3 degrees of freedom."""
 RIDGE = 1e-4
 """Prior information [1/m^2], (100 m)^-2, that keeps blind directions finite."""
+UPRIGHT_TILT = 0.01
+"""Standard deviation [rad] of a wall's lean, where its own returns do not tell it: they arrive level."""
 FLOOR_TILT = 0.05
 """Standard deviation [rad] of the angle between the floor and the plane that the agent moves in."""
 
@@ -63,21 +65,28 @@ class History(NamedTuple):
 
 
 def fit_feature(
-    kind: Returns, start: Floats, parent: Floats | None, anchor: Floats, history: History, steps: int
+    kind: Returns,
+    start: Floats,
+    parent: Floats | None,
+    anchor: Floats,
+    history: History,
+    steps: int,
+    upright: float = np.inf,
 ) -> Fit:
     """Gauss-Newton from `start` (..., 3), measurements far off counting for less (Student's t).
 
     `parent` (..., 3) is the known point of an image hypothesis. With `history.doubt` the pose is fitted along, held by
-    its own covariance: a wrong speed must not speak against a hypothesis that is right.
+    its own covariance: a wrong speed must not speak against a hypothesis that is right. `upright` is the standard
+    deviation [m] of the feature's height about the anchor's, 0 lean for a wall.
     """
     anchors = np.stack([anchor, anchor])
-    solution = _solve(kind, np.array(start), parent, anchors, history, None)
+    solution = _solve(kind, np.array(start), parent, anchors, history, None, upright)
     for _ in range(steps):
         damping = DAMPING * np.trace(solution.normal, axis1=-2, axis2=-1)[..., None, None] * np.eye(3)
         step = np.linalg.solve(solution.normal + damping, solution.slope[..., None])[..., 0]
         length = np.linalg.norm(step, axis=-1, keepdims=True)
         feature = solution.feature + step * np.minimum(1.0, 1.0 / np.maximum(length, 1e-12))
-        solution = _solve(kind, feature, parent, anchors, history, solution.trust)
+        solution = _solve(kind, feature, parent, anchors, history, solution.trust, upright)
         if length.max() < CONVERGED:
             break
     return Fit(solution.feature, np.asarray(np.linalg.inv(solution.normal), dtype=np.float64), solution.cost)
@@ -104,6 +113,7 @@ def _solve(
     anchors: Floats,
     history: History,
     trust: Floats | None,
+    upright: float = np.inf,
 ) -> _Solution:
     known = _features(feature, parent)
     linear = linearise(kind, known, anchors, history.poses)
@@ -120,10 +130,14 @@ def _solve(
     solved = np.linalg.solve(inner, outer)
     normal = gram[..., :3, :3] - gram[..., :3, 3:-1] @ solved[..., :3] + RIDGE * np.eye(3)
     slope = gram[..., :3, -1] - (gram[..., :3, 3:-1] @ solved[..., 3:])[..., 0]
+    lean = feature[..., 2] - anchors[0, 2]
+    normal[..., 2, 2] += upright**-2
+    slope[..., 2] -= upright**-2 * lean
     pose_error = solved[..., 3]
     left = residual - (by_doubt @ pose_error[..., None, :, None])[..., 0]
     squared = np.einsum("...ki,...ki->...k", left, left)
     cost = np.sum((TAIL + 3.0) * np.log1p(squared / TAIL), axis=-1) + np.sum(pose_error**2, axis=-1)
+    cost = cost + (lean / upright) ** 2
     return _Solution(feature, normal, slope, cost, (TAIL + 3.0) / (TAIL + squared))
 
 

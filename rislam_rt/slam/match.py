@@ -10,7 +10,7 @@ from rislam_rt.model import RadioConfig
 from rislam_rt.slam.associate import Candidates, inverse_3x3
 from rislam_rt.slam.expect import Belief, Expected
 from rislam_rt.slam.moments import POSE, Moments
-from rislam_rt.slam.returns import linearise
+from rislam_rt.slam.returns import TX, linearise
 from rislam_rt.slam.tracks import AMPLITUDE_WANDER, Tracks
 
 INSIDE, OUTSIDE = 0.9, 1.1
@@ -138,7 +138,7 @@ def track_covariance(tracks: Tracks) -> Floats:
 
 
 def hidden_tracks(outlook: Outlook, tracks: Tracks, gate: float) -> Booleans:
-    """(T,) whether a track that is no wall return runs where the map expects a return of its strength.
+    """(T,) whether a track runs where the map expects a return of its strength (wall returns: where one is expected).
 
     Such a track would keep the measurements that prove the map right; it must give way.
     """
@@ -151,7 +151,8 @@ def hidden_tracks(outlook: Outlook, tracks: Tracks, gate: float) -> Booleans:
     distance = np.einsum("tri,trij,trj->tr", gap, inverse, gap)
     fade = np.abs(tracks.log_amplitude[:, None] - outlook.log_amplitude)
     near = (distance < gate) & (fade < 3.0 * np.hypot(outlook.log_amplitude_std, 0.3))
-    return near.any(axis=1) & ~tracks.specular
+    near &= ~tracks.specular[:, None] | (outlook.expected.returns.point == TX)
+    return near.any(axis=1)
 
 
 def explained(outlook: Outlook, seen: Floats, covariance: Floats, gate: float) -> Integers:
