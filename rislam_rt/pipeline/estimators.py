@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from rislam_rt import slam
 from rislam_rt.information.landmarks import Unknown
 from rislam_rt.pipeline.spec import Settings
-from rislam_rt.slam.schemes import bp_slam
+from rislam_rt.slam.schemes import bp_slam, channel_slam
 
 
 class Estimator(NamedTuple):
@@ -29,6 +29,10 @@ ESTIMATORS: dict[str, Estimator] = {
     "bp_slam": Estimator(
         bp_slam.init, bp_slam.predict, bp_slam.step, bp_slam.estimate, lambda settings: settings.bp_slam,
         angles=False, walls="images",
+    ),
+    "channel_slam": Estimator(
+        channel_slam.init, channel_slam.predict, channel_slam.step, channel_slam.estimate,
+        lambda settings: settings.channel_slam, angles=False, walls="images",
     ),
 }  # fmt: skip
 """All estimators by name."""

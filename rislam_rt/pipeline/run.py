@@ -21,6 +21,7 @@ from rislam_rt.model import (
     SlamResult,
     Trajectory,
 )
+from rislam_rt.pipeline.change import change_room
 from rislam_rt.pipeline.choose import build_designer
 from rislam_rt.pipeline.control import check_control, open_link
 from rislam_rt.pipeline.cycle import Agent, Cycle, Means, Rng, Room, run_cycle
@@ -50,6 +51,7 @@ class Seeds(NamedTuple):
     design: np.random.SeedSequence
     motion: np.random.SeedSequence
     panel: np.random.SeedSequence
+    room: np.random.SeedSequence
 
 
 class Stage(NamedTuple):
@@ -76,7 +78,7 @@ def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
     """
     check_run(scene, spec)
     seeds = Seeds(*rng.bit_generator.seed_seq.spawn(len(Seeds._fields)))  # type: ignore[attr-defined]
-    scene = cut_scene(scene, spec.cycles)
+    scene = change_room(cut_scene(scene, spec.cycles), spec.room, rng=np.random.default_rng(seeds.room))
     motion = draw_motion(scene, spec.motion.sigma_a_m_s2, rng=np.random.default_rng(seeds.motion))
     scene = replace(scene, agent=motion)
     begin = perf_counter()
@@ -175,8 +177,10 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     Raises
     ------
     ConfigError
-        The budget is not the cycle, there are fewer cycles than asked for, or a scheme needs a panel that is not there.
+        The budget is not the cycle, there are fewer cycles than asked for, a scheme needs a panel that is not there, or
+        the room cannot be changed as asked.
     """
+    scene = change_room(scene, spec.room, rng=np.random.default_rng(0))
     motion, budget = scene.agent, spec.budget
     if spec.cycles is not None and spec.cycles > len(motion):
         raise ConfigError(f"cycles: {spec.cycles} received; the scene has {len(motion)}, give no more")

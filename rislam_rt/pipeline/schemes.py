@@ -26,5 +26,6 @@ SCHEMES: dict[str, Scheme] = {
     "genie": Scheme("spec", on_truth=True),
     "no_ris": Scheme(None),
     "bp_slam": Scheme("random", estimator="bp_slam"),
+    "channel_slam": Scheme("random", estimator="channel_slam"),
 }
 """All schemes by name."""

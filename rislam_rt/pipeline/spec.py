@@ -13,6 +13,7 @@ from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.ris import PanelTolerance
 from rislam_rt.slam import SlamConfig
 from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
+from rislam_rt.slam.schemes.channel_slam import ChannelSlamConfig
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=64)]
 Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]
@@ -37,6 +38,7 @@ def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()
 _Filter = _section("_Filter", SlamConfig, "Fields of `SlamConfig`.")
 _Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.")
 _BpSlam = _section("_BpSlam", BpSlamConfig, "Fields of `BpSlamConfig`.")
+_ChannelSlam = _section("_ChannelSlam", ChannelSlamConfig, "Fields of `ChannelSlamConfig`.")
 _Designers = _section("_Designers", DesignConfig, "Fields of `DesignConfig`.", without=("certify",))
 
 
@@ -46,6 +48,10 @@ class SlamSection(_Filter):  # type: ignore[misc, valid-type]
 
 class BpSlamSection(_BpSlam):  # type: ignore[misc, valid-type]
     """Settings of the scheme `bp_slam`, SI units."""
+
+
+class ChannelSlamSection(_ChannelSlam):  # type: ignore[misc, valid-type]
+    """Settings of the scheme `channel_slam`, SI units."""
 
 
 class ReceiverSection(_Receiver):  # type: ignore[misc, valid-type]
@@ -160,6 +166,17 @@ class PanelSection(Section):
         return PanelTolerance(self.amplitude_std, float(np.radians(self.phase_std_deg)), self.dead, self.stuck)
 
 
+class RoomSection(Section):
+    """What of the scene is replaced; nothing by default."""
+
+    panel_rows: Annotated[int, Field(ge=1, le=256)] | None = None
+    panel_cols: Annotated[int, Field(ge=1, le=256)] | None = None
+    """The spacing of the elements and the panel's centre stay as they are."""
+    panel_levels: Annotated[int, Field(ge=2, le=65536)] | None = None
+    scatterers: Annotated[int, Field(ge=0, le=100)] | None = None
+    """Their number: the scene's first ones, and then spheres at places drawn for every seed (see `pipeline.change`)."""
+
+
 class PipelineSpec(Section):
     """A whole pipeline file of the main job."""
 
@@ -180,11 +197,13 @@ class PipelineSpec(Section):
     design: DesignSection = DesignSection()
     budget: BudgetSection = BudgetSection()
     control: ControlSection = ControlSection()
+    room: RoomSection = RoomSection()
     panel: PanelSection = PanelSection()
     motion: MotionSection = MotionSection()
     start: StartSection = StartSection()
     slam: SlamSection = SlamSection()
     bp_slam: BpSlamSection = BpSlamSection()
+    channel_slam: ChannelSlamSection = ChannelSlamSection()
 
     @model_validator(mode="before")
     @classmethod
@@ -199,7 +218,7 @@ class PipelineSpec(Section):
         return self
 
 
-ESTIMATOR_SECTIONS = ("bp_slam",)
+ESTIMATOR_SECTIONS = ("bp_slam", "channel_slam")
 """Sections of the estimators that are not the project's own."""
 
 
@@ -230,6 +249,7 @@ class Settings(NamedTuple):
     slam: SlamConfig
     design: DesignConfig
     bp_slam: BpSlamConfig
+    channel_slam: ChannelSlamConfig
 
 
 def build_settings(spec: PipelineSpec) -> Settings:
@@ -246,6 +266,7 @@ def build_settings(spec: PipelineSpec) -> Settings:
         SlamConfig(**spec.slam.model_dump()),
         build_design(spec.design),
         BpSlamConfig(**spec.bp_slam.model_dump()),
+        ChannelSlamConfig(**spec.channel_slam.model_dump()),
     )
 
 

@@ -22,7 +22,9 @@ from rislam_rt.pipeline.bound import scheme_bound
 from rislam_rt.pipeline.schemes import SCHEMES
 
 DIVERGED = 0.5
-"""Position error [m] that no run may ever reach: far above any bound here, a fraction of the room."""
+"""Position error [m] that no run may reach unless the bound is of that size: a fraction of the room."""
+FAR_OVER = 5.0
+"""Error over bound that chance does not explain: five standard deviations even if all error is along one line."""
 NEAR_LANDMARK = 1.0
 """Distance [m] from a true landmark beyond which an estimate is not held for it."""
 NEAR_WALL = 0.5
@@ -56,7 +58,8 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     """The scores of one scheme."""
     scene, truth = result.scene, result.scene.agent.position
     errors = position_errors(scheme.position, truth)
-    rmse, bound = root_mean_square(errors), bound_rmse(result, scheme)
+    limit = bound_course(result, scheme)
+    rmse, bound = root_mean_square(errors), None if limit is None else root_mean_square(limit)
     motion = trajectory_error(scheme.position, truth) if len(truth) > 1 else None
     axes = np.flatnonzero(np.einsum("kii->ki", scheme.covariance[:, :3, :3]).min(axis=0) > 0.0)
     nees = None
@@ -74,7 +77,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "largest_m": largest,
         "rmse_aligned_m": motion.rmse_aligned if motion else None,
         "nees_per_dof": nees if nees is None or np.isfinite(nees) else None,
-        "diverged": largest > DIVERGED,
+        "diverged": has_diverged(errors, limit),
         "outcomes": {name: scheme.outcome.count(name) for name in sorted(set(scheme.outcome))},
         "landmarks": landmark_scores(scene, scheme),
         "walls": wall_scores(scene, scheme.map),
@@ -86,11 +89,17 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     }
 
 
-def bound_rmse(result: SlamResult, scheme: SchemeResult) -> float | None:
-    """Root mean square over the cycles of the posterior bound [m]; None where the scheme's name says nothing."""
+def bound_course(result: SlamResult, scheme: SchemeResult) -> Floats | None:
+    """The posterior bound (K,) [m]; None where the scheme's name says nothing of it."""
     if scheme.scheme not in SCHEMES:
         return None
-    return root_mean_square(scheme_bound(result.scene, result.paths, scheme.gain, scheme.scheme, result.config))
+    return scheme_bound(result.scene, result.paths, scheme.gain, scheme.scheme, result.config)
+
+
+def has_diverged(errors: Floats, limit: Floats | None) -> bool:
+    """Whether the error (K,) [m] ever exceeds `DIVERGED`, and `FAR_OVER` times the bound where there is one."""
+    least = DIVERGED if limit is None else np.maximum(DIVERGED, FAR_OVER * limit)
+    return bool((errors > least).any())
 
 
 def map_score(scene: Scene, estimate: MapEstimate) -> dict[str, Any]:

@@ -6,13 +6,17 @@ from pathlib import Path
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.read import build_spec, read_table
 from rislam_rt.pipeline.spec import PipelineSpec, build_design, build_radio, build_settings
-from rislam_rt.pipeline.studies.spec import CompareSpec, Fig4aSpec
+from rislam_rt.pipeline.studies.spec import ClaimsSpec, CompareSpec, Fig4aSpec
+from rislam_rt.pipeline.studies.swept import SWEPT, SweptSpec, check_swept
 
-KINDS = ("slam", "compare_channels", "fig4a")
+KINDS = ("slam", "compare_channels", "fig4a", *SWEPT, "claims")
 """What `kind` may say; `slam` if it is not there."""
 
 
-def load_any(path: str | Path, overrides: Sequence[str] = ()) -> PipelineSpec | CompareSpec | Fig4aSpec:
+AnySpec = PipelineSpec | CompareSpec | Fig4aSpec | SweptSpec | ClaimsSpec
+
+
+def load_any(path: str | Path, overrides: Sequence[str] = ()) -> AnySpec:
     """The specification of a file of any kind, `key=value` settings (dotted keys) put over it first.
 
     Raises
@@ -26,6 +30,10 @@ def load_any(path: str | Path, overrides: Sequence[str] = ()) -> PipelineSpec | 
         return build_spec(table, CompareSpec, lambda spec: build_radio(spec.radio))
     if kind == "fig4a":
         return build_spec(table, Fig4aSpec, lambda spec: (build_radio(spec.radio), build_design(spec.design)))
+    if kind in SWEPT:
+        return build_spec(table, SWEPT[kind], check_swept)
+    if kind == "claims":
+        return build_spec(table, ClaimsSpec, lambda spec: None)
     if kind in KINDS:
         return build_spec(table, PipelineSpec, build_settings)
     source = "--set" if "kind" in table.changed else path

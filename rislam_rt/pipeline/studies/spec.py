@@ -79,6 +79,16 @@ class Fig4aSpec(StudySpec):
         return self
 
 
+class ClaimsSpec(Section):
+    """The paper's claims against the figures that other studies left behind."""
+
+    kind: Literal["claims"]
+    name: Name
+    description: str = ""
+    results: str = "../docs"
+    """Folder of `fig4a.json`, `fig4b.json` and `fig4c.json`, relative to the pipeline file."""
+
+
 def study_record(spec: StudySpec, scenes: list[Scene]) -> dict[str, Any]:
     """What is needed to repeat a study: configuration, seed, versions, and the hash of every scene."""
     return {

@@ -1,0 +1,30 @@
+"""Studies that go through settings and seeds on the sweep engine: their specifications, cells and scores."""
+
+from rislam_rt.pipeline.studies.swept.collect import Group, group_rows, paired_gain, spread
+from rislam_rt.pipeline.studies.swept.spec import (
+    SWEPT,
+    AblationsSpec,
+    Fig4bSpec,
+    Fig4cSpec,
+    RoomsSpec,
+    SweptSpec,
+    VariantSection,
+)
+from rislam_rt.pipeline.studies.swept.sweep import build_sweep, cell_spec, check_swept
+
+__all__ = [
+    "SWEPT",
+    "AblationsSpec",
+    "Fig4bSpec",
+    "Fig4cSpec",
+    "Group",
+    "RoomsSpec",
+    "SweptSpec",
+    "VariantSection",
+    "build_sweep",
+    "cell_spec",
+    "check_swept",
+    "group_rows",
+    "paired_gain",
+    "spread",
+]

@@ -1,0 +1,114 @@
+"""What the pipeline file of a swept study may say."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from rislam_rt.pipeline.spec import Decibel, Name, Positive, Section
+from rislam_rt.pipeline.studies.spec import Seed
+
+
+class VariantSection(Section):
+    """Settings of the main job under a name."""
+
+    name: Name
+    group: str = ""
+    """Heading under which it stands in a table."""
+    note: str = ""
+    """One line on what it means."""
+    set: dict[str, Any] = Field(default={})
+    """Values by dotted key, as `slam.use_vt`."""
+
+
+class SweptSpec(Section):
+    """What all swept studies share."""
+
+    kind: str
+    name: Name
+    description: str = ""
+    seed: Seed = 7
+    repetitions: Annotated[int, Field(ge=1, le=100_000)] = 20
+    """Runs with different seeds at every point; a repetition has the same motion and noise at all of them."""
+    time_limit_s: Positive | None = None
+    """Longest time one cell may take; it counts as failed then."""
+    run: dict[str, Any] = Field(default={})
+    """Settings of the main job, with its own defaults."""
+
+    @property
+    def all_variants(self) -> list[VariantSection]:
+        """Variants that the study goes through; none by default."""
+        return []
+
+
+class _OneRoom(SweptSpec):
+    scene: str | None = None
+    """Scene folder, relative to the pipeline file; `--scene` comes first."""
+
+
+class Fig4bSpec(_OneRoom):
+    """Error against SNR, as in Fig. 4(b)."""
+
+    kind: Literal["fig4b"]
+    snr_db: list[Decibel] = Field(default=[-10.0, 0.0, 10.0, 20.0, 30.0], min_length=1)
+    """SNR of the paper's sphere at 3 m, integrated over the signal and all antennas."""
+    cases: Annotated[list[VariantSection], Field(min_length=1)]
+    """Motions and starts, a part of the figure each."""
+
+    @property
+    def all_variants(self) -> list[VariantSection]:
+        """The cases."""
+        return self.cases
+
+    @model_validator(mode="after")
+    def _each_once(self) -> "Fig4bSpec":
+        _check_names(self.cases)
+        return self
+
+
+class Fig4cSpec(_OneRoom):
+    """Error of agent and panel against the panel's size, as in Fig. 4(c)."""
+
+    kind: Literal["fig4c"]
+    sizes: list[Annotated[int, Field(ge=1, le=256)]] = Field(default=[4, 6, 8, 10, 12, 16], min_length=1)
+    """Elements along one side of a square panel."""
+
+
+class RoomsSpec(SweptSpec):
+    """All schemes in many rooms."""
+
+    kind: Literal["rooms"]
+    scenes: Annotated[list[str], Field(min_length=1)]
+    """Scene folders, relative to the pipeline file."""
+
+
+class AblationsSpec(_OneRoom):
+    """One setting changed at a time."""
+
+    kind: Literal["ablations"]
+    variants: Annotated[list[VariantSection], Field(min_length=1)]
+    """The first one is the reference that the others are compared with."""
+
+    @property
+    def all_variants(self) -> list[VariantSection]:
+        """The variants."""
+        return self.variants
+
+    @model_validator(mode="after")
+    def _each_once(self) -> "AblationsSpec":
+        _check_names(self.variants)
+        return self
+
+
+SWEPT: dict[str, type[SweptSpec]] = {
+    "fig4b": Fig4bSpec,
+    "fig4c": Fig4cSpec,
+    "rooms": RoomsSpec,
+    "ablations": AblationsSpec,
+}
+"""Swept studies by the `kind` of their file."""
+
+
+def _check_names(variants: list[VariantSection]) -> None:
+    names = [variant.name for variant in variants]
+    if len(set(names)) < len(names):
+        raise ValueError("a name comes twice; give each once")
