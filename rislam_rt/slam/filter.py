@@ -24,6 +24,8 @@ from rislam_rt.slam.tracks import Glance, Tracks, advance, begin, extend, no_tra
 
 LOS_MARGIN = 0.1
 """Length [m] beyond the baseline below which a component is the direct path: no landmark can be that near."""
+FAR = 1e5
+"""Length [m], and standard deviation of anything, that stands for an infinite one."""
 STRANGERS = np.array([1.3, 2.0, 3.0])
 """Factor on the standard deviations of returns over 0, 1 and 2 walls, for paths in their cell that the map lacks."""
 STRAIN_RATE = 0.05
@@ -216,17 +218,17 @@ def _follow(
 
 
 def glance_of(measurement: Measurement, radio: RadioConfig) -> Glance:
-    """A measurement in the filter's units; standard deviations are kept off zero."""
-    length = SPEED_OF_LIGHT * measurement.tau
-    amplitude = np.maximum(measurement.amplitude, 1e-30)
+    """A measurement in the filter's units; nothing stays infinite, no standard deviation zero."""
+    length = np.clip(SPEED_OF_LIGHT * measurement.tau, 0.0, FAR)
+    amplitude = np.clip(measurement.amplitude, 1e-30, 1e30)
     free = np.exp(free_space(radio)) / np.maximum(length, 1e-3)
     std = np.concatenate([SPEED_OF_LIGHT * measurement.tau_std[:, None], measurement.cosines_std], axis=1)
     return Glance(
-        np.concatenate([length[:, None], measurement.cosines], axis=1),
-        np.maximum(std, 1e-5),
+        np.concatenate([length[:, None], np.clip(measurement.cosines, -FAR, FAR)], axis=1),
+        np.clip(std, 1e-5, FAR),
         np.log(amplitude),
         np.minimum(measurement.amplitude_std / amplitude, 1.0),
-        np.maximum(measurement.amplitude_std, 1e-30),
+        np.clip(measurement.amplitude_std, 1e-30, 1e30),
         amplitude / free,
     )
 
