@@ -21,7 +21,6 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-CELLS = 120
 SWEEP = (
     *("--set", "channel=image_source", "--set", "cycles=5", "--set", "slam.num_particles=40"),
     *("--set", 'schemes=["random"]', "--axis", "radio.reference_snr_db=-10,-5,0,5,10,15"),
@@ -45,26 +44,26 @@ def main() -> int:
         bad = 0
         with cluster() as address:
             for name, how in (("jobs1", ("--jobs", "1")), ("jobs2", ("--jobs", "2")), ("dask", ("--dask", address))):
-                width = 1 if name == "jobs1" else 2
-                bad += torture(base / name, how, given.kills, first, (took - first) / width, whole, rng=rng)
+                bad += torture(base / name, how, given.kills, first, whole, rng=rng)
         print(f"{time.monotonic() - begin:.0f} s in all")
     return int(bad > 0)
 
 
 def torture(
-    folder: Path, how: tuple[str, str], kills: int, first: float, work: float, whole: dict[str, bytes],
-    *, rng: np.random.Generator,
-) -> int:  # fmt: skip
+    folder: Path, how: tuple[str, str], kills: int, first: float, whole: dict[str, bytes], *, rng: np.random.Generator
+) -> int:
     """Kill a sweep so many times, let it end, compare; 1 if anything is wrong.
 
-    A kill comes at a time that is uniform up to `reach`, chosen so that the kills let 70 % of the work be done.
+    Each kill waits for 0 to 7 more cells, drawn at random, and then a random time: up to that of the first cell if it
+    waited for none (so that it falls into the start), else up to a second.
     """
-    share = 0.7 * work / kills
-    reach = first + share + np.sqrt(share**2 + 2.0 * share * first)
     done, late = [], 0
     for _ in range(kills):
-        process = start(folder, how)
-        time.sleep(rng.uniform(0.0, reach))
+        wanted, process = cells(folder) + int(rng.integers(8)), start(folder, how)
+        pause = rng.uniform(0.0, first if wanted == cells(folder) else 1.0)
+        while process.poll() is None and cells(folder) < wanted:
+            time.sleep(0.01)
+        time.sleep(pause)
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
         late += process.wait() != -signal.SIGKILL

@@ -6,11 +6,11 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
-
 
 def draw(settings, seed):
     """A few numbers from the seed, some linear algebra (whose bits depend on the threads), and the clock apart."""
+    import numpy as np
+
     time.sleep(settings.get("sleep", 0.0))
     x = np.random.default_rng(seed).standard_normal((60, 60))
     return {
@@ -37,11 +37,13 @@ def misbehave(settings, seed):
     if kind == "hang":
         time.sleep(1e6)
     if kind == "raise":
-        raise ValueError("no\nsuch luck")
+        raise ValueError("no \udcff \u00e9\nsuch luck")
     if kind == "object":
         return {"x": object()}
     if kind == "list":
         return [1]
+    if kind == "names":
+        return {(1, 2): 3}
     print("a cell that talks")
     return {"ok": True}
 
@@ -55,10 +57,17 @@ def count(settings, seed):
     return {"x": settings["x"]}
 
 
-if __name__ == "__main__":
-    # A sweep in a process of its own, for tests that kill it: FOLDER JOBS
-    from rislam_rt.pipeline.sweeps import Axis, Effort, Sweep, run_sweep
+def slow_sweep():
+    """Long enough to be killed in the middle."""
+    from rislam_rt.pipeline.sweeps import Axis, Sweep
 
-    axes = (Axis("x", tuple(range(6))), Axis("word", ("one", "two")))
-    sweep = Sweep("sweep_cells:draw", axes, {"deep": {"y": 1}, "sleep": 0.05}, 2, paired=("word",))
-    run_sweep(sweep, Path(sys.argv[1]), Effort(jobs=int(sys.argv[2])), tell=lambda told: print(told.done, flush=True))
+    axes = (Axis("x", tuple(range(10))), Axis("word", ("one", "two")))
+    return Sweep("sweep_cells:draw", axes, {"deep": {"y": 1}, "sleep": 0.1}, paired=("word",))
+
+
+if __name__ == "__main__":
+    # In a process of its own, for tests that kill it: FOLDER JOBS
+    from rislam_rt.pipeline.sweeps import Effort, run_sweep
+
+    folder, jobs = Path(sys.argv[1]), int(sys.argv[2])
+    run_sweep(slow_sweep(), folder, Effort(jobs=jobs), tell=lambda told: print(told.done, flush=True))

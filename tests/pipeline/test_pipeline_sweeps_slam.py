@@ -10,7 +10,7 @@ import pytest
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.pipeline.summary import summarise
-from rislam_rt.pipeline.sweeps import Effort, build_cells, run_sweep
+from rislam_rt.pipeline.sweeps import build_cells, run_sweep
 from rislam_rt.pipeline.sweeps.slam import load_section, score_rows, slam_sweep, write_scores
 from rislam_rt.report.sweep import main_axis, scores_figure
 from rislam_rt.scene import load_scene
@@ -24,7 +24,7 @@ TINY = ("channel=image_source", "cycles=3", "slam.num_particles=20", 'schemes=["
 def swept(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sweep")
     sweep = slam_sweep(PIPELINE, TINY, ["radio.reference_snr_db=0,13", "schemes=random,no_ris"], repeat=2)
-    return folder, run_sweep(sweep, folder, Effort(jobs=2)).rows
+    return folder, run_sweep(sweep, folder).rows
 
 
 def test_axes_become_what_the_setting_is():

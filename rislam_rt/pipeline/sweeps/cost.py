@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from rislam_rt.pipeline.sweeps.axes import Cell
 
 
@@ -32,12 +30,13 @@ def estimate_cost(left: Sequence[Cell], known: Sequence[Mapping[str, Any]], widt
     for cell in left:
         key = repr(cell.point)
         points[key] = cell.point, points.get(key, (cell.point, 0))[1] + 1
-    each = np.array([[_similar(point, known), count] for point, count in points.values()])
-    total = float(each[:, 0] @ each[:, 1])
-    return Cost(len(left), total / len(left), max(total / min(width, len(left)), float(each[:, 0].max())))
+    each = [(_similar(point, known), count) for point, count in points.values()]
+    total = sum(seconds * count for seconds, count in each)
+    return Cost(len(left), total / len(left), max(total / min(width, len(left)), max(seconds for seconds, _ in each)))
 
 
 def _similar(point: Mapping[str, Any], known: Sequence[Mapping[str, Any]]) -> float:
-    shared = np.array([sum(other["point"].get(key) == value for key, value in point.items()) for other in known])
-    seconds = np.array([other["seconds"] for other in known])
-    return float(seconds[shared == shared.max()].mean())
+    shared = [sum(other["point"].get(key) == value for key, value in point.items()) for other in known]
+    most = max(shared)
+    seconds = [float(other["seconds"]) for other, number in zip(known, shared, strict=True) if number == most]
+    return sum(seconds) / len(seconds)

@@ -45,9 +45,8 @@ class Worker:
             return self._dead(0.0)
         self.fresh = False
         begin = monotonic()
-        assert self.process.stdin is not None
         try:
-            self.process.stdin.write(json.dumps(task).encode() + b"\n")
+            self._say(json.dumps(task).encode() + b"\n")
         except BrokenPipeError:
             return self._dead(0.0)
         try:
@@ -58,6 +57,11 @@ class Worker:
                 cause=HUNG, message=f"not done after {limit:g} s, its time limit", seconds=monotonic() - begin
             )
         return self._dead(monotonic() - begin) if line is None else Outcome(*json.loads(line))
+
+    def _say(self, line: bytes) -> None:
+        assert self.process.stdin is not None
+        while line:
+            line = line[os.write(self.process.stdin.fileno(), line) :]
 
     def _hear(self, limit: float | None) -> bytes | None:
         """The next line; None if the process ends instead."""

@@ -5,8 +5,6 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import numpy as np
-
 from rislam_rt.errors import RislamError
 
 
@@ -18,9 +16,9 @@ def plain_result(result: Any) -> dict[str, Any]:
     RislamError
         It is no mapping of names to numbers, text, lists and mappings of these.
     """
-    if not isinstance(result, Mapping):
+    if not isinstance(result, Mapping) or not all(isinstance(name, str) for name in result):
         raise RislamError(f"the cell returned {type(result).__name__}; return a mapping of names to values")
-    return {name: _plain(str(name), value) for name, value in result.items()}
+    return {name: _plain(name, value) for name, value in result.items()}
 
 
 def flatten(result: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
@@ -34,11 +32,11 @@ def flatten(result: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, A
 
 def json_bytes(content: Any) -> bytes:
     """JSON in one spelling."""
-    return (json.dumps(content, sort_keys=True, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
+    return (json.dumps(content, sort_keys=True, indent=1, allow_nan=False) + "\n").encode()
 
 
 def _plain(name: str, value: Any) -> Any:
-    if isinstance(value, np.generic | np.ndarray):
+    if hasattr(value, "tolist"):  # of numpy, which a worker does not import by itself: cells that need it do
         value = value.tolist()
     if value is None or isinstance(value, bool | int | str):
         return value

@@ -175,7 +175,7 @@ def csv_bytes(entries: Sequence[Mapping[str, Any]]) -> bytes:
     table.writerow(entries[0] if entries else ())
     for entry in entries:
         table.writerow([";".join(map(str, v)) if isinstance(v, list) else v for v in entry.values()])
-    return text.getvalue().encode()
+    return text.getvalue().encode(errors="backslashreplace")
 
 
 def _file(folder: Path, cell: Cell) -> Path:
