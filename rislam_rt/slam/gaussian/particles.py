@@ -19,6 +19,8 @@ SLOT = 4
 """Numbers of a past pose: position and heading."""
 CLONED = np.array([0, 1, 2, 6])
 """The columns of the pose that a slot keeps."""
+ROUNDING = 1e-9
+"""Spread [m, m/s] of particle means that counts as none: along axes that are known exactly only rounding is left."""
 
 
 class Particles(NamedTuple):
@@ -63,6 +65,15 @@ def begin(start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) ->
     rows = np.concatenate([np.arange(POSE), np.tile(CLONED, window)])
     within = np.diag((1.0 - share) * std**2)[np.ix_(rows, rows)]
     return Particles(np.full(count, -np.log(count)), mean, np.tile(within, (count, 1, 1)), window)
+
+
+def furnish(particles: Particles, features: Floats, covariance: Floats) -> Particles:
+    """Particles that know F features (F, 3) beforehand, with a covariance (3F, 3F)."""
+    count, size, more = *particles.mean.shape, len(covariance)
+    mean = np.concatenate([particles.mean, np.tile(features.ravel(), (count, 1))], axis=1)
+    wide = np.zeros((count, size + more, size + more))
+    wide[:, :size, :size], wide[:, size:, size:] = particles.covariance, covariance
+    return particles._replace(mean=mean, covariance=wide)
 
 
 def propagate(
@@ -154,7 +165,7 @@ def thin(particles: Particles, config: SlamConfig, *, rng: np.random.Generator) 
     weight = np.exp(particles.log_weight)
     centre, total = mixture(weight, particles.mean[:, :6], particles.covariance[:, :6, :6])
     apart = np.sqrt(weight @ (particles.mean[:, :6] - centre) ** 2)
-    if np.all(apart <= 0.5 * np.sqrt(np.diag(total))):
+    if np.all(apart <= 0.5 * np.sqrt(np.diag(total)) + ROUNDING):
         mean, covariance = mixture(weight, particles.mean, particles.covariance)
         return Particles(np.zeros(1), mean[None], covariance[None], particles.window), True
     if effective_size(particles) >= config.resample_below * count:
