@@ -1,7 +1,18 @@
 """Floor 5: localisation and mapping. The belief never reads truth: nothing here sees a channel or a scene."""
 
 from rislam_rt.slam.config import SlamConfig, StartPrior
-from rislam_rt.slam.filter import FilterState, Outcome, StepInfo, init, step
+from rislam_rt.slam.filter import FilterState, Outcome, StepInfo, init, revisit, step
 from rislam_rt.slam.mapping import estimate, predict
 
-__all__ = ["FilterState", "Outcome", "SlamConfig", "StartPrior", "StepInfo", "estimate", "init", "predict", "step"]
+__all__ = [
+    "FilterState",
+    "Outcome",
+    "SlamConfig",
+    "StartPrior",
+    "StepInfo",
+    "estimate",
+    "init",
+    "predict",
+    "revisit",
+    "step",
+]

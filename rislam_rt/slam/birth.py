@@ -261,24 +261,26 @@ def _images(history: History, scene: Scene) -> list[Verdict]:
     """The image of each known point in a new wall on the Rx leg."""
     verdicts = []
     for kind in (IMAGE, TWIN):
-        starts = [(p, first_guess(kind, scene.features[p], scene.anchor, history)) for p in scene.book.points]
-        parents = np.array([p for p, start in starts if start is not None], dtype=np.int64)
-        if not len(parents):
+        starts = {int(p): first_guess(kind, scene.features[p], scene.anchor, history) for p in scene.book.points}
+        good = {p: start for p, start in starts.items() if start is not None}
+        if kind is TWIN:  # a wall far from throwing both into one cell is not worth a fit
+            good = {p: start for p, start in good.items() if _one_cell(start, scene.features[p], scene, history, 2.0)}
+        if not good:
             continue
-        start = np.array([start for _, start in starts if start is not None])
+        parents, start = np.array(list(good)), np.array(list(good.values()))
         fits = fit_feature(kind, start, scene.features[parents], scene.anchor, history, 6)
         for parent, fit in zip(parents, map(Fit._make, zip(*fits, strict=True)), strict=True):
-            if kind is IMAGE or _one_cell(fit, scene.features[parent], scene, history):
+            if kind is IMAGE or _one_cell(fit.feature, scene.features[parent], scene, history, 1.1):
                 verdicts.append(Verdict(kind, int(parent), fit))
     return verdicts
 
 
-def _one_cell(fit: Fit, parent: Floats, scene: Scene, history: History) -> bool:
-    """Whether a wall would throw both its returns into one resolution cell, halfway through the history."""
+def _one_cell(wall: Floats, parent: Floats, scene: Scene, history: History, cells: float) -> bool:
+    """Whether a wall would throw both its returns within so many resolution cells, halfway through the history."""
     middle = len(history.seen) // 2
     poses = Poses(history.poses.tx[middle], history.poses.rx[middle], history.poses.heading[middle])
-    seen = observe(TWIN, np.stack([fit.feature, parent]), np.stack([scene.anchor, scene.anchor]), poses).seen
-    return bool(np.all(np.abs(seen[0] - seen[1]) < 1.1 * scene.outlook.cell))
+    seen = observe(TWIN, np.stack([wall, parent]), np.stack([scene.anchor, scene.anchor]), poses).seen
+    return bool(np.all(np.abs(seen[0] - seen[1]) < cells * scene.outlook.cell))
 
 
 def _established(book: Book) -> Integers:

@@ -32,6 +32,9 @@ class Engine(Protocol):
     def begin(self, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> Any:
         """The start prior, without features."""
 
+    def furnish(self, particles: Any, features: Floats, covariance: Floats) -> Any:
+        """F features (F, 3) known beforehand, with a covariance (3F, 3F)."""
+
     def propagate(
         self,
         particles: Any,

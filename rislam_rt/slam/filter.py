@@ -17,7 +17,7 @@ from rislam_rt.slam.engine import Told, engine_of
 from rislam_rt.slam.expect import Belief, expected_returns
 from rislam_rt.slam.learn import Hits, learn
 from rislam_rt.slam.match import Outlook, candidates, hidden_tracks, look_ahead
-from rislam_rt.slam.moments import Moments, poses_of
+from rislam_rt.slam.moments import POSE, Moments, poses_of
 from rislam_rt.slam.prune import keepers
 from rislam_rt.slam.returns import Poses, compact
 from rislam_rt.slam.tracks import Glance, Tracks, advance, begin, extend, no_tracks
@@ -99,6 +99,18 @@ def init(
         ris,
         radio,
     )
+
+
+def revisit(state: FilterState, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> FilterState:
+    """Another run, or another agent, on the map of an earlier one: landmarks, walls and who they are stay known.
+
+    The map keeps the covariance that it had; its frame is the earlier run's, and so must be the start's.
+    """
+    fresh, moments = init(start, state.body, state.ris, state.radio, config, rng=rng), believed(state)
+    particles = engine_of(config).furnish(fresh.particles, moments.features, moments.covariance[POSE:, POSE:])
+    count = len(state.book.ident)
+    book = state.book._replace(shown=np.ones((count, 2)), drift=np.zeros((count, 3)))
+    return fresh._replace(particles=particles, book=book)
 
 
 def step(

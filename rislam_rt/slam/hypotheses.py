@@ -123,7 +123,8 @@ def _solve(
     by_doubt = by_pose @ history.doubt[:3] - history.lag[:, None, None] * (by_pose @ history.doubt[3:])
     columns = np.concatenate([jacobian, by_doubt, residual[..., None]], axis=-1)
     weighted = columns if trust is None else columns * trust[..., None, None]
-    gram = np.einsum("...kia,...kib->...ab", weighted, columns)
+    tall = (*columns.shape[:-3], -1, columns.shape[-1])
+    gram = np.swapaxes(weighted.reshape(tall), -1, -2) @ columns.reshape(tall)
     size = history.doubt.shape[1]
     inner = gram[..., 3:-1, 3:-1] + np.eye(size)
     outer = np.concatenate([gram[..., 3:-1, :3], gram[..., 3:-1, -1:]], axis=-1)

@@ -1,11 +1,12 @@
 """Which landmark is the panel? Bayes over landmarks, from amplitudes under the codes that were applied.
 
 "Is the panel" predicts the amplitude with no free parameter (Rician about the panel's gain under the code, averaged
-over the belief); "is a scatterer" predicts one unknown cross-section for all cycles, integrated out on a grid.
+over the belief); "is a scatterer" predicts one unknown cross-section for all cycles, integrated out on a grid. Cycles
+in which a landmark does not show count too: of a path near the threshold only the strong amplitudes are ever seen.
 """
 
 import numpy as np
-from scipy.special import ive
+from scipy.special import chndtr, ive
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.model import RadioConfig, RisCode, RisSpec
@@ -17,6 +18,10 @@ MODEL_ERROR = 0.05
 """Relative error of predicted amplitudes: geometry, and what the amplitude law leaves out."""
 DOUBT = 4.0
 """Largest log-likelihood ratio that one cycle may add, so that one freak amplitude decides nothing."""
+SHOWN = 0.9
+"""Probability that a path above the threshold is reported at all: others may shade it or merge with it."""
+BEYOND = 8.0
+"""Standard deviations above the threshold from which on no amplitude stays below it."""
 
 
 def log_rice(amplitude: Floats, mean: Floats, std: Floats) -> Floats:
@@ -25,6 +30,16 @@ def log_rice(amplitude: Floats, mean: Floats, std: Floats) -> Floats:
     product = amplitude * mean / variance
     bessel = np.log(ive(0, product))
     return np.log(amplitude / variance) - 0.5 * (amplitude - mean) ** 2 / variance + bessel
+
+
+def log_missed(mean: Floats, std: Floats, threshold: float) -> Floats:
+    """Log probability that the amplitude of a constant `mean` is not reported: below `threshold`, shaded or merged.
+
+    Below it is one minus Marcum's Q, a noncentral chi-square of two degrees of freedom.
+    """
+    level = threshold / std
+    below = chndtr(level**2, 2.0, np.minimum(mean / std, level + BEYOND) ** 2)
+    return np.asarray(np.log(1.0 - SHOWN * (1.0 - below)))
 
 
 def point_amplitude(strength: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig) -> Floats:
@@ -47,15 +62,29 @@ def predicted_panel_gain(
 def log_panel(amplitude: Floats, std: Floats, gain: Complexes) -> Floats:
     """Log likelihood (P,) of amplitudes (P,) under "is the panel", averaged over belief samples of gain (P, S)."""
     mean = np.abs(gain)
-    spread = np.hypot(std[:, None], MODEL_ERROR * mean)
-    each = log_rice(amplitude[:, None], mean, spread)
+    each = log_rice(amplitude[:, None], mean, _spread(std, mean))
+    return np.logaddexp.reduce(each, axis=1) - np.log(gain.shape[1])
+
+
+def log_panel_missed(std: Floats, gain: Complexes, threshold: float) -> Floats:
+    """Log probability (P,) that the panel is not reported, averaged over belief samples of gain (P, S)."""
+    mean = np.abs(gain)
+    each = log_missed(mean, _spread(std, mean), threshold)
     return np.logaddexp.reduce(each, axis=1) - np.log(gain.shape[1])
 
 
 def log_scatterer(amplitude: Floats, std: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig) -> Floats:
     """Log likelihood (P, G) of amplitudes (P,) for every strength of the grid."""
     mean = point_amplitude(np.exp(STRENGTHS), tx_length[:, None], rx_length[:, None], radio)
-    return log_rice(amplitude[:, None], mean, np.hypot(std[:, None], MODEL_ERROR * mean))
+    return log_rice(amplitude[:, None], mean, _spread(std, mean))
+
+
+def log_scatterer_missed(
+    std: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig, threshold: float
+) -> Floats:
+    """Log probability (P, G) that a scatterer is not reported, for every strength of the grid."""
+    mean = point_amplitude(np.exp(STRENGTHS), tx_length[:, None], rx_length[:, None], radio)
+    return log_missed(mean, _spread(std, mean), threshold)
 
 
 def strength_moments(log_grid: Floats) -> tuple[Floats, Floats]:
@@ -80,3 +109,8 @@ def panel_probabilities(log_ris: Floats) -> Floats:
     if not len(log_ris):
         return np.zeros(0)
     return np.exp(log_ris - np.logaddexp(np.logaddexp.reduce(log_ris), 0.0))
+
+
+def _spread(std: Floats, mean: Floats) -> Floats:
+    """Standard deviation (P, N) of amplitudes about predicted means (P, N), from noise (P,) and model."""
+    return np.asarray(np.hypot(std[:, None], MODEL_ERROR * mean))

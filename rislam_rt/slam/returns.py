@@ -62,14 +62,17 @@ class Poses(NamedTuple):
 def reflect(point: Floats, wall: Floats, anchor: Floats) -> Floats:
     """Mirror images (..., 3) of points in walls given as images (..., 3) of anchors (..., 3)."""
     span = wall - anchor
-    depth = np.sum(span * (point - 0.5 * (wall + anchor)), axis=-1) / np.sum(span * span, axis=-1)
+    across = np.einsum("...i,...i->...", span, point - 0.5 * (wall + anchor))
+    depth = across / np.einsum("...i,...i->...", span, span)
     return point - 2.0 * depth[..., None] * span
 
 
 def leg_images(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -> Floats:
     """Apparent positions (..., G, 3) of the legs' far ends, from features (..., F, 3) and Tx positions (..., 3)."""
     legs = returns.legs
-    base = np.where((legs[:, 0] == TX)[:, None], tx[..., None, :], features[..., legs[:, 0], :])
+    moving, base = legs[:, 0] == TX, features[..., legs[:, 0], :]
+    if moving.any():  # only then do images differ from pose to pose
+        base = np.where(moving[:, None], tx[..., None, :], base)
     for column in (1, 2):
         rows = np.flatnonzero(legs[:, column] != NONE)
         if len(rows):
@@ -135,10 +138,14 @@ def linearise(returns: Returns, features: Floats, anchor: Floats, poses: Poses) 
     features_jacobian = by_rx @ wide[..., returns.rx, :, :]
     features_jacobian[..., 0, :] += (by_tx[..., None, :] @ wide[..., returns.tx, :, :])[..., 0, :]
     features_jacobian = features_jacobian.reshape(*features_jacobian.shape[:-1], count, 3)
-    moves = np.where((returns.legs[:, 0] == TX)[:, None, None], by_base, 0.0)
-    tx_jacobian = by_rx @ moves[..., returns.rx, :, :]
-    own = moves[..., returns.tx, :, :] - np.eye(3)
-    tx_jacobian[..., 0, :] += np.einsum("...ra,...rab->...rb", by_tx, own)
+    moving = returns.legs[:, 0] == TX
+    if moving.any():  # the images of a moving base move with it
+        moves = np.where(moving[:, None, None], by_base, 0.0)
+        tx_jacobian = by_rx @ moves[..., returns.rx, :, :]
+        tx_jacobian[..., 0, :] += np.einsum("...ra,...rab->...rb", by_tx, moves[..., returns.tx, :, :])
+    else:
+        tx_jacobian = np.zeros(by_rx.shape)
+    tx_jacobian[..., 0, :] -= by_tx
     return Linear(seen, features_jacobian, tx_jacobian, -by_rx)
 
 
@@ -159,7 +166,9 @@ def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Flo
 def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -> tuple[Floats, Floats, Floats]:
     """Images (..., G, 3) of the legs, their derivatives (..., G, F, 3, 3) by the features, and by the base."""
     legs = returns.legs
-    image = np.where((legs[:, 0] == TX)[:, None], tx[..., None, :], features[..., legs[:, 0], :])
+    moving, image = legs[:, 0] == TX, features[..., legs[:, 0], :]
+    if moving.any():  # only then do images differ from pose to pose
+        image = np.where(moving[:, None], tx[..., None, :], image)
     by_feature = np.zeros((*image.shape[:-1], features.shape[-2], 3, 3))
     by_base = np.zeros((*image.shape, 3)) + np.eye(3)
     own = np.flatnonzero(legs[:, 0] != TX)
@@ -171,12 +180,13 @@ def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats
         walls = legs[rows, column]
         wall, start = features[..., walls, :], image[..., rows, :]
         span = wall - anchor[walls]
-        square = np.sum(span * span, axis=-1)[..., None, None]
+        square = np.einsum("...i,...i->...", span, span)[..., None, None]
         mirrored = reflect(start, wall, anchor[walls])
-        depth = np.sum(span * (start - 0.5 * (wall + anchor[walls])), axis=-1)[..., None, None] / square
+        depth = np.einsum("...i,...i->...", span, start - 0.5 * (wall + anchor[walls]))[..., None, None] / square
         householder = np.eye(3) - 2.0 * span[..., :, None] * span[..., None, :] / square
         by_feature[..., rows, :, :, :] = householder[..., None, :, :] @ by_feature[..., rows, :, :, :]
-        by_base[..., rows, :, :] = householder @ by_base[..., rows, :, :]
+        if moving.any():
+            by_base[..., rows, :, :] = householder @ by_base[..., rows, :, :]
         by_wall = -2.0 * (depth * np.eye(3) + span[..., :, None] * (mirrored - wall)[..., None, :] / square)
         by_feature[..., rows, walls, :, :] += by_wall
         image[..., rows, :] = mirrored

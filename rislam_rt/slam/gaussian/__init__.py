@@ -1,7 +1,17 @@
 """The Rao-Blackwellised engine: few particles, each a Gaussian over pose, recent trail and map."""
 
 from rislam_rt.slam.gaussian.birth import settle
-from rislam_rt.slam.gaussian.particles import Particles, begin, drop, effective_size, moments, propagate, thin, trail
+from rislam_rt.slam.gaussian.particles import (
+    Particles,
+    begin,
+    drop,
+    effective_size,
+    furnish,
+    moments,
+    propagate,
+    thin,
+    trail,
+)
 from rislam_rt.slam.gaussian.update import Update, update
 
 __all__ = [
@@ -10,6 +20,7 @@ __all__ = [
     "begin",
     "drop",
     "effective_size",
+    "furnish",
     "moments",
     "propagate",
     "settle",
