@@ -28,6 +28,11 @@ def misbehave(settings, seed):
     kind = settings["kind"]
     if kind == "abort":
         os.abort()
+    if kind == "orphan":
+        if os.fork() == 0:
+            time.sleep(5.0)
+            os._exit(0)
+        os.abort()
     if kind == "segfault":
         ctypes.string_at(0)
     if kind == "leave":

@@ -180,28 +180,29 @@ def test_resumed_sweep_runs_what_is_missing(tmp_path):
 
 
 def test_trouble_is_recorded_and_the_rest_goes_on(tmp_path):
-    kinds = ("good", "abort", "segfault", "leave", "exit", "hang", "raise", "object", "list", "names", "fine")
+    kinds = ("good", "abort", "orphan", "segfault", "leave", "exit", "hang", "raise", "object", "list", "names", "fine")
     sweep = Sweep("sweep_cells:misbehave", (Axis("kind", kinds),))
-    report = run_sweep(sweep, tmp_path, Effort(jobs=2, time_limit=1.5))
+    report = run_sweep(sweep, tmp_path, Effort(jobs=2, time_limit=3.0))
     found = {row.cell.point["kind"]: (row.state, row.message) for row in report.rows}
     assert found == {
         "good": ("done", ""),
         "abort": ("died", "its process was killed by SIGABRT"),
+        "orphan": ("died", "its process was killed by SIGABRT"),
         "segfault": ("died", "its process was killed by SIGSEGV"),
         "leave": ("died", "its process ended with exit code 0"),
         "exit": ("raised", "SystemExit: gone"),
-        "hang": ("hung", "not done after 1.5 s, its time limit"),
+        "hang": ("hung", "not done after 3 s, its time limit"),
         "raise": ("raised", "ValueError: no \udcff \u00e9"),
         "object": ("raised", "the cell returned x = object; return numbers, text, lists or mappings"),
         "list": ("raised", "the cell returned list; return a mapping of names to values"),
         "names": ("raised", "the cell returned dict; return a mapping of names to values"),
         "fine": ("done", ""),
     }
-    assert len(report.failed) == 9
+    assert len(report.failed) == 10
     # what failed by itself is not tried again, and is in the table
     again = []
     run_sweep(sweep, tmp_path, tell=again.append)
-    assert [(t.done, t.failed, t.last) for t in again] == [(2, 9, None)]
+    assert [(t.done, t.failed, t.last) for t in again] == [(2, 10, None)]
     assert "SIGABRT" in (tmp_path / "table.csv").read_text()
 
 

@@ -24,6 +24,9 @@ SAME_BITS = {**dict.fromkeys(_THREADS, "1"), "PYTHONHASHSEED": "0"}
 FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 """Signals that a process does not send itself when it breaks: a user, a queue, or a kernel out of memory did."""
 
+LOOK_SECONDS = 1.0
+"""Longest time between two looks at whether a worker lives."""
+
 
 class Worker:
     """One interpreter, started fresh (never a fork: numerical libraries keep threads); it does cells one by one."""
@@ -71,9 +74,13 @@ class Worker:
         waiting = select.poll()
         waiting.register(ear, select.POLLIN)
         while not line.endswith(b"\n"):
-            left = None if end is None else 1e3 * max(end - monotonic(), 0.0)
-            if not waiting.poll(left):
-                raise TimeoutError
+            left = LOOK_SECONDS if end is None else min(LOOK_SECONDS, max(end - monotonic(), 0.0))
+            if not waiting.poll(1e3 * left):
+                if not self.alive:
+                    return None  # a child of its own that lives on keeps the pipe open
+                if end is not None and monotonic() >= end:
+                    raise TimeoutError
+                continue
             part = os.read(ear, 1 << 16)
             if not part:
                 return None
