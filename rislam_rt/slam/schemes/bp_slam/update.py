@@ -39,6 +39,8 @@ from rislam_rt.slam.schemes.resampling import (
 
 GATE = 5.0
 """Standard deviations beyond which the likelihood of a range counts as zero (4e-6 of its peak)."""
+AGENT_MEMORY = 100.0
+"""Steps over which the agent's error stays much the same."""
 
 
 class Belief(NamedTuple):
@@ -223,18 +225,22 @@ def _resample_agent(state: Floats, log_weight: Floats, *, rng: np.random.Generat
     return smooth(chosen[None], width, 0, rng=rng)[0], float(effective[0])
 
 
-WANDER = 20.0
-
-
 def _patience(features: Features, state: Floats, noise: float) -> Floats:
-    """Powers (K,) of the factors that a feature learns from."""
+    """Powers (K,) of the factors that a feature learns from, one where it is known well.
+
+    A factor holds the noise of its own step and the agent's error `e`, which the next steps share. Over `n` steps the
+    feature may learn `1 / (noise^2 / n + var e)`, and not n times the first step's share; the power
+    `1 / (1 + n var e / noise^2)` gives it that. A feature that is known well keeps what it shares with the agent in its
+    slope and needs no such care; one spread along an arc does, since no line follows an arc. The share of the second
+    kind is taken as `v / (v + 1 m^2)` with v the variance of the cloud.
+    """
     dims = features.cloud.shape[2]
     weight = features.weight
     centre = np.einsum("kn,knd->kd", weight, features.cloud)
     square = np.einsum("kn,knd->k", weight, (features.cloud - centre[:, None]) ** 2)
     wide = square / (1.0 + square)
     agent = state[:, :dims].var(axis=0).mean()
-    return 1.0 / (1.0 + WANDER * wide * agent / noise**2)
+    return np.asarray(1.0 / (1.0 + AGENT_MEMORY * wide * agent / noise**2))
 
 
 def _update_features(
@@ -245,7 +251,7 @@ def _update_features(
     kept = features.known | (features.existence >= config.pruning_threshold)
     features, gains = select(features, kept), gains[kept]
     free = ~features.known[:, None]
-    power = _patience(features, state, thickness)
+    power = _patience(features, state, thickness) if config.coupled else np.ones(len(gains))
     log_weight = features.log_weight + np.where(free, power[:, None] * np.log(gains.mean(axis=1)), 0.0)
     log_weight -= log_weight.max(axis=1, keepdims=True, initial=-np.inf)
     cloud, slope = features.cloud, features.slope

@@ -2,8 +2,8 @@
 
 Source: Gentner et al., "Multipath assisted positioning with simultaneous localization and mapping", IEEE TWC 2016. As
 there, labels are taken as known, there is no model of detection, and a path that ends takes its virtual transmitter
-with it. Unlike there, no transmitter stands in the room: both ends move with the agent, so that a virtual transmitter is
-a point `a` at range `|p_T - a| + |a - p_R|`.
+with it. Unlike there, no transmitter stands in the room: both ends move with the agent, so that a virtual transmitter
+is a point `a` at range `|p_T - a| + |a - p_R|`.
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, MapEstimate, Measurement, RadioConfig, RisCode, RisSpec, SlamEstimate
 from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo
-from rislam_rt.slam.moments import normalised, square_root, systematic_ancestors
+from rislam_rt.slam.moments import normalised, systematic_ancestors
 from rislam_rt.slam.schemes.bp_slam.ranges import Bistatic
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
 from rislam_rt.slam.schemes.channel_slam.tracker import Tracks, advance, assign, follow, no_tracks
@@ -29,14 +29,12 @@ from rislam_rt.slam.schemes.channel_slam.transmitters import (
     update,
 )
 from rislam_rt.slam.schemes.delays import point_ranges
-from rislam_rt.slam.schemes.resampling import effective_fraction, kernel_width
+from rislam_rt.slam.schemes.resampling import effective_fraction
 
 STRAIN_RATE = 0.1
 """Share of the latest cycle in the running means of squared innovations."""
 NIS_LIMIT = 3.0
 """Running mean of the NIS per degree of freedom above which the filter says that it has diverged."""
-RIDGE = 1e-6
-"""Keeps the regression on the agent's state solvable where its cloud is flat, as with a known height."""
 
 
 class ChannelSlamState(NamedTuple):
@@ -103,7 +101,7 @@ def step(
     ess = float(effective_fraction(np.exp(state.log_weight)[None])[0]) * config.num_particles
     low = ess < config.resample_below * config.num_particles
     if low:
-        state = _resample(state, ess, rng=rng)
+        state = _resample(state, rng=rng)
     nis, dof = float(squares.sum()), len(squares)
     strain = state.strain + 0.5 * STRAIN_RATE * (nis / dof - state.strain) if dof else state.strain
     state = state._replace(strain=strain)
@@ -175,7 +173,7 @@ def _correct(
     unfit = [name for name in names.tolist() if strains[name] > config.strain_limit]
     hit = prune(result.transmitters, np.exp(log_weight), config.prune_weight)
     hit = hit.keep(~np.isin(hit.label, unfit))
-    joined = join(rest, hit)
+    joined = join([rest, hit])
     present = set(joined.label.tolist())
     strains = {name: value for name, value in strains.items() if name in present}
     return state._replace(log_weight=log_weight, transmitters=joined, strains=strains), result.square, evidence
@@ -191,31 +189,28 @@ def _give_birth(
         new = born(
             int(label[row]), state.agent[:, :3], float(length[row]), float(std[row]), model, config.num_directions
         )
-        known = join(known, new)
+        known = join([known, new])
     return state._replace(transmitters=known)
 
 
-def _resample(state: ChannelSlamState, ess: float, *, rng: np.random.Generator) -> ChannelSlamState:
-    """Equally likely particles, moved by a kernel that keeps mean and covariance (Liu and West).
+def _resample(state: ChannelSlamState, *, rng: np.random.Generator) -> ChannelSlamState:
+    """Equally likely particles, each with the virtual transmitters of its ancestor.
 
-    The means of virtual transmitters follow by their regression on the agent's state, so that what they have in common
-    with it stays in common.
+    No kernel: to move an agent without its whole history breaks what ties it to its virtual transmitters, and was seen
+    to make up knowledge of the course. The process noise alone keeps particles apart, as in the publication.
     """
     count = len(state.log_weight)
-    mean, covariance = _agent_moments(state.log_weight, state.agent)
-    ancestors = systematic_ancestors(state.log_weight, count, rng=rng)
-    chosen = state.agent[ancestors]
-    spread = square_root(covariance)
-    width = float(kernel_width(count, spread.shape[1], np.array([ess / count]))[0]) if spread.shape[1] else 0.0
-    draw = rng.standard_normal((count, spread.shape[1])) @ spread.T
-    moved = mean + np.sqrt(1.0 - width**2) * (chosen - mean) + width * draw
+    rows = systematic_ancestors(state.log_weight, count, rng=rng)
     known = state.transmitters
-    slopes = _regression(state.agent, np.exp(state.log_weight), known.mean.reshape(count, -1))
-    shifted = known.mean.reshape(count, -1)[ancestors] + (moved - chosen) @ slopes
     return state._replace(
-        agent=moved,
+        agent=state.agent[rows],
         log_weight=np.full(count, -np.log(count)),
-        transmitters=known._replace(mean=shifted.reshape(known.mean.shape), log_share=known.log_share[ancestors]),
+        transmitters=known._replace(
+            base=known.base[rows],
+            mean=known.mean[rows],
+            covariance=known.covariance[rows],
+            log_share=known.log_share[rows],
+        ),
     )
 
 
@@ -225,15 +220,6 @@ def _agent_moments(log_weight: Floats, agent: Floats) -> tuple[Floats, Floats]:
     mean = weight @ agent
     centred = agent - mean
     return mean, (centred * weight[:, None]).T @ centred
-
-
-def _regression(agent: Floats, weight: Floats, values: Floats) -> Floats:
-    """Slopes (6, D) of values (N, D) on the agent's states (N, 6)."""
-    lean = agent - weight @ agent
-    scale = np.maximum(np.sqrt(weight @ lean**2), 1e-12)
-    lean = lean / scale
-    weighted = lean.T * weight
-    return np.asarray(np.linalg.solve(weighted @ lean + RIDGE * np.eye(len(scale)), weighted @ values) / scale[:, None])
 
 
 def _map(known: Transmitters, weight: Floats, config: ChannelSlamConfig) -> MapEstimate:

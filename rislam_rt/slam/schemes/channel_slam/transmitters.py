@@ -2,10 +2,11 @@
 
 Source: Gentner et al., "Multipath assisted positioning with simultaneous localization and mapping", IEEE TWC 2016 (a
 virtual transmitter a path, inside every agent particle); the Gaussian sum in place of particles is that of
-Ulmschneider, Gentner, Jost and Dammann, "Rao-Blackwellized Gaussian sum particle filter for multipath assisted positioning", 2018.
+Ulmschneider, Gentner, Jost and Dammann, "Rao-Blackwellized Gaussian sum particle filter for multipath assisted
+positioning", 2018.
 
-The covariance of a Gaussian depends on where ranges were taken, not on what they were, and hardly differs between agent
-particles a few centimetres apart: one covariance serves all of them, means and shares are each particle's own.
+Every agent particle linearises where it is itself: ranges alone do not tell how the whole map is turned about the
+agent, and derivatives shared by particles of different courses would make such knowledge up.
 """
 
 from typing import NamedTuple
@@ -23,12 +24,16 @@ GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 class Transmitters(NamedTuple):
     """C Gaussians of all virtual transmitters, those of one transmitter side by side, in N agent particles."""
 
+    base: Floats
+    """(N, C, 3) where the particle was at the birth [m]."""
+    frame: Floats
+    """(C, 3, 3) rows: direction of the Gaussian from there, and two directions across."""
     mean: Floats
-    """(N, C, 3) [m]."""
+    """(N, C, 3) distance from the base [m], and tangents of the two angles off the direction."""
+    covariance: Floats
+    """(N, C, 3, 3) of these three."""
     log_share: Floats
     """(N, C); the shares of one transmitter sum to one in every particle."""
-    covariance: Floats
-    """(C, 3, 3) [m^2]."""
     label: Integers
     """(C,) label of the path."""
 
@@ -37,25 +42,50 @@ class Transmitters(NamedTuple):
         """(V,) first Gaussian of every virtual transmitter."""
         return np.flatnonzero(np.diff(self.label, prepend=self.label[:1] - 1)) if len(self.label) else self.label
 
+    @property
+    def owner(self) -> Integers:
+        """(C,) number of the virtual transmitter that a Gaussian belongs to."""
+        return np.repeat(np.arange(len(self.starts)), np.diff(self.starts, append=len(self.label)))
+
     def keep(self, rows: Booleans) -> "Transmitters":
         """Some of the Gaussians."""
-        return Transmitters(self.mean[:, rows], self.log_share[:, rows], self.covariance[rows], self.label[rows])
+        per_particle = (self.base, self.mean, self.covariance, self.log_share)
+        base, mean, covariance, log_share = (column[:, rows] for column in per_particle)
+        return Transmitters(base, self.frame[rows], mean, covariance, log_share, self.label[rows])
+
+
+class Points(NamedTuple):
+    """Gaussians in the room."""
+
+    position: Floats
+    """(N, C, 3) [m]."""
+    jacobian: Floats
+    """(N, C, 3, 3) derivatives; rows: by distance, by either tangent; columns: x, y, z."""
 
 
 def no_transmitters(num_particles: int) -> Transmitters:
     """None yet."""
+    three = np.zeros((num_particles, 0, 3))
+    square = np.zeros((num_particles, 0, 3, 3))
     empty = np.zeros(0, dtype=np.int64)
-    return Transmitters(np.zeros((num_particles, 0, 3)), np.zeros((num_particles, 0)), np.zeros((0, 3, 3)), empty)
+    return Transmitters(three, square[0], three, square, np.zeros((num_particles, 0)), empty)
 
 
-def join(first: Transmitters, second: Transmitters) -> Transmitters:
-    """Both."""
-    return Transmitters(
-        np.concatenate([first.mean, second.mean], axis=1),
-        np.concatenate([first.log_share, second.log_share], axis=1),
-        np.concatenate([first.covariance, second.covariance]),
-        np.concatenate([first.label, second.label]),
-    )
+def join(parts: list[Transmitters]) -> Transmitters:
+    """All of them in one."""
+    columns = zip(*parts, strict=True)
+    return Transmitters(*(np.concatenate(c, axis=axis) for c, axis in zip(columns, (1, 0, 1, 1, 1, 0), strict=True)))
+
+
+def points_of(known: Transmitters) -> Points:
+    """Where the means lie, `base + distance u` with `u` along `direction + p e + q f`, and how they move."""
+    distance, tangents = known.mean[..., 0, None], known.mean[..., 1:]
+    reach = np.sqrt(1.0 + np.sum(tangents**2, axis=-1, keepdims=True))
+    unit = (known.frame[:, 0] + tangents[..., :1] * known.frame[:, 1] + tangents[..., 1:] * known.frame[:, 2]) / reach
+    across = [
+        distance / reach * (known.frame[:, axis] - tangents[..., axis - 1, None] / reach * unit) for axis in (1, 2)
+    ]
+    return Points(known.base + distance * unit, np.stack([unit, *across], axis=-2))
 
 
 def even_directions(count: int, upper_half: bool) -> Floats:
@@ -67,20 +97,29 @@ def even_directions(count: int, upper_half: bool) -> Floats:
 
 
 def born(label: int, position: Floats, length: float, std: float, model: Bistatic, count: int) -> Transmitters:
-    """A virtual transmitter somewhere at range `length` [m] from agents (N, 3): `count` Gaussians on a half sphere.
+    """A virtual transmitter somewhere at range `length` [m] from agents (N, 3): `count` Gaussians over all directions.
 
-    A Gaussian that lies flat on a sphere sticks out of it; each is moved inwards by what that adds to its mean range.
+    They are Gaussian in distance and angles, so that they lie along the sphere and do not stick out of it.
     """
     direction = even_directions(count, model.upper_half)
     area = (2.0 if model.upper_half else 4.0) * np.pi
-    radius = 0.5 * length
-    across = 0.5 * radius * np.sqrt(area / count)
-    outer = direction[:, :, None] * direction[:, None]
-    covariance = across**2 * (np.eye(3) - outer) + (0.5 * std) ** 2 * outer
-    mean = model.invert(position[:, None], direction, np.full(count, length))
-    mean = mean - across**2 / np.maximum(radius, across) * direction
-    share = np.full(mean.shape[:2], -np.log(count))
-    return Transmitters(mean, share, covariance, np.full(count, label))
+    distance = length_of(model.invert(np.zeros(3), direction, np.full(count, length)))
+    side = np.where(np.abs(direction[:, 2:]) < 0.9, np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
+    first = np.cross(direction, side)
+    first /= np.maximum(length_of(first), 1e-12)[:, None]
+    frame = np.stack([direction, first, np.cross(direction, first)], axis=1)
+    across = 0.5 * np.sqrt(area / count)
+    shape = (len(position), count)
+    mean = np.stack([distance, np.zeros(count), np.zeros(count)], axis=1)
+    covariance = np.diag([(0.5 * std) ** 2, across**2, across**2])
+    return Transmitters(
+        np.broadcast_to(position[:, None], (*shape, 3)),
+        frame,
+        np.broadcast_to(mean, (*shape, 3)),
+        np.broadcast_to(covariance, (*shape, 3, 3)),
+        np.full(shape, -np.log(count)),
+        np.full(count, label),
+    )
 
 
 class Update(NamedTuple):
@@ -96,7 +135,7 @@ class Update(NamedTuple):
 def update(
     known: Transmitters, position: Floats, weight: Floats, length: Floats, std: Floats, model: Bistatic, outlier: float
 ) -> Update:
-    """Every virtual transmitter updated by its range: a second-order Kalman update of every Gaussian.
+    """Every virtual transmitter updated by its range: a Kalman update of every Gaussian, of second order in the angles.
 
     Parameters
     ----------
@@ -107,24 +146,20 @@ def update(
     outlier
         Probability that a range is uniform over a metre instead.
     """
-    starts = known.starts
-    owner = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(known.label)))
-    center = np.einsum("n,nci->ci", weight, known.mean)
-    slope, bend = _derivatives(model, weight @ position, center)
-    curved = bend @ known.covariance
-    bias = 0.5 * np.trace(curved, axis1=1, axis2=2)
-    spread = known.covariance @ slope[..., None]
-    variance = (slope[:, None] @ spread)[:, 0, 0] + 0.5 * np.trace(curved @ curved, axis1=1, axis2=2)
-    variance = variance + std[owner] ** 2
-    miss = length[owner] - model.ranges(position[:, None], known.mean) - bias
-    gain = spread[..., 0] / variance[:, None]
+    starts, owner, points = known.starts, known.owner, points_of(known)
+    predicted, slope = _range(model, position, points)
+    drift = np.sum((position[:, None] - known.base) * points.jacobian[..., 0, :], axis=-1)
+    curve = 4.0 * drift * known.mean[..., 0] / predicted * (known.covariance[..., 1, 1] + known.covariance[..., 2, 2])
+    spread = _apply(known.covariance, slope)
+    variance = np.sum(slope * spread, axis=-1) + 0.5 * curve**2 + std[owner] ** 2
+    miss = length[owner] - predicted - 0.5 * curve
+    gain = spread / variance[..., None]
     log_joint = known.log_share - 0.5 * (miss**2 / variance + np.log(variance) + LOG_TWO_PI)
     log_path = _log_sums(log_joint, starts)
-    moved = Transmitters(
-        known.mean + miss[..., None] * gain,
-        log_joint - log_path[:, owner],
-        known.covariance - gain[:, :, None] * spread[:, None, :, 0],
-        known.label,
+    moved = known._replace(
+        mean=known.mean + miss[..., None] * gain,
+        covariance=known.covariance - gain[..., :, None] * spread[..., None, :],
+        log_share=log_joint - log_path[:, owner],
     )
     robust = np.logaddexp(np.log1p(-outlier) + log_path, np.log(outlier)).sum(axis=1)
     return Update(moved, robust, _squares(known, weight, miss, variance, starts))
@@ -135,12 +170,8 @@ def prune(known: Transmitters, weight: Floats, least: float) -> Transmitters:
     if not len(known.label):
         return known
     share = weight @ np.exp(known.log_share)
-    starts = known.starts
-    owner = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(known.label)))
-    kept = known.keep((share >= least) | (share >= np.maximum.reduceat(share, starts)[owner]))
-    starts = kept.starts
-    owner = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(kept.label)))
-    return kept._replace(log_share=kept.log_share - _log_sums(kept.log_share, starts)[:, owner])
+    kept = known.keep((share >= least) | (share >= np.maximum.reduceat(share, known.starts)[known.owner]))
+    return kept._replace(log_share=kept.log_share - _log_sums(kept.log_share, kept.starts)[:, kept.owner])
 
 
 def moments(known: Transmitters, weight: Floats) -> tuple[Floats, Floats]:
@@ -148,24 +179,29 @@ def moments(known: Transmitters, weight: Floats) -> tuple[Floats, Floats]:
     starts = known.starts
     if not len(starts):
         return np.zeros((0, 3)), np.zeros((0, 3, 3))
-    share = weight[:, None] * np.exp(known.log_share)
-    total = share.sum(axis=0)
-    first = np.einsum("nc,nci->ci", share, known.mean)
-    second = np.einsum("nc,nci,ncj->cij", share, known.mean, known.mean) + total[:, None, None] * known.covariance
+    share, points = weight[:, None] * np.exp(known.log_share), points_of(known)
+    first = np.einsum("nc,nci->ci", share, points.position)
+    second = np.einsum("nc,nci,ncj->cij", share, points.position, points.position)
+    carried = known.covariance @ points.jacobian
+    second += np.einsum("nc,ncki,nckj->cij", share, points.jacobian, carried)
     mean = np.add.reduceat(first, starts)
     return mean, np.add.reduceat(second, starts) - mean[:, :, None] * mean[:, None]
 
 
-def _derivatives(model: Bistatic, agent: Floats, point: Floats) -> tuple[Floats, Floats]:
-    """First (C, 3) and second (C, 3, 3) [1/m] derivatives of the range with respect to points (C, 3)."""
-    slope, bend = np.zeros(point.shape), np.zeros((*point.shape, 3))
-    for end in (model.tx, model.rx):
-        span = point - agent - end
-        reach = np.maximum(length_of(span), 1e-3)
-        unit = span / reach[:, None]
-        slope += unit
-        bend += (np.eye(3) - unit[:, :, None] * unit[:, None]) / reach[:, None, None]
-    return slope, bend
+def _range(model: Bistatic, agent: Floats, points: Points) -> tuple[Floats, Floats]:
+    """Ranges (N, C) [m] from agents (N, 3), and slopes (N, C, 3) by distance and tangents."""
+    offset = points.position - agent[:, None]
+    to_tx, to_rx = offset - model.tx, offset - model.rx
+    tx, rx = np.maximum(length_of(to_tx), 1e-3), np.maximum(length_of(to_rx), 1e-3)
+    return tx + rx, _apply(points.jacobian.swapaxes(2, 3), to_tx / tx[..., None] + to_rx / rx[..., None])
+
+
+def _apply(matrix: Floats, vector: Floats) -> Floats:
+    """Products (N, C, 3) of transposed (or symmetric) matrices (N, C, 3, 3) with vectors (N, C, 3)."""
+    total = matrix[..., 0, :] * vector[..., 0:1]
+    for axis in (1, 2):
+        total = total + matrix[..., axis, :] * vector[..., axis : axis + 1]
+    return total
 
 
 def _log_sums(values: Floats, starts: Integers) -> Floats:
