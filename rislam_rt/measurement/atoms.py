@@ -75,9 +75,7 @@ def factors(sounding: Sounding, parameters: Floats) -> Factors:
 def tone_response(frequency: Floats, delay: Floats) -> Complexes:
     """`exp(-j 2 pi f tau)` (M, P); of evenly spaced tones: a coarse and a fine factor save most exponentials."""
     count = len(frequency)
-    fine = int(np.sqrt(count))
-    if count % fine:
-        return np.exp(-2j * np.pi * frequency[:, None] * delay)
+    fine = next(size for size in range(int(np.sqrt(count)), 0, -1) if count % size == 0)
     coarse = np.exp(-2j * np.pi * frequency[::fine, None] * delay)
     offset = np.exp(-2j * np.pi * (frequency[:fine] - frequency[0])[:, None] * delay)
     return (coarse[:, None] * offset).reshape(count, len(delay))

@@ -58,13 +58,14 @@ def signals_dataset(
     """
     samples, noise, found, labels, truth = [], [], [], [], []
     heard = np.zeros((paths.num_cycles, paths.num_paths), dtype=np.int8)
-    tracks, last = init_tracks(), trajectory.time[0]
+    tracks, last, previous = init_tracks(), trajectory.time[0], None
     for cycle in range(paths.num_cycles):
         received = receive(paths, cycle, float(trajectory.heading[cycle]), radio, config)
         captures = capture(received, radio, config, rng=rng)
-        components = find_components(captures, radio, config)
+        components = find_components(captures, radio, config, previous)
+        previous = to_measurement(components, config)
         step = float(trajectory.time[cycle] - last)
-        tracks, info = step_tracks(tracks, to_measurement(components, config), step, TrackingConfig())
+        tracks, info = step_tracks(tracks, previous, step, TrackingConfig())
         last = trajectory.time[cycle]
         samples.append(np.array([one.samples for one in captures], dtype=np.complex64))
         noise.append([one.noise_psd for one in captures])

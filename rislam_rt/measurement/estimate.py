@@ -13,7 +13,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Complexes, Floats
 from rislam_rt.measurement.atoms import Sounding
 from rislam_rt.measurement.detect import Grid, into_range, pick_peaks
-from rislam_rt.measurement.refine import Accuracy, Fit, accuracy, contribution, fit_amplitudes, refine, removal_loss
+from rislam_rt.measurement.refine import Accuracy, Fit, accuracy, contribution, fit_amplitudes, refine, without_idle
 
 BATCH = 16
 """Most paths that are added between two refinements."""
@@ -21,15 +21,20 @@ ROUNDS = 40
 """Most rounds of search; each but the last adds a path."""
 SEARCH_STEPS = 2
 """Refinements a round: enough for the residual of the next one, since every round refines all paths again."""
+KNOWN_STEPS = 6
+"""Most refinements of paths that were known beforehand: a cycle moves them by less than a tenth of a cell."""
 FINAL_STEPS = 12
 FINAL_TOLERANCE = 0.01
 """Noise energy that the last step may leave: a tenth of a standard deviation."""
 TRIAL_STEPS = 6
 """Most refinements of the other paths after one was taken out, before the costs are compared."""
+TOUCHED = 1.0
+"""Energy over N0 that a new path takes from an old one's signal, from which on the old one is refined with it."""
 COUPLED = 0.1
 """Correlation of two signals from which on one can stand in for the other's loss."""
 SLACK = 0.1
 """How far (B tau, u, v) may leave the window and the sky during the search, so that paths on the edge do not stick."""
+NOTHING = np.zeros((0, 3))
 
 
 class Estimate(NamedTuple):
@@ -40,7 +45,13 @@ class Estimate(NamedTuple):
 
 
 def estimate_paths(
-    sounding: Sounding, grid: Grid, samples: Complexes, threshold: float, window: tuple[float, float], most: int
+    sounding: Sounding,
+    grid: Grid,
+    samples: Complexes,
+    threshold: float,
+    window: tuple[float, float],
+    most: int,
+    known: Floats = NOTHING,
 ) -> Estimate:
     """All paths in samples (L, M) whose noise has unit variance.
 
@@ -52,15 +63,23 @@ def estimate_paths(
         First and last delay, in resolution cells.
     most
         Largest number of paths.
+    known
+        (Q, 3) where paths are likely to be, such as those of the last sounding: the search begins with them. Each has
+        to prove itself like any other.
     """
-    fit = fit_amplitudes(sounding, np.zeros((0, 3)), samples)
+    fit = fit_amplitudes(sounding, known[:most], samples)
+    if len(known):
+        fit = refine(sounding, fit, samples, steps=KNOWN_STEPS)
+        fit = _drop(sounding, fit, samples, threshold, window)
     for _ in range(ROUNDS):
         room = min(BATCH, most - len(fit.parameters))
         fresh = pick_peaks(sounding, grid, fit.residual, threshold, window, room)
         if not len(fresh):
             break
         grown = fit_amplitudes(sounding, np.concatenate([fit.parameters, fresh]), samples)
-        grown = refine(sounding, grown, samples, steps=SEARCH_STEPS)
+        # From nothing, every round moves all paths; where most were known, only those that a new one touches.
+        local = _touched(grown, len(fresh)) if len(known) else np.ones(len(grown.parameters), dtype=bool)
+        grown = _refine_some(sounding, grown, samples, local)
         grown = _drop(sounding, grown, samples, threshold, window)
         if grown.cost >= fit.cost - threshold:
             break
@@ -71,18 +90,33 @@ def estimate_paths(
     return Estimate(fit, accuracy(fit))
 
 
+def _touched(fit: Fit, fresh: int) -> Booleans:
+    """(P,) the last so many paths, and those which would lose more than noise if they did not give way to them."""
+    energy = np.abs(fit.amplitude[-fresh:]) ** 2 / fit.residual.size
+    touched = np.any(np.abs(fit.inner.signal[:, -fresh:]) ** 2 * energy > TOUCHED, axis=1)
+    touched[-fresh:] = True
+    return touched
+
+
+def _refine_some(sounding: Sounding, fit: Fit, samples: Complexes, chosen: Booleans) -> Fit:
+    """Refine the chosen paths (P,) for the next search, the others held."""
+    if chosen.all():
+        return refine(sounding, fit, samples, steps=SEARCH_STEPS)
+    rows = np.flatnonzero(chosen)
+    local = fit.residual + contribution(fit, rows)
+    part = refine(sounding, fit_amplitudes(sounding, fit.parameters[rows], local), local, steps=SEARCH_STEPS)
+    parameters = fit.parameters.copy()
+    parameters[rows] = part.parameters
+    return fit_amplitudes(sounding, parameters, samples)
+
+
 def _drop(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float, window: tuple[float, float]) -> Fit:
     """Without the paths that left the window or the sky, and those whose loss alone costs less than the threshold."""
-    while len(fit.parameters):
-        astray = ~_inside(fit.parameters, window)
-        loss = np.where(astray, np.inf, removal_loss(fit))
-        weakest = int(np.argmin(loss))
-        keep = ~astray
-        keep[weakest] = loss[weakest] >= threshold
-        if keep.all():
-            return fit
-        fit = refine(sounding, fit_amplitudes(sounding, fit.parameters[keep], samples), samples, steps=1)
-    return fit
+    keep = _inside(fit.parameters, window)
+    if not keep.all():
+        fit = fit_amplitudes(sounding, fit.parameters[keep], samples)
+    keep = without_idle(fit, threshold)
+    return fit if keep.all() else fit_amplitudes(sounding, fit.parameters[keep], samples)
 
 
 def _prune(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float) -> Fit:

@@ -10,7 +10,14 @@ from rislam_rt.model import Measurement, Paths, PathTruth, RadioConfig
 
 
 def measure(
-    paths: Paths, cycle: int, heading: float, radio: RadioConfig, config: ReceiverConfig, *, rng: np.random.Generator
+    paths: Paths,
+    cycle: int,
+    heading: float,
+    radio: RadioConfig,
+    config: ReceiverConfig,
+    previous: Measurement | None = None,
+    *,
+    rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
     """Multipath components of one cycle, in the order of their delays, and which path each of them was.
 
@@ -23,8 +30,11 @@ def measure(
         Row of `paths`.
     heading
         Of the body about z [rad].
+    previous
+        What was measured in the cycle before: `waveform` begins its search there, which saves a third of its time and
+        more; `bound` has no use for it.
     """
     received = receive(paths, cycle, heading, radio, config)
     if config.estimator == "waveform":
-        return measure_waveform(received, radio, config, rng=rng)
+        return measure_waveform(received, radio, config, previous, rng=rng)
     return measure_bound(received, radio, config, paths.num_paths, rng=rng)

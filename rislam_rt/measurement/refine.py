@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.measurement.atoms import Factors, Grams, Sounding, correlate, factors, inner_products, synthesise
 from rislam_rt.measurement.waves import correlate_waves, wave_signals
 
@@ -128,9 +128,24 @@ def joint_bound(inner: Grams, amplitude: Complexes) -> tuple[Floats, Floats]:
     return covariance, np.maximum(spread, 0.0)
 
 
-def removal_loss(fit: Fit) -> Floats:
-    """(P,) by how much the cost would grow without each path, the others' amplitudes fitted again."""
-    return np.abs(fit.amplitude) ** 2 / np.real(np.diagonal(amplitude_covariance(fit)))
+def without_idle(fit: Fit, threshold: float) -> Booleans:
+    """(P,) which paths are left when those go, the most idle first, without which the cost grows by less than that.
+
+    The others' amplitudes are fitted again after each, by a rank-one change of their covariance.
+    """
+    amplitude, covariance = fit.amplitude.copy(), amplitude_covariance(fit)
+    keep = np.ones(len(amplitude), dtype=bool)
+    while keep.any():
+        variance = np.real(np.diagonal(covariance))
+        loss = np.where(keep, np.abs(amplitude) ** 2 / np.where(keep, variance, 1.0), np.inf)
+        idle = int(np.argmin(loss))
+        if loss[idle] >= threshold:
+            break
+        keep[idle] = False
+        share = covariance[:, idle] / variance[idle]
+        amplitude -= share * amplitude[idle]
+        covariance = covariance - np.outer(share, covariance[idle])
+    return keep
 
 
 def amplitude_covariance(fit: Fit) -> Complexes:
@@ -147,10 +162,10 @@ def information_matrix(inner: Grams, amplitude: Complexes) -> tuple[Floats, tupl
     count = len(amplitude)
     inverse = _inverse(inner.signal)
     mixed = (inner.mixed * amplitude).transpose(1, 0, 2).reshape(count, 3 * count)
-    slope = inner.slope * amplitude.conj()[:, None] * amplitude
     coupling = inverse @ mixed
-    full = slope.transpose(0, 2, 1, 3).reshape(3 * count, 3 * count) - mixed.conj().T @ coupling
-    information = 0.5 * np.real(full + full.conj().T)
+    slope = np.real(inner.slope * (amplitude.conj()[:, None] * amplitude))
+    shared = np.concatenate([mixed.real, mixed.imag]).T @ np.concatenate([coupling.real, coupling.imag])
+    information = slope.transpose(0, 2, 1, 3).reshape(3 * count, 3 * count) - 0.5 * (shared + shared.T)
     information[np.diag_indices(3 * count)] += np.repeat(PRIOR, count)
     return information, (inverse, coupling)
 

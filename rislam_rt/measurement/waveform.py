@@ -9,7 +9,8 @@ from rislam_rt.information import measurement_std
 from rislam_rt.measurement.atoms import build_sounding
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.detect import build_grid
-from rislam_rt.measurement.estimate import Estimate, estimate_paths
+from rislam_rt.measurement.doubt import crowding, luck, mirror_variance, unmirrored
+from rislam_rt.measurement.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.measurement.identify import identify
 from rislam_rt.measurement.joint import LEAST_CERTAINTY
@@ -76,9 +77,11 @@ def capture(
     ]
 
 
-def find_components(captures: list[Capture], radio: RadioConfig, config: ReceiverConfig) -> Components:
-    """All components in the captures of one cycle."""
-    found = [_find(one, radio, config) for one in captures]
+def find_components(
+    captures: list[Capture], radio: RadioConfig, config: ReceiverConfig, previous: Measurement | None = None
+) -> Components:
+    """All components in the captures of one cycle; the search begins with those of the previous one, if given."""
+    found = [_find(one, radio, config, _known(one, radio, previous)) for one in captures]
     joined = [np.concatenate(fields) for fields in zip(*found, strict=True)]
     order = np.argsort(joined[0])
     tau, cosines, gain, tau_std, cosines_std, amplitude_std, from_panel = (field[order] for field in joined)
@@ -86,10 +89,15 @@ def find_components(captures: list[Capture], radio: RadioConfig, config: Receive
 
 
 def measure_waveform(
-    received: Received, radio: RadioConfig, config: ReceiverConfig, *, rng: np.random.Generator
+    received: Received,
+    radio: RadioConfig,
+    config: ReceiverConfig,
+    previous: Measurement | None = None,
+    *,
+    rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
     """Components estimated from the cycle's signal, and the paths that they most likely are."""
-    found = find_components(capture(received, radio, config, rng=rng), radio, config)
+    found = find_components(capture(received, radio, config, rng=rng), radio, config, previous)
     return to_measurement(found, config), PathTruth(identify(found.tau, found.cosines, found.gain, received, radio))
 
 
@@ -106,22 +114,36 @@ def to_measurement(found: Components, config: ReceiverConfig) -> Measurement:
     )
 
 
-def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig) -> Components:
+def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Floats:
+    """Parameters (Q, 3) of the previous cycle's components of this kind of capture."""
+    if previous is None:
+        return NOTHING
+    mine = np.ones(len(previous), dtype=bool)
+    if previous.from_panel is not None:
+        mine = previous.from_panel == one.from_panel
+    return np.column_stack([previous.tau * radio.bandwidth, previous.cosines])[mine]
+
+
+def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Floats) -> Components:
     """Components of one capture."""
     sounding = build_sounding(one.samples.shape[1], radio, element_exact=config.element_exact)
     window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
     grid = build_grid(sounding, window)
     threshold = detection_threshold(radio, config)
     samples = one.samples / np.sqrt(one.noise_psd)
-    found = estimate_paths(sounding, grid, samples, threshold, window, config.max_components)
+    found = estimate_paths(sounding, grid, samples, threshold, window, config.max_components, known)
     parameters, gain, deviation, amplitude_std = _resolved(found, radio)
+    cosines = into_disc(unmirrored(parameters[:, 1:], radio))
+    variance = deviation**2 * luck(np.abs(gain) ** 2 * samples.size)[:, None]
+    variance *= crowding(parameters, threshold, radio)
+    mirrored = mirror_variance(cosines, np.sqrt(variance[:, 1:]), radio)
     scale = np.sqrt(one.noise_psd * one.samples.shape[1] / radio.energy)
     return Components(
         np.clip(parameters[:, 0], *window) / radio.bandwidth,
-        into_disc(parameters[:, 1:]),
+        cosines,
         scale * gain,
-        deviation[:, 0] / radio.bandwidth,
-        capped(deviation[:, 1:], radio),
+        np.sqrt(variance[:, 0]) / radio.bandwidth,
+        np.hypot(capped(np.sqrt(variance[:, 1:]), radio), np.sqrt(mirrored)),
         scale * amplitude_std,
         np.full(len(gain), one.from_panel),
     )

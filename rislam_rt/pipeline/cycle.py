@@ -52,6 +52,8 @@ class Agent(NamedTuple):
     state: Any
     link: Link | None
     """None without a panel."""
+    heard: Measurement | None = None
+    """What was measured in the cycle before."""
 
 
 class Means(NamedTuple):
@@ -111,7 +113,7 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
         applied = link.applied if room.faults is None else room.faults.settle(link.applied)
         paths = rephase(paths, applied, 1.0 if room.faults is None else room.faults.weight)
     measurement, truth = measure(
-        paths, 0, heading, means.settings.radio, means.settings.receiver, rng=rng.noise
+        paths, 0, heading, means.settings.radio, means.settings.receiver, agent.heard, rng=rng.noise
     )  # fmt: skip
     clock.append(perf_counter())
 
@@ -125,7 +127,7 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
         belief, info, measurement, truth, paths.gain[0], sent, applied,
         (optimise, communicate + air, acquire, localise),
     )  # fmt: skip
-    return Agent(state, link), outcome
+    return Agent(state, link, measurement), outcome
 
 
 def _nominal_step(motion: Trajectory) -> float:
