@@ -2,7 +2,8 @@
 
 The paper's room with all classes of paths, at places along the track, one core. Prints processor time a cycle of the
 bound-driven receivers, of the signal's synthesis and of the waveform estimator, for each size of array, bandwidth and
-noise level. Run: `OMP_NUM_THREADS=1 python benchmarks/receiver.py [--places 12]`.
+noise level; the estimator begins from nothing, and with what it found in the cycle before. Run:
+`OMP_NUM_THREADS=1 python benchmarks/receiver.py [--places 12]`.
 """
 
 import argparse
@@ -25,6 +26,7 @@ from rislam_rt.measurement import (
     with_reference_snr,
 )
 from rislam_rt.measurement.tracking import TrackingConfig
+from rislam_rt.measurement.waveform import to_measurement
 from rislam_rt.model import Paths, RadioConfig, RxArray, Trajectory
 from rislam_rt.scene import load_scene
 
@@ -45,8 +47,9 @@ def main() -> None:
     parser.add_argument("--places", type=int, default=12)
     arguments = parser.parse_args()
     scene = load_scene("scenes/paper_room")
-    rows = np.linspace(0, len(scene.agent) - 1, arguments.places).astype(int)
     agent = scene.agent
+    after = np.linspace(1, len(agent) - 1, arguments.places).astype(int)
+    rows = np.concatenate([after, after - 1])  # the places, then the cycle before each
     motion = Trajectory(agent.time[rows], agent.position[rows], agent.velocity[rows], agent.heading[rows], agent.body)
     paths = ImageSourceChannel(scene, RadioConfig()).paths(motion)
 
@@ -92,7 +95,7 @@ def times(work: Callable[[int], Any], places: int) -> list[float]:
 
 def track_times(paths: Paths, motion: Trajectory, radio: RadioConfig) -> list[float]:
     state, seconds = init_tracks(), []
-    for cycle in range(len(motion)):
+    for cycle in range(len(motion) // 2):
         measurement, _ = draw(paths, motion, cycle, radio, ReceiverConfig())
         for _ in range(4):
             begin = time.process_time()
@@ -102,11 +105,15 @@ def track_times(paths: Paths, motion: Trajectory, radio: RadioConfig) -> list[fl
 
 
 def print_case(name: str, paths: Paths, motion: Trajectory, radio: RadioConfig, config: ReceiverConfig) -> None:
-    places = len(motion)
-    captures = [sound(paths, motion, cycle, radio, config) for cycle in range(places)]
-    found = [len(find_components(one, radio, config).tau) for one in captures]
+    places = len(motion) // 2
+    captures = [sound(paths, motion, cycle, radio, config) for cycle in range(2 * places)]
+    before = [to_measurement(find_components(one, radio, config), config) for one in captures[places:]]
+    found = [len(find_components(one, radio, config).tau) for one in captures[:places]]
     spent = times(lambda k: find_components(captures[k], radio, config), places)
     print_times(name, spent, f"  {captures[0][0].samples.size:6d} samples, {np.mean(found):5.1f} components")
+    print_times(
+        "  from the cycle before", times(lambda k: find_components(captures[k], radio, config, before[k]), places)
+    )
 
 
 def print_times(name: str, seconds: list[float], note: str = "") -> None:
