@@ -27,9 +27,10 @@ def main() -> None:
     paths = ImageSourceChannel(scene, RADIO).paths(motion)
     for config in (ReceiverConfig(), ReceiverConfig(estimator="waveform")):
         rng = np.random.default_rng(2)
-        state, label, truth, confirmed = init_tracks(), [], [], []
+        state, label, truth, confirmed, measurement = init_tracks(), [], [], [], None
         for cycle in range(len(motion)):
-            measurement, known = measure(paths, cycle, float(motion.heading[cycle]), RADIO, config, rng=rng)
+            heading = float(motion.heading[cycle])
+            measurement, known = measure(paths, cycle, heading, RADIO, config, measurement, rng=rng)
             state, info = step_tracks(state, measurement, 0.1, TrackingConfig())
             label.append(info.label)
             truth.append(known.path)

@@ -21,11 +21,18 @@ def repeat(paths, config, times, radio=RADIO, heading=0.0, seed=1):
     return [measure(paths, 0, heading, radio, config, rng=rng) for _ in range(times)]
 
 
+def many(make_paths, gain):
+    """Fifty paths more than a resolution cell apart: fifty draws a measurement."""
+    return make_paths([(PathKind.PS, 2.0 + 0.4 * i, UP, gain) for i in range(50)])
+
+
 def test_lone_path_errs_as_the_bound_says(make_paths, make_gain):
-    paths = make_paths([(PathKind.PS, 4.0, UP, make_gain(25.0, RADIO, 0.7))])
+    paths = many(make_paths, make_gain(25.0, RADIO, 0.7))
     times = 2000
-    runs = [m for m, _ in repeat(paths, QUIET, times)]
-    errors = np.array([[m.tau[0] - paths.tau[0, 0], *(m.cosines[0] - paths.arrival[0, 0, :2])] for m in runs])
+    runs = [m for m, _ in repeat(paths, QUIET, times // 50)]
+    errors = np.concatenate(
+        [np.column_stack([m.tau - paths.tau[0], m.cosines - paths.arrival[0, :, :2]]) for m in runs]
+    )
     snr = 10.0**2.5
     tau = 1.0 / np.sqrt(8.0 * np.pi**2 * RADIO.bandwidth**2 / 12.0 * snr)
     lever = np.arange(4) - 1.5  # half wavelengths, four elements each
@@ -34,7 +41,7 @@ def test_lone_path_errs_as_the_bound_says(make_paths, make_gain):
     np.testing.assert_allclose(errors.std(axis=0), [tau, cosine, cosine], rtol=0.08)
     # mean of 2000: five standard errors
     assert np.all(np.abs(errors.mean(axis=0)) < 5.0 * np.array([tau, cosine, cosine]) / np.sqrt(times))
-    amplitude = np.array([m.amplitude[0] for m in runs])
+    amplitude = np.concatenate([m.amplitude for m in runs])
     assert amplitude.std() == pytest.approx(runs[0].amplitude_std[0], rel=0.08)
 
 
@@ -54,8 +61,8 @@ def test_detection_follows_marcum_q(make_paths, make_gain, snr_db):
     integral = quad(lambda x: x * np.exp(-0.5 * (x - a) ** 2) * ive(0, a * x), b, b + 40.0)[0]
     probability = float(detection_probability(np.array(snr), threshold))
     assert probability == pytest.approx(integral, rel=1e-6)
-    paths = make_paths([(PathKind.PS, 4.0, UP, make_gain(snr_db, RADIO))])
-    seen = np.mean([len(m) for m, _ in repeat(paths, QUIET, 2000)])
+    paths = many(make_paths, make_gain(snr_db, RADIO))
+    seen = np.mean([len(m) / 50.0 for m, _ in repeat(paths, QUIET, 40)])
     assert seen == pytest.approx(probability, abs=5.0 * np.sqrt(0.25 / 2000))
 
 
