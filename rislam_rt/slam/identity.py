@@ -6,7 +6,7 @@ in which a landmark does not show count too: of a path near the threshold only t
 """
 
 import numpy as np
-from scipy.special import chndtr, ive
+from scipy.special import chndtr, i0e
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.model import RadioConfig, RisCode, RisSpec
@@ -28,7 +28,7 @@ def log_rice(amplitude: Floats, mean: Floats, std: Floats) -> Floats:
     """Log density of the amplitude of a constant `mean` in complex noise of `std` a real dimension."""
     variance = std**2
     product = amplitude * mean / variance
-    bessel = np.log(ive(0, product))
+    bessel = np.log(i0e(product))
     return np.log(amplitude / variance) - 0.5 * (amplitude - mean) ** 2 / variance + bessel
 
 

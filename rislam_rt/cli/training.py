@@ -1,0 +1,58 @@
+"""What `rislam-rt run` does with a pipeline that trains the classifier."""
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from rislam_rt.cli.options import write_json
+
+if TYPE_CHECKING:
+    from rislam_rt.cli.study import Given
+    from rislam_rt.pipeline.studies.classifier.spec import ClassifierSpec
+
+PAGE, SCORES, IMPORTANCE = "classifier", "figures/classifier_scores.png", "figures/classifier_features.png"
+
+
+def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
+    """Train the classifier of components and score it; weights, page, data and figures."""
+    from rislam_rt.cli.progress import show_progress
+    from rislam_rt.cli.scenes import open_scene
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.pipeline.files import write_atomic
+    from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.studies.classifier.run import ALL, run_training
+    from rislam_rt.pipeline.studies.spec import study_record
+    from rislam_rt.report.classifier import (
+        classifier_page,
+        classifier_table,
+        draw_importance,
+        draw_scores,
+        weights_file,
+    )
+    from rislam_rt.report.style import to_png
+
+    if given.scene is not None:
+        raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'train_classifier' names its rooms; set 'rooms'")
+    folder = given.out or Path("runs") / f"{spec.name}-{spec.seed}"
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError(f"--out {folder}: is a file; give a folder")
+    scenes = [open_scene(Path(os.path.normpath(given.pipeline.parent / room.scene))).scene for room in spec.rooms]
+    prepare_channel(spec.channel)
+    with show_progress() as progress:
+        found = run_training(scenes, spec, progress=progress)
+    content = {**study_record(spec, scenes), **classifier_table(found)}
+    files = {
+        f"{PAGE}.md": classifier_page(found, spec, (SCORES, IMPORTANCE) if given.page else None).encode(),
+        f"{PAGE}.json": (json.dumps(content, indent=1, allow_nan=False) + "\n").encode(),
+        "weights.npz": weights_file(found),
+    }
+    if given.page:
+        files |= {SCORES: to_png(draw_scores(found)), IMPORTANCE: to_png(draw_importance(found))}
+    for name, data in files.items():
+        write_atomic(folder / name, data)
+    typer.echo(f"F1 on all test rooms: {found.scores['plain'][ALL]['network'].f1:.4f}")
+    typer.echo(f"page: {folder / PAGE}.md")
+    write_json(given.json, content)

@@ -1,0 +1,139 @@
+"""Labelled tracks from walks: what the receiver reports, tracked as the agent would, and what each truly was."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.design.single import exact_code
+from rislam_rt.measurement import ReceiverConfig, TrackingConfig, init_tracks, measure, step_tracks
+from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, RisSpec, Trajectory
+from rislam_rt.ris import rephase
+from rislam_rt.slam.classify import Sightings, track_features
+
+WINDOW = 40
+"""Cycles that a track is judged by, as many as the filter keeps."""
+LOS_MARGIN = 0.1
+"""Length [m] beyond the baseline below which a component is the direct path, as in the filter."""
+VELOCITY_STD = 0.01
+"""Error [m/s] of the agent's own velocity in each axis, constant over a walk."""
+CLUTTER = -1
+"""In `Examples.kind`."""
+POLICIES = ("random", "held", "exact")
+"""How a walk sets the panel: a random code each cycle, one random code, or the best for its direct path."""
+
+
+class Examples(NamedTuple):
+    """N components of tracks, one row a component and cycle; LOS by length left out, as it never becomes a track."""
+
+    features: Floats
+    """(N, F)."""
+    kind: Integers
+    """(N,) `PathKind`, or `CLUTTER`."""
+    age: Integers
+    """(N,) measurements of its track within the window."""
+    ratio: Floats
+    """(N,) amplitude over that of free space of the same length."""
+    walk: Integers
+    """(N,) number of the walk."""
+
+    @property
+    def keep(self) -> Booleans:
+        """(N,) whether it came over a landmark."""
+        return self.kind >= PathKind.PS
+
+    @property
+    def labelled(self) -> Booleans:
+        """(N,) whether it was a path, and not clutter."""
+        return self.kind != CLUTTER
+
+    def pick(self, rows: Booleans | Integers) -> "Examples":
+        """Some of them."""
+        return Examples._make(field[rows] for field in self)
+
+
+def join(parts: list[Examples]) -> Examples:
+    """Several sets as one, walks numbered through."""
+    return Examples._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
+
+
+def set_codes(paths: Paths, panel: RisSpec | None, policy: str, *, rng: np.random.Generator) -> Paths:
+    """The paths of a walk under the codes of a policy."""
+    if panel is None or paths.ris is None:
+        return paths
+    shape = (paths.num_cycles, panel.rows, panel.cols)
+    if policy == "exact" and np.any(paths.kind == PathKind.RIS):
+        return rephase(paths, RisCode(_best_codes(paths, panel), panel.levels))
+    index = rng.integers(panel.levels, size=shape if policy == "random" else shape[1:])
+    return rephase(paths, RisCode(index, panel.levels))
+
+
+def _best_codes(paths: Paths, panel: RisSpec) -> Integers:
+    """(K, N, M) codes of largest gain for the direct path; zero where it is hidden."""
+    assert paths.ris is not None
+    column = int(np.flatnonzero(paths.kind == PathKind.RIS)[0])
+    tx, rx = paths.ris.tx[:, paths.ris.tx_leg[column]], paths.ris.rx[:, paths.ris.rx_leg[column]]
+    response = (tx * rx).reshape(len(tx), -1)
+    return exact_code(response, panel.levels)[0].reshape(tx.shape)
+
+
+def gather_walk(
+    paths: Paths, motion: Trajectory, radio: RadioConfig, receiver: ReceiverConfig, walk: int, stride: int,
+    *, rng: np.random.Generator
+) -> Examples:  # fmt: skip
+    """Examples of one walk, every `stride`-th cycle of it."""
+    believed = motion.position + np.outer(motion.time, rng.standard_normal(3) * [VELOCITY_STD, VELOCITY_STD, 0.0])
+    baseline = float(np.linalg.norm(motion.body.tx_offset - motion.body.rx_offset))
+    state, config, memory = init_tracks(), TrackingConfig(), _Memory()
+    found: list[Examples] = []
+    for cycle in range(len(motion)):
+        measurement, truth = measure(paths, cycle, float(motion.heading[cycle]), radio, receiver, rng=rng)
+        dt = float(motion.time[cycle] - motion.time[cycle - 1]) if cycle else 0.0
+        state, info = step_tracks(state, measurement, dt, config)
+        length = SPEED_OF_LIGHT * measurement.tau
+        std = np.column_stack([SPEED_OF_LIGHT * measurement.tau_std, measurement.cosines_std])
+        rows = np.column_stack([length, measurement.cosines, std, np.log(measurement.amplitude)])
+        memory.add(info.label, rows, cycle)
+        far = length > baseline + LOS_MARGIN + 3.0 * np.minimum(std[:, 0], LOS_MARGIN)
+        memory.forget(state.label)
+        if cycle % stride == stride - 1 and far.any():
+            # a cycle's walk through the window starts at a random phase, so that every age occurs
+            sightings = memory.sightings(info.label[far], cycle, believed, motion.heading)
+            kind = np.where(truth.path >= 0, paths.kind[truth.path], CLUTTER)[far]
+            free = radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * length[far])
+            found.append(
+                Examples(
+                    track_features(sightings, motion.body, radio), kind, sightings.held.sum(axis=1),
+                    measurement.amplitude[far] / free, np.full(int(far.sum()), walk),
+                )
+            )  # fmt: skip
+    return join(found)
+
+
+class _Memory:
+    """The last measurements of each living label: the tracker itself keeps none."""
+
+    def __init__(self) -> None:
+        self.rows: dict[int, dict[int, Floats]] = {}
+
+    def add(self, labels: Integers, rows: Floats, cycle: int) -> None:
+        for label, row in zip(labels.tolist(), rows, strict=True):
+            self.rows.setdefault(label, {})[cycle] = row
+
+    def forget(self, living: Integers) -> None:
+        alive = set(living.tolist())
+        self.rows = {label: held for label, held in self.rows.items() if label in alive}
+
+    def sightings(self, labels: Integers, cycle: int, position: Floats, heading: Floats) -> Sightings:
+        """What the labels have shown in the window that ends at a cycle."""
+        first = max(0, cycle - WINDOW + 1)
+        table = np.zeros((len(labels), cycle - first + 1, 7))
+        table[..., 3:6] = 1.0
+        held = np.zeros(table.shape[:2], dtype=np.bool_)
+        for place, label in enumerate(labels.tolist()):
+            for when, row in self.rows[label].items():
+                if when >= first:
+                    table[place, when - first], held[place, when - first] = row, True
+        window = slice(first, cycle + 1)
+        return Sightings(table[..., :3], table[..., 3:6], table[..., 6], held, position[window], heading[window])

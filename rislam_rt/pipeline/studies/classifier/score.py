@@ -1,0 +1,126 @@
+"""How good a classifier is: F1 of "keep", intervals over walks, what each feature is worth."""
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.model import PathKind
+from rislam_rt.pipeline.studies.classifier.gather import Examples
+from rislam_rt.slam.classify import FEATURES, Network, classify, classify_geometric
+
+AMPLITUDE_RULE = 0.35
+"""Amplitude over that of free space above which the plain rule removes (`SlamConfig.specular_ratio`)."""
+NUM_RESAMPLES = 1000
+NUM_SHUFFLES = 5
+
+Rule = Callable[[Examples], Booleans]
+"""Which examples are kept."""
+
+
+class Score(NamedTuple):
+    """Of one rule on one set of examples; clutter counts in `clutter_kept` alone."""
+
+    f1: float
+    """2 TP / (2 TP + FP + FN) of keep; NaN-free: 1 where there is nothing to keep and nothing was kept."""
+    low: float
+    high: float
+    precision: float
+    recall: float
+    removed: float
+    """Share of LOS and wall returns that were removed."""
+    clutter_kept: float
+    """Share of clutter that was kept."""
+
+
+def rules(network: Network) -> dict[str, Rule]:
+    """The network and what it is compared with."""
+    return {
+        "network": lambda e: classify(e.features, network) > 0.5,
+        "geometric": lambda e: classify_geometric(e.features) > 0.5,
+        "amplitude": lambda e: e.ratio < AMPLITUDE_RULE,
+    }
+
+
+def score(examples: Examples, rule: Rule, coverage: float, *, rng: np.random.Generator) -> Score:
+    """F1 with its interval by resampling walks, which are independent of each other as single cycles are not."""
+    kept = rule(examples)
+    labelled, keep = examples.labelled, examples.keep
+    tables = np.array([_counts(kept, keep, labelled & (examples.walk == w)) for w in np.unique(examples.walk)])
+    draws = rng.integers(len(tables), size=(NUM_RESAMPLES, len(tables)))
+    tail = 50.0 * (1.0 - coverage)
+    low, high = np.percentile(_f1(tables[draws].sum(axis=1)), [tail, 100.0 - tail])
+    hit, false, missed, right = tables.sum(axis=0)
+    clutter = kept[~labelled]
+    return Score(
+        float(_f1(tables.sum(axis=0)[None])[0]),
+        float(low),
+        float(high),
+        _share(hit, hit + false),
+        _share(hit, hit + missed),
+        _share(right, right + false),
+        float(clutter.mean()) if len(clutter) else 0.0,
+    )
+
+
+def importance(examples: Examples, network: Network, *, rng: np.random.Generator) -> dict[str, Floats]:
+    """Loss of F1 (S,) when one feature is shuffled among the examples, S times."""
+    known = examples.pick(examples.labelled)
+    full = f1(known.keep, classify(known.features, network) > 0.5)
+    lost: dict[str, Floats] = {}
+    for column, name in enumerate(FEATURES):
+        drops = []
+        for _ in range(NUM_SHUFFLES):
+            features = known.features.copy()
+            features[:, column] = rng.permutation(features[:, column])
+            drops.append(full - f1(known.keep, classify(features, network) > 0.5))
+        lost[name] = np.array(drops)
+    return lost
+
+
+def by_age(examples: Examples, rule: Rule, edges: tuple[int, ...]) -> dict[str, float]:
+    """F1 by the measurements that a track had, in bins `edges[i] <= age < edges[i + 1]`."""
+    known = examples.pick(examples.labelled)
+    kept = rule(known)
+    bins = {}
+    for low, high in pairwise(edges):
+        rows = (known.age >= low) & (known.age < high)
+        if rows.any():
+            bins[f"{low} to {high - 1}" if high - low > 1 else f"{low}"] = f1(known.keep[rows], kept[rows])
+    return bins
+
+
+def mistakes(examples: Examples, rule: Rule) -> dict[str, Any]:
+    """Wrong examples by path class: wrong, and how many there are."""
+    kept = rule(examples)
+    return {
+        kind.name: (int(np.sum((examples.kind == kind) & (kept != examples.keep))), int(np.sum(examples.kind == kind)))
+        for kind in PathKind
+        if np.any(examples.kind == kind)
+    }
+
+
+def f1(keep: Booleans, kept: Booleans) -> float:
+    """F1 of keep."""
+    return float(_f1(np.array(_counts(kept, keep, np.ones(len(keep), dtype=np.bool_)))[None])[0])
+
+
+def _counts(kept: Booleans, keep: Booleans, rows: Booleans) -> tuple[int, int, int, int]:
+    """Kept rightly, kept wrongly, removed wrongly, removed rightly."""
+    return (
+        int(np.sum(rows & kept & keep)),
+        int(np.sum(rows & kept & ~keep)),
+        int(np.sum(rows & ~kept & keep)),
+        int(np.sum(rows & ~kept & ~keep)),
+    )
+
+
+def _f1(tables: Any) -> Floats:
+    hit, false, missed = tables[:, 0], tables[:, 1], tables[:, 2]
+    return np.asarray(np.where(hit + false + missed > 0, 2.0 * hit / np.maximum(2 * hit + false + missed, 1), 1.0))
+
+
+def _share(part: float, whole: float) -> float:
+    return float(part / whole) if whole else 1.0

@@ -1,0 +1,29 @@
+"""Which multipath components came over a landmark: a small network, its features, and a geometric baseline."""
+
+from rislam_rt.slam.classify.features import FEATURES, MotionFit, Sightings, fit_motion, track_features
+from rislam_rt.slam.classify.geometric import classify_geometric
+from rislam_rt.slam.classify.network import (
+    Network,
+    classify,
+    load_classifier,
+    log_odds,
+    network_arrays,
+    read_network,
+)
+from rislam_rt.slam.classify.sightings import sightings_of
+
+__all__ = [
+    "FEATURES",
+    "MotionFit",
+    "Network",
+    "Sightings",
+    "classify",
+    "classify_geometric",
+    "fit_motion",
+    "load_classifier",
+    "log_odds",
+    "network_arrays",
+    "read_network",
+    "sightings_of",
+    "track_features",
+]
