@@ -28,10 +28,12 @@ def command(
     """Run a pipeline in a room: trace, then design, measure, localise and map, cycle by cycle.
 
     An interrupted run goes on where it stopped when the same command is given again; a completed one is replaced.
-    A file of another kind is a study: 'compare_channels' (exit code 1 if a path is unexplained) or 'fig4a'.
+    A file of another kind is a study: 'compare_channels' (exit code 1 if a path is unexplained), 'fig4a', 'claims',
+    'train_classifier', or 'fig4b', 'fig4c', 'rooms', 'ablations', which go through settings and seeds (exit code 1 if a
+    run failed).
     """
-    from rislam_rt.cli.study import run_compare_channels, run_gain_curves
-    from rislam_rt.pipeline.studies import CompareSpec, Fig4aSpec, load_any
+    from rislam_rt.cli.study import run_claims, run_compare_channels, run_gain_curves, run_swept
+    from rislam_rt.pipeline.studies import ClaimsSpec, ClassifierSpec, CompareSpec, Fig4aSpec, SweptSpec, load_any
 
     spec = load_any(pipeline, set_ or ())
     given = Given(pipeline, scene, out, jobs, json, page)
@@ -39,6 +41,14 @@ def command(
         run_compare_channels(spec, given)
     elif isinstance(spec, Fig4aSpec):
         run_gain_curves(spec, given)
+    elif isinstance(spec, SweptSpec):
+        run_swept(spec, given)
+    elif isinstance(spec, ClaimsSpec):
+        run_claims(spec, given)
+    elif isinstance(spec, ClassifierSpec):
+        from rislam_rt.cli.training import run_classifier
+
+        run_classifier(spec, given)
     else:
         run_main_job(spec, given)
 

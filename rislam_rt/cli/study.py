@@ -9,7 +9,10 @@ import typer
 from rislam_rt.cli.options import write_json
 
 if TYPE_CHECKING:
-    from rislam_rt.pipeline.studies import CompareSpec, Fig4aSpec
+    from collections.abc import Sequence
+
+    from rislam_rt.pipeline.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec
+    from rislam_rt.pipeline.sweeps import Row
 
 
 class Given(NamedTuple):
@@ -77,6 +80,57 @@ def run_gain_curves(spec: "Fig4aSpec", given: Given) -> None:
         typer.echo("\n".join([*verdict(found, element), ""]))
     typer.echo(f"page: {write_fig4a(found, spec, scene.name, content, folder, figures=given.page)}")
     write_json(given.json, content)
+
+
+def run_swept(spec: "SweptSpec", given: Given) -> None:
+    """A study on the sweep engine; its page grows while it runs. Exit code 1 if a cell failed."""
+    from rislam_rt.cli.progress import show_sweep
+    from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.studies.swept import build_sweep
+    from rislam_rt.pipeline.studies.swept.record import swept_record
+    from rislam_rt.pipeline.sweeps import Effort, build_cells, run_sweep
+    from rislam_rt.report.swept import write_swept
+
+    sweep = build_sweep(spec, given.pipeline, given.scene)
+    folder, cells = _folder(given.out, Path("runs") / f"{spec.name}-{spec.seed}"), Path("sweeps") / spec.name
+    for kind in {cell.depends["config"]["channel"] for cell in build_cells(sweep)}:
+        prepare_channel(kind)
+    record = swept_record(spec, sweep, given.pipeline)
+
+    def grow(rows: "Sequence[Row]") -> None:
+        write_swept(rows, spec, record, folder, figures=given.page)
+
+    effort = Effort(given.jobs or os.cpu_count() or 1, None, spec.time_limit_s)
+    try:
+        with show_sweep() as tell:
+            report = run_sweep(sweep, cells, effort, tell=tell, grow=grow)
+    except KeyboardInterrupt:
+        typer.echo("interrupted: what is done is kept; the same command goes on from there", err=True)
+        raise typer.Exit(130) from None
+    typer.echo(f"page: {write_swept(report.rows, spec, record, folder, figures=given.page)}")
+    typer.echo(f"cells: {cells}")
+    write_json(given.json, {**record, "failed": len(report.failed)})
+    if report.failed:
+        raise typer.Exit(1)
+
+
+def run_claims(spec: "ClaimsSpec", given: Given) -> None:
+    """The claims' table, from what other studies left behind."""
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.pipeline.studies.claims import judge, read_results
+    from rislam_rt.report.claims import write_claims
+
+    if given.scene is not None:
+        raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'claims' runs in no room; leave it out")
+    results = read_results(_beside(given.pipeline, spec.results))
+    found = judge(results)
+    folder = _folder(given.out, Path("runs") / spec.name)
+    names = ("seed", "scenes", "versions")
+    sources = {study: {name: content[name] for name in names} for study, content in results.items()}
+    for claim in found:
+        typer.echo(f"{claim.verdict}: {claim.claim}")
+    typer.echo(f"page: {write_claims(found, spec.name, sources, folder)}")
+    write_json(given.json, {"claims": [claim._asdict() for claim in found]})
 
 
 def _beside(pipeline: Path, scene: str) -> Path:

@@ -81,7 +81,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "outcomes": {name: scheme.outcome.count(name) for name in sorted(set(scheme.outcome))},
         "landmarks": landmark_scores(scene, scheme),
         "walls": wall_scores(scene, scheme.map),
-        "map": map_score(scene, scheme.map),
+        "map": map_score(scene, scheme.map, panel=bool(scheme.levels)),
         "association": {"accuracy": score.accuracy, "precision": score.precision, "recall": score.recall},
         "step_seconds": seconds,
         "over_budget": over_budget(seconds, result.config["budget"]),
@@ -102,10 +102,14 @@ def has_diverged(errors: Floats, limit: Floats | None) -> bool:
     return bool((errors > least).any())
 
 
-def map_score(scene: Scene, estimate: MapEstimate) -> dict[str, Any]:
-    """GOSPA of the last map's points (images left out) against all landmarks, cut off at `NEAR_LANDMARK`, order 2."""
+def map_score(scene: Scene, estimate: MapEstimate, *, panel: bool = True) -> dict[str, Any]:
+    """GOSPA of the last map's points (images left out) against all landmarks, cut off at `NEAR_LANDMARK`, order 2.
+
+    Without a `panel` in the scheme there is none to be found.
+    """
     points = estimate.position[estimate.parent < 0]
-    found = gospa(points, scene.landmark_positions, cutoff=NEAR_LANDMARK)
+    truth = scene.landmark_positions if panel else scene.landmark_positions[: len(scene.scatterers)]
+    found = gospa(points, truth, cutoff=NEAR_LANDMARK)
     names = ("gospa_m", "localisation_m", "missed", "false")
     return dict(zip(names, found, strict=True))
 

@@ -22,8 +22,20 @@ SCHEME = {
     "exact": "#009E73",
     "genie": "#CC79A7",
     "no_ris": "#7a5c00",
+    "bp_slam": "#56B4E9",
+    "channel_slam": "#E69F00",
 }
 """Colour of each scheme, the same in every figure."""
+MARKER = {
+    "optimized": "o",
+    "random": "s",
+    "exact": "^",
+    "genie": "*",
+    "no_ris": "D",
+    "bp_slam": "v",
+    "channel_slam": "P",
+}
+"""Marker of each scheme, so that colour is never all that tells them apart."""
 KIND = {
     PathKind.LOS: "black",
     PathKind.VT: "#999999",

@@ -1,6 +1,8 @@
 """Pipelines other than the main job: a file's `kind` says which; each has its specification and its run here."""
 
+from rislam_rt.pipeline.studies.classifier.spec import ClassifierSpec
 from rislam_rt.pipeline.studies.kinds import load_any
-from rislam_rt.pipeline.studies.spec import CompareSpec, Fig4aSpec, StudySpec
+from rislam_rt.pipeline.studies.spec import ClaimsSpec, CompareSpec, Fig4aSpec, StudySpec
+from rislam_rt.pipeline.studies.swept.spec import SweptSpec
 
-__all__ = ["CompareSpec", "Fig4aSpec", "StudySpec", "load_any"]
+__all__ = ["ClaimsSpec", "ClassifierSpec", "CompareSpec", "Fig4aSpec", "StudySpec", "SweptSpec", "load_any"]

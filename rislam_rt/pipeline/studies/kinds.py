@@ -6,14 +6,15 @@ from pathlib import Path
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.read import build_spec, read_table
 from rislam_rt.pipeline.spec import PipelineSpec, build_design, build_radio, build_settings
+from rislam_rt.pipeline.studies.classifier.spec import ClassifierSpec, build_receiver
 from rislam_rt.pipeline.studies.spec import ClaimsSpec, CompareSpec, Fig4aSpec
 from rislam_rt.pipeline.studies.swept import SWEPT, SweptSpec, check_swept
 
-KINDS = ("slam", "compare_channels", "fig4a", *SWEPT, "claims")
+KINDS = ("slam", "compare_channels", "fig4a", *SWEPT, "claims", "train_classifier")
 """What `kind` may say; `slam` if it is not there."""
 
 
-AnySpec = PipelineSpec | CompareSpec | Fig4aSpec | SweptSpec | ClaimsSpec
+AnySpec = PipelineSpec | CompareSpec | Fig4aSpec | SweptSpec | ClaimsSpec | ClassifierSpec
 
 
 def load_any(path: str | Path, overrides: Sequence[str] = ()) -> AnySpec:
@@ -32,6 +33,8 @@ def load_any(path: str | Path, overrides: Sequence[str] = ()) -> AnySpec:
         return build_spec(table, Fig4aSpec, lambda spec: (build_radio(spec.radio), build_design(spec.design)))
     if kind in SWEPT:
         return build_spec(table, SWEPT[kind], check_swept)
+    if kind == "train_classifier":
+        return build_spec(table, ClassifierSpec, lambda spec: (build_radio(spec.radio), build_receiver(spec.receiver)))
     if kind == "claims":
         return build_spec(table, ClaimsSpec, lambda spec: None)
     if kind in KINDS:

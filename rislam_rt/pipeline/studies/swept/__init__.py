@@ -1,6 +1,7 @@
 """Studies that go through settings and seeds on the sweep engine: their specifications, cells and scores."""
 
-from rislam_rt.pipeline.studies.swept.collect import Group, group_rows, paired_gain, spread
+from rislam_rt.pipeline.studies.swept.cell import cell_spec
+from rislam_rt.pipeline.studies.swept.collect import Group, group_rows, paired_difference, paired_gain, spread
 from rislam_rt.pipeline.studies.swept.spec import (
     SWEPT,
     AblationsSpec,
@@ -10,7 +11,7 @@ from rislam_rt.pipeline.studies.swept.spec import (
     SweptSpec,
     VariantSection,
 )
-from rislam_rt.pipeline.studies.swept.sweep import build_sweep, cell_spec, check_swept
+from rislam_rt.pipeline.studies.swept.sweep import build_sweep, check_swept
 
 __all__ = [
     "SWEPT",
@@ -25,6 +26,7 @@ __all__ = [
     "cell_spec",
     "check_swept",
     "group_rows",
+    "paired_difference",
     "paired_gain",
     "spread",
 ]

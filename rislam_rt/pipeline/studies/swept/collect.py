@@ -25,9 +25,20 @@ class Group(NamedTuple):
         """Names, in the order in which they ran."""
         return list(dict.fromkeys(name for result in self.results if result for name in result["schemes"]))
 
-    def column(self, scheme: str, name: str) -> Floats:
-        """(R,) a score by dotted name, e.g. `landmarks.ris.rmse_m`; NaN where there is none."""
+    def column(self, scheme: str, *name: str) -> Floats:
+        """(R,) a score by its names, outermost first, e.g. `"landmarks", "ris", "rmse_m"`; NaN where there is none."""
         return np.array([_look(result, scheme, name) for result in self.results], dtype=np.float64)
+
+    def parts(self, scheme: str, name: str) -> list[str]:
+        """What a score holds in any repetition: the landmarks of `landmarks`, the walls of `walls`."""
+        found = [result["schemes"].get(scheme, {}).get(name, {}) for result in self.results if result]
+        return list(dict.fromkeys(part for entry in found for part in entry))
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why schemes failed, each reason once."""
+        entries = [(name, entry) for result in self.results if result for name, entry in result["schemes"].items()]
+        return list(dict.fromkeys(f"{name}: {entry['failed']}" for name, entry in entries if "failed" in entry))
 
     def failed(self, scheme: str) -> int:
         """Repetitions without a score of the scheme: it failed, or its cell did."""
@@ -86,8 +97,8 @@ def paired_difference(ours: Floats, theirs: Floats) -> Interval | None:
     return bootstrap(pairs, rng=np.random.default_rng(0), statistic=difference, level=LEVEL)
 
 
-def _look(result: Mapping[str, Any] | None, scheme: str, name: str) -> float:
+def _look(result: Mapping[str, Any] | None, scheme: str, name: Sequence[str]) -> float:
     found: Any = result["schemes"].get(scheme) if result else None
-    for part in name.split("."):
+    for part in name:
         found = found.get(part) if isinstance(found, Mapping) else None
     return float("nan") if found is None else float(found)

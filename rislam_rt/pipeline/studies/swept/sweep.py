@@ -60,7 +60,7 @@ def check_swept(spec: SweptSpec) -> None:
         They are not. The message begins with the field.
     """
     variants = {variant.name: dict(variant.set) for variant in spec.all_variants}
-    for name in variants or {"": None}:
+    for name in variants or [""]:
         try:
             cell_spec({"run": spec.run, "variant": name, "variants": variants})
         except ConfigError as error:

@@ -1,0 +1,115 @@
+"""One setting changed at a time: what each is worth, as table, figure and page."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from rislam_rt.evaluate import Interval
+from rislam_rt.pipeline.studies.swept import AblationsSpec, Group, paired_gain
+from rislam_rt.report.style import TRUTH, styled
+from rislam_rt.report.swept.entries import (
+    interval_entry,
+    metres,
+    metres_between,
+    percent_between,
+    ratio,
+    scheme_entry,
+    table_lines,
+    trouble,
+)
+from rislam_rt.report.swept.lines import mark_metres
+
+WORSE, BETTER, SAME = "#D55E00", "#0072B2", "#8c8c8c"
+
+
+def ablations_content(groups: Sequence[Group], spec: AblationsSpec) -> dict[str, Any]:
+    """Plain data: one entry a variant and scheme; the change is against the reference's first scheme, seed by seed."""
+    about = {variant.name: variant for variant in spec.variants}
+    base = groups[0]
+    own = base.column(base.schemes[0], "rmse_m") if base.schemes else np.full(len(base.results), np.nan)
+    entries = []
+    for group in groups:
+        variant = about[str(group.point["variant"])]
+        for scheme in group.schemes:
+            gain = paired_gain(group.column(scheme, "rmse_m"), own)
+            change = Interval(-gain.value, -gain.upper, -gain.lower) if gain else None
+            first = group is base and scheme == base.schemes[0]
+            entries.append(
+                {
+                    **scheme_entry(group, scheme),
+                    "group": variant.group,
+                    "note": variant.note,
+                    **interval_entry("change", None if first else change),
+                }
+            )
+    return {"reference": spec.variants[0].name, "entries": entries}
+
+
+def draw_ablations(content: Mapping[str, Any]) -> Figure:
+    """RMSE of every variant with its interval, its bound as a tick, the reference as a line."""
+    entries = [entry for entry in content["entries"] if entry["rmse_m"] is not None]
+    with styled():
+        figure = Figure(figsize=(8.2, 1.4 + 0.3 * len(entries)))
+        axis = figure.subplots()
+        for row, entry in enumerate(entries):
+            value, low, high = (entry[name] or entry["rmse_m"] for name in ("rmse_m", "rmse_low_m", "rmse_high_m"))
+            axis.plot([low, high], [row, row], color=_colour(entry), lw=1.4)
+            axis.plot([value], [row], color=_colour(entry), marker="o", ms=6)
+            if entry["bound_m"]:
+                axis.plot([entry["bound_m"]], [row], color=TRUTH, marker="|", ms=11, mew=1.6)
+        if entries:
+            axis.axvline(entries[0]["rmse_m"], color=SAME, lw=1.0, ls=":")
+        axis.set_yticks(range(len(entries)), [_label(entry) for entry in entries], fontsize=9)
+        axis.invert_yaxis()
+        axis.set_xscale("log")
+        mark_metres(axis.xaxis)
+        axis.grid(axis="y", visible=False)
+        axis.set_xlabel("RMSE of the agent's position [m]: dot with 95 % interval; black tick: posterior bound")
+        axis.set_title("blue: better than the reference, orange: worse, grey: no telling", fontsize=10)
+    return figure
+
+
+def ablations_page(
+    content: Mapping[str, Any], groups: Sequence[Group], about: Sequence[str], figure: str | None
+) -> str:
+    """Markdown: what was done, the picture, a table a group of variants."""
+    lines = ["# Ablations: one setting at a time", "", *about, ""]
+    lines += [
+        f"The reference is `{content['reference']}`. The change is that of the agent's RMSE against it, from pairs of"
+    ]
+    lines += ["runs with the same motion and noise; more is worse.", ""]
+    if figure is not None:
+        lines += [f"![RMSE of every variant]({figure})", ""]
+    for name in dict.fromkeys(entry["group"] for entry in content["entries"]):
+        own = [entry for entry in content["entries"] if entry["group"] == name]
+        lines += [f"## {name or 'Reference'}", "", *table_lines(_HEAD, [_row(entry) for entry in own]), ""]
+    return "\n".join([*lines, "## Failures", "", *trouble(groups)]) + "\n"
+
+
+_HEAD = [
+    "variant", "scheme", "agent RMSE [m]", "change", "bound [m]", "RMSE / bound", "NEES", "panel [m]",
+    "scatterers [m]", "walls [m]", "association", "diverged", "failed",
+]  # fmt: skip
+
+
+def _row(entry: Mapping[str, Any]) -> list[str]:
+    known = entry["change"] is not None
+    change = Interval(entry["change"], entry["change_low"], entry["change_high"]) if known else None
+    return [
+        f"`{entry['variant']}`" + (f": {entry['note']}" if entry["note"] else ""), entry["scheme"],
+        metres_between(entry), percent_between(change), metres(entry["bound_m"]), ratio(entry["over_bound"]),
+        ratio(entry["nees_per_dof"]), metres(entry["ris_m"]), metres(entry["scatterer_m"]), metres(entry["wall_m"]),
+        ratio(entry["association"]), f"{entry['diverged']} of {entry['runs']}", str(entry["failed"]),
+    ]  # fmt: skip
+
+
+def _colour(entry: Mapping[str, Any]) -> str:
+    if entry["change"] is None or entry["change_low"] <= 0.0 <= entry["change_high"]:
+        return SAME
+    return WORSE if entry["change"] > 0.0 else BETTER
+
+
+def _label(entry: Mapping[str, Any]) -> str:
+    return f"{entry['group']}: {entry['variant']}" if entry["group"] else str(entry["variant"])

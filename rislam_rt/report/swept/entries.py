@@ -1,0 +1,173 @@
+"""One line a point and scheme of a swept study: numbers for tables, CSV and JSON, and how they are written."""
+
+import csv
+import io
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.evaluate import Interval
+from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.pipeline.studies.swept import Group, spread
+
+NEAR_BOUND = 1.5
+"""RMSE over the posterior bound up to which the bound is what limits."""
+GOOD_ASSOCIATION = 0.95
+"""Share of components taken for what they were, below which association is held to limit."""
+NOTHING = "-"
+
+
+def scheme_entry(group: Group, scheme: str) -> dict[str, Any]:
+    """Scores of one scheme at one point, over all repetitions. Errors are root mean squares over the repetitions."""
+    rmse, bound = group.column(scheme, "rmse_m"), group.column(scheme, "bound_m")
+    overall, least = spread(rmse), spread(bound)
+    known = rmse[~np.isnan(rmse)]
+    return {
+        **group.point,
+        "scheme": scheme,
+        "runs": len(known),
+        "failed": group.failed(scheme),
+        "diverged": group.diverged(scheme),
+        **interval_entry("rmse", overall, "_m"),
+        "median_m": float(np.median(known)) if len(known) else None,
+        "bound_m": least.value if least else None,
+        "over_bound": overall.value / least.value if overall and least and least.value else None,
+        "nees_per_dof": _mean(group.column(scheme, "nees_per_dof")),
+        "association": _mean(group.column(scheme, "association", "accuracy")),
+        "gospa_m": _mean(group.column(scheme, "map", "gospa_m")),
+        **_landmarks(group, scheme),
+        **_walls(group, scheme),
+    }
+
+
+def interval_entry(name: str, interval: Interval | None, unit: str = "") -> dict[str, float | None]:
+    """Value and ends under three names; None where there is none."""
+    value, low, high = interval or (None, None, None)
+    return {f"{name}{unit}": value, f"{name}_low{unit}": _finite(low), f"{name}_high{unit}": _finite(high)}
+
+
+def what_limits(entry: Mapping[str, Any]) -> str:
+    """The first of bound, association and filter that explains an error."""
+    if entry["over_bound"] is None:
+        return NOTHING
+    if entry["over_bound"] <= NEAR_BOUND:
+        return "bound"
+    return "association" if (entry["association"] or 0.0) < GOOD_ASSOCIATION else "filter"
+
+
+def csv_text(entries: Sequence[Mapping[str, Any]]) -> str:
+    """Entries as CSV; lists are left out, numbers have six digits."""
+    names = [name for name, value in entries[0].items() if not isinstance(value, list)] if entries else []
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(names)
+    table.writerows([_cell(entry[name]) for name in names] for entry in entries)
+    return text.getvalue()
+
+
+def metres(value: float | None) -> str:
+    """Three decimals."""
+    return NOTHING if value is None or np.isnan(value) else f"{value:.3f}"
+
+
+def metres_between(entry: Mapping[str, Any]) -> str:
+    """RMSE with its interval."""
+    if entry["rmse_m"] is None:
+        return NOTHING
+    if entry["rmse_low_m"] is None:
+        return metres(entry["rmse_m"])
+    return f"{entry['rmse_m']:.3f} ({entry['rmse_low_m']:.3f} to {entry['rmse_high_m']:.3f})"
+
+
+def ratio(value: float | None) -> str:
+    """Two decimals."""
+    return NOTHING if value is None else f"{value:.2f}"
+
+
+def percent_between(interval: Interval | None) -> str:
+    """A share with its interval, in percent."""
+    if interval is None:
+        return NOTHING
+    return f"{100 * interval.value:.0f} % ({100 * interval.lower:.0f} to {100 * interval.upper:.0f})"
+
+
+def table_lines(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """A markdown table."""
+    return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
+
+
+def paragraph(text: str) -> list[str]:
+    """A paragraph of markdown in lines of readable length."""
+    return textwrap.wrap(" ".join(text.split()), 118, break_long_words=False, break_on_hyphens=False)
+
+
+def trouble(groups: Sequence[Group]) -> list[str]:
+    """Markdown: how many runs failed or diverged, and why they failed."""
+    runs = sum(len(group.results) for group in groups for _ in group.schemes)
+    failed = sum(group.failed(scheme) for group in groups for scheme in group.schemes)
+    diverged = sum(group.diverged(scheme) for group in groups for scheme in group.schemes)
+    lines = [f"Of {runs} runs {failed} failed and {diverged} diverged (more than 0.5 m and five times the bound off);"]
+    lines.append("those that diverged are in every number, those that failed have none and are counted.")
+    reasons = list(dict.fromkeys(reason for group in groups for reason in group.reasons))
+    return [*lines, *(f"- {reason}" for reason in ["", *reasons[:10]] if reason)]
+
+
+def panel_of(group: Group, scheme: str) -> str | None:
+    """Name of the landmark that is the panel."""
+    names = group.parts(scheme, "landmarks")
+    known = [name for name in names if not np.isnan(group.column(scheme, "landmarks", name, "cycles_identified")).all()]
+    return known[0] if known else None
+
+
+def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
+    """Errors at the end of the run, and the share of (landmark, run) pairs in which it was in the map then.
+
+    Both are None where there is nothing to be found.
+    """
+    panel = panel_of(group, scheme)
+    names = group.parts(scheme, "landmarks")
+    others = [group.column(scheme, "landmarks", name, "final_m") for name in names if name != panel]
+    there = panel is not None and SCHEMES[scheme].panel
+    own = group.column(scheme, "landmarks", str(panel), "final_m") if there else np.zeros(0)
+    rest = np.concatenate(others) if others else np.zeros(0)
+    return {
+        "ris_m": _rms(own),
+        "ris_found": _share(own),
+        "scatterer_m": _rms(rest),
+        "scatterer_found": _share(rest),
+    }
+
+
+def _walls(group: Group, scheme: str) -> dict[str, float | None]:
+    """Angle and distance errors at the end of the run over all walls that were found, and the share of those."""
+    names = group.parts(scheme, "walls")
+    angle, offset = (
+        np.concatenate([group.column(scheme, "walls", name, part) for name in names]) if names else np.zeros(0)
+        for part in ("angle_deg", "offset_m")
+    )
+    return {"wall_deg": _rms(angle), "wall_m": _rms(offset), "wall_found": _share(angle)}
+
+
+def _rms(values: Floats) -> float | None:
+    known = values[~np.isnan(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else None
+
+
+def _mean(values: Floats) -> float | None:
+    known = values[~np.isnan(values)]
+    return float(np.mean(known)) if len(known) else None
+
+
+def _share(values: Floats) -> float | None:
+    return float(np.mean(~np.isnan(values))) if len(values) else None
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and np.isfinite(value) else None
+
+
+def _cell(value: Any) -> Any:
+    return "" if value is None else f"{value:.6g}" if isinstance(value, float) else value

@@ -1,0 +1,160 @@
+"""Fig. 4(b): the agent's error against SNR, all schemes with their bounds, as figure, table and page."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from rislam_rt.evaluate import Interval
+from rislam_rt.pipeline.studies.swept import Fig4bSpec, Group, paired_difference, paired_gain
+from rislam_rt.pipeline.studies.swept.sweep import SNR
+from rislam_rt.report.style import styled
+from rislam_rt.report.swept.entries import (
+    interval_entry,
+    metres,
+    metres_between,
+    paragraph,
+    percent_between,
+    ratio,
+    scheme_entry,
+    table_lines,
+    trouble,
+    what_limits,
+)
+from rislam_rt.report.swept.lines import draw_schemes, explain_lines
+
+OURS = "optimized"
+"""The scheme that the paper proposes."""
+BENCHMARKS = ("random", "no_ris", "bp_slam", "channel_slam")
+"""Those that the paper, or we, hold it against; `exact` and `genie` are references."""
+
+
+def fig4b_content(groups: Sequence[Group], spec: Fig4bSpec) -> dict[str, Any]:
+    """Plain data: one entry a case, SNR and scheme, and the gains of the paper's scheme over the others."""
+    entries = [
+        {
+            "case": group.point["variant"],
+            "snr_db": group.point[SNR],
+            "paper_snr_db": group.mean("paper_snr_db"),
+            **{name: value for name, value in scheme_entry(group, scheme).items() if name not in group.point},
+            "each_m": _each(group, scheme),
+        }
+        for group in groups
+        for scheme in group.schemes
+    ]
+    return {"entries": entries, "gains": [entry for group in groups for entry in gain_entries(group)]}
+
+
+def gain_entries(group: Group) -> list[dict[str, Any]]:
+    """How far the paper's scheme is below each other one, in share and metres, and what the bounds say of it."""
+    if OURS not in group.schemes:
+        return []
+    found = []
+    ours, least = group.column(OURS, "rmse_m"), group.column(OURS, "bound_m")
+    for scheme in group.schemes:
+        if scheme == OURS:
+            continue
+        theirs, bound = group.column(scheme, "rmse_m"), group.column(scheme, "bound_m")
+        limit = paired_gain(least, bound)
+        found.append(
+            {
+                "case": group.point["variant"],
+                "snr_db": group.point[SNR],
+                "over": scheme,
+                **interval_entry("gain", paired_gain(ours, theirs)),
+                **interval_entry("lower_by", paired_difference(ours, theirs), "_m"),
+                "bound_gain": limit.value if limit else None,
+            }
+        )
+    return found
+
+
+def draw_fig4b(content: Mapping[str, Any], spec: Fig4bSpec) -> Figure:
+    """RMSE against SNR, one part a case; the paper's SNR along the top."""
+    cases = [case for case in spec.cases if any(e["case"] == case.name for e in content["entries"])]
+    with styled():
+        figure = Figure(figsize=(1.2 + 5.2 * len(cases), 5.0))
+        axes = figure.subplots(1, len(cases), squeeze=False)[0]
+        for axis, case in zip(axes, cases, strict=True):
+            entries = [entry for entry in content["entries"] if entry["case"] == case.name]
+            snr = sorted({entry["snr_db"] for entry in entries})
+            curves: dict[str, list[Mapping[str, Any]]] = {}
+            for entry in sorted(entries, key=lambda entry: entry["snr_db"]):
+                curves.setdefault(entry["scheme"], []).append(entry)
+            draw_schemes(axis, snr, curves)
+            axis.set_title(f"{case.name}: {case.note}" if case.note else case.name, fontsize=9, weight="bold")
+            axis.set_xlabel("SNR of a 5 cm sphere at 3 m, over signal and all antennas [dB]")
+            shift = float(np.mean([entry["paper_snr_db"] - entry["snr_db"] for entry in entries]))
+            top = axis.secondary_xaxis("top", functions=(lambda x, s=shift: x + s, lambda x, s=shift: x - s))
+            top.set_xlabel("SNR as the paper defines it [dB]", fontsize=9)
+        axes[0].set_ylabel("RMSE of the agent's position [m]")
+        explain_lines(axes[0])
+    return figure
+
+
+def fig4b_page(
+    content: Mapping[str, Any], groups: Sequence[Group], spec: Fig4bSpec, about: Sequence[str], figure: str | None
+) -> str:
+    """Markdown: what was done, the picture, errors, gains, and what limits them."""
+    lines = ["# Error of the agent against SNR: Fig. 4(b)", "", *about, ""]
+    if figure is not None:
+        lines += [f"![RMSE of the agent against SNR]({figure})", ""]
+    for case in spec.cases:
+        entries = [entry for entry in content["entries"] if entry["case"] == case.name]
+        gains = [entry for entry in content["gains"] if entry["case"] == case.name]
+        if entries:
+            lines += [f"## {case.name}: {case.note}", "", *_error_lines(entries), "", *_gain_lines(gains), ""]
+            lines += [*_budget_lines(entries), ""]
+    return "\n".join([*lines, "## Failures", "", *trouble(groups)]) + "\n"
+
+
+def _error_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
+    schemes = list(dict.fromkeys(entry["scheme"] for entry in entries))
+    rows = []
+    for snr in dict.fromkeys(entry["snr_db"] for entry in entries):
+        own = {entry["scheme"]: entry for entry in entries if entry["snr_db"] == snr}
+        paper = next(iter(own.values()))["paper_snr_db"]
+        rows.append([f"{snr:g}", f"{paper:.0f}", *(metres_between(own[s]) if s in own else "-" for s in schemes)])
+    head = ["SNR [dB]", "paper's SNR [dB]", *schemes]
+    return ["RMSE of the agent [m], with its 95 % interval:", "", *table_lines(head, rows)]
+
+
+def _gain_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Gains, in pairs of runs with the same motion and noise."""
+    rivals = list(dict.fromkeys(entry["over"] for entry in gains))
+    rows = []
+    for snr in dict.fromkeys(entry["snr_db"] for entry in gains):
+        cells = [f"{snr:g}"]
+        for rival in rivals:
+            entry = next(e for e in gains if e["snr_db"] == snr and e["over"] == rival)
+            known = entry["gain"] is not None
+            gain = Interval(entry["gain"], entry["gain_low"], entry["gain_high"]) if known else None
+            limit = f"; bounds {100 * entry['bound_gain']:.0f} %" if entry["bound_gain"] is not None else ""
+            cells.append(f"{percent_between(gain)}, {metres(entry['lower_by_m'])} m{limit}")
+        rows.append(cells)
+    title = (
+        f"How far `{OURS}` is below the others, from pairs of runs with the same motion and noise (95 % interval), in"
+    )
+    head = ["SNR [dB]", *(f"than {rival}" for rival in rivals)]
+    return [title, "metres, and the same of their bounds:", "", *table_lines(head, rows)]
+
+
+def _budget_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
+    rows = [
+        [
+            f"{entry['snr_db']:g}", entry["scheme"], metres(entry["bound_m"]), ratio(entry["over_bound"]),
+            ratio(entry["nees_per_dof"]), ratio(entry["association"]), f"{entry['diverged']} of {entry['runs']}",
+            str(entry["failed"]), what_limits(entry),
+        ]
+        for entry in entries
+    ]  # fmt: skip
+    head = ["SNR [dB]", "scheme", "bound [m]", "RMSE / bound", "NEES", "association", "diverged", "failed", "limit"]
+    text = """Error budget. The limit is the bound where the RMSE is within 1.5 of it, else association where fewer than
+    95 % of the components are taken for what they are, else the filter. NEES is that of the position per degree of
+    freedom: 1 if the estimator knows how wrong it is."""
+    return [*paragraph(text), "", *table_lines(head, rows)]
+
+
+def _each(group: Group, scheme: str) -> list[float | None]:
+    return [None if np.isnan(value) else float(value) for value in group.column(scheme, "rmse_m")]

@@ -1,0 +1,100 @@
+"""The files of a swept study: page, CSV, JSON and figure, from the cells that there are."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from matplotlib.figure import Figure
+
+from rislam_rt.pipeline.files import write_atomic
+from rislam_rt.pipeline.studies.swept import (
+    AblationsSpec,
+    Fig4bSpec,
+    Fig4cSpec,
+    Group,
+    RoomsSpec,
+    SweptSpec,
+    group_rows,
+)
+from rislam_rt.pipeline.sweeps import Row
+from rislam_rt.pipeline.sweeps.record import json_bytes, plain_result
+from rislam_rt.report.style import to_png
+from rislam_rt.report.swept.ablations import ablations_content, ablations_page, draw_ablations
+from rislam_rt.report.swept.entries import csv_text, paragraph
+from rislam_rt.report.swept.fig4b import draw_fig4b, fig4b_content, fig4b_page
+from rislam_rt.report.swept.fig4c import draw_fig4c, fig4c_content, fig4c_page
+from rislam_rt.report.swept.rooms import draw_rooms, rooms_content, rooms_page
+
+
+class Shape(NamedTuple):
+    """How a study is told."""
+
+    content: dict[str, Any]
+    draw: Callable[[], Figure]
+    page: Callable[[Sequence[str], str | None], str]
+
+
+def write_swept(
+    rows: Sequence[Row], spec: SweptSpec, record: Mapping[str, Any], folder: Path, *, figures: bool = True
+) -> Path | None:
+    """Write `<name>.md`, `.csv`, `.json` and `figures/<name>.png`; returns the page, None before any cell is done.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    groups = [group for group in group_rows(rows) if group.schemes]
+    if not groups:
+        return None
+    shape = shape_of(groups, spec)
+    figure = f"figures/{spec.name}.png" if figures else None
+    if figure is not None:
+        write_atomic(folder / figure, to_png(shape.draw()))
+    write_atomic(folder / f"{spec.name}.csv", csv_text(shape.content["entries"]).encode())
+    write_atomic(folder / f"{spec.name}.json", json_bytes(plain_result({**record, **shape.content})))
+    page = folder / f"{spec.name}.md"
+    write_atomic(page, shape.page(about_lines(groups, spec, record), figure).encode())
+    return page
+
+
+def shape_of(groups: Sequence[Group], spec: SweptSpec) -> Shape:
+    """Content, figure and page of a study of any kind."""
+    if isinstance(spec, Fig4bSpec):
+        content = fig4b_content(groups, spec)
+        return Shape(content, lambda: draw_fig4b(content, spec), lambda a, f: fig4b_page(content, groups, spec, a, f))
+    if isinstance(spec, Fig4cSpec):
+        content = fig4c_content(groups)
+        return Shape(content, lambda: draw_fig4c(content), lambda a, f: fig4c_page(content, groups, a, f))
+    if isinstance(spec, AblationsSpec):
+        content = ablations_content(groups, spec)
+        return Shape(content, lambda: draw_ablations(content), lambda a, f: ablations_page(content, groups, a, f))
+    assert isinstance(spec, RoomsSpec)
+    content = rooms_content(groups)
+    return Shape(content, lambda: draw_rooms(content), lambda a, f: rooms_page(content, groups, a, f))
+
+
+def about_lines(groups: Sequence[Group], spec: SweptSpec, record: Mapping[str, Any]) -> list[str]:
+    """Where the numbers come from."""
+    config = record["settings"]
+    source = "ray tracing (Sionna RT)" if config["channel"] == "traced" else "image sources"
+    cycles = f"the first {config['cycles']} cycles" if config["cycles"] else "all cycles"
+    there = sum(result is not None for group in groups for result in group.results)
+    wanted = len(groups) * spec.repetitions
+    unfinished = "" if there == wanted else f" Not complete: {there} of {wanted} cells."
+    rivals = [name for name in ("bp_slam", "channel_slam") if any(name in group.schemes for group in groups)]
+    rooms = f"Room{'s' if len(record['scenes']) > 1 else ''} {', '.join(f'`{name}`' for name in record['scenes'])}"
+    text = f"""{rooms}; paths by {source} with up to {config["depth"]} wall bounces, {cycles} of the trajectory,
+    {spec.repetitions} seeds a point (seed {spec.seed}). Written by `rislam-rt run` from one pipeline, do not edit.
+    {unfinished}"""
+    law = """For every seed the true motion is the scene's trajectory plus white acceleration, and the estimators
+    are told its standard deviation; a start is told with one draw of its errors. All schemes of a seed share
+    motion, paths, noise and start. RMSE is over the cycles, then over the seeds; intervals are 95 % bootstrap
+    intervals over the seeds. The posterior bound is that of the same motion and codes, with landmarks and walls
+    unknown and the association known; that of delay-only schemes counts no angles and holds every mirror image as a
+    point of its own."""
+    if rivals:
+        names = " and ".join(f"`{name}`" for name in rivals)
+        law += f""" {names} (their own estimators, told delays alone) run with the panel under random codes: one more
+        landmark for them than a plain wall would be."""
+    return [*paragraph(text), "", *paragraph(law)]

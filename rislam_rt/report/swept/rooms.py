@@ -1,0 +1,137 @@
+"""All rooms in one table: agent, landmarks, walls, map, association, and which aims are met."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from rislam_rt.pipeline.studies.swept import Group
+from rislam_rt.report.style import MARKER, scheme_colour, styled
+from rislam_rt.report.swept.entries import (
+    metres,
+    metres_between,
+    paragraph,
+    ratio,
+    scheme_entry,
+    table_lines,
+    trouble,
+    what_limits,
+)
+from rislam_rt.report.swept.lines import mark_metres
+
+AIMS: dict[str, float] = {
+    "rmse_m": 0.04,
+    "over_bound": 1.5,
+    "ris_m": 0.06,
+    "scatterer_m": 0.1,
+    "wall_deg": 2.0,
+    "wall_m": 0.1,
+    "diverged": 0,
+    "failed": 0,
+}
+"""Largest value that is good enough."""
+
+
+def rooms_content(groups: Sequence[Group]) -> dict[str, Any]:
+    """Plain data: one entry a room and scheme, and the aims."""
+    entries = []
+    for group in groups:
+        room = PurePosixPath(str(group.point["scene"])).name
+        for scheme in group.schemes:
+            entry = scheme_entry(group, scheme)
+            entries.append({"room": room, **entry, "limit": what_limits(entry), "missed": missed_aims(entry)})
+    return {"entries": entries, "aims": AIMS}
+
+
+def missed_aims(entry: Mapping[str, Any]) -> list[str]:
+    """Names of the aims that are missed; what is there and was never found misses its own."""
+    there = {"ris_m": "ris_found", "scatterer_m": "scatterer_found"}
+    asked = {name: limit for name, limit in AIMS.items() if name not in there or entry[there[name]] is not None}
+    return [name for name, limit in asked.items() if entry[name] is None or entry[name] > limit]
+
+
+def draw_rooms(content: Mapping[str, Any]) -> Figure:
+    """Agent's RMSE in every room, the bound as a bar across, and the aim."""
+    entries = content["entries"]
+    rooms = list(dict.fromkeys(entry["room"] for entry in entries))
+    schemes = list(dict.fromkeys(entry["scheme"] for entry in entries))
+    with styled():
+        figure = Figure(figsize=(max(6.0, 2.5 + 1.05 * len(rooms)), 4.6))
+        axis = figure.subplots()
+        for number, scheme in enumerate(schemes):
+            shift = 0.14 * (number - 0.5 * (len(schemes) - 1))
+            own = {entry["room"]: entry for entry in entries if entry["scheme"] == scheme}
+            shown = [room for room in rooms if room in own and own[room]["rmse_m"]]
+            x = np.array([rooms.index(room) + shift for room in shown])
+            value = np.array([own[room]["rmse_m"] for room in shown])
+            ends = np.array(
+                [[own[r]["rmse_low_m"] or own[r]["rmse_m"], own[r]["rmse_high_m"] or own[r]["rmse_m"]] for r in shown]
+            ).reshape(-1, 2)
+            bound = [own[room]["bound_m"] for room in shown]
+            colour = scheme_colour(scheme)
+            axis.errorbar(
+                x, value, np.abs(ends.T - value), color=colour, ls="none", marker=MARKER.get(scheme, "o"), ms=5,
+                capsize=2, label=scheme,
+            )  # fmt: skip
+            axis.hlines(bound, x - 0.06, x + 0.06, color=colour, lw=2.0, ls=(0, (1, 0.6)))
+        axis.axhline(AIMS["rmse_m"], color="black", lw=0.9, ls=":")
+        axis.text(1.0, AIMS["rmse_m"], " aim", va="center", fontsize=9, transform=axis.get_yaxis_transform())
+        axis.set_yscale("log")
+        mark_metres(axis.yaxis)
+        axis.set_xticks(range(len(rooms)), rooms, rotation=20, ha="right")
+        axis.set_ylabel("RMSE of the agent's position [m]")
+        axis.set_title("Marks: RMSE over seeds with 95 % interval; short bars: posterior bound", fontsize=10)
+        figure.legend(loc="outside lower center", ncols=6, fontsize=9)
+    return figure
+
+
+def rooms_page(content: Mapping[str, Any], groups: Sequence[Group], about: Sequence[str], figure: str | None) -> str:
+    """Markdown: what was done, the aims, one table of all rooms."""
+    aims = content["aims"]
+    lines = ["# All rooms", "", *about, ""]
+    text = f"""Aims: agent's RMSE at most {aims["rmse_m"]:g} m and {aims["over_bound"]:g} times its posterior bound,
+    panel at most {aims["ris_m"]:g} m, scatterers {aims["scatterer_m"]:g} m, walls {aims["wall_deg"]:g} degrees and
+    {aims["wall_m"]:g} m, no divergence. Landmarks and walls are scored at the end of a run, RMS over those found; a
+    share in brackets says how many were. GOSPA is of the map's points, cut off at 1 m, order 2. What limits is the
+    bound where the RMSE is within 1.5 of it, else association where fewer than 95 % of the components are taken for
+    what they are, else the filter."""
+    lines += [*paragraph(text), ""]
+    if figure is not None:
+        lines += [f"![RMSE of the agent in every room]({figure})", ""]
+    head = [
+        "room", "scheme", "agent RMSE [m]", "bound [m]", "RMSE / bound", "NEES", "panel [m]", "scatterers [m]",
+        "walls [deg]", "walls [m]", "GOSPA [m]", "association", "diverged", "failed", "aims missed", "limit",
+    ]  # fmt: skip
+    rows = [
+        [
+            entry["room"], entry["scheme"], metres_between(entry), metres(entry["bound_m"]), ratio(entry["over_bound"]),
+            ratio(entry["nees_per_dof"]), _found(entry, "ris_m", "ris_found"),
+            _found(entry, "scatterer_m", "scatterer_found"), _found(entry, "wall_deg", "wall_found", 1),
+            _found(entry, "wall_m", "wall_found"), ratio(entry["gospa_m"]), ratio(entry["association"]),
+            f"{entry['diverged']} of {entry['runs']}", str(entry["failed"]),
+            ", ".join(NAMES[name] for name in entry["missed"]) or "none", entry["limit"],
+        ]
+        for entry in content["entries"]
+    ]  # fmt: skip
+    return "\n".join([*lines, *table_lines(head, rows), "", "## Failures", "", *trouble(groups)]) + "\n"
+
+
+NAMES = {
+    "rmse_m": "agent",
+    "over_bound": "bound",
+    "ris_m": "panel",
+    "scatterer_m": "scatterers",
+    "wall_deg": "wall angle",
+    "wall_m": "wall distance",
+    "diverged": "divergence",
+    "failed": "failure",
+}
+"""Aims in the page's words."""
+
+
+def _found(entry: Mapping[str, Any], name: str, share: str, digits: int = 3) -> str:
+    if entry[name] is None:
+        return "none found" if entry[share] is not None else "-"
+    return f"{entry[name]:.{digits}f} ({entry[share]:.0%})"
