@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.angles import unit
 from rislam_rt.slam.moments import POSE, Moments, normalised, where
 from rislam_rt.slam.nested import agents
 from rislam_rt.slam.nested.cloud import HOPELESS, Cloud, Engine, Kernel, kernel_width
@@ -46,6 +47,12 @@ class Nested(NamedTuple):
     """(F,) effective share of landmark particles, over the agent particles on average."""
     updates: Integers
     """(F,) measurements that each landmark has had."""
+    shift: Floats
+    """(3, 3) [m^2] covariance of a shift of everything together, about which no return says anything: the error of the
+    start's position. It is kept aside and exact, so that no resampling can wear it out."""
+    follow: Floats
+    """(F, 3, 3) how a landmark moves with such a shift: a point as it does, the image of a fixed anchor in a wall by
+    twice its part across the wall."""
 
     @property
     def weight(self) -> Floats:
@@ -53,14 +60,37 @@ class Nested(NamedTuple):
         return np.exp(self.log_weight)
 
 
-def start(position: Floats, velocity: Floats, heading: Floats, window: int) -> Nested:
-    """Agent particles (N, 3) of equal weight, and an empty map."""
-    count = len(position)
-    trail = np.tile(np.column_stack([position, heading]), (window, 1, 1))
-    empty, none = np.zeros((count, 0, 3)), np.zeros(0, dtype=np.int64)
+def start(pose: Floats, shift: Floats, window: int) -> Nested:
+    """Agent particles (N, 7) of equal weight (position, velocity, heading), and an empty map."""
+    count = len(pose)
+    trail = np.tile(pose[:, [0, 1, 2, 6]], (window, 1, 1))
+    empty, none, spread = np.zeros((count, 0, 3)), np.zeros(0, dtype=np.int64), np.zeros((count, 0, 3, 3))
     weight = np.full(count, -np.log(count))
-    spread = np.zeros((count, 0, 3, 3))
-    return Nested(position, velocity, heading, weight, trail, (), empty, empty, spread, np.zeros(0), none)
+    return Nested(
+        pose[:, :3],
+        pose[:, 3:6],
+        pose[:, 6],
+        weight,
+        trail,
+        (),
+        empty,
+        empty,
+        spread,
+        np.zeros(0),
+        none,
+        shift,
+        np.zeros((0, 3, 3)),
+    )
+
+
+def draw_start(mean: Floats, std: Floats, count: int, window: int, *, rng: np.random.Generator) -> Nested:
+    """Agent particles from a Gaussian over position, velocity and heading (7,), with its moments exactly.
+
+    The position's error is a shift of everything and is not sampled.
+    """
+    normal = agents.standardise(np.full(count, 1.0 / count), rng.standard_normal((count, 7)))
+    normal[:, :3] = 0.0
+    return start(mean + std * normal, np.diag(std[:3] ** 2), window)
 
 
 def propagate(belief: Nested, dt: float, accelerate: Floats, turn: float, *, rng: np.random.Generator) -> Nested:
@@ -68,7 +98,7 @@ def propagate(belief: Nested, dt: float, accelerate: Floats, turn: float, *, rng
 
     `turn` [rad] is that of a random step of the heading.
     """
-    noise = agents.exact_noise(belief.weight, joint(belief), 4, rng=rng)
+    noise = agents.exact_noise(joint(belief), 4, rng=rng)
     acceleration = noise[:, :3] * accelerate
     position = belief.position + dt * belief.velocity + 0.5 * dt**2 * acceleration
     velocity, heading = belief.velocity + dt * acceleration, belief.heading + turn * noise[:, 3]
@@ -116,7 +146,14 @@ def renew(
 
 
 def settle(
-    belief: Nested, mean: Floats, covariance: Floats, config: NestedConfig, engine: Engine, *, rng: np.random.Generator
+    belief: Nested,
+    mean: Floats,
+    covariance: Floats,
+    config: NestedConfig,
+    engine: Engine,
+    *,
+    wall: Floats | None = None,
+    rng: np.random.Generator,
 ) -> Nested:
     """A new landmark, of which nothing is known: particles about a Gaussian, weighed to stand for a flat prior.
 
@@ -129,6 +166,8 @@ def settle(
         (N, 3) [m], one for each agent particle.
     covariance
         (3, 3) [m^2] of the landmark given an agent particle's trajectory.
+    wall
+        (3,) anchor of a wall; None for a point.
     """
     count, features = len(belief.log_weight), len(belief.clouds)
     size = num_points(covariance, count, features + 1, config)
@@ -145,6 +184,7 @@ def settle(
         covariance=np.concatenate([belief.covariance, sums.covariance[:, None]], axis=1),
         ess=np.append(belief.ess, 1.0),
         updates=np.append(belief.updates, 0),
+        follow=np.concatenate([belief.follow, _follow(mean.mean(axis=0), wall)[None]]),
     )
 
 
@@ -158,12 +198,15 @@ def drop(belief: Nested, keep: Booleans) -> Nested:
         covariance=belief.covariance[:, rows],
         ess=belief.ess[rows],
         updates=belief.updates[rows],
+        follow=belief.follow[rows],
     )
 
 
 def gaussian(belief: Nested) -> Moments:
-    """Joint mean and covariance: the agent particles' own, and their clouds' on average."""
+    """Joint mean and covariance: the agent particles' own, their clouds' on average, and the common shift's."""
     mean, covariance = agents.moments(belief.weight, joint(belief))
+    moves = np.concatenate([np.eye(3), np.zeros((POSE - 3, 3)), belief.follow.reshape(-1, 3)])
+    covariance = covariance + moves @ belief.shift @ moves.T
     for feature, block in enumerate(mean_covariances(belief)):
         covariance[where(feature), where(feature)] += block
     return Moments(mean, covariance)
@@ -211,9 +254,8 @@ def _renew_agents(
     belief: Nested, spans: Floats, config: NestedConfig, engine: Engine, *, rng: np.random.Generator
 ) -> Nested:
     """Agent particles resampled: clouds follow by index, moved as a whole with the kernel; so is the trail."""
-    weight = belief.weight
-    count = num_agents(agents.moments(weight, belief.position)[1], config)
-    ancestors, moved = agents.resample(weight, joint(belief), count, rng=rng)
+    count = num_agents(agents.moments(belief.weight, belief.position)[1], config)
+    ancestors, moved = agents.resample(belief.log_weight, joint(belief), count, rng=rng)
     position, velocity, heading = moved[:, :3], moved[:, 3:6], moved[:, 6]
     mean = moved[:, POSE:].reshape(count, -1, 3)
     trail = belief.trail[:, ancestors]
@@ -232,6 +274,8 @@ def _renew_agents(
         belief.covariance[ancestors],
         belief.ess,
         belief.updates,
+        belief.shift,
+        belief.follow,
     )
 
 
@@ -241,6 +285,14 @@ def _inherit(cloud: Cloud, ancestors: Integers, engine: Engine) -> Cloud:
     cloud = cloud._replace(block=block, row=row, log_total=cloud.log_total[ancestors])
     written = int(cloud.block.max(initial=0)) + 1
     return engine.compact(cloud) if len(np.unique(block)) < SPARSE * written else cloud
+
+
+def _follow(mean: Floats, wall: Floats | None) -> Floats:
+    """(3, 3) motion of a landmark when everything is shifted."""
+    if wall is None:
+        return np.eye(3)
+    across = unit(mean - wall)
+    return 2.0 * np.outer(across, across)
 
 
 def _root(covariance: Floats) -> Floats:

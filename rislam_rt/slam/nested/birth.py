@@ -5,6 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
 from rislam_rt.slam.birth import Birth
+from rislam_rt.slam.hypotheses import POINT
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.belief import Nested, absorb, mean_covariances, renew
 from rislam_rt.slam.nested.belief import settle as place
@@ -36,7 +37,8 @@ def settle(
     along; agent particles are resampled in between, as what it tells of their past may be decisive.
     """
     mean, covariance, noise = _fit(belief, birth, body)
-    belief = place(belief, mean, covariance, config, engine, rng=rng)
+    wall = None if birth.verdict.kind is POINT else birth.anchor
+    belief = place(belief, mean, covariance, config, engine, wall=wall, rng=rng)
     owner = len(belief.clouds) - 1
     belief, _ = absorb(belief, owner, [_prior(belief, birth)], engine)
     for row in range(len(birth.slots)):

@@ -114,13 +114,15 @@ def restoring_map(wanted: Floats, found: Floats) -> Floats:
     Of all such maps that which moves particles least, if the two covariances are alike. Directions in which nothing is
     left to stretch stay as they are.
     """
-    size = np.trace(wanted, axis1=1, axis2=2)[:, None, None] / 3.0 + 1e-20
-    ridge = 1e-8 * size * np.eye(3)
-    lower = np.linalg.cholesky(wanted + ridge)
-    white = np.linalg.solve(lower, np.swapaxes(np.linalg.solve(lower, found + ridge), 1, 2))
+    size = np.maximum(np.trace(wanted, axis1=1, axis2=2), 0.0)[:, None] / 3.0 + 1e-4
+    values, vectors = np.linalg.eigh(0.5 * (wanted + np.swapaxes(wanted, 1, 2)))
+    root = np.sqrt(np.maximum(values, 1e-8 * size))[:, None]
+    turned = np.swapaxes(vectors, 1, 2)
+    forth, back = vectors * root @ turned, vectors / root @ turned
+    white = back @ found @ back
     values, vectors = np.linalg.eigh(0.5 * (white + np.swapaxes(white, 1, 2)))
-    stretch = vectors * (np.clip(values, 1e-4, None) ** -0.5)[:, None] @ np.swapaxes(vectors, 1, 2)
-    return lower @ stretch @ np.linalg.inv(lower)
+    stretch = vectors * (np.maximum(values, 1e-4) ** -0.5)[:, None] @ np.swapaxes(vectors, 1, 2)
+    return np.asarray(forth @ stretch @ back)
 
 
 def kernel_width(size: int, dims: int) -> float:

@@ -9,7 +9,7 @@ from rislam_rt.model import Body
 from rislam_rt.slam.birth import Birth
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.moments import Moments
-from rislam_rt.slam.nested import agents, belief, birth
+from rislam_rt.slam.nested import belief, birth
 from rislam_rt.slam.nested.belief import Nested
 from rislam_rt.slam.nested.cloud import Engine
 from rislam_rt.slam.nested.config import PAPER_SCALE, NestedConfig
@@ -86,10 +86,8 @@ def begin(start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) ->
     std = np.concatenate([start.position_std * config.axes, start.velocity_std * config.axes, [start.heading_std]])
     if config.heading != "estimated":
         std[6] = 0.0
-    count = nested.num_agents
-    normal = agents.standardise(np.full(count, 1.0 / count), rng.standard_normal((count, 7)))
-    pose = np.concatenate([start.position, start.velocity, [start.heading]]) + std * normal
-    state = belief.start(pose[:, :3], pose[:, 3:6], pose[:, 6], config.window)
+    centre = np.concatenate([start.position, start.velocity, [start.heading]])
+    state = belief.draw_start(centre, std, nested.num_agents, config.window, rng=rng)
     return Particles(state, np.zeros(config.window), 0.0, nested)
 
 

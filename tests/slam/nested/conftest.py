@@ -1,0 +1,19 @@
+"""Engines and small scenes of the nested filter's tests."""
+
+import numpy as np
+import pytest
+
+from rislam_rt.slam.nested.cloud import Engine
+from rislam_rt.slam.nested.machine import pick_engine
+
+
+@pytest.fixture(params=["numpy", "drjit"])
+def engine(request: pytest.FixtureRequest) -> Engine:
+    """Both engines in turn."""
+    return pick_engine(request.param)
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """A fixed seed."""
+    return np.random.default_rng(7)

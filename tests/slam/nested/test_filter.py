@@ -1,0 +1,213 @@
+"""The whole filter: Kalman's answer where that is exact, the paper's weights, seeds, hard cases, consistency."""
+
+import numpy as np
+import pytest
+from known_walk import BODY, CYCLE, HEADING, STD, room, walk
+from scipy.stats import chi2
+
+from rislam_rt.arrays import Floats
+from rislam_rt.slam import SlamConfig, StartPrior, gaussian
+from rislam_rt.slam.nested import agents, belief, operations
+from rislam_rt.slam.nested.belief import Nested
+from rislam_rt.slam.nested.cloud import Engine
+from rislam_rt.slam.nested.config import NestedConfig
+from rislam_rt.slam.nested.machine import pick_engine
+from rislam_rt.slam.nested.sightline import Sighting, linear_sightline
+from rislam_rt.slam.nested.update import Seen, update
+from rislam_rt.slam.returns import Returns
+
+LANDMARKS = np.array([[2.0, 1.0, 1.0], [3.0, 3.0, 3.0]])
+PRIOR, NOISE, WANDER, SPEED_STD, START_STD, COUNT = 0.1, 0.05, 0.3, 0.05, 0.02, 1500
+
+
+def fixed(agents: int, points: int, **more: object) -> SlamConfig:
+    """So many particles, no more and no fewer."""
+    return SlamConfig(
+        filter="nested",
+        agent_particles=agents,
+        landmark_particles=points,
+        adaptive=False,
+        **more,  # type: ignore[arg-type]
+    )
+
+
+def linear(state: Nested, owner: int, seen: Floats, covariance: Floats) -> list[Sighting]:
+    """The offset from agent to landmark."""
+    return [Sighting((linear_sightline(state.centre[:, owner], state.position),), seen, covariance)]
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_equals_a_kalman_filter_where_that_is_exact(seed: int) -> None:
+    """Linear and Gaussian: offsets from agent to two landmarks, all axes alike.
+
+    The mean of N weighted particles with effective size E errs by sqrt(P / E). Clouds are resampled at E = N / 2 at
+    the latest, with exact moments, so that after R resamplings errors of at most R + 1 such stretches have come
+    together: sqrt(2 (R + 1) / N) standard deviations, and twice that, relatively, in a variance. Landmark particles
+    add noise to the weights, which the effective size counts as well. Four of these standard deviations are allowed.
+    """
+    config, engine = NestedConfig(num_agents=COUNT, num_points=128, adaptive=False), pick_engine("drjit")
+    rng = np.random.default_rng(seed)
+    std = np.repeat([START_STD, SPEED_STD, 0.0], [3, 3, 1])
+    normal = agents.standardise(np.full(COUNT, 1.0 / COUNT), rng.standard_normal((COUNT, 7)))
+    state = belief.start(std * normal, np.zeros((3, 3)), 4)
+    mean = np.concatenate([np.zeros(6), LANDMARKS.ravel()])
+    covariance = np.diag(np.repeat([START_STD, SPEED_STD, PRIOR, PRIOR], 3)) ** 2
+    truth = mean + np.sqrt(np.diag(covariance)) * rng.standard_normal(12)
+    for owner, place in enumerate(LANDMARKS):
+        state = belief.settle(state, np.tile(place, (COUNT, 1)), PRIOR**2 * np.eye(3), config, engine, rng=rng)
+        known = Sighting(
+            (linear_sightline(state.centre[:, owner] - place, np.zeros(3)),), np.zeros(3), PRIOR**2 * np.eye(3)
+        )
+        state, _ = belief.absorb(state, owner, [known], engine)
+    move = np.eye(12)
+    move[:3, 3:6] = CYCLE * np.eye(3)
+    shake = np.concatenate([0.5 * CYCLE**2 * np.eye(3), CYCLE * np.eye(3), np.zeros((6, 3))])
+    look = np.concatenate([np.tile(-np.eye(3), (2, 1)), np.zeros((6, 3)), np.eye(6)], axis=1)
+    renewals = 0
+    for _ in range(30):
+        truth = move @ truth + shake @ (WANDER * rng.standard_normal(3))
+        seen = look @ truth + NOISE * rng.standard_normal(6)
+        mean, covariance = move @ mean, move @ covariance @ move.T + WANDER**2 * shake @ shake.T
+        gain = covariance @ look.T @ np.linalg.inv(look @ covariance @ look.T + NOISE**2 * np.eye(6))
+        mean, covariance = mean + gain @ (seen - look @ mean), covariance - gain @ look @ covariance
+        state = belief.propagate(state, CYCLE, np.full(3, WANDER), 0.0, rng=rng)
+        for owner in range(2):
+            part = linear(state, owner, seen[3 * owner : 3 * owner + 3], NOISE**2 * np.eye(3))
+            state, _ = belief.absorb(state, owner, part, engine)
+        state, done = belief.renew(state, np.zeros(4), config, engine, rng=rng)
+        renewals += done
+    found = belief.gaussian(state)
+    rows = np.delete(np.arange(13), 6)
+    std, error = np.sqrt(np.diag(covariance)), np.sqrt(2.0 * (renewals + 1) / COUNT)
+    assert renewals > 2
+    assert error < 0.2, "the tolerance must mean something"
+    np.testing.assert_allclose((found.mean[rows] - mean) / std, 0.0, atol=4.0 * error)
+    np.testing.assert_allclose(np.diag(found.covariance)[rows] / std**2, 1.0, atol=8.0 * error)
+    correlation = found.covariance[np.ix_(rows, rows)] / np.outer(std, std)
+    np.testing.assert_allclose(correlation, covariance / np.outer(std, std), atol=8.0 * error)
+
+
+def seen_once(weighting: str, noise: Floats) -> tuple[Nested, float]:
+    """One update of a small belief with two landmarks."""
+    rng = np.random.default_rng(5)
+    config = NestedConfig(num_agents=50, num_points=64, adaptive=False, weighting=weighting)
+    engine = pick_engine("numpy")
+    pose = np.array([0.5, 0.7, 0.5, 0.0, 0.0, 0.0, HEADING]) + 0.02 * rng.standard_normal((50, 7))
+    state = belief.start(pose, np.zeros((3, 3)), 4)
+    for place in LANDMARKS:
+        state = belief.settle(state, np.tile(place, (50, 1)), 0.01 * np.eye(3), config, engine, rng=rng)
+    truth = room(1, 0, rng=rng)
+    returns = truth.returns
+    seen = np.array([[3.5, 0.7, 0.3], [8.5, 0.6, 0.4]])
+    return update(state, Seen(returns, returns, np.zeros((2, 3)), BODY, seen, noise), config, engine)
+
+
+def test_the_papers_factor_cancels() -> None:
+    """Amplitudes 1 : 30 or alike: the same weights of agent and landmark particles, to single precision."""
+    alike, unlike = np.full((2, 3), 1e-3), np.array([[1e-4] * 3, [1e-1] * 3])
+    (one, evidence), (other, shifted) = seen_once("paper", alike), seen_once("paper", unlike)
+    np.testing.assert_allclose(other.log_weight, one.log_weight, atol=1e-5)
+    np.testing.assert_allclose(other.mean, one.mean, atol=1e-6)
+    strength = 1.0 / np.sqrt(unlike[:, 0])
+    assert shifted - evidence == pytest.approx(np.sum(np.log(strength / strength.mean())), abs=1e-4)
+    for weighting in ("power", "crlb"):
+        (one, _), (other, _) = seen_once(weighting, alike), seen_once(weighting, unlike)
+        assert np.abs(other.log_weight - one.log_weight).max() > 0.1
+
+
+@pytest.mark.parametrize("machine", ["numpy", "drjit"])
+def test_the_same_seed_gives_the_same_bits(machine: str) -> None:
+    config = fixed(100, 64, machine=machine)
+    one, other = (walk(operations, config, 20, walls=1, rng=np.random.default_rng(4)) for _ in range(2))
+    assert one.resampled > 0
+    for a, b in zip(one.moments, other.moments, strict=True):
+        np.testing.assert_array_equal(a.mean, b.mean)
+        np.testing.assert_array_equal(a.covariance, b.covariance)
+
+
+AGENTS = 100
+
+
+def started(**more: object) -> tuple[operations.Particles, SlamConfig]:
+    config = fixed(AGENTS, 32, machine="numpy", **more)
+    start = StartPrior(np.array([0.5, 0.7, 0.5]), np.array([0.07, 0.07, 0.0]), HEADING)
+    return operations.begin(start, config, rng=np.random.default_rng(1)), config
+
+
+def finite(particles: operations.Particles) -> bool:
+    """Whether all that the filter knows is a number, and weights sum to one."""
+    state = particles.belief
+    found = belief.gaussian(state)
+    parts = [state.position, state.velocity, state.trail, state.mean, state.covariance, found.mean, found.covariance]
+    return all(np.isfinite(part).all() for part in parts) and bool(np.isclose(state.weight.sum(), 1.0))
+
+
+def test_no_measurements_change_nothing() -> None:
+    particles, config = started()
+    none = Returns(np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+    empty = np.zeros((0, 3))
+    told = operations.update(particles, none, none, empty, BODY, empty, empty, rng=np.random.default_rng(0))
+    assert told.particles is particles
+    assert (told.log_evidence, told.nis) == (0.0, 0.0)
+    for slot in range(5):
+        particles = operations.propagate(
+            particles, CYCLE, 0.01 * config.axes, HEADING, slot, config, rng=np.random.default_rng(0)
+        )
+        particles, _ = operations.thin(particles, config, rng=np.random.default_rng(0))
+    assert finite(particles)
+
+
+@pytest.mark.parametrize("offset", [1e3, 1e12, 1e30])
+def test_impossible_measurements_leave_a_belief(offset: float, engine: Engine) -> None:
+    particles, _ = started()
+    state, config, rng = particles.belief, particles.config, np.random.default_rng(2)
+    state = belief.settle(state, np.tile(LANDMARKS[0], (AGENTS, 1)), 0.01 * np.eye(3), config, engine, rng=rng)
+    for _ in range(3):
+        far = linear(state, 0, np.full(3, offset), 1e-8 * np.eye(3))
+        state, _ = belief.absorb(state, 0, far, engine)
+        state, _ = belief.renew(state, particles.spans, config, engine, rng=rng)
+    assert finite(particles._replace(belief=state))
+
+
+def test_coincident_landmarks_are_told_as_two() -> None:
+    particles, config = started()
+    state, rng, engine = particles.belief, np.random.default_rng(3), pick_engine("numpy")
+    for _ in range(2):
+        place = np.tile(LANDMARKS[0], (AGENTS, 1))
+        state = belief.settle(state, place, 1e-12 * np.eye(3), particles.config, engine, rng=rng)
+    particles = particles._replace(belief=state)
+    truth = room(3, 0, rng=rng)
+    for cycle in range(1, 4):
+        seen = np.tile([3.4, 0.8, 0.2], (2, 1))
+        std = np.tile(STD, (2, 1))
+        told = operations.update(particles, truth.returns, truth.returns, truth.anchor, BODY, seen, std, rng=rng)
+        particles, _ = operations.thin(told.particles, config, rng=rng)
+        assert finite(particles), cycle
+    assert operations.moments(operations.drop(particles, np.array([True, False]))).mean.shape == (10,)
+
+
+def test_estimated_heading_is_filtered() -> None:
+    particles, config = started(heading="estimated")
+    for slot in range(10):
+        particles = operations.propagate(
+            particles, CYCLE, 0.01 * config.axes, 9.9, slot, config, rng=np.random.default_rng(slot)
+        )
+    found = operations.moments(particles)
+    assert found.heading == pytest.approx(HEADING, abs=1e-9)
+    assert found.covariance[6, 6] == pytest.approx(10 * CYCLE * config.turn_std**2, rel=1e-3)
+
+
+def test_pose_errors_are_as_large_as_the_filter_says() -> None:
+    """Known associations, truth drawn from the model: mean NEES of 8 seeds inside its 99 % interval.
+
+    Beside it the joint Gaussian filter on the same measurements, so that a bad draw shows as one.
+    """
+    seeds, cycles = 8, 30
+    nees, reference = np.zeros(seeds), np.zeros(seeds)
+    for seed in range(seeds):
+        run = walk(operations, fixed(1000, 256), cycles, rng=np.random.default_rng([seed, 1]))
+        nees[seed] = run.nees[-1]
+        reference[seed] = walk(gaussian, SlamConfig(), cycles, rng=np.random.default_rng([seed, 1])).nees[-1]
+    low, high = chi2.ppf([0.005, 0.995], 4 * seeds) / seeds
+    assert low < reference.mean() < high
+    assert low < nees.mean() < high
