@@ -35,11 +35,12 @@ def scores_figure(scores: Sequence[Score]) -> Figure:
     for score in scores:
         groups.setdefault((score.scheme, _others(score.point, along)), []).append(score)
     kinds = list(dict.fromkeys(others for _, others in groups))
+    step = min(0.12, 0.8 / len(groups))
     with styled():
         figure = Figure(figsize=(7.0, 4.6))
         axis = figure.subplots()
         for number, ((scheme, others), group) in enumerate(groups.items()):
-            shift = 0.0 if numeric else 0.12 * (number - 0.5 * (len(groups) - 1))
+            shift = 0.0 if numeric or not along else step * (number - 0.5 * (len(groups) - 1))
             line = "none" if not numeric else LINES[kinds.index(others) % len(LINES)]
             style: Mapping[str, Any] = {"ls": line, "marker": MARKERS[number % len(MARKERS)], "ms": 5, "capsize": 3}
             x = [_place(score, along, ticks, numeric) + shift for score in group]
