@@ -105,7 +105,7 @@ def load_signals(path: str | Path) -> "xr.Dataset":
     try:
         data = xr.load_dataset(path, engine="h5netcdf")
     except FileNotFoundError:
-        raise StoreError(f"{path}: no such file; write one with 'rislam-rt trace SCENE --signals FILE'") from None
+        raise StoreError(f"{path}: no such file; write one with 'rislam-rt trace SCENE --signals'") from None
     except Exception as error:  # the HDF5 library raises nearly anything on a damaged file
         raise StoreError(f"{path}: not a readable NetCDF file ({type(error).__name__}); write it again") from None
     names = [str(name)[:-5] for name in data.data_vars if str(name).endswith("_real")]
