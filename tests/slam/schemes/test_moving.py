@@ -1,0 +1,63 @@
+"""Both rivals in the setting of the package: both ends move, and the interface is that of its own filter."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from rooms import BODY, CYCLE, HEADING, RADIO, build_room, measurement_of
+
+from rislam_rt.slam import Outcome
+from rislam_rt.slam.filter import REMOVED
+from rislam_rt.slam.schemes import bp_slam, channel_slam
+
+SCHEMES = [
+    pytest.param(bp_slam, bp_slam.BpSlamConfig(num_particles=128, sigma_a=0.01), id="bp_slam"),
+    pytest.param(channel_slam, channel_slam.ChannelSlamConfig(num_particles=60, num_directions=32), id="channel_slam"),
+]
+
+
+@pytest.mark.parametrize(("scheme", "config"), SCHEMES)
+def test_a_short_walk_stays_within_bounds(scheme: Any, config: Any) -> None:
+    """Delays alone never tell how map and course are turned: no worse than three times dead reckoning.
+
+    That is 0.01 m of start and 0.01 m/s over the walk, on two axes.
+    """
+    room, rng = build_room(40, 1), np.random.default_rng(2)
+    state = scheme.init(room.start, BODY, None, RADIO, config, rng=rng)
+    for cycle, measurement in enumerate(room.measurements):
+        dt = CYCLE if cycle else 0.0
+        state, info = scheme.step(state, measurement, None, dt, HEADING, config, rng=rng)
+        belief = scheme.estimate(state, config)
+        reckoned = np.sqrt(2.0) * np.hypot(0.01, 0.01 * CYCLE * cycle)
+        assert np.linalg.norm(belief.position - room.position[cycle]) < 3.0 * reckoned
+        assert np.linalg.eigvalsh(belief.covariance)[0] > -1e-12
+        assert len(info.landmark) == len(measurement)
+        assert np.isfinite([info.nis, info.log_evidence, info.ess]).all()
+    assert info.num_landmarks >= 1
+    assert info.outcome == Outcome.OK
+    assert len(belief.samples) == config.num_samples
+    ahead = scheme.predict(state, CYCLE, config)
+    assert np.allclose(ahead.position, belief.position + CYCLE * belief.velocity, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("scheme", "config"), SCHEMES)
+def test_direct_path_and_wall_returns_are_set_aside(scheme: Any, config: Any) -> None:
+    """By length and by strength; nothing is left, and the filter survives it."""
+    room, rng = build_room(1, 1), np.random.default_rng(3)
+    state = scheme.init(room.start, BODY, None, RADIO, config, rng=rng)
+    bright = measurement_of(np.array([0.1, 3.0, 7.0]), ratio=0.85)
+    _, info = scheme.step(state, bright, None, CYCLE, HEADING, config, rng=rng)
+    assert np.array_equal(info.landmark, [REMOVED, REMOVED, REMOVED])
+    assert info.outcome == Outcome.NO_LANDMARKS
+    _, info = scheme.step(state, measurement_of(np.zeros(0)), None, CYCLE, HEADING, config, rng=rng)
+    assert info.outcome == Outcome.NO_MEASUREMENTS
+
+
+@pytest.mark.parametrize(("scheme", "config"), SCHEMES)
+def test_a_known_height_stays(scheme: Any, config: Any) -> None:
+    """Every particle keeps the height that it was told, exactly."""
+    room, rng = build_room(5, 1), np.random.default_rng(4)
+    state = scheme.init(room.start, BODY, None, RADIO, config, rng=rng)
+    for measurement in room.measurements:
+        state, _ = scheme.step(state, measurement, None, CYCLE, HEADING, config, rng=rng)
+    assert np.all(scheme.estimate(state, config).samples[:, 2] == room.start.position[2])
