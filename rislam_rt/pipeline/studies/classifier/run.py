@@ -117,11 +117,11 @@ def _walk(
 
 
 def _fit(rooms: list[RoomExamples], spec: ClassifierSpec, *, rng: np.random.Generator) -> Network:
-    """One network from one random start; every room, and either class in it, has the same weight."""
+    """One network from one random start; keep and remove have the same weight."""
     parts = [part for room in rooms if room.use == "train" for part in (room.plain, room.versions)]
-    parts = [part.pick(part.labelled) for part in parts]
-    together = join(parts)
-    weight = np.concatenate([np.full(len(part.kind), 1.0 / max(len(part.kind), 1)) for part in parts])
+    together = join([part.pick(part.labelled) for part in parts])
+    share = float(np.clip(together.keep.mean(), 1e-6, 1.0 - 1e-6))
+    weight = np.where(together.keep, 1.0 / share, 1.0 / (1.0 - share))
     section = spec.network
     return train_network(
         together.features, together.keep, weight, section.hidden, section.penalty, section.iterations, rng=rng
