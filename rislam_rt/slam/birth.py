@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.geometry.angles import unit
+from rislam_rt.geometry.angles import rotation_z, unit
 from rislam_rt.model import Body
 from rislam_rt.slam.associate import inverse_3x3
 from rislam_rt.slam.book import Book, enter
@@ -27,7 +27,7 @@ from rislam_rt.slam.hypotheses import (
 )
 from rislam_rt.slam.match import Outlook, explained, hidden_tracks
 from rislam_rt.slam.moments import Moments, poses_of, square_root
-from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe
+from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe, reflect
 from rislam_rt.slam.tracks import Tracks
 
 STRIDE = 4
@@ -48,6 +48,10 @@ ELDER_CYCLES = 6
 """Cycles of history from which on a track keeps longer and weaker ones waiting."""
 PARENT_HITS = 10
 """Measurements of a point before walls are found by it."""
+MIRROR_CYCLES = 3
+"""Measurements of a wall return before it is held against new points."""
+MIRROR_MARGIN = 0.1
+"""Distance [m] by which a point must lie nearer to an image of the agent."""
 PARALLEL = 4.0
 """Standard deviations (and 0.02) within which a track's direction is that of a known leg."""
 
@@ -72,6 +76,8 @@ class Scene(NamedTuple):
     anchor: Floats
     """(3,) where the agent is: the anchor of a wall born now."""
     outlook: Outlook
+    mirrored: Floats
+    """(V, 3) [m] the agent's own images in walls, as its wall returns show them now."""
     config: SlamConfig
 
 
@@ -135,7 +141,9 @@ def examine(
     due = due_tracks(tracks, outlook, past.cycle, config)
     if not len(due):
         return -1, tracks, None
-    scene = Scene(moments.features, book, moments.position, outlook, config)
+    scene = Scene(
+        moments.features, book, moments.position, outlook, mirror_images(tracks, moments, book, past.body), config
+    )
     moving = tracks.moving.copy()
     doubt = square_root(moments.covariance[:6, :6])
     for row in due:
@@ -217,7 +225,33 @@ def judge(history: History, scene: Scene) -> Verdict | None:
     if best.kind is MOVING:
         return best
     ready = best.kind is POINT or (len(history.seen) >= WALL_CYCLES and best.parent in _established(scene.book))
+    if best.kind is POINT and is_behind_mirror(best.fit.feature, scene):
+        return None
     return best if _sharp(best) and ready else None
+
+
+def mirror_images(tracks: Tracks, moments: Moments, book: Book, body: Body) -> Floats:
+    """Images (V, 3) of the agent, from the wall returns that are followed now and from the walls of the map."""
+    rows = np.flatnonzero(tracks.specular & (tracks.misses == 0) & (tracks.length >= MIRROR_CYCLES))
+    seen = tracks.mean[rows, :, 0]
+    flat = seen[:, 1:] / np.maximum(1.0, np.linalg.norm(seen[:, 1:], axis=1))[:, None]
+    ray = np.concatenate([flat, np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=1), 0.0))[:, None]], axis=1)
+    poses = poses_of(moments.position, np.asarray(moments.heading), body)
+    shown = poses.rx + seen[:, :1] * (ray @ rotation_z(np.asarray(moments.heading)).T)
+    walls = book.walls
+    held = reflect(moments.position, moments.features[walls], book.anchor[walls])
+    return np.concatenate([shown, held.reshape(-1, 3)])
+
+
+def is_behind_mirror(point: Floats, scene: Scene) -> bool:
+    """Whether a point lies nearer to an image of the agent than to the agent.
+
+    No way over walls is shorter than the straight one, so that nothing in the room does: such a point is itself an
+    image, of something not yet found. Where walls end short, a point beside one has to wait until that wall's return
+    is gone.
+    """
+    direct = np.linalg.norm(point - scene.anchor)
+    return bool((np.linalg.norm(point - scene.mirrored, axis=1) < direct - MIRROR_MARGIN).any())
 
 
 def judge_wall(history: History, scene: Scene) -> Verdict | None:
