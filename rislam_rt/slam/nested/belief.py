@@ -114,7 +114,9 @@ def absorb(belief: Nested, owner: int, sightings: Sequence[Sighting], engine: En
     cloud, count = belief.clouds[owner], len(belief.log_weight)
     cloud, sums = engine.weigh(cloud, tuple(sighting.kind for sighting in sightings), pack(sightings, count))
     possible = np.where(sums.log_total > 0.1 * HOPELESS, sums.log_total, -np.inf)
-    log_weight, evidence = normalised(belief.log_weight + possible)
+    likely = belief.log_weight + possible
+    top = float(likely.max())
+    log_weight, evidence = normalised(likely - top if np.isfinite(top) else likely)
     if not np.isfinite(evidence):
         return belief, -np.inf
     mean, covariance = belief.mean.copy(), belief.covariance.copy()
@@ -125,7 +127,7 @@ def absorb(belief: Nested, owner: int, sightings: Sequence[Sighting], engine: En
     updates[owner] += len(sightings)
     clouds = (*belief.clouds[:owner], cloud, *belief.clouds[owner + 1 :])
     moved = belief._replace(mean=mean, covariance=covariance, ess=ess, updates=updates)
-    return moved._replace(log_weight=log_weight, clouds=clouds), evidence
+    return moved._replace(log_weight=log_weight, clouds=clouds), evidence + top
 
 
 def renew(

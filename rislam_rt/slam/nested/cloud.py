@@ -18,6 +18,8 @@ HOPELESS = -1e30
 DEEPEST = -30.0
 """Least exponent, against the largest of the same agent particle, at which a weight is summed up: less would only
 make denormal numbers, which are slow."""
+LEAST_STD = 1e-4
+"""Least standard deviation [m] of a cloud that is resampled: a collapsed one must not stay so."""
 LARGEST_WIDTH = 0.9
 """Largest kernel width."""
 
@@ -111,12 +113,11 @@ def combine(lanes: Floats) -> Sums:
 def restoring_map(wanted: Floats, found: Floats) -> Floats:
     """Linear maps (N, 3, 3) that give offsets of covariance `found` the covariance `wanted`.
 
-    Of all such maps that which moves particles least, if the two covariances are alike. Directions in which nothing is
-    left to stretch stay as they are.
+    Of all such maps that which moves particles least, if the two covariances are alike. A cloud that has collapsed is
+    opened to `LEAST_STD`.
     """
-    size = np.maximum(np.trace(wanted, axis1=1, axis2=2), 0.0)[:, None] / 3.0 + 1e-4
     values, vectors = np.linalg.eigh(0.5 * (wanted + np.swapaxes(wanted, 1, 2)))
-    root = np.sqrt(np.maximum(values, 1e-8 * size))[:, None]
+    root = np.sqrt(np.maximum(values, LEAST_STD**2))[:, None]
     turned = np.swapaxes(vectors, 1, 2)
     forth, back = vectors * root @ turned, vectors / root @ turned
     white = back @ found @ back

@@ -17,7 +17,8 @@ from rislam_rt.slam.nested.update import Seen, update
 from rislam_rt.slam.returns import Returns
 
 LANDMARKS = np.array([[2.0, 1.0, 1.0], [3.0, 3.0, 3.0]])
-PRIOR, NOISE, WANDER, SPEED_STD, START_STD, COUNT = 0.1, 0.05, 0.3, 0.05, 0.02, 1500
+PRIOR, NOISE, WANDER, SPEED_STD, START_STD = 0.05, 0.05, 0.1, 0.05, 0.02
+COUNT, SIZE = 1500, 1024
 
 
 def fixed(agents: int, points: int, **more: object) -> SlamConfig:
@@ -36,16 +37,17 @@ def linear(state: Nested, owner: int, seen: Floats, covariance: Floats) -> list[
     return [Sighting((linear_sightline(state.centre[:, owner], state.position),), seen, covariance)]
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_equals_a_kalman_filter_where_that_is_exact(seed: int) -> None:
     """Linear and Gaussian: offsets from agent to two landmarks, all axes alike.
 
-    The mean of N weighted particles with effective size E errs by sqrt(P / E). Clouds are resampled at E = N / 2 at
-    the latest, with exact moments, so that after R resamplings errors of at most R + 1 such stretches have come
-    together: sqrt(2 (R + 1) / N) standard deviations, and twice that, relatively, in a variance. Landmark particles
-    add noise to the weights, which the effective size counts as well. Four of these standard deviations are allowed.
+    The mean of weighted particles of effective size E errs by sqrt(P / E), and their variance by twice that relatively.
+    Agent particles: E >= N / 2 at each of R resamplings, whose errors add up: 2 (R + 1) / N. Landmark particles: all
+    agent particles share the first cloud, and the first measurements leave a part of it, (PROPOSAL sqrt(1 + PRIOR^2 /
+    NOISE^2))^-3 = 1 / 9.5, before it is first resampled: 9.5 / M, once for each landmark. Four standard deviations of the
+    sum are allowed.
     """
-    config, engine = NestedConfig(num_agents=COUNT, num_points=128, adaptive=False), pick_engine("drjit")
+    config, engine = NestedConfig(num_agents=COUNT, num_points=SIZE, adaptive=False), pick_engine("drjit")
     rng = np.random.default_rng(seed)
     std = np.repeat([START_STD, SPEED_STD, 0.0], [3, 3, 1])
     normal = agents.standardise(np.full(COUNT, 1.0 / COUNT), rng.standard_normal((COUNT, 7)))
@@ -78,9 +80,9 @@ def test_equals_a_kalman_filter_where_that_is_exact(seed: int) -> None:
         renewals += done
     found = belief.gaussian(state)
     rows = np.delete(np.arange(13), 6)
-    std, error = np.sqrt(np.diag(covariance)), np.sqrt(2.0 * (renewals + 1) / COUNT)
+    std, error = np.sqrt(np.diag(covariance)), np.sqrt(2.0 * (renewals + 1) / COUNT + 2 * 9.5 / SIZE)
     assert renewals > 2
-    assert error < 0.2, "the tolerance must mean something"
+    assert error < 0.25, "the tolerance must mean something"
     np.testing.assert_allclose((found.mean[rows] - mean) / std, 0.0, atol=4.0 * error)
     np.testing.assert_allclose(np.diag(found.covariance)[rows] / std**2, 1.0, atol=8.0 * error)
     correlation = found.covariance[np.ix_(rows, rows)] / np.outer(std, std)
