@@ -21,7 +21,7 @@ def train_network(
     mean, scale = features.mean(axis=0), np.maximum(features.std(axis=0), 1e-6)
     inputs = (features - mean) / scale
     sizes = [features.shape[1], hidden, hidden, 1]
-    shapes = [s for a, b in pairwise(sizes) for s in ((a, b), (b,))]
+    shapes: list[tuple[int, ...]] = [s for a, b in pairwise(sizes) for s in ((a, b), (b,))]
     start = []
     for shape in shapes:
         reach = np.sqrt(6.0 / sum(shape)) if len(shape) == 2 else 0.0

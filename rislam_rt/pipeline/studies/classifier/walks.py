@@ -49,7 +49,7 @@ def random_version(scene: Scene, *, rng: np.random.Generator) -> Scene:
     """The same room with other walls (slabs of building materials every other time) and other scatterers' radii."""
     slabs = rng.uniform() < 0.5
     reflectors = tuple(replace(one, material=_material(slabs, rng)) for one in scene.reflectors)
-    radii = np.exp(rng.uniform(*np.log(RADIUS), size=len(scene.scatterers)))
+    radii = np.exp(rng.uniform(np.log(RADIUS[0]), np.log(RADIUS[1]), size=len(scene.scatterers)))
     scatterers = tuple(
         replace(one, rcs=float(np.pi * radius**2), radius=float(radius), law="constant", height=None)
         for one, radius in zip(scene.scatterers, radii, strict=True)
@@ -66,10 +66,10 @@ def _material(slab: bool, rng: np.random.Generator) -> Material:
 
 def _arc(scene: Scene, start: Floats, cycles: int, rng: np.random.Generator) -> Trajectory:
     """Constant speed and rate of turn from a start."""
-    time = CYCLE * np.arange(cycles)
+    time = CYCLE * np.arange(cycles, dtype=np.float64)
     speed, rate = rng.uniform(*SPEED), TURN_RATE * rng.standard_normal()
     heading = rng.uniform(-np.pi, np.pi) + rate * time
     velocity = speed * np.stack([np.cos(heading), np.sin(heading), np.zeros(cycles)], axis=1)
-    steps = np.concatenate([np.zeros((1, 3)), 0.5 * CYCLE * (velocity[1:] + velocity[:-1])])
+    steps: Floats = np.concatenate([np.zeros((1, 3)), 0.5 * CYCLE * (velocity[1:] + velocity[:-1])])
     turned = np.arctan2(np.sin(heading), np.cos(heading))
     return Trajectory(time, start + np.cumsum(steps, axis=0), velocity, turned, scene.agent.body)
