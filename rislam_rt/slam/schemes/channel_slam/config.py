@@ -12,7 +12,7 @@ from rislam_rt.errors import ConfigError
 class ChannelSlamConfig:
     """Model and effort. SI units."""
 
-    num_particles: int = 150
+    num_particles: int = 100
     """Of the agent."""
     num_directions: int = 48
     """Gaussians over which a new virtual transmitter is spread, on the half sphere about the agent."""
@@ -37,7 +37,7 @@ class ChannelSlamConfig:
     """Cycles without a range after which a track, and its virtual transmitter, is given up."""
     strain_limit: float = 4.0
     """Running mean of a path's squared normalised innovation above which its virtual transmitter starts anew."""
-    prune_weight: float = 3e-3
+    prune_weight: float = 5e-3
     """Share of a virtual transmitter's Gaussians below which one is dropped."""
     resample_below: float = 0.5
     """Fraction of the particles that the effective sample size must not fall below."""

@@ -175,15 +175,21 @@ def prune(known: Transmitters, weight: Floats, least: float) -> Transmitters:
 
 
 def moments(known: Transmitters, weight: Floats) -> tuple[Floats, Floats]:
-    """Mean (V, 3) [m] and covariance (V, 3, 3) [m^2] of every virtual transmitter over agents and Gaussians."""
+    """Mean (V, 3) [m] and covariance (V, 3, 3) [m^2] of every virtual transmitter over agents and Gaussians.
+
+    The covariance of a Gaussian and its derivatives enter as their means over the agents, which differ little in them.
+    """
     starts = known.starts
     if not len(starts):
         return np.zeros((0, 3)), np.zeros((0, 3, 3))
     share, points = weight[:, None] * np.exp(known.log_share), points_of(known)
+    total = share.sum(axis=0)
+    part = share / np.maximum(total, 1e-300)
     first = np.einsum("nc,nci->ci", share, points.position)
-    second = np.einsum("nc,nci,ncj->cij", share, points.position, points.position)
-    carried = known.covariance @ points.jacobian
-    second += np.einsum("nc,ncki,nckj->cij", share, points.jacobian, carried)
+    second = np.einsum("nci,ncj->cij", share[..., None] * points.position, points.position)
+    jacobian = np.einsum("nc,ncij->cij", part, points.jacobian)
+    covariance = np.einsum("nc,ncij->cij", share, known.covariance)
+    second += jacobian.swapaxes(1, 2) @ covariance @ jacobian
     mean = np.add.reduceat(first, starts)
     return mean, np.add.reduceat(second, starts) - mean[:, :, None] * mean[:, None]
 
