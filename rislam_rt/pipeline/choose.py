@@ -1,5 +1,7 @@
 """How each scheme chooses the panel's code: from the predicted belief, or, for the reference, from the truth."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from rislam_rt.design import design_code, designer, problem_from_paths
@@ -22,9 +24,11 @@ def build_designer(scheme: Scheme, panel: RisSpec, room: Room, spec: PipelineSpe
 def _on_belief(method: str, panel: RisSpec, spec: PipelineSpec, settings: Settings) -> Designer:
     section = spec.design
 
-    def choose(belief: SlamEstimate, cycle: int, *, rng: np.random.Generator) -> RisCode:
+    def choose(belief: Callable[[], SlamEstimate], cycle: int, *, rng: np.random.Generator) -> RisCode:
+        if method == "random":  # looks at no belief
+            return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)
         design = design_code(
-            belief, panel, settings.radio, method=method, rng=rng, samples=section.samples, config=settings.design,
+            belief(), panel, settings.radio, method=method, rng=rng, samples=section.samples, config=settings.design,
             landmark_uncertainty=section.landmark_uncertainty, least_snr=section.least_snr,
         )  # fmt: skip
         return design.code
@@ -36,9 +40,9 @@ def _on_truth(method: str, panel: RisSpec, room: Room, spec: PipelineSpec, setti
     """The genie: true paths of the cycle in which the code will take effect, and the belief's own prior."""
     last = len(room.trajectory) - 1
 
-    def choose(belief: SlamEstimate, cycle: int, *, rng: np.random.Generator) -> RisCode:
+    def choose(belief: Callable[[], SlamEstimate], cycle: int, *, rng: np.random.Generator) -> RisCode:
         due = min(cycle + spec.control.delay_cycles, last)
-        prior = prior_from_covariance(belief.covariance[:2, :2])
+        prior = prior_from_covariance(belief().covariance[:2, :2])
         tx, rx = room.trajectory.tx[due], room.trajectory.rx[due]
         try:
             problem = problem_from_paths(

@@ -4,7 +4,9 @@ The agent's side of it (design and filter) gets the measurement, the code that i
 its heading; paths and poses stay on the room's side.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
 from typing import Any, NamedTuple, Protocol
 
@@ -83,8 +85,8 @@ class Cycle(NamedTuple):
 class Designer(Protocol):
     """Chooses a code from the predicted belief."""
 
-    def __call__(self, belief: SlamEstimate, cycle: int, *, rng: np.random.Generator) -> RisCode:
-        """`cycle` is for the reference that knows the truth."""
+    def __call__(self, belief: Callable[[], SlamEstimate], cycle: int, *, rng: np.random.Generator) -> RisCode:
+        """`belief` is worked out on being called, for not all need it; `cycle` is for the one that knows the truth."""
         ...
 
 
@@ -99,7 +101,7 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
     link, sent = agent.link, None
     if link is not None and means.designer is not None:
         ahead = dt + control.delay_cycles * _nominal_step(motion)
-        sent = means.designer(estimator.predict(agent.state, ahead, config), cycle, rng=rng.design)
+        sent = means.designer(partial(estimator.predict, agent.state, ahead, config), cycle, rng=rng.design)
     clock.append(perf_counter())
 
     air = 0.0

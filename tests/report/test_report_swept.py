@@ -119,6 +119,7 @@ def test_nothing_is_written_before_the_first_cell_and_one_cell_is_enough(tmp_pat
     assert write_swept(empty, fig4b_spec(1), RECORD, tmp_path) is None
     assert list(tmp_path.iterdir()) == []
     text = write_swept([found[0], *empty[1:]], fig4b_spec(1), RECORD, tmp_path).read_text()
+    assert "Of 5 runs 0 failed" in text  # what has not run yet has not failed
     assert "nan" not in text.lower().replace("variance", "")
 
 

@@ -106,7 +106,7 @@ def paragraph(text: str) -> list[str]:
 
 def trouble(groups: Sequence[Group]) -> list[str]:
     """Markdown: how many runs failed or diverged, and why they failed."""
-    runs = sum(len(group.results) for group in groups for _ in group.schemes)
+    runs = sum((len(group.results) - group.missing) * len(group.schemes) for group in groups)
     failed = sum(group.failed(scheme) for group in groups for scheme in group.schemes)
     diverged = sum(group.diverged(scheme) for group in groups for scheme in group.schemes)
     lines = [f"Of {runs} runs {failed} failed and {diverged} diverged (more than 0.5 m and five times the bound off);"]

@@ -8,6 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import Interval, bootstrap, bootstrap_ratio, rms_over_runs
 from rislam_rt.pipeline.sweeps import Row
+from rislam_rt.pipeline.sweeps.store import DONE, MISSING
 
 LEVEL = 0.95
 """Confidence of every interval."""
@@ -19,6 +20,8 @@ class Group(NamedTuple):
     point: Mapping[str, Any]
     results: tuple[Mapping[str, Any] | None, ...]
     """One a repetition; None where the cell has not ended well."""
+    missing: int = 0
+    """Repetitions that have not run yet."""
 
     @property
     def schemes(self) -> list[str]:
@@ -42,7 +45,7 @@ class Group(NamedTuple):
 
     def failed(self, scheme: str) -> int:
         """Repetitions without a score of the scheme: it failed, or its cell did."""
-        return int(np.isnan(self.column(scheme, "rmse_m")).sum())
+        return int(np.isnan(self.column(scheme, "rmse_m")).sum()) - self.missing
 
     def diverged(self, scheme: str) -> int:
         """Repetitions in which the estimate was lost."""
@@ -59,7 +62,11 @@ def group_rows(rows: Sequence[Row]) -> list[Group]:
     for row in rows:
         groups.setdefault(repr(row.cell.point), []).append(row)
     return [
-        Group(group[0].cell.point, tuple(row.result if row.state == "done" else None for row in group))
+        Group(
+            group[0].cell.point,
+            tuple(row.result if row.state == DONE else None for row in group),
+            sum(row.state == MISSING for row in group),
+        )
         for group in groups.values()
     ]
 
