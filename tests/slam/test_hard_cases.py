@@ -1,0 +1,62 @@
+"""A sample of the hard cases: no exception, no warning, nothing that is not finite, covariances that are some."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+SAMPLE = 40
+
+
+def _load() -> ModuleType:
+    """The benchmark that draws them; it is no part of a package."""
+    file = Path(__file__).parents[2] / "benchmarks" / "hard_cases.py"
+    spec = importlib.util.spec_from_file_location("hard_cases", file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["hard_cases"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+hard = _load()
+
+
+@pytest.mark.parametrize("number", range(SAMPLE))
+def test_filter_survives(number: int) -> None:
+    """Twelve cycles at most: landmarks are born where the settings drawn ask for little history."""
+    # a stride without a common factor goes through all kinds alike
+    kind = hard.KINDS[(5 * number) % len(hard.KINDS)]
+    verdict = hard.run_case(hard.draw_case(kind, number, "rao_blackwellised", most=12))
+    assert not verdict.faults, verdict.faults[:3]
+    assert len(verdict.outcomes) >= 10
+
+
+def test_a_start_wrong_by_a_metre_shifts_the_map_and_nothing_else() -> None:
+    """Absolute position is unobservable: the filter cannot notice, must not diverge, and stays off by what it was.
+
+    Relative to its start it errs by what an honest start leaves: 0.01 m/s over 4 s and the landmarks' own errors.
+    """
+    drifts = []
+    for seed in range(1, 2):
+        case = hard.draw_case("start wrong by 1 m", seed, "rao_blackwellised")
+        case = case._replace(config=hard.SlamConfig())
+        verdict = hard.run_case(case)
+        drifts.append(verdict.drift)
+        assert not verdict.lost
+        assert "diverged" not in verdict.outcomes
+        assert np.linalg.norm(case.start.position - case.truth[0]) > 0.9
+    assert max(drifts) < 0.1
+
+
+def test_faults_would_be_noticed() -> None:
+    """The look at estimate and diagnostics sees a NaN, a negative variance, and an asymmetric covariance."""
+    bad = np.diag([1.0, -1e-6])
+    assert hard._not_covariance(bad[None])
+    assert hard._not_covariance(np.array([[[1.0, 0.1], [0.0, 1.0]]]))
+    assert hard._not_covariance(np.full((1, 2, 2), np.nan))
+    assert not hard._not_covariance(np.diag([1.0, 0.0])[None])
