@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import rotation_z, unit
 from rislam_rt.model import Body
 from rislam_rt.slam.associate import inverse_3x3
@@ -174,12 +174,20 @@ def due_tracks(tracks: Tracks, outlook: Outlook, cycle: int, config: SlamConfig)
     if not (ready & turn).any():
         return np.zeros(0, dtype=np.int64)
     hidden = hidden_tracks(outlook, tracks, config.gate)
-    alive = ~tracks.specular & ~hidden & (tracks.length >= ELDER_CYCLES) & (tracks.misses <= 1)
+    alive = ~tracks.specular & ~hidden & (tracks.length >= ELDER_CYCLES) & (tracks.misses <= 2)
     length = tracks.mean[:, 0, 0]
-    elder = (length[None] < length[:, None] - 0.05) & (tracks.log_amplitude[None] > tracks.log_amplitude[:, None] + 0.1)
+    stronger = tracks.log_amplitude[None] > tracks.log_amplitude[:, None] + 0.1
+    elder = (length[None] < length[:, None] - 0.05) & (stronger | _aligned(tracks))
     waits = (elder & alive[None]).any(axis=1) & growing & ~tracks.specular
     rows = np.flatnonzero(ready & turn & ~waits)
     return rows[np.argsort(tracks.mean[rows, 0, 0])]
+
+
+def _aligned(tracks: Tracks) -> Booleans:
+    """(T, T) whether two tracks come from one direction: the longer is likely the shorter over a wall on the Tx leg."""
+    gap = np.abs(tracks.mean[None, :, 1:, 0] - tracks.mean[:, None, 1:, 0])
+    variance = tracks.covariance[..., 1:, 0, 0]
+    return np.asarray((gap < PARALLEL * np.sqrt(variance[None] + variance[:, None] + 0.02**2)).all(axis=-1))
 
 
 def track_history(tracks: Tracks, row: int, past: Past, doubt: Floats, free_space: float) -> tuple[History, Integers]:
