@@ -1,0 +1,220 @@
+"""Association: the assignment against brute force, its gates, tracks that give way, and what merges at the receiver."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.measurement.parts import merge
+from rislam_rt.measurement.received import Received
+from rislam_rt.model import RadioConfig
+from rislam_rt.slam.associate import Candidates, associate, inverse_3x3, pair_costs
+from rislam_rt.slam.expect import Expected
+from rislam_rt.slam.match import Merger, Outlook, candidates, hidden_tracks, merge_returns, resolution_cell
+from rislam_rt.slam.returns import NONE, Returns
+from rislam_rt.slam.tracks import Glance, Tracks, no_tracks
+
+GATE, CLUTTER = 16.3, 0.016
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20240621)
+
+
+def draw_candidates(count: int, *, rng: np.random.Generator) -> Candidates:
+    """Near each other, so that they compete."""
+    root = rng.normal(size=(count, 3, 3))
+    return Candidates(
+        np.array([3.0, 0.2, 0.1]) + 0.05 * rng.normal(size=(count, 3)),
+        2e-3 * root @ np.swapaxes(root, 1, 2) + 1e-4 * np.eye(3),
+        0.2 * rng.normal(size=count),
+        np.full(count, 0.3),
+        np.log(rng.uniform(0.3, 0.95, count)),
+    )
+
+
+def glance(seen: Floats, log_amplitude: Floats, std: float = 0.02) -> Glance:
+    """Measurements as the filter looks at them."""
+    count = len(seen)
+    return Glance(seen, np.full((count, 3), std), log_amplitude, np.full(count, 0.1), np.ones(count), np.zeros(count))
+
+
+def test_assignment_is_the_best_of_all() -> None:
+    """Against every one-to-one pairing of up to four and four, unassigned ones costing nothing."""
+    rng = np.random.default_rng(5)
+    contested = 0
+    for _ in range(60):
+        here, there = rng.integers(1, 5, size=2)
+        found = draw_candidates(int(here), rng=rng)
+        seen = glance(found.seen[rng.integers(here, size=there)] + 0.05 * rng.normal(size=(there, 3)), np.zeros(there))
+        cost = pair_costs(found, seen, GATE, CLUTTER)
+        chosen = associate(found, seen, GATE, CLUTTER)
+        best = min(
+            sum(cost[row, column] for row, column in enumerate(choice) if column >= 0)
+            for choice in product(range(-1, there), repeat=int(here))
+            if len(taken := [c for c in choice if c >= 0]) == len(set(taken))
+        )
+        got = sum(cost[row, column] for row, column in enumerate(chosen) if column >= 0)
+        assert got == pytest.approx(best, abs=1e-9)
+        used = chosen[chosen >= 0]
+        assert len(set(used.tolist())) == len(used)
+        greedy = np.argmin(cost, axis=1)
+        contested += int(len(set(greedy.tolist())) < here <= there)
+    # the cases are worth the name: the cheapest measurement is often the same one for several
+    assert contested > 10
+
+
+def test_cost_is_the_likelihood_ratio_against_clutter(rng: np.random.Generator) -> None:
+    """-2 log of P_D N(gap; S) N(fade; s^2) / clutter density, by scipy."""
+    from scipy.stats import multivariate_normal, norm
+
+    found = draw_candidates(1, rng=rng)
+    seen = glance(found.seen + 0.01, np.array([0.1]))
+    density = multivariate_normal.logpdf(seen.seen[0], found.seen[0], found.covariance[0] + 0.02**2 * np.eye(3))
+    fade = norm.logpdf(0.1, found.log_amplitude[0], np.hypot(0.3, 0.1))
+    want = -2.0 * (density + fade + found.log_odds[0] - np.log(CLUTTER))
+    np.testing.assert_allclose(pair_costs(found, seen, GATE, CLUTTER)[0, 0], want, rtol=1e-12)
+
+
+@pytest.mark.parametrize("axis", range(4))
+def test_beyond_the_gate_nothing_is_paired(axis: int) -> None:
+    """Just inside the squared distance in delay, either cosine or log amplitude, and just outside."""
+    found = Candidates(
+        np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, 0.05), np.zeros(1)
+    )  # fmt: skip
+    for factor, paired in ((0.99, True), (1.01, False)):
+        seen, fade = np.zeros((1, 3)), np.zeros(1)
+        if axis < 3:
+            seen[0, axis] = factor * np.sqrt(GATE * (1e-4 + 0.02**2))
+        else:
+            fade[0] = factor * np.sqrt(GATE * (0.05**2 + 0.1**2))
+        # clutter is made so rare that only the gate stands between the two
+        assert (associate(found, glance(seen, fade), GATE, 1e-9)[0] == 0) == paired
+
+
+def test_nothing_to_assign() -> None:
+    rng = np.random.default_rng(1)
+    none = glance(np.zeros((0, 3)), np.zeros(0))
+    np.testing.assert_array_equal(associate(draw_candidates(3, rng=rng), none, GATE, CLUTTER), [-1, -1, -1])
+    empty = Candidates._make(field[:0] for field in draw_candidates(1, rng=rng))
+    assert len(associate(empty, glance(np.zeros((2, 3)), np.zeros(2)), GATE, CLUTTER)) == 0
+
+
+def test_small_inverses(rng: np.random.Generator) -> None:
+    root = rng.normal(size=(20, 3, 3))
+    matrix = root @ np.swapaxes(root, 1, 2) + 0.1 * np.eye(3)
+    inverse, log_det = inverse_3x3(matrix)
+    # condition numbers up to 1e3: rounding below 1e-12
+    np.testing.assert_allclose(inverse, np.linalg.inv(matrix), rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(log_det, np.linalg.slogdet(matrix)[1], atol=1e-12)
+
+
+def outlook(seen: Floats, log_amplitude: Floats) -> Outlook:
+    """Returns that are expected there, and merge with nothing."""
+    count = len(seen)
+    legs = np.stack([np.arange(count), np.full(count, NONE), np.full(count, NONE)], axis=1)
+    rows, ones = np.arange(count), np.ones(count, dtype=np.bool_)
+    alone = Merger(np.full(count, -1), ~ones, np.zeros((count, 3)), ~ones)
+    expected = Expected(
+        Returns(legs, rows, rows), log_amplitude, np.full(count, 0.2), 0 * rows, rows, ones, np.full(count, -1), ones
+    )
+    spread = np.tile(1e-4 * np.eye(3), (count, 1, 1))
+    cell = np.array([0.3, 0.5, 0.5])
+    return Outlook(expected, seen, spread, log_amplitude, np.full(count, 0.2), ones, alone, cell)
+
+
+def follow(seen: Floats, log_amplitude: Floats, shine: Floats) -> Tracks:
+    """Tracks at some places."""
+    count = len(seen)
+    fields = {name: np.zeros((count, *field.shape[1:]), field.dtype) for name, field in no_tracks(4)._asdict().items()}
+    mean = np.stack([seen, np.zeros((count, 3))], axis=-1)
+    spread = np.tile(1e-4 * np.eye(2), (count, 3, 1, 1))
+    return Tracks(
+        **{**fields, "mean": mean, "covariance": spread, "log_amplitude": log_amplitude, "shine": shine}
+    )  # fmt: skip
+
+
+def test_tracks_behind_an_expected_return_give_way() -> None:
+    """One on it, one on it but ten times stronger, one on it but a wall return, one elsewhere."""
+    place = np.array([3.0, 0.2, 0.1])
+    ahead = outlook(place[None], np.zeros(1))
+    tracks = follow(
+        np.stack([place, place, place, place + 0.2]), np.array([0.0, 2.3, 0.0, 0.0]), np.array([0.0, 0.0, 1.0, 0.0])
+    )
+    hidden = hidden_tracks(ahead, tracks, GATE)
+    np.testing.assert_array_equal(hidden, [True, False, False, False])
+    # and a hidden one gets nothing, even where it fits better than the return
+    found = candidates(ahead, tracks, hidden)
+    chosen = associate(found, glance(place[None], np.zeros(1)), GATE, CLUTTER)
+    assert chosen[0] == 0
+    assert chosen[1] == -1
+
+
+def test_what_the_filter_expects_to_merge_the_receiver_merges() -> None:
+    """Random groups of paths of which no gap is near the limit: the same ones come out, the same ones do not.
+
+    The receiver's own rule, on delay and both cosines, from the strongest down.
+    """
+    rng, radio, agreed = np.random.default_rng(17), RadioConfig(), 0
+    cell = resolution_cell(radio)
+    for _ in range(200):
+        count = int(rng.integers(2, 7))
+        place = np.array([5.0, 0.0, 0.0]) + cell * np.array([1.0, 0.5, 0.5]) * rng.uniform(-1.0, 1.0, (count, 3))
+        reach = np.max(np.abs(place[None] - place[:, None]) / cell, axis=2)
+        if ((reach > 0.88) & (reach < 1.12)).any():
+            continue
+        strength = np.exp(rng.normal(size=count))
+        foreseen = merge_returns(place, _expected(strength), no_tracks(4), cell)
+        taken = _taken_by_receiver(place, strength, radio)
+        np.testing.assert_array_equal(foreseen.absorbed, taken)
+        agreed += int(taken.any())
+    assert agreed > 30
+
+
+def _expected(strength: Floats) -> Expected:
+    return outlook(np.zeros((len(strength), 3)), np.log(strength)).expected
+
+
+def _taken_by_receiver(place: Floats, strength: Floats, radio: RadioConfig) -> Integers:
+    """(N,) whether a path comes out as part of a stronger one."""
+    direction = np.column_stack([place[:, 1:], np.sqrt(1.0 - np.sum(place[:, 1:] ** 2, axis=1))])
+    count = len(place)
+    received = Received(
+        np.arange(count),
+        place[:, 0] / SPEED_OF_LIGHT,
+        direction,
+        strength.astype(np.complex128),
+        np.zeros(count, dtype=np.bool_),
+        place[:, 0],
+    )
+    kept = merge(received, radio, False).path
+    return ~np.isin(np.arange(count), kept)
+
+
+def test_reciprocals_come_out_halfway_and_shift_nothing() -> None:
+    """A pair in one cell names each other's place; alone in its cell it is disturbed by nobody."""
+    place = np.array([[5.0, 0.1, 0.1], [5.05, 0.12, 0.1], [9.0, 0.1, 0.1]])
+    expected = _expected(np.array([1.0, 1.0, 1.0]))._replace(twin=np.array([1, 0, -1]))
+    merger = merge_returns(place, expected, no_tracks(4), np.array([0.3, 0.5, 0.5]))
+    leader = int(np.flatnonzero(~merger.absorbed[:2])[0])
+    assert merger.partner[leader] == 1 - leader
+    assert merger.partner[2] == -1
+    assert not merger.absorbed[2]
+    np.testing.assert_array_equal(merger.disturbance[[leader, 2]], 0.0)
+
+
+def test_disturbance_is_what_random_phases_make_of_a_weaker_path() -> None:
+    """Root mean square of Re sum alpha_i conj(alpha) z_i / |alpha|^2 over phases, by drawing 20 000 of them.
+
+    To first order in the amplitude ratio 0.2, so that the next order leaves (0.2)^2 = 4 %; the draws add 1 %.
+    """
+    rng = np.random.default_rng(3)
+    place = np.array([[5.0, 0.1, 0.1], [5.1, 0.2, 0.05]])
+    merger = merge_returns(place, _expected(np.array([1.0, 0.2])), no_tracks(4), np.array([0.3, 0.5, 0.5]))
+    gain = np.stack([np.ones(20_000, complex), 0.2 * np.exp(2j * np.pi * rng.uniform(size=20_000))])
+    total = gain.sum(axis=0)
+    came = np.einsum("pn,pa->na", (gain * total.conj()).real / np.abs(total) ** 2, place)
+    np.testing.assert_allclose(merger.disturbance[0], np.sqrt(np.mean((came - place[0]) ** 2, axis=0)), rtol=0.06)
