@@ -65,7 +65,7 @@ def draw_importance(found: Training) -> Figure:
             right.plot(list(bins), list(bins.values()), "o-", color=COLOUR[rule], label=NAME[rule])
         right.axhline(0.98, color="black", lw=0.8, ls=":")
         right.set(xlabel="measurements of the track in the window", ylabel='F1 of "keep"', title="F1 against age")
-        right.legend(loc="center left", bbox_to_anchor=(0.0, 0.42))
+        right.legend(loc="center", bbox_to_anchor=(0.5, 0.44))
     return figure
 
 
