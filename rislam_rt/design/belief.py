@@ -9,8 +9,8 @@ from rislam_rt.design.designers import designer, random_design
 from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.result import Design, DesignConfig
 from rislam_rt.geometry.angles import unit
-from rislam_rt.geometry.planes import mirror, plane_between
-from rislam_rt.information import path_gradient, prior_from_covariance, range_information
+from rislam_rt.geometry.planes import mirror, mirror_direction, plane_between
+from rislam_rt.information import GradientMode, path_gradient, prior_from_covariance, range_information
 from rislam_rt.model import MapEstimate, RadioConfig, RisSpec, SlamEstimate
 from rislam_rt.ris import leg_response
 
@@ -28,6 +28,7 @@ def design_code(
     config: DesignConfig = _DEFAULT,
     landmark_uncertainty: bool = False,
     least_snr: float = 0.0,
+    gradient: GradientMode = "exact",
 ) -> Design:
     """A code for the next cycle from the belief predicted to it; truth is not looked at.
 
@@ -42,13 +43,16 @@ def design_code(
     least_snr
         SNR over all antennas, linear, at which the receiver detects a path every other time. 0, the paper's objective,
         counts the information of paths that will be missed.
+    gradient
+        How a path's length is held to change with the agent: `exact`, or as the paper has it (see `vertex_gradient`).
 
     If no landmark is held for the panel yet, the outcome is `NO_PATHS` and the code is a random one.
     """
     chosen = designer(method)
     problem = problem_from_belief(
-        belief, ris, radio, samples=samples, landmark_uncertainty=landmark_uncertainty, least_snr=least_snr
-    )
+        belief, ris, radio, samples=samples, landmark_uncertainty=landmark_uncertainty, least_snr=least_snr,
+        gradient=gradient,
+    )  # fmt: skip
     if problem is None:
         return random_design(method, ris, rng=rng)
     return chosen(problem, rng=rng, config=config)
@@ -56,7 +60,7 @@ def design_code(
 
 def problem_from_belief(
     belief: SlamEstimate, ris: RisSpec, radio: RadioConfig, *, samples: int = 4, landmark_uncertainty: bool = False,
-    least_snr: float = 0.0,
+    least_snr: float = 0.0, gradient: GradientMode = "exact",
 ) -> DesignProblem | None:  # fmt: skip
     """The design problem of a belief; None if its map holds no panel.
 
@@ -75,7 +79,7 @@ def problem_from_belief(
     return DesignProblem(
         response=_panel_responses(belief.map, panel, tx, rx, ris, radio),
         static_gain=_point_gains(belief.map, static, tx, rx, radio),
-        gradient=path_gradient(tx, rx, points[both.tx_point], points[both.rx_point])[..., :2],
+        gradient=_gradient(points, both, tx, rx, gradient)[..., :2],
         prior=prior_from_covariance(belief.covariance[:2, :2]),
         scale=float(range_information(np.array(unit_snr), radio)),
         levels=ris.levels,
@@ -106,6 +110,24 @@ def _believed_paths(landmarks: MapEstimate) -> tuple[_Believed, _Believed]:
     )
     over_panel = paths.source == landmarks.ris
     return _Believed(*(field[over_panel] for field in paths)), _Believed(*(field[~over_panel] for field in paths))
+
+
+def _gradient(points: Floats, paths: _Believed, tx: Floats, rx: Floats, mode: GradientMode) -> Floats:
+    """(B, Q, 3) gradients of the path lengths by the agent's position.
+
+    The segment between landmark and wall is that between wall and device, mirrored in the wall between landmark and
+    image: so the paper's sum over all segments needs no bounce points. A point that is its own image has no wall.
+    """
+    if mode == "exact":
+        return path_gradient(tx, rx, points[paths.tx_point], points[paths.rx_point])
+    last = unit(rx - points[paths.rx_point])
+    if mode == "appendix":
+        return last
+    total = np.zeros_like(last)
+    for seen, way in ((paths.tx_point, unit(points[paths.tx_point] - tx)), (paths.rx_point, last)):
+        inner = mirror_direction(way, unit(points[seen] - points[paths.source]))
+        total = total + way + np.where((seen != paths.source)[:, None], inner, 0.0)
+    return total
 
 
 def _ratio(landmarks: MapEstimate, paths: _Believed) -> Floats:

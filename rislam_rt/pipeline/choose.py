@@ -30,6 +30,7 @@ def _on_belief(method: str, panel: RisSpec, spec: PipelineSpec, settings: Settin
         design = design_code(
             belief(), panel, settings.radio, method=method, rng=rng, samples=section.samples, config=settings.design,
             landmark_uncertainty=section.landmark_uncertainty, least_snr=section.least_snr,
+            gradient=section.gradient,
         )  # fmt: skip
         return design.code
 

@@ -27,5 +27,7 @@ SCHEMES: dict[str, Scheme] = {
     "no_ris": Scheme(None),
     "bp_slam": Scheme("random", estimator="bp_slam"),
     "channel_slam": Scheme("random", estimator="channel_slam"),
+    "bp_slam_no_ris": Scheme(None, estimator="bp_slam"),
+    "channel_slam_no_ris": Scheme(None, estimator="channel_slam"),
 }
 """All schemes by name."""

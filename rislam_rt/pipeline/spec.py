@@ -101,6 +101,8 @@ class DesignSection(DesignerSection):
     """Positions of the belief over which the objective is averaged; 1 designs on the mean."""
     landmark_uncertainty: bool = False
     """Whether each landmark's covariance discounts its path."""
+    gradient: Literal["exact", "paper", "appendix"] = "exact"
+    """How the design holds a path's length to change with the agent; the last two are the paper's."""
     least_snr_db: Decibel | None = None
     """SNR over all antennas at which the receiver detects a path every other time, for a design that knows what will be
     missed; the paper's objective counts the information of every path."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.design import DESIGNERS, design_code, problem_from_belief
-from rislam_rt.information import Outcome
+from rislam_rt.information import Outcome, vertex_gradient
 from rislam_rt.model import empty_map
 
 POSITION = np.array([1.2, 2.1, 0.5])
@@ -98,3 +98,36 @@ def test_absurd_beliefs_give_a_code_and_no_nan(make_belief, make_spec, radio, rn
             for method in ("genetic", "coordinate"):
                 design = design_code(odd, make_spec(), radio, method=method, rng=rng)
                 assert not np.isnan([design.crlb, design.bound, design.gain_db, design.gap_db]).any()
+
+
+def test_gradients_as_the_paper_has_them_equal_those_of_the_bounced_paths(make_belief, make_spec, radio, rng):
+    """Against `vertex_gradient` on explicit bounce points: path Tx, sphere, wall, Rx and its reciprocal."""
+    belief = make_belief(POSITION, rng)
+    tx, rx = belief.body.ends(belief.position, np.array(belief.heading))
+    found = belief.map
+    rows = np.arange(len(found.parent))
+    points = [found.ris, *rows[(found.parent < 0) & (rows != found.ris)]]
+    images = [row for row in rows if found.parent[row] >= 0]
+    chains = [(p, p, p) for p in points] + [(found.parent[i], found.parent[i], i) for i in images]
+    chains += [(found.parent[i], i, found.parent[i]) for i in images]
+    over_panel = [chain for chain in chains if chain[0] == found.ris]
+    for mode in ("paper", "appendix"):
+        problem = problem_from_belief(belief, make_spec(), radio, samples=1, gradient=mode)
+        ordered = over_panel + [chain for chain in chains if chain[0] != found.ris]
+        for number, (source, first, last) in enumerate(ordered):
+            corners = [found.position[source]]
+            for end, seen, at in ((tx, first, 0), (rx, last, len(corners))):
+                if seen != source:
+                    corners.insert(
+                        at if at == 0 else len(corners), _bounce(end, found.position[source], found.position[seen])
+                    )
+            vertices = np.array([corners + [corners[-1]] * (3 - len(corners))])
+            expected = vertex_gradient(tx, rx, vertices, np.array([len(corners)]), mode=mode)[0, :2]
+            np.testing.assert_allclose(problem.gradient[0, number], expected, atol=1e-12)
+
+
+def _bounce(end, point, image):
+    """Where the straight line from `end` to the image crosses the plane halfway between point and image."""
+    normal, middle = image - point, 0.5 * (image + point)
+    share = ((middle - end) @ normal) / ((image - end) @ normal)
+    return end + share * (image - end)

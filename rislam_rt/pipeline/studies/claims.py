@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from rislam_rt.errors import ConfigError
 
-FILES = ("fig4a.json", "fig4b.json", "fig4c.json")
+FILES = ("fig4a.json", "fig4b.json", "fig4b_lively.json", "fig4c.json")
 """What the studies leave behind, in the folder of the results."""
 LEAST_GAIN, LEAST_FALL = 0.31, 0.1
 """The paper: error lower than every benchmark's by this share; and than without a panel by this many metres."""
@@ -53,7 +53,8 @@ def read_results(folder: Path) -> dict[str, Mapping[str, Any]]:
 
 def judge(results: Mapping[str, Mapping[str, Any]]) -> list[Claim]:
     """All claims, in the order of the paper."""
-    gains, entries = results.get("fig4b", {}).get("gains", []), results.get("fig4b", {}).get("entries", [])
+    curves = [content for name, content in results.items() if name.startswith("fig4b")]
+    gains, entries = ([entry for content in curves for entry in content[part]] for part in ("gains", "entries"))
     cases = list(dict.fromkeys(gain["case"] for gain in gains))
     found = [*_fig4a(results.get("fig4a"))]
     for case in cases:
