@@ -241,7 +241,7 @@ def draw(found: list[tuple[Case, Floats, int]], file: Path) -> None:
             for number, (case, wrong, trials) in enumerate(sorted(shown, key=lambda one: one[0])):
                 _curve(axis, case, wrong, trials, number, title)
             axis.axhline(1e-3, color="black", lw=0.8, ls=":")
-            axis.set(yscale="log", ylim=(5e-5, 1.0), xlabel="cycles", title=title)
+            axis.set(yscale="log", ylim=(5e-5, 1.0), xlabel="cycles", title=title, xticks=range(0, 21, 5))
             axis.legend(fontsize=8, loc="upper right" if "codes" not in title else "center right")
         figure.axes[0].set_ylabel("probability of a wrong panel")
         figure.axes[0].annotate("aim", (0.5, 1.1e-3), fontsize=8)
@@ -262,7 +262,8 @@ def _curve(axis, case: Case, wrong: Floats, trials: int, number: int, title: str
     low, high = interval(wrong, trials)
     line = "-" if case.changing and case.misses else "--"
     axis.plot(cycle, np.where(share > 0.0, share, np.nan), color=colour, ls=line, lw=1.6, label=label)
-    axis.fill_between(cycle, np.maximum(low, 1e-6), high, color=colour, alpha=0.15, lw=0.0)
+    if "codes" in title:  # the others have too few trials: their bands would hide each other
+        axis.fill_between(cycle, np.maximum(low, 1e-6), high, color=colour, alpha=0.15, lw=0.0)
 
 
 if __name__ == "__main__":
