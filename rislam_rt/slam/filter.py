@@ -15,6 +15,7 @@ from rislam_rt.slam.book import Book, empty_book, strike
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.engine import Told, engine_of
 from rislam_rt.slam.expect import Belief, expected_returns
+from rislam_rt.slam.health import Health, check
 from rislam_rt.slam.learn import Hits, learn
 from rislam_rt.slam.match import Outlook, candidates, hidden_tracks, look_ahead
 from rislam_rt.slam.moments import POSE, Moments, poses_of
@@ -28,8 +29,6 @@ FAR = 1e5
 """Length [m], and standard deviation of anything, that stands for an infinite one."""
 STRANGERS = np.array([1.3, 2.0, 3.0])
 """Factor on the standard deviations of returns over 0, 1 and 2 walls, for paths in their cell that the map lacks."""
-STRAIN_RATE = 0.05
-"""Share of the latest cycle in the running mean of the NIS."""
 UNUSED, REMOVED = -1, -2
 """In `StepInfo.landmark`: clutter or not yet explained; taken for LOS or a wall return."""
 
@@ -54,8 +53,7 @@ class FilterState(NamedTuple):
     tracks: Tracks
     time: Floats
     """(W,) times [s] of the last W cycles."""
-    strain: float
-    """Running mean of NIS per degree of freedom: 1 when all is well."""
+    health: Health
     body: Body
     ris: RisSpec | None
     radio: RadioConfig
@@ -94,7 +92,7 @@ def init(
         empty_book(),
         no_tracks(config.window),
         np.zeros(config.window),
-        1.0,
+        Health(),
         body,
         ris,
         radio,
@@ -155,11 +153,12 @@ def step(
     ess = engine.effective_size(state.particles)
     particles, resampled = engine.thin(state.particles, config, rng=rng)
     dof = 3 * int(used.sum())
-    strain = state.strain + STRAIN_RATE * (updated.nis / dof - state.strain) if dof else state.strain
-    outcome = _outcome(len(measurement), len(state.book.ident), strain)
+    certain = np.flatnonzero(expected.likely & expected.founding & ~outlook.merger.outshone)
+    health = check(state.health, updated.nis, dof, int(np.isin(certain, hit).sum()), len(certain))
+    outcome = _outcome(len(measurement), len(state.book.ident), health)
     count = len(state.book.points)
     info = StepInfo(landmark, ess, resampled, updated.nis, dof, updated.log_evidence, count, outcome)
-    return state._replace(particles=particles, strain=strain), info
+    return state._replace(particles=particles, health=health), info
 
 
 def believed(state: FilterState) -> Moments:
@@ -262,7 +261,7 @@ def _move(
     """The belief carried to the next cycle, whose pose joins the trail."""
     cycle = state.cycle + 1
     slot, last = cycle % config.window, state.cycle % config.window
-    accelerate = config.sigma_a * config.axes
+    accelerate = state.health.haste * config.sigma_a * config.axes
     course, engine = float(wrap(np.asarray(heading))), engine_of(config)
     particles = engine.propagate(state.particles, dt, accelerate, course, slot, config, rng=rng)
     time = state.time.copy()
@@ -286,9 +285,9 @@ def _bend(moments: Moments) -> Floats:
     return np.array([0.02 + speed**2, 0.02 + speed**2, 0.02 + speed**2])
 
 
-def _outcome(num_measurements: int, num_features: int, strain: float) -> Outcome:
+def _outcome(num_measurements: int, num_features: int, health: Health) -> Outcome:
     if num_measurements == 0:
         return Outcome.NO_MEASUREMENTS
     if num_features == 0:
         return Outcome.NO_LANDMARKS
-    return Outcome.DIVERGED if strain > 3.0 else Outcome.OK
+    return Outcome.DIVERGED if health.diverged else Outcome.OK
