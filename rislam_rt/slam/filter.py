@@ -125,7 +125,9 @@ def step(
     state = _move(state, dt, heading, config, rng=rng)
     glance = glance_of(measurement, state.radio)
     landmark = np.where(is_los(glance, state.body), REMOVED, UNUSED)
-    free = np.flatnonzero(landmark == UNUSED)
+    # by delay and direction, so that nothing (whose turn it is, ties) hangs on the order of the report
+    order = np.lexsort(glance.seen.T[::-1])
+    free = order[landmark[order] == UNUSED]
     glance = Glance._make(field[free] for field in glance)
     moments = believed(state)
     belief = Belief(moments.features, state.book, _poses(state, moments), state.body, state.radio, state.ris)
