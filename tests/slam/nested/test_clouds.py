@@ -137,7 +137,7 @@ def test_resampling_draws_in_proportion_to_the_weights(engine: Engine, rng: np.r
     Systematic resampling draws a particle of weight w either floor(M w) or ceil(M w) times; over C agent particles with
     combs of their own the mean count has a standard deviation of at most 0.5 / sqrt(C).
     """
-    agents, size = 400, 32
+    agents, size = 150, 32
     points = rng.standard_normal((1, size, 3))
     log_weight = rng.standard_normal((1, size))
     zero = np.zeros(agents, dtype=np.int64)

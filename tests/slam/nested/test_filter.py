@@ -37,7 +37,7 @@ def linear(state: Nested, owner: int, seen: Floats, covariance: Floats) -> list[
     return [Sighting((linear_sightline(state.centre[:, owner], state.position),), seen, covariance)]
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0])
 def test_equals_a_kalman_filter_where_that_is_exact(seed: int) -> None:
     """Linear and Gaussian: offsets from agent to two landmarks, all axes alike.
 
@@ -200,14 +200,14 @@ def test_estimated_heading_is_filtered() -> None:
 
 
 def test_pose_errors_are_as_large_as_the_filter_says() -> None:
-    """Known associations, truth drawn from the model: mean NEES of 8 seeds inside its 99 % interval.
+    """Known associations, truth drawn from the model: mean NEES of 5 seeds inside its 99 % interval.
 
     Beside it the joint Gaussian filter on the same measurements, so that a bad draw shows as one.
     """
-    seeds, cycles = 8, 30
+    seeds, cycles = 5, 20
     nees, reference = np.zeros(seeds), np.zeros(seeds)
     for seed in range(seeds):
-        run = walk(operations, fixed(1000, 256), cycles, rng=np.random.default_rng([seed, 1]))
+        run = walk(operations, fixed(800, 128), cycles, rng=np.random.default_rng([seed, 1]))
         nees[seed] = run.nees[-1]
         reference[seed] = walk(gaussian, SlamConfig(), cycles, rng=np.random.default_rng([seed, 1])).nees[-1]
     low, high = chi2.ppf([0.005, 0.995], 4 * seeds) / seeds

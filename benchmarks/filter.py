@@ -1,0 +1,195 @@
+"""How fast is the nested particle filter, what does it need, and how does it grow?
+
+Three questions: particle updates a second against plain numpy (in blocks that fit the cache) and against the machine's
+copy bandwidth; time and memory of a run at the paper's scale (2000 agent particles, 6000 of each landmark for each of
+them), from a stated number of measured cycles; and the time of a cycle against each of the three numbers, as a figure.
+Times are of the processor, over all threads, so that other programs on the machine count little; with `t` threads and
+an idle machine the clock shows about one t-th. Run: `RISLAM_RT_THREADS=2 python benchmarks/filter.py`.
+"""
+
+import argparse
+import resource
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.backend import prepare_backend
+from rislam_rt.model import Body
+from rislam_rt.slam import SlamConfig, StartPrior
+from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.nested import belief, operations
+from rislam_rt.slam.nested.cloud import Engine, Kernel, kernel_width
+from rislam_rt.slam.nested.machine import pick_engine
+from rislam_rt.slam.nested.sightline import Sighting, linear_sightline, pack, trace_sightline
+from rislam_rt.slam.returns import NONE, Returns, observe
+
+BODY = Body(np.array([-0.04388, -0.02397, 0.0]), np.array([0.04388, 0.02397, 0.0]))
+START, VELOCITY, HEADING, CYCLE, SIGMA_A = np.array([0.5, 0.7, 0.5]), np.array([0.07, 0.07, 0.0]), 0.3, 0.1, 0.01
+STD = np.array([0.01, 0.01, 0.01])
+BYTES = 24
+"""Memory that an update must touch: a point and its weight read, the weight written."""
+FIGURE = Path(__file__).parents[1] / "docs" / "figures" / "filter_growth.png"
+COLOURS = ("#0072B2", "#D55E00", "#009E73")
+
+
+def seconds(task: Callable[[], object], repeat: int = 5) -> tuple[float, float]:
+    """Least processor and clock seconds of several goes, after one that is not counted."""
+    task()
+    spent = []
+    for _ in range(repeat):
+        cpu, clock = time.process_time(), time.perf_counter()
+        task()
+        spent.append((time.process_time() - cpu, time.perf_counter() - clock))
+    best = np.array(spent).min(axis=0)
+    return float(best[0]), float(best[1])
+
+
+def copy_seconds(size: int) -> float:
+    """Processor seconds to move as many bytes as one pass over `size` particles must, half read and half written."""
+    source = np.ones(size * BYTES // 8, dtype=np.float32)
+    target = np.empty_like(source)
+    return seconds(lambda: np.copyto(target, source))[0]
+
+
+def compare_engines(agents: int, points: int) -> None:
+    """One landmark, one direct return: update and resampling by numpy and by Dr.Jit."""
+    rng = np.random.default_rng(1)
+    count, floor = agents * points, copy_seconds(agents * points)
+    print(
+        f"\n{agents} agent particles, {points} landmark particles each, {prepare_backend().threads} threads of Dr.Jit"
+    )
+    print("| engine | update [s] | M updates/s | share of copy bandwidth | resampling [s] | update, clock [s] |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    rates = {}
+    for name in ("numpy", "drjit"):
+        engine = pick_engine(name)
+        update, resample = _passes(engine, agents, points, rng=rng)
+        (cpu, clock), (again, _) = seconds(update), seconds(resample, 3)
+        rates[name] = np.array([cpu, again, clock])
+        print(f"| {name} | {cpu:.3f} | {count / cpu / 1e6:.0f} | {floor / cpu:.2f} | {again:.3f} | {clock:.3f} |")
+    ratio = rates["numpy"] / rates["drjit"]
+    print(f"numpy over Dr.Jit: update {ratio[0]:.1f} and resampling {ratio[1]:.1f} in processor time, ", end="")
+    print(f"update {ratio[2]:.1f} by the clock; copying the same bytes takes {floor:.3f} s")
+
+
+def _passes(
+    engine: Engine, agents: int, points: int, *, rng: np.random.Generator
+) -> tuple[Callable[[], object], Callable[[], object]]:
+    """An update, and a resampling, of clouds that are every agent particle's own."""
+    position = START + 0.02 * rng.standard_normal((agents, 3))
+    poses, place = poses_of(position, np.full(agents, HEADING), BODY), np.array([2.0, 1.0, 1.0])
+    features = np.broadcast_to(place, (agents, 1, 3))
+    returns = Returns(np.array([[0, NONE, NONE]]), np.array([0]), np.array([0]))
+    seen = observe(returns, place[None], np.zeros((1, 3)), poses_of(START, np.asarray(HEADING), BODY)).seen[0]
+    line = trace_sightline(returns, 0, 0, features, np.zeros((1, 3)), poses)
+    sighting = Sighting((line,), seen, np.diag(STD**2))
+    kinds, constants = (sighting.kind,), pack([sighting], agents)
+    zero = np.zeros(agents, dtype=np.int64)
+    cloud = engine.build(0.05 * rng.standard_normal((1, points, 3)), np.zeros((1, points)), zero, zero)
+    cloud, sums = engine.weigh(cloud, (), np.zeros((0, agents)))
+    kernel = Kernel(rng.random(agents), 7919 % points, points // 12 * 4, kernel_width(points, 3))
+    cloud = engine.resample(cloud, sums.covariance, points, kernel)
+    cloud, sums = engine.weigh(cloud, kinds, constants)
+    return (
+        lambda: engine.weigh(cloud, kinds, constants),
+        lambda: engine.resample(cloud, sums.covariance, points, kernel),
+    )
+
+
+def walk(agents: int, points: int, landmarks: int, cycles: int) -> Floats:
+    """Processor seconds of each cycle of a walk at fixed numbers of particles, all landmarks seen every cycle."""
+    rng = np.random.default_rng(2)
+    config = SlamConfig(
+        filter="nested", agent_particles=agents, landmark_particles=points, adaptive=False, machine="drjit"
+    )
+    particles = operations.begin(StartPrior(START, VELOCITY, HEADING), config, rng=rng)
+    places = rng.uniform([1.0, 1.0, 1.0], [5.0, 5.0, 3.0], (landmarks, 3))
+    state = particles.belief
+    for row, place in enumerate(places):
+        at = place + 0.03 * rng.standard_normal(3)
+        state = belief.settle(
+            state, np.tile(at, (agents, 1)), 0.03**2 * np.eye(3), particles.config, particles.engine, rng=rng
+        )
+        known = linear_sightline(state.centre[:, row] - at, np.zeros(3))
+        state, _ = belief.absorb(state, row, [Sighting((known,), np.zeros(3), 0.03**2 * np.eye(3))], particles.engine)
+    particles = particles._replace(belief=state)
+    rows, anchor = np.arange(landmarks), np.zeros((landmarks, 3))
+    returns = Returns(np.column_stack([rows, np.full((landmarks, 2), NONE)]), rows, rows)
+    spent = []
+    for cycle in range(1, cycles + 1):
+        poses = poses_of(START + cycle * CYCLE * VELOCITY, np.asarray(HEADING), BODY)
+        seen = observe(returns, places, anchor, poses).seen + STD * rng.standard_normal((landmarks, 3))
+        began = time.process_time()
+        particles = operations.propagate(
+            particles, CYCLE, SIGMA_A * config.axes, HEADING, cycle % config.window, config, rng=rng
+        )
+        std = np.tile(STD, (landmarks, 1))
+        particles = operations.update(particles, returns, returns, anchor, BODY, seen, std, rng=rng).particles
+        particles, _ = operations.thin(particles, config, rng=rng)
+        spent.append(time.process_time() - began)
+    return np.array(spent)
+
+
+def paper_run(landmarks: int, cycles: int) -> None:
+    """Time and memory at the paper's scale."""
+    clock = time.perf_counter()
+    spent = walk(2000, 6000, landmarks, cycles)
+    clock = time.perf_counter() - clock
+    threads = prepare_backend().threads
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    whole = 600 * float(spent.mean()) / 60
+    print(f"\n2000 x 6000 particles, {landmarks} landmarks seen every cycle, {cycles} cycles measured:")
+    print(f"{spent.mean():.2f} s of CPU a cycle ({spent.min():.2f} to {spent.max():.2f}), {clock:.0f} s on the clock")
+    print(f"600 cycles: {whole:.1f} min of processor, {whole / threads:.1f} min if {threads} threads had a core each")
+    print(f"largest memory of the process: {peak:.1f} GiB")
+
+
+def draw_growth(cycles: int) -> None:
+    """Median time of a cycle against agents, landmarks, and landmark particles."""
+    base = {"agents": 500, "points": 1000, "landmarks": 4}
+    sweeps = {
+        "agents": (125, 250, 500, 1000, 2000),
+        "points": (252, 500, 1000, 2000, 4000),
+        "landmarks": (1, 2, 4, 8, 16),
+    }
+    names = {"agents": "agent particles", "points": "landmark particles", "landmarks": "landmarks"}
+    figure, axes = plt.subplots(1, 3, figsize=(9.0, 3.2), sharey=True, layout="constrained")
+    for axis, colour, (name, values) in zip(axes, COLOURS, sweeps.items(), strict=True):
+        times = [1e3 * float(np.median(walk(**{**base, name: value}, cycles=cycles))) for value in values]
+        print(f"{names[name]}: " + ", ".join(f"{v}: {t:.0f} ms" for v, t in zip(values, times, strict=True)))
+        axis.loglog(values, times, "o-", color=colour)
+        axis.loglog(values, [times[-1] * v / values[-1] for v in values], ":", color="0.5", label="proportional")
+        axis.set_xlabel(names[name])
+        axis.set_xticks(values, [str(v) for v in values], fontsize=8)
+        axis.minorticks_off()
+        axis.set_title(", ".join(f"{base[k]} {names[k]}" for k in base if k != name), fontsize=8)
+        axis.grid(alpha=0.3)
+    axes[0].set_ylabel("processor time of a cycle [ms]")
+    axes[0].legend(frameon=False, fontsize=8)
+    figure.savefig(FIGURE, dpi=150)
+
+
+def main() -> None:
+    """Answer all three, or some."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--parts", nargs="+", default=["engines", "paper", "growth"])
+    parser.add_argument("--cycles", type=int, default=10)
+    parser.add_argument("--landmarks", type=int, default=10)
+    arguments = parser.parse_args()
+    if "engines" in arguments.parts:
+        compare_engines(2000, 6000)
+    if "paper" in arguments.parts:
+        paper_run(arguments.landmarks, arguments.cycles)
+    if "growth" in arguments.parts:
+        draw_growth(arguments.cycles)
+
+
+if __name__ == "__main__":
+    main()
