@@ -44,8 +44,8 @@ def test_equals_a_kalman_filter_where_that_is_exact(seed: int) -> None:
     The mean of weighted particles of effective size E errs by sqrt(P / E), and their variance by twice that relatively.
     Agent particles: E >= N / 2 at each of R resamplings, whose errors add up: 2 (R + 1) / N. Landmark particles: all
     agent particles share the first cloud, and the first measurements leave a part of it, (PROPOSAL sqrt(1 + PRIOR^2 /
-    NOISE^2))^-3 = 1 / 9.5, before it is first resampled: 9.5 / M, once for each landmark. Four standard deviations of the
-    sum are allowed.
+    NOISE^2))^-3 = 1 / 9.5, before it is first resampled: 9.5 / M, once for each landmark. Four standard deviations
+    of the sum are allowed.
     """
     config, engine = NestedConfig(num_agents=COUNT, num_points=SIZE, adaptive=False), pick_engine("drjit")
     rng = np.random.default_rng(seed)
