@@ -97,16 +97,19 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
         f'{base64.b64encode(picture).decode()}"><figcaption>{html.escape(CAPTIONS[name])}</figcaption></figure>'
         for name, picture in pictures.items()
     )
+    warnings = "".join(f'<p class="note">Warning: {html.escape(line)}</p>\n' for line in result.warnings)
     versions = ", ".join(f"{name} {number}" for name, number in result.versions.items())
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title><style>{STYLE}</style></head><body>
 <h1>{html.escape(title)}</h1>
 <p class="note">{summary["cycles"]} cycles, seed {summary["seed"]}, paths {html.escape(result.paths.source)} in
 {summary["trace_seconds"]:.1f} s.</p>
-<h2>RMSE</h2>
+{warnings}<h2>RMSE</h2>
 <table><tr><th></th>{head}</tr>{rows}</table>
 <p class="note">Agent and landmarks: over the cycles (for a landmark, those in which the map holds it).
-Walls, at the end: distance of the estimated plane over the true surface, and the angle between them.</p>
+Walls, at the end: distance of the estimated plane over the true surface, and the angle between them. The bound is the
+posterior bound of the same motion, codes and noise with landmarks and walls unknown. GOSPA is of the last map's points,
+cut off at 1 m.</p>
 {figures}
 <h2>To repeat it</h2>
 <p class="note">{html.escape(versions)}; scene SHA-256 {html.escape(result.scene.digest)}.

@@ -27,6 +27,8 @@ def print_summary(summary: Mapping[str, Any]) -> None:
     for row in summary_rows(summary):
         table.add_row(*row)
     _show(title, table)
+    for line in summary["warnings"]:
+        print(f"warning: {line}")
 
 
 def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
@@ -38,6 +40,9 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
         rows.append([f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)])
     for name in first["walls"]:
         rows.append([f"wall {name}", *(_wall(s["walls"][name]) for s in schemes)])
+    rows.append(["posterior bound of the agent", *(_metres(s["bound_m"]) for s in schemes)])
+    rows.append(["GOSPA of the map", *(_metres(s["map"]["gospa_m"]) for s in schemes)])
+    rows.append(["association right", *(f"{s['association']['accuracy']:.0%}" for s in schemes)])
     rows.append(["over budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)])
     rows.append(["diverged", *("yes" if s["diverged"] else "no" for s in schemes)])
     return rows

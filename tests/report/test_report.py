@@ -1,6 +1,7 @@
 """The report: lines that are drawn, figures that exist, a page that needs nothing else."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -121,3 +122,9 @@ def test_names_from_files_cannot_break_the_page(result):
 
     evil = replace(result, name="<script>alert(1)</script>")
     assert "<script" not in build_page(evil, summarise(evil), {})
+
+
+def test_warnings_stand_on_the_page(result):
+    warned = replace(result, warnings=("ris: too wide for <the band>",))
+    assert "Warning: ris: too wide for &lt;the band&gt;" in build_page(warned, summarise(warned), {})
+    assert "Warning" not in build_page(result, summarise(result), {})
