@@ -1,6 +1,7 @@
 """The reconfigurable surface: what its controller tells the agent, where it hangs, and the code it is set to."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -66,10 +67,17 @@ class RisSpec:
         return float(np.hypot(self.cols * self.spacing[0], self.rows * self.spacing[1]))
 
     def offsets(self) -> Floats:
-        """Element positions (N, M, 3) [m] about the panel's centre, in the room's axes."""
-        n = (np.arange(self.rows) - (self.rows - 1) / 2.0) * self.spacing[1]
-        m = (np.arange(self.cols) - (self.cols - 1) / 2.0) * self.spacing[0]
-        return n[:, None, None] * self.up + m[None, :, None] * self.right
+        """Element positions (N, M, 3) [m] about the panel's centre, in the room's axes; read-only."""
+        return _offsets(self)
+
+
+@lru_cache(maxsize=64)
+def _offsets(spec: RisSpec) -> Floats:
+    n = (np.arange(spec.rows) - (spec.rows - 1) / 2.0) * spec.spacing[1]
+    m = (np.arange(spec.cols) - (spec.cols - 1) / 2.0) * spec.spacing[0]
+    offsets = n[:, None, None] * spec.up + m[None, :, None] * spec.right
+    offsets.flags.writeable = False
+    return offsets
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -29,6 +29,8 @@ FAR = 1e5
 """Length [m], and standard deviation of anything, that stands for an infinite one."""
 STRANGERS = np.array([1.3, 2.0, 3.0])
 """Factor on the standard deviations of returns over 0, 1 and 2 walls, for paths in their cell that the map lacks."""
+PRUNE_STRIDE = 5
+"""Cycles between two looks at what should go, births apart."""
 UNUSED, REMOVED = -1, -2
 """In `StepInfo.landmark`: clutter or not yet explained; taken for LOS or a wall return."""
 
@@ -204,6 +206,8 @@ def _tidy(
         particles = engine.settle(particles, birth, state.body, rng=rng)
         book = birth.enter(book)
     tracks = tracks.keep(np.arange(len(tracks.misses)) != row)
+    if birth is None and state.cycle % PRUNE_STRIDE:
+        return state._replace(particles=particles, book=book, tracks=tracks)
     keep = keepers(engine.moments(particles), book, outlook, belief, config)
     if not keep.all():
         particles, book = engine.drop(particles, keep), strike(book, keep)

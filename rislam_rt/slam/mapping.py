@@ -63,20 +63,17 @@ def build_map(moments: Moments, book: Book) -> MapEstimate:
     mean, covariance = moments.features, moments.covariance[POSE:, POSE:]
     points, row = book.points, {int(ident): place for place, ident in enumerate(book.ident)}
     images = book.images[book.image_hits >= IMAGE_HITS]
-    places, spreads = [mean[points]], [_blocks(covariance, points)]
-    for point, wall, _ in images:
-        image, spread = _image(mean, covariance, book, row[int(point)], row[int(wall)])
-        places.append(image[None])
-        spreads.append(spread[None])
-    place_of = {int(book.ident[p]): order for order, p in enumerate(points)}
-    strength = np.exp(book.log_strength[0][points])
-    ratio = np.exp(np.array([book.ratio[row[int(wall)]] for wall in images[:, 1]]))
+    parent = np.array([row[int(p)] for p in images[:, 0]], dtype=np.int64)
+    wall = np.array([row[int(w)] for w in images[:, 1]], dtype=np.int64)
+    image, spread = _images(mean, covariance, book, parent, wall)
+    place_of = {int(p): order for order, p in enumerate(points)}
+    strength, ratio = np.exp(book.log_strength[0][points]), np.exp(book.ratio[wall])
     normal, offset, std = _walls(mean, covariance, book)
     return MapEstimate(
         np.concatenate([book.ident[points], images[:, 2]]),
-        np.concatenate(places),
-        np.concatenate(spreads),
-        np.concatenate([np.full(len(points), -1), [place_of[int(p)] for p in images[:, 0]]]),
+        np.concatenate([mean[points], image]),
+        np.concatenate([_blocks(covariance, points), spread]),
+        np.concatenate([np.full(len(points), -1), [place_of[int(p)] for p in parent]]),
         np.concatenate([book.ris_probability[points], np.zeros(len(images))]),
         np.concatenate([strength, ratio]),
         normal,
@@ -98,18 +95,20 @@ def _walls(mean: Floats, covariance: Floats, book: Book) -> tuple[Floats, Floats
     return normal, offset, np.stack([np.sqrt(across) / length, 0.5 * np.sqrt(np.maximum(along, 0.0))], axis=-1)
 
 
-def _image(mean: Floats, covariance: Floats, book: Book, point: int, wall: int) -> tuple[Floats, Floats]:
-    """Mirror image (3,) of a point in a wall, and its covariance (3, 3) from both."""
-    anchor = book.anchor[wall]
-    span = mean[wall] - anchor
-    square = span @ span
-    depth = span @ (mean[point] - 0.5 * (mean[wall] + anchor)) / square
-    image = mean[point] - 2.0 * depth * span
-    by_point = np.eye(3) - 2.0 * np.outer(span, span) / square
-    by_wall = -2.0 * (depth * np.eye(3) + np.outer(span, image - mean[wall]) / square)
-    index = np.concatenate([3 * point + np.arange(3), 3 * wall + np.arange(3)])
-    jacobian = np.concatenate([by_point, by_wall], axis=1)
-    return reflect(mean[point], mean[wall], anchor), jacobian @ covariance[np.ix_(index, index)] @ jacobian.T
+def _images(mean: Floats, covariance: Floats, book: Book, points: Integers, walls: Integers) -> tuple[Floats, Floats]:
+    """Mirror images (Q, 3) of points in walls, and their covariances (Q, 3, 3) from both."""
+    point, wall, anchor = mean[points], mean[walls], book.anchor[walls]
+    span = wall - anchor
+    square = np.einsum("qi,qi->q", span, span)[:, None, None]
+    image = reflect(point, wall, anchor)
+    depth = np.einsum("qi,qi->q", span, point - 0.5 * (wall + anchor))[:, None, None] / square
+    by_point = np.eye(3) - 2.0 * span[:, :, None] * span[:, None, :] / square
+    by_wall = -2.0 * (depth * np.eye(3) + span[:, :, None] * (image - wall)[:, None, :] / square)
+    axes = np.arange(3)
+    index = np.concatenate([3 * points[:, None] + axes, 3 * walls[:, None] + axes], axis=1)
+    jacobian = np.concatenate([by_point, by_wall], axis=2)
+    inner = covariance[index[:, :, None], index[:, None, :]]
+    return image, jacobian @ inner @ np.swapaxes(jacobian, 1, 2)
 
 
 def _blocks(covariance: Floats, rows: Integers) -> Floats:
