@@ -13,6 +13,7 @@ from rislam_rt.slam.nested import belief, birth
 from rislam_rt.slam.nested.belief import Nested
 from rislam_rt.slam.nested.cloud import Engine
 from rislam_rt.slam.nested.config import PAPER_SCALE, NestedConfig
+from rislam_rt.slam.nested.furnish import furnish as place_known
 from rislam_rt.slam.nested.machine import pick_engine
 from rislam_rt.slam.nested.update import FLOOR, Seen, look, trusted, whitened
 from rislam_rt.slam.nested.update import update as absorb_all
@@ -26,6 +27,7 @@ __all__ = [
     "begin",
     "drop",
     "effective_size",
+    "furnish",
     "moments",
     "propagate",
     "settle",
@@ -89,6 +91,12 @@ def begin(start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) ->
     centre = np.concatenate([start.position, start.velocity, [start.heading]])
     state = belief.draw_start(centre, std, nested.num_agents, config.window, rng=rng)
     return Particles(state, np.zeros(config.window), 0.0, nested)
+
+
+def furnish(particles: Particles, features: Floats, covariance: Floats) -> Particles:
+    """F landmarks (F, 3) known beforehand, with a covariance (3F, 3F)."""
+    known = place_known(particles.belief, features, covariance, particles.config, particles.engine)
+    return particles._replace(belief=known)
 
 
 def propagate(

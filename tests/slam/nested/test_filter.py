@@ -188,6 +188,19 @@ def test_coincident_landmarks_are_told_as_two() -> None:
     assert operations.moments(operations.drop(particles, np.array([True, False]))).mean.shape == (10,)
 
 
+def test_a_known_map_enters_with_its_covariance() -> None:
+    """Clouds of 32 particles each agent particle keep their own moments to 1 / sqrt(32), a small part of the whole."""
+    particles, _ = started()
+    root = 0.05 * np.random.default_rng(8).standard_normal((6, 6))
+    covariance = root @ root.T
+    found = operations.moments(operations.furnish(particles, LANDMARKS, covariance))
+    std = np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose((found.features - LANDMARKS).ravel() / std, 0.0, atol=0.2)
+    scaled = found.covariance[7:, 7:] / np.outer(std, std)
+    np.testing.assert_allclose(scaled, covariance / np.outer(std, std), atol=0.2)
+    assert found.covariance[0, 0] == pytest.approx(0.01**2, rel=0.3)
+
+
 def test_estimated_heading_is_filtered() -> None:
     particles, config = started(heading="estimated")
     for slot in range(10):
