@@ -111,6 +111,9 @@ def test_failures_are_counted_and_never_dropped(tmp_path):
     assert "6 failed and 1 diverged" in page  # five schemes of the lost cell, and one of the next
     assert "- random: no luck" in page
     assert "Not complete: 29 of 30 cells" in page
+    only = [row if row.cell.point[SNR] == 0.0 else row._replace(state="missing", result={}) for row in snr_rows()]
+    page = write_swept(only, fig4b_spec(), RECORD, tmp_path).read_text()
+    assert "Not complete: 6 of 30 cells" in page
 
 
 def test_nothing_is_written_before_the_first_cell_and_one_cell_is_enough(tmp_path):

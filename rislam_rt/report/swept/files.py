@@ -54,7 +54,7 @@ def write_swept(
     write_atomic(folder / f"{spec.name}.csv", csv_text(shape.content["entries"]).encode())
     write_atomic(folder / f"{spec.name}.json", json_bytes(plain_result({**record, **shape.content})))
     page = folder / f"{spec.name}.md"
-    write_atomic(page, shape.page(about_lines(groups, spec, record), figure).encode())
+    write_atomic(page, shape.page(about_lines(groups, spec, record, len(rows)), figure).encode())
     return page
 
 
@@ -74,13 +74,12 @@ def shape_of(groups: Sequence[Group], spec: SweptSpec) -> Shape:
     return Shape(content, lambda: draw_rooms(content), lambda a, f: rooms_page(content, groups, a, f))
 
 
-def about_lines(groups: Sequence[Group], spec: SweptSpec, record: Mapping[str, Any]) -> list[str]:
-    """Where the numbers come from."""
+def about_lines(groups: Sequence[Group], spec: SweptSpec, record: Mapping[str, Any], wanted: int) -> list[str]:
+    """Where the numbers come from; `wanted`: how many cells there will be."""
     config = record["settings"]
     source = "ray tracing (Sionna RT)" if config["channel"] == "traced" else "image sources"
     cycles = f"the first {config['cycles']} cycles" if config["cycles"] else "all cycles"
     there = sum(result is not None for group in groups for result in group.results)
-    wanted = len(groups) * spec.repetitions
     unfinished = "" if there == wanted else f" Not complete: {there} of {wanted} cells."
     rivals = [name for name in ("bp_slam", "channel_slam") if any(name in group.schemes for group in groups)]
     rooms = f"Room{'s' if len(record['scenes']) > 1 else ''} {', '.join(f'`{name}`' for name in record['scenes'])}"
