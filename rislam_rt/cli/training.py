@@ -53,6 +53,6 @@ def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
         files |= {SCORES: to_png(draw_scores(found)), IMPORTANCE: to_png(draw_importance(found))}
     for name, data in files.items():
         write_atomic(folder / name, data)
-    typer.echo(f"F1 on all test rooms: {found.scores['plain'][ALL]['network'].f1:.4f}")
+    typer.echo(f"F1 on all test rooms: {found.scores[ALL]['network'].f1:.4f}")
     typer.echo(f"page: {folder / PAGE}.md")
     write_json(given.json, content)

@@ -6,17 +6,20 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.pipeline.studies.classifier.gather import join
-from rislam_rt.pipeline.studies.classifier.run import ALL, Training
-from rislam_rt.pipeline.studies.classifier.score import Score, by_age, mistakes, rules
+from rislam_rt.pipeline.studies.classifier.run import Training
+from rislam_rt.pipeline.studies.classifier.score import Score, by_value, mistakes, rules
 from rislam_rt.pipeline.studies.classifier.spec import ClassifierSpec
 from rislam_rt.report.style import styled
-from rislam_rt.slam.classify import network_arrays
+from rislam_rt.slam.classify import FEATURES, network_arrays
 
-COLOUR = {"network": "#0072B2", "geometric": "#D55E00", "amplitude": "#009E73"}
-NAME = {"network": "network", "geometric": "geometric baseline", "amplitude": "amplitude rule"}
+COLOUR = {"network": "#0072B2", "single": "#56B4E9", "geometric": "#D55E00", "amplitude": "#009E73"}
+MARK = {"network": "o", "single": "^", "geometric": "s", "amplitude": "D"}
+NAME = {
+    "network": "network, over a track's life", "single": "network, single look", "geometric": "geometric baseline",
+    "amplitude": "amplitude rule",
+}  # fmt: skip
 AGES = (1, 2, 3, 5, 10, 20, 40, 41)
-SETS = {"plain": "Rooms as they are", "versions": "Random versions of the rooms: materials, radii, noise"}
+SNRS = (5, 10, 13, 16, 20, 25, 30, 40, 60)
 
 
 def weights_file(found: Training) -> bytes:
@@ -27,123 +30,168 @@ def weights_file(found: Training) -> bytes:
 
 
 def draw_scores(found: Training) -> Figure:
-    """F1 of every rule in every room, with intervals."""
+    """F1 of every rule in every room, with intervals, on the whole range and near 1."""
+    rooms = {name: scores for name, scores in found.scores.items() if has_keep(found, name)}
+    place = np.arange(len(rooms))
     with styled():
-        figure = Figure(figsize=(11.0, 4.6))
-        for axis, (kind, title) in zip(figure.subplots(1, 2, sharey=True), SETS.items(), strict=True):
-            rooms = {name: scores for name, scores in found.scores[kind].items() if _has_keep(found, kind, name)}
-            place = np.arange(len(rooms))
-            for shift, rule in zip((-0.22, 0.0, 0.22), NAME, strict=True):
+        figure = Figure(figsize=(11.0, 5.0))
+        for axis, low in zip(figure.subplots(1, 2, sharey=True), (0.0, 0.9), strict=True):
+            for shift, rule in zip((-0.27, -0.09, 0.09, 0.27), NAME, strict=True):
                 scores = [scores[rule] for scores in rooms.values()]
                 middle = np.array([one.f1 for one in scores])
                 span = [
                     middle - [min(one.low, one.f1) for one in scores],
                     [max(one.high, one.f1) for one in scores] - middle,
                 ]
-                axis.errorbar(middle, place + shift, xerr=span, fmt="o", ms=4, color=COLOUR[rule], label=NAME[rule])
+                axis.errorbar(
+                    middle, place + shift, xerr=span, fmt=MARK[rule], ms=4, color=COLOUR[rule], label=NAME[rule]
+                )
             axis.axvline(0.98, color="black", lw=0.8, ls=":")
-            axis.set(yticks=place, yticklabels=[_labelled(found, name) for name in rooms], xlabel='F1 of "keep"')
-            axis.set(title=title, xlim=(0.0, 1.02))
+            axis.set(yticks=place, yticklabels=list(rooms), xlabel='F1 of "keep"', xlim=(low, 1.0 + 0.02 * (1.0 - low)))
+        figure.axes[0].set_title("All scores")
+        figure.axes[1].set_title("The same from 0.9; dotted: the aim, 0.98")
         figure.axes[0].invert_yaxis()
         handles, labels = figure.axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+        figure.legend(handles, labels, loc="outside lower center", ncols=4)
     return figure
 
 
 def draw_importance(found: Training) -> Figure:
-    """Loss of F1 when a feature is shuffled, and F1 against the age of a track, on the test rooms as they are."""
-    test = _test(found)
+    """Loss of F1 when a feature is shuffled, and F1 against age of the track and SNR, on the test rooms."""
     with styled():
-        figure = Figure(figsize=(11.0, 4.4))
-        left, right = figure.subplots(1, 2)
+        figure = Figure(figsize=(12.0, 4.8))
+        left, middle, right = figure.subplots(1, 3)
         order = sorted(found.importance, key=lambda name: float(found.importance[name].mean()))
         mean = [float(found.importance[name].mean()) for name in order]
         left.barh(order, mean, xerr=[float(np.std(found.importance[n])) for n in order], color=COLOUR["network"])
         left.set(xlabel="loss of F1 when shuffled", title="What each feature is worth")
-        for rule, judge in rules(found.network).items():
-            bins = by_age(test, judge, AGES)
-            right.plot(list(bins), list(bins.values()), "o-", color=COLOUR[rule], label=NAME[rule])
-        right.axhline(0.98, color="black", lw=0.8, ls=":")
-        right.set(xlabel="measurements of the track in the window", ylabel='F1 of "keep"', title="F1 against age")
-        right.legend(loc="center", bbox_to_anchor=(0.5, 0.44))
+        left.tick_params(axis="y", labelsize=7)
+        for rule in NAME:
+            for axis, bins in ((middle, _by_age(found, rule)), (right, _by_snr(found, rule))):
+                height = [score for score, _ in bins.values()]
+                axis.plot(list(bins), height, marker=MARK[rule], color=COLOUR[rule], label=NAME[rule])
+        for axis in (middle, right):
+            axis.axhline(0.98, color="black", lw=0.8, ls=":")
+            axis.tick_params(axis="x", labelsize=7)
+        middle.set(xlabel="measurements of the track in the window", ylabel='F1 of "keep"', title="F1 against age")
+        right.set(xlabel="integrated SNR [dB]", title="F1 against SNR")
+        figure.legend(*middle.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 
 def classifier_table(found: Training) -> dict[str, Any]:
     """All scores as plain data."""
+    tested = found.sets.tested
     return {
         "scores": {
-            kind: {room: {rule: one._asdict() for rule, one in scores.items()} for room, scores in rooms.items()}
-            for kind, rooms in found.scores.items()
+            room: {rule: one._asdict() for rule, one in scores.items()} for room, scores in found.scores.items()
         },
+        "mean_over_rooms": {rule: mean.tolist() for rule, mean in found.mean.items()},
+        "share": {name: share_of(found, name) for name in found.sets.test},
         "f1_of_restarts": found.restarts,
         "importance": {name: lost.tolist() for name, lost in found.importance.items()},
-        "by_age": {rule: by_age(_test(found), judge, AGES) for rule, judge in rules(found.network).items()},
-        "mistakes": {rule: mistakes(_test(found), judge) for rule, judge in rules(found.network).items()},
+        "by_age": {rule: _by_age(found, rule) for rule in NAME},
+        "by_snr": {rule: _by_snr(found, rule) for rule in NAME},
+        "mistakes": {rule: mistakes(tested, judge) for rule, judge in rules(found.network).items()},
     }
 
 
 def classifier_page(found: Training, spec: ClassifierSpec, figures: tuple[str, str] | None) -> str:
     """Markdown: what was done, scores, features."""
-    trained = [room.name for room in found.rooms if room.use == "train"]
     lines = [
         "# Classifier of multipath components: scores", "",
         f"Written by `rislam-rt run` from one pipeline, do not edit. Seed {spec.seed}, paths by "
-        f"{'ray tracing' if spec.channel == 'traced' else 'image sources'}; {spec.walks} random walks through each",
-        f"room as it is and {spec.versions} through random versions of it, {spec.cycles} cycles each. Trained on "
-        f"{', '.join(trained)}.",
-        f"Intervals: {spec.coverage:.0%}, whole walks resampled. Clutter is neither kept nor removed in F1; its share",
-        "that is kept stands apart.", "",
+        f"{'ray tracing' if spec.channel == 'traced' else 'image sources'}. Trained on {spec.train} random rooms, one",
+        f"walk of {spec.cycles} cycles each, reference SNR {spec.snr_low_db:g} to {spec.snr_high_db:g} dB; the random "
+        f"start chosen on {spec.validation} further random rooms;",
+        f"tested on {spec.walks} random walks through each named room, none of which was trained on. Intervals: "
+        f"{spec.coverage:.0%}, whole walks",
+        "resampled. Clutter is neither kept nor removed in F1; its share that is kept stands apart.", "",
     ]  # fmt: skip
     if figures is not None:
         lines += [f"![F1 in each room]({figures[0]})", ""]
-    for kind, title in SETS.items():
-        lines += [f"## {title}", "", *_score_table(found, kind), ""]
-    spread = f"{min(found.restarts):.4f} to {max(found.restarts):.4f}"
-    lines += [f"F1 on all test rooms as they are over {len(found.restarts)} random starts of the fit: {spread}.", ""]
-    lines += ["## Mistakes on the test rooms as they are", "", *_mistake_table(found), "", "## Features", ""]
+    lines += ["## Scores", "", *_score_table(found), ""]
+    lines += ["F1 of each random start, on the random rooms for validation and on all test rooms: "]
+    lines += [", ".join(f"{chosen:.4f} and {tested:.4f}" for chosen, tested in found.restarts) + ".", ""]
+    lines += ["## Mistakes on the test rooms", "", *_mistake_table(found), ""]
+    lines += ["### By room, of the network", "", *_room_mistakes(found), ""]
+    lines += ["### By age and by SNR", "", *_bin_table(found), "", "## Features", ""]
     if figures is not None:
-        lines += [f"![Importance of features, and F1 against age]({figures[1]})", ""]
+        lines += [f"![Importance of features, and F1 against age and SNR]({figures[1]})", ""]
     lines += ["| feature | loss of F1 when shuffled |", "| --- | --- |"]
     order = sorted(found.importance.items(), key=lambda item: -float(item[1].mean()))
     lines += [f"| {name} | {lost.mean():.4f} ± {lost.std():.4f} |" for name, lost in order]
     return "\n".join(lines) + "\n"
 
 
-def _score_table(found: Training, kind: str) -> list[str]:
-    lines = ["| room | network | precision | recall | removed rightly | clutter kept | geometric | amplitude rule |",
-             "| --- | --- | --- | --- | --- | --- | --- | --- |"]  # fmt: skip
-    for name, scores in found.scores[kind].items():
+def has_keep(found: Training, name: str) -> bool:
+    """Whether there is anything to keep in a room."""
+    return name not in found.sets.test or bool(found.sets.test[name].keep.any())
+
+
+def share_of(found: Training, name: str) -> tuple[float, float]:
+    """Which share of all labelled components of the test, and of those to keep, comes from a room."""
+    room, tested = found.sets.test[name], found.sets.tested
+    return float(room.labelled.sum() / tested.labelled.sum()), float(room.keep.sum() / max(tested.keep.sum(), 1))
+
+
+def _score_table(found: Training) -> list[str]:
+    titles = ["room", "share of components", "of those to keep", *NAME.values(), "precision", "recall",
+              "removed rightly", "clutter kept"]  # fmt: skip
+    lines = [_row(titles), _row(["---"] * len(titles))]
+    for name, scores in found.scores.items():
         net = scores["network"]
-        cells = [
-            _f1(net), f"{net.precision:.3f}", f"{net.recall:.3f}", f"{net.removed:.3f}", f"{net.clutter_kept:.2f}",
-            _f1(scores["geometric"]), _f1(scores["amplitude"]),
-        ] if _has_keep(found, kind, name) else [
-            "nothing to keep", "", "", f"{net.removed:.3f}", f"{net.clutter_kept:.2f}", "", ""
-        ]  # fmt: skip
-        lines.append(f"| {_labelled(found, name)} | {' | '.join(cells)} |")
-    return lines
+        share = [f"{part:.2f}" for part in share_of(found, name)] if name in found.sets.test else ["", ""]
+        tail = [f"{net.removed:.3f}", f"{net.clutter_kept:.2f}"]
+        if has_keep(found, name):
+            cells = [*(_f1(scores[rule]) for rule in NAME), f"{net.precision:.3f}", f"{net.recall:.3f}"]
+        else:
+            cells = ["nothing to keep", "", "", "", "", ""]
+        lines.append(_row([name, *share, *cells, *tail]))
+    mean = [f"{m:.3f} ({low:.3f} to {high:.3f})" for m, low, high in (found.mean[rule] for rule in NAME)]
+    return [*lines, _row(["mean over test rooms", "", "", *mean, "", "", "", ""])]
 
 
 def _mistake_table(found: Training) -> list[str]:
-    tables = {rule: mistakes(_test(found), judge) for rule, judge in rules(found.network).items()}
-    lines = [f"| path class | examples | {' | '.join(NAME.values())} |", "| --- | --- | --- | --- | --- |"]
+    tables = {rule: mistakes(found.sets.tested, judge) for rule, judge in rules(found.network).items()}
+    lines = [_row(["path class", "examples", *NAME.values()]), _row(["---"] * (2 + len(NAME)))]
     for kind, (_, total) in tables["network"].items():
-        wrong = " | ".join(str(tables[rule][kind][0]) for rule in NAME)
-        lines.append(f"| {kind} | {total} | {wrong} |")
+        lines.append(_row([kind, str(total), *(str(tables[rule][kind][0]) for rule in NAME)]))
     return lines
 
 
-def _test(found: Training) -> Any:
-    return join([room.plain for room in found.rooms if room.use == "test"])
+def _room_mistakes(found: Training) -> list[str]:
+    judge = rules(found.network)["network"]
+    tables = {name: mistakes(examples, judge) for name, examples in found.sets.test.items()}
+    kinds = list(mistakes(found.sets.tested, judge))
+    lines = [_row(["room", *kinds]), _row(["---"] * (1 + len(kinds)))]
+    for name, table in tables.items():
+        lines.append(_row([name, *("{} of {}".format(*table[kind]) if kind in table else "" for kind in kinds)]))
+    return lines
 
 
-def _has_keep(found: Training, kind: str, name: str) -> bool:
-    return name == ALL or any(bool(getattr(room, kind).keep.any()) for room in found.rooms if room.name == name)
+def _bin_table(found: Training) -> list[str]:
+    lines = [_row(["bin", "examples", *NAME.values()]), _row(["---"] * (2 + len(NAME)))]
+    for unit, maker in (("measurements", _by_age), ("dB", _by_snr)):
+        bins = {rule: maker(found, rule) for rule in NAME}
+        for name, (_, count) in bins["network"].items():
+            lines.append(_row([f"{name} {unit}", str(count), *(f"{bins[rule][name][0]:.3f}" for rule in NAME)]))
+    return lines
 
 
-def _labelled(found: Training, name: str) -> str:
-    return name if name == ALL else next(f"{room.name} ({room.use})" for room in found.rooms if room.name == name)
+def _by_age(found: Training, rule: str) -> dict[str, tuple[float, int]]:
+    tested = found.sets.tested
+    return by_value(tested, rules(found.network)[rule], tested.age.astype(np.float64), AGES)
+
+
+def _by_snr(found: Training, rule: str) -> dict[str, tuple[float, int]]:
+    tested = found.sets.tested
+    level = 10.0 / np.log(10.0) * tested.features[:, FEATURES.index("snr")]
+    return by_value(tested, rules(found.network)[rule], level, SNRS)
+
+
+def _row(cells: list[str]) -> str:
+    return f"| {' | '.join(cells)} |"
 
 
 def _f1(score: Score) -> str:

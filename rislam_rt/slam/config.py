@@ -10,6 +10,8 @@ from rislam_rt.slam.nested.config import ENGINES, WEIGHTINGS
 
 FILTERS = ("rao_blackwellised", "nested")
 """Filters with the same inputs and outputs."""
+CLASSIFIERS = ("amplitude", "geometric", "network")
+"""Rules by which components are taken for wall returns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +43,8 @@ class SlamConfig:
     """Integrated SNR (linear, all antennas) above which the agent expects to see a path."""
     specular_ratio: float = 0.35
     """Amplitude over that of free space of the same length, above which a component is a wall return."""
+    classifier: str = "amplitude"
+    """Who tells wall returns from landmark paths: the rule above, `geometric`, or the trained `network`."""
     birth_cycles: int = 12
     """Cycles of history that a track needs before a landmark can come of it."""
     window: int = 40
@@ -72,6 +76,7 @@ class SlamConfig:
             ("heading", self.heading, ("known", "velocity", "estimated")),
             ("height", self.height, ("known", "estimated")),
             ("weighting", self.weighting, WEIGHTINGS),
+            ("classifier", self.classifier, CLASSIFIERS),
             ("machine", self.machine, ENGINES),
         ):
             if value not in allowed:

@@ -21,6 +21,7 @@ from rislam_rt.slam.match import Outlook, candidates, hidden_tracks, look_ahead
 from rislam_rt.slam.moments import POSE, Moments, poses_of
 from rislam_rt.slam.prune import keepers
 from rislam_rt.slam.returns import Poses, compact
+from rislam_rt.slam.sift import sift
 from rislam_rt.slam.tracks import Glance, Tracks, advance, begin, extend, no_tracks
 
 LOS_MARGIN = 0.1
@@ -149,7 +150,7 @@ def step(
     white[used] = updated.white
     book, names = learn(belief, believed(state), outlook, Hits(hit, taken, white), glance, code, rng=rng)
     landmark[free[taken]] = names
-    tracks, removed = _follow(_rates(moments), tracks, glance, picks, num_returns, state.cycle, config)
+    tracks, removed = _follow(state, _rates(moments), tracks, glance, picks, num_returns, config)
     landmark[free[removed]] = REMOVED
     state = _tidy(state._replace(tracks=tracks, book=book), outlook, belief, config, rng=rng)
 
@@ -215,22 +216,26 @@ def _tidy(
 
 
 def _follow(
+    state: FilterState,
     rates: Floats,
     tracks: Tracks,
     glance: Glance,
     picks: Integers,
     num_returns: int,
-    cycle: int,
     config: SlamConfig,
 ) -> tuple[Tracks, Integers]:
     """Tracks extended, begun and ended; and which measurements were taken for wall returns."""
     bright = glance.ratio > config.specular_ratio
     kept = np.flatnonzero(picks[num_returns:] >= 0)
     used = picks[num_returns:][kept]
-    tracks = extend(tracks, kept, glance, used, bright, cycle)
-    spare = np.setdiff1d(np.arange(len(bright)), picks)
-    removed = np.concatenate([used[tracks.specular[kept]], spare[bright[spare]]])
-    tracks = begin(tracks, glance, spare, bright, rates, cycle)
+    tracks = extend(tracks, kept, glance, used, bright, state.cycle)
+    spare, count = np.setdiff1d(np.arange(len(bright)), picks), len(tracks.misses)
+    tracks = begin(tracks, glance, spare, bright, rates, state.cycle)
+    if config.classifier != "amplitude":
+        position, heading = engine_of(config).trail(state.particles, np.arange(config.window))
+        tracks = sift(tracks, position, heading, state.cycle, state.body, state.radio, config.classifier)
+    rows = np.concatenate([kept, count + np.arange(len(spare))])
+    removed = np.concatenate([used, spare])[tracks.specular[rows]]
     return tracks.keep(tracks.misses <= config.max_misses), removed
 
 

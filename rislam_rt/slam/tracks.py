@@ -48,11 +48,17 @@ class Tracks(NamedTuple):
     """(T, W, 3)."""
     cycle: Integers
     """(T, W) cycle of each row, -1 where empty."""
+    level: Floats
+    """(T, W) log amplitudes, likewise."""
+    odds: Floats
+    """(T,) log odds of a landmark's path, where a classifier has looked."""
+    looks: Integers
+    """(T,) how often it has."""
 
     @property
     def specular(self) -> Booleans:
         """(T,) whether it is taken for a wall return."""
-        return self.moving | (self.shine > 0.3)
+        return self.moving | np.where(self.looks > 0, self.odds < 0.0, self.shine > 0.3)
 
     @property
     def length(self) -> Integers:
@@ -76,6 +82,9 @@ def no_tracks(window: int) -> Tracks:
         np.zeros((0, window, 3)),
         np.zeros((0, window, 3)),
         np.full((0, window), -1),
+        np.zeros((0, window)),
+        np.zeros(0),
+        np.zeros(0, dtype=np.int64),
     )
 
 
@@ -100,9 +109,10 @@ def extend(tracks: Tracks, rows: Integers, glance: Glance, picks: Integers, brig
     log_amplitude, misses, shine = tracks.log_amplitude.copy(), tracks.misses.copy(), tracks.shine.copy()
     log_amplitude[rows], misses[rows] = glance.log_amplitude[picks], 0
     shine[rows] += 0.2 * (bright[picks] - shine[rows])
-    seen, std, cycles = tracks.seen.copy(), tracks.std.copy(), tracks.cycle.copy()
+    seen, std, cycles, level = tracks.seen.copy(), tracks.std.copy(), tracks.cycle.copy(), tracks.level.copy()
     slot = cycle % cycles.shape[1]
     seen[rows, slot], std[rows, slot], cycles[rows, slot] = glance.seen[picks], glance.std[picks], cycle
+    level[rows, slot] = glance.log_amplitude[picks]
     return tracks._replace(
         mean=mean,
         covariance=covariance,
@@ -112,6 +122,7 @@ def extend(tracks: Tracks, rows: Integers, glance: Glance, picks: Integers, brig
         seen=seen,
         std=std,
         cycle=cycles,
+        level=level,
     )
 
 
@@ -125,10 +136,11 @@ def begin(tracks: Tracks, glance: Glance, picks: Integers, bright: Booleans, rat
     covariance = np.zeros((count, 3, 2, 2))
     covariance[..., 0, 0] = glance.std[picks] ** 2
     covariance[..., 1, 1] = rate**2
-    seen, std = np.zeros((count, window, 3)), np.zeros((count, window, 3))
+    seen, std, level = np.zeros((count, window, 3)), np.zeros((count, window, 3)), np.zeros((count, window))
     cycles = np.full((count, window), -1)
     slot = cycle % window
     seen[:, slot], std[:, slot], cycles[:, slot] = glance.seen[picks], glance.std[picks], cycle
+    level[:, slot] = glance.log_amplitude[picks]
     fresh = Tracks(
         mean,
         covariance,
@@ -139,5 +151,8 @@ def begin(tracks: Tracks, glance: Glance, picks: Integers, bright: Booleans, rat
         seen,
         std,
         cycles,
+        level,
+        np.zeros(count),
+        np.zeros(count, dtype=np.int64),
     )
     return Tracks._make(np.concatenate([old, new]) for old, new in zip(tracks, fresh, strict=True))

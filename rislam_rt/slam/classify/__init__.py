@@ -4,6 +4,7 @@ from rislam_rt.slam.classify.features import FEATURES, MotionFit, Sightings, fit
 from rislam_rt.slam.classify.geometric import classify_geometric
 from rislam_rt.slam.classify.network import (
     Network,
+    blend,
     classify,
     load_classifier,
     log_odds,
@@ -17,6 +18,7 @@ __all__ = [
     "MotionFit",
     "Network",
     "Sightings",
+    "blend",
     "classify",
     "classify_geometric",
     "fit_motion",

@@ -5,7 +5,8 @@ distance 1/q turn by `-q P d`, P the projection across h; its length changes by 
 q = 2/length and a = 2; for its images and their reciprocals both differ; for one wall's return q = 0 and a = 2 (the
 image moves along with the agent). A wall and a level ceiling turn a path as a point does along its own azimuth, and
 not across it. Two upright walls at right angles are a corner reflector: a point but for its strength, for its place on
-the horizon, and for being where the returns of both walls say (`echo.py`). Nothing here needs a map or the truth.
+the horizon, and for being where the returns of both walls say (`echo.py`). Images of a point are where its own path and
+the walls' returns say (`images.py`). Nothing here needs a map or the truth.
 """
 
 from typing import NamedTuple
@@ -16,6 +17,8 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, RadioConfig
 from rislam_rt.slam.classify.echo import echo_misfit
+from rislam_rt.slam.classify.images import image_misfit
+from rislam_rt.slam.classify.still import stillness
 
 FEATURES = (
     "strength",
@@ -34,6 +37,9 @@ FEATURES = (
     "misfit_moving",
     "echo_misfit",
     "echo_strength",
+    "image_misfit",
+    "image_strength",
+    "mirror",
     "age",
 )
 """Names of the columns of `track_features`, in their order."""
@@ -87,7 +93,7 @@ class MotionFit(NamedTuple):
 
 
 def track_features(sightings: Sightings, body: Body, radio: RadioConfig) -> Floats:
-    """(T, 17) features, see `FEATURES`; every track needs one measurement at least.
+    """(T, 20) features, see `FEATURES`; every track needs one measurement at least.
 
     The tracks should be all that the agent holds at a time: some features relate them to each other.
     """
@@ -102,7 +108,10 @@ def track_features(sightings: Sightings, body: Body, radio: RadioConfig) -> Floa
     strength = 0.5 * log_power - log_free + np.log(length)
     fit = fit_motion(sightings)
     offset = rotation_z(sightings.heading[-1]) @ (body.tx_offset - body.rx_offset)
-    echo = echo_misfit(*_latest(sightings), strength, offset)
+    seen, std = _latest(sightings)
+    echo = echo_misfit(seen, std, strength, offset)
+    still = stillness(fit.turn, fit.turn_std, fit.approach, fit.approach_std)
+    image = image_misfit(seen, std, strength, offset, still, echo.misfit)
     columns = [
         strength,
         0.5 * np.log(np.maximum(fading, 0.0) + FADING_FLOOR**2),
@@ -120,6 +129,9 @@ def track_features(sightings: Sightings, body: Body, radio: RadioConfig) -> Floa
         np.log1p(fit.misfit_moving),
         np.log1p(echo.misfit),
         echo.strength,
+        np.log1p(image.misfit),
+        image.strength,
+        image.mirror,
         np.log(count),
     ]
     return np.stack(columns, axis=1)

@@ -8,13 +8,16 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.errors import ConfigError
 from rislam_rt.slam.classify.features import FEATURES
 
 NUM_LAYERS = 3
 WEIGHTS = "weights.npz"
 """The trained network's file, beside this module."""
+
+LEAST_SHARE, SURE = 0.3, 8.0
+"""Share of the latest look in a track's log odds at least, and the largest log odds of a look."""
 
 
 class Network(NamedTuple):
@@ -43,6 +46,15 @@ def log_odds(features: Floats, network: Network) -> Floats:
         if layer < NUM_LAYERS - 1:
             value = np.tanh(value)
     return value[:, 0]
+
+
+def blend(odds: Floats, looks: Integers, fresh: Floats) -> Floats:
+    """Log odds (M,) of a track over its life: `odds` after `looks` (M,) earlier looks, and this look's `fresh` ones.
+
+    A mean of the first looks, then one that forgets; clipped, so that no single look decides for good.
+    """
+    share = np.maximum(1.0 / (looks + 1.0), LEAST_SHARE)
+    return np.asarray(odds + share * (np.clip(fresh, -SURE, SURE) - odds))
 
 
 @cache

@@ -37,6 +37,8 @@ class Examples(NamedTuple):
     """(N,) amplitude over that of free space of the same length."""
     walk: Integers
     """(N,) number of the walk."""
+    track: Integers
+    """(N,) label of its track within the walk; a walk's examples are in the order of time."""
 
     @property
     def keep(self) -> Booleans:
@@ -54,7 +56,7 @@ class Examples(NamedTuple):
 
 
 def join(parts: list[Examples]) -> Examples:
-    """Several sets as one, walks numbered through."""
+    """Several sets as one."""
     return Examples._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
 
 
@@ -105,7 +107,7 @@ def gather_walk(
             found.append(
                 Examples(
                     track_features(sightings, motion.body, radio), kind, sightings.held.sum(axis=1),
-                    measurement.amplitude[far] / free, np.full(int(far.sum()), walk),
+                    measurement.amplitude[far] / free, np.full(int(far.sum()), walk), info.label[far],
                 )
             )  # fmt: skip
     return join(found)

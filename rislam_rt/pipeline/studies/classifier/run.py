@@ -1,4 +1,4 @@
-"""Gather examples in all rooms, train on some, score on the others."""
+"""Gather examples in random rooms, train and choose on them, and score once on the named rooms."""
 
 import zlib
 from collections.abc import Sequence
@@ -8,43 +8,60 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.errors import SceneError
 from rislam_rt.measurement import with_reference_snr
 from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.pipeline.run import Progress, build_channel
 from rislam_rt.pipeline.spec import build_radio
 from rislam_rt.pipeline.studies.classifier.gather import POLICIES, Examples, gather_walk, join, set_codes
-from rislam_rt.pipeline.studies.classifier.score import Score, f1, importance, rules, score
-from rislam_rt.pipeline.studies.classifier.spec import ClassifierSpec, LearnedRoom, build_receiver
+from rislam_rt.pipeline.studies.classifier.random_rooms import random_room
+from rislam_rt.pipeline.studies.classifier.score import (
+    Score,
+    f1,
+    importance,
+    mean_over_rooms,
+    odds_over_life,
+    rules,
+    score,
+)
+from rislam_rt.pipeline.studies.classifier.spec import ClassifierSpec, build_receiver
 from rislam_rt.pipeline.studies.classifier.train import train_network
-from rislam_rt.pipeline.studies.classifier.walks import random_version, random_walk
+from rislam_rt.pipeline.studies.classifier.walks import random_walk
 from rislam_rt.slam.classify import Network
 
+ALL, RANDOM = "all test rooms", "random rooms (validation)"
+RANDOM_DEPTH = 2
+"""Wall bounces, both legs together, in random rooms."""
+_TRIES = 20
 
-class RoomExamples(NamedTuple):
-    """Examples of one room."""
 
-    name: str
-    use: str
-    plain: Examples
-    """From walks through the room as it is."""
-    versions: Examples
-    """From walks through random versions of it."""
+class Sets(NamedTuple):
+    """Examples to learn from, to choose by, and to test on."""
+
+    train: Examples
+    validation: Examples
+    test: dict[str, Examples]
+    """By room."""
+
+    @property
+    def tested(self) -> Examples:
+        """All test rooms together."""
+        return join(list(self.test.values()))
 
 
 class Training(NamedTuple):
     """The network and what it is worth."""
 
     network: Network
-    rooms: list[RoomExamples]
-    scores: dict[str, dict[str, dict[str, Score]]]
-    """By set (`plain`, `versions`), by room (and `all test rooms`), by rule."""
-    restarts: list[float]
-    """F1 on all test rooms as they are, of each random start's network."""
+    sets: Sets
+    scores: dict[str, dict[str, Score]]
+    """By room (and `ALL`, `RANDOM`), by rule."""
+    mean: dict[str, Floats]
+    """Mean (3,) over the test rooms' F1 with its interval, by rule."""
+    restarts: list[tuple[float, float]]
+    """F1 of each random start's network on the random rooms for validation, and on all test rooms."""
     importance: dict[str, Floats]
-    """Loss of F1 on all test rooms as they are, feature by feature, several shuffles each."""
-
-
-ALL = "all test rooms"
+    """Loss of F1 on all test rooms, feature by feature, several shuffles each."""
 
 
 def run_training(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Progress | None = None) -> Training:
@@ -58,56 +75,70 @@ def run_training(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Pro
         The traced channel failed, or the machine lacks what it needs.
     """
     tell = progress or (lambda stage, at, total: None)
-    rooms: list[RoomExamples] = []
+    total, rooms = spec.train + spec.validation, list[Examples]()
+    tell("random rooms", 0, total)
+    for number in range(total):
+        rooms.append(gather_random(number, spec))
+        tell("random rooms", number + 1, total)
+    test: dict[str, Examples] = {}
     tell("rooms", 0, len(scenes))
     for scene, room in zip(scenes, spec.rooms, strict=True):
-        rooms.append(gather_room(scene, room, spec))
-        tell("rooms", len(rooms), len(scenes))
-    return train_and_score(rooms, spec)
+        test[scene.name] = gather_room(scene, room.depth, spec)
+        tell("rooms", len(test), len(scenes))
+    return train_and_score(Sets(join(rooms[: spec.train]), join(rooms[spec.train :]), test), spec)
 
 
-def train_and_score(rooms: list[RoomExamples], spec: ClassifierSpec) -> Training:
-    """Fit from several random starts on the training rooms; score the first fit on all rooms."""
+def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:
+    """Fit from several random starts, keep the best on the validation rooms, score it on all."""
     starts = np.random.default_rng(spec.seed).spawn(spec.network.restarts)
-    networks = [_fit(rooms, spec, rng=child) for child in starts]
-    test = {kind: _all_tests(rooms, kind) for kind in ("plain", "versions")}
-    known = test["plain"].pick(test["plain"].labelled)
-    restarts = [f1(known.keep, rules(network)["network"](known)) for network in networks]
-    network = networks[0]
+    networks = [_fit(sets.train, spec, rng=child) for child in starts]
+    restarts = [(_f1_of(sets.validation, network), _f1_of(sets.tested, network)) for network in networks]
+    network = networks[int(np.argmax([chosen for chosen, _ in restarts]))]
+    places = {**sets.test, ALL: sets.tested, RANDOM: sets.validation}
+    judges = rules(network)
     scores = {
-        kind: {
-            name: {
-                rule: score(examples, judge, spec.coverage, rng=np.random.default_rng(spec.seed))
-                for rule, judge in rules(network).items()
-            }
-            for name, examples in ({room.name: getattr(room, kind) for room in rooms} | {ALL: test[kind]}).items()
+        name: {
+            rule: score(examples, judge, spec.coverage, rng=np.random.default_rng(spec.seed))
+            for rule, judge in judges.items()
         }
-        for kind in ("plain", "versions")
+        for name, examples in places.items()
     }
-    lost = importance(test["plain"], network, rng=np.random.default_rng(spec.seed))
-    return Training(network, rooms, scores, restarts, lost)
+    filled = [examples for examples in sets.test.values() if examples.keep.any()]
+    mean = {
+        rule: mean_over_rooms(filled, judge, spec.coverage, rng=np.random.default_rng(spec.seed))
+        for rule, judge in judges.items()
+    }
+    lost = importance(sets.tested, network, rng=np.random.default_rng(spec.seed))
+    return Training(network, sets, scores, mean, restarts, lost)
 
 
-def gather_room(scene: Scene, room: LearnedRoom, spec: ClassifierSpec) -> RoomExamples:
-    """Examples of one room; they depend on its name and the seed alone."""
-    name = zlib.crc32(scene.name.encode())
-    radio = build_radio(spec.radio)
-    sets = []
-    for kind, walks in enumerate((spec.walks, spec.versions)):
-        parts = []
-        for walk in range(walks):
-            rng = np.random.default_rng([spec.seed, name, kind, walk])
-            version = random_version(scene, rng=rng) if kind else scene
-            noise = with_reference_snr(radio, float(rng.uniform(spec.snr_low_db, spec.snr_high_db))) if kind else radio
-            parts.append(_walk(version, room.depth, noise, spec, 1000 * (name % 1_000_000) + walk, rng=rng))
-        sets.append(join(parts))
-    return RoomExamples(scene.name, room.use, sets[0], sets[1])
+def gather_random(number: int, spec: ClassifierSpec) -> Examples:
+    """Examples of one walk through the random room of a number."""
+    rng = np.random.default_rng([spec.seed, number])
+    for _ in range(_TRIES):
+        scene = random_room(f"random_{number}", rng=rng)
+        radio = with_reference_snr(build_radio(spec.radio), float(rng.uniform(spec.snr_low_db, spec.snr_high_db)))
+        try:
+            return _walk(scene, RANDOM_DEPTH, radio, spec, number, rng=rng)
+        except SceneError:  # too full for a walk: another room
+            continue
+    raise SceneError(f"random room {number}: no walk of {spec.cycles} cycles in {_TRIES} rooms; give fewer cycles")
+
+
+def gather_room(scene: Scene, depth: int, spec: ClassifierSpec) -> Examples:
+    """Examples of a named room; they depend on its name and the seed alone."""
+    name, radio = zlib.crc32(scene.name.encode()), build_radio(spec.radio)
+    parts = []
+    for walk in range(spec.walks):
+        rng = np.random.default_rng([spec.seed, name, 0, walk])
+        parts.append(_walk(scene, depth, radio, spec, 1000 * (name % 1_000_000) + walk, rng=rng))
+    return join(parts)
 
 
 def _walk(
     scene: Scene, depth: int, radio: RadioConfig, spec: ClassifierSpec, walk: int, *, rng: np.random.Generator
 ) -> Examples:
-    """Examples of one random walk through one version of a room."""
+    """Examples of one random walk through a room."""
     motion = random_walk(scene, spec.cycles, rng=rng)
     paths = build_channel(spec.channel, replace(scene, agent=motion), radio, depth).paths(motion)
     policy = POLICIES[walk % len(POLICIES)]
@@ -116,17 +147,18 @@ def _walk(
     return gather_walk(paths, motion, radio, receiver, walk, spec.stride, rng=rng)
 
 
-def _fit(rooms: list[RoomExamples], spec: ClassifierSpec, *, rng: np.random.Generator) -> Network:
-    """One network from one random start; keep and remove have the same weight."""
-    parts = [part for room in rooms if room.use == "train" for part in (room.plain, room.versions)]
-    together = join([part.pick(part.labelled) for part in parts])
-    share = float(np.clip(together.keep.mean(), 1e-6, 1.0 - 1e-6))
-    weight = np.where(together.keep, 1.0 / share, 1.0 / (1.0 - share))
+def _fit(examples: Examples, spec: ClassifierSpec, *, rng: np.random.Generator) -> Network:
+    """One network from one random start; a walk counts by the square root of its examples, both classes alike."""
+    known = examples.pick(examples.labelled)
+    _, row, count = np.unique(known.walk, return_inverse=True, return_counts=True)
+    share = float(np.clip(known.keep.mean(), 1e-6, 1.0 - 1e-6))
+    weight = np.where(known.keep, 1.0 / share, 1.0 / (1.0 - share)) / np.sqrt(count[row])
     section = spec.network
     return train_network(
-        together.features, together.keep, weight, section.hidden, section.penalty, section.iterations, rng=rng
+        known.features, known.keep, weight, section.hidden, section.penalty, section.iterations, rng=rng
     )
 
 
-def _all_tests(rooms: list[RoomExamples], kind: str) -> Examples:
-    return join([getattr(room, kind) for room in rooms if room.use == "test"])
+def _f1_of(examples: Examples, network: Network) -> float:
+    known = examples.pick(examples.labelled)
+    return f1(known.keep, odds_over_life(known, network) > 0.0)

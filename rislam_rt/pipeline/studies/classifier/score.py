@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline.studies.classifier.gather import Examples
-from rislam_rt.slam.classify import FEATURES, Network, classify, classify_geometric
+from rislam_rt.slam.classify import FEATURES, Network, blend, classify_geometric, log_odds
 
 AMPLITUDE_RULE = 0.35
 """Amplitude over that of free space above which the plain rule removes (`SlamConfig.specular_ratio`)."""
@@ -38,17 +38,28 @@ class Score(NamedTuple):
 def rules(network: Network) -> dict[str, Rule]:
     """The network and what it is compared with."""
     return {
-        "network": lambda e: classify(e.features, network) > 0.5,
+        "network": lambda e: odds_over_life(e, network) > 0.0,
+        "single": lambda e: log_odds(e.features, network) > 0.0,
         "geometric": lambda e: classify_geometric(e.features) > 0.5,
         "amplitude": lambda e: e.ratio < AMPLITUDE_RULE,
     }
 
 
+def odds_over_life(examples: Examples, network: Network) -> Floats:
+    """Log odds (N,) of keep, blended over the looks that each track has had so far."""
+    fresh = log_odds(examples.features, network)
+    found, held = np.empty(len(fresh)), dict[tuple[int, int], tuple[float, int]]()
+    for row, name in enumerate(zip(examples.walk.tolist(), examples.track.tolist(), strict=True)):
+        odds, looks = held.get(name, (0.0, 0))
+        found[row] = blend(np.array(odds), np.array(looks), fresh[row])
+        held[name] = (float(found[row]), looks + 1)
+    return found
+
+
 def score(examples: Examples, rule: Rule, coverage: float, *, rng: np.random.Generator) -> Score:
     """F1 with its interval by resampling walks, which are independent of each other as single cycles are not."""
     kept = rule(examples)
-    labelled, keep = examples.labelled, examples.keep
-    tables = np.array([_counts(kept, keep, labelled & (examples.walk == w)) for w in np.unique(examples.walk)])
+    labelled, tables = examples.labelled, _tables(examples, kept)
     draws = rng.integers(len(tables), size=(NUM_RESAMPLES, len(tables)))
     tail = 50.0 * (1.0 - coverage)
     low, high = np.percentile(_f1(tables[draws].sum(axis=1)), [tail, 100.0 - tail])
@@ -65,30 +76,42 @@ def score(examples: Examples, rule: Rule, coverage: float, *, rng: np.random.Gen
     )
 
 
+def mean_over_rooms(rooms: list[Examples], rule: Rule, coverage: float, *, rng: np.random.Generator) -> Floats:
+    """Mean (3,) of the rooms' F1 with its interval, walks resampled within each room."""
+    draws = []
+    for examples in rooms:
+        tables = _tables(examples, rule(examples))
+        picks = rng.integers(len(tables), size=(NUM_RESAMPLES, len(tables)))
+        draws.append(np.append(_f1(tables[picks].sum(axis=1)), _f1(tables.sum(axis=0)[None])))
+    mean = np.mean(draws, axis=0)
+    tail = 50.0 * (1.0 - coverage)
+    return np.array([mean[-1], *np.percentile(mean[:-1], [tail, 100.0 - tail])])
+
+
 def importance(examples: Examples, network: Network, *, rng: np.random.Generator) -> dict[str, Floats]:
     """Loss of F1 (S,) when one feature is shuffled among the examples, S times."""
     known = examples.pick(examples.labelled)
-    full = f1(known.keep, classify(known.features, network) > 0.5)
+    full = f1(known.keep, odds_over_life(known, network) > 0.0)
     lost: dict[str, Floats] = {}
     for column, name in enumerate(FEATURES):
         drops = []
         for _ in range(NUM_SHUFFLES):
             features = known.features.copy()
             features[:, column] = rng.permutation(features[:, column])
-            drops.append(full - f1(known.keep, classify(features, network) > 0.5))
+            drops.append(full - f1(known.keep, odds_over_life(known._replace(features=features), network) > 0.0))
         lost[name] = np.array(drops)
     return lost
 
 
-def by_age(examples: Examples, rule: Rule, edges: tuple[int, ...]) -> dict[str, float]:
-    """F1 by the measurements that a track had, in bins `edges[i] <= age < edges[i + 1]`."""
-    known = examples.pick(examples.labelled)
-    kept = rule(known)
+def by_value(examples: Examples, rule: Rule, value: Floats, edges: tuple[int, ...]) -> dict[str, tuple[float, int]]:
+    """F1, and how many examples, in bins `edges[i] <= value < edges[i + 1]` of age or SNR."""
+    kept, known = rule(examples), examples.labelled
     bins = {}
     for low, high in pairwise(edges):
-        rows = (known.age >= low) & (known.age < high)
+        rows = known & (value >= low) & (value < high)
         if rows.any():
-            bins[f"{low} to {high - 1}" if high - low > 1 else f"{low}"] = f1(known.keep[rows], kept[rows])
+            name = f"{low} to {high - 1}" if high - low > 1 else f"{low}"
+            bins[name] = (f1(examples.keep[rows], kept[rows]), int(rows.sum()))
     return bins
 
 
@@ -105,6 +128,12 @@ def mistakes(examples: Examples, rule: Rule) -> dict[str, Any]:
 def f1(keep: Booleans, kept: Booleans) -> float:
     """F1 of keep."""
     return float(_f1(np.array(_counts(kept, keep, np.ones(len(keep), dtype=np.bool_)))[None])[0])
+
+
+def _tables(examples: Examples, kept: Booleans) -> Integers:
+    """(walks, 4) counts of each walk, clutter left out."""
+    walks = np.unique(examples.walk)
+    return np.array([_counts(kept, examples.keep, examples.labelled & (examples.walk == walk)) for walk in walks])
 
 
 def _counts(kept: Booleans, keep: Booleans, rows: Booleans) -> tuple[int, int, int, int]:

@@ -22,11 +22,10 @@ def build_receiver(section: ReceiverSection) -> ReceiverConfig:
     return ReceiverConfig(**section.model_dump())
 
 
-class LearnedRoom(RoomSection):
-    """One room; `picture` has no meaning here."""
+class TestedRoom(RoomSection):
+    """One room, for testing alone; `picture` has no meaning here."""
 
     depth: Annotated[int, Field(ge=0, le=4)] = 2
-    use: Literal["train", "test"]
 
 
 class NetworkSection(Section):
@@ -38,24 +37,27 @@ class NetworkSection(Section):
     """Times half the squared weights."""
     iterations: Count = 400
     restarts: Annotated[int, Field(ge=1, le=50)] = 5
-    """Random starts; the first is kept, the others tell how much the start matters."""
+    """Random starts; the best on the random rooms for validation is kept."""
 
 
 class ClassifierSpec(StudySpec):
-    """Training of the classifier of multipath components on some rooms, and its score on others."""
+    """Training of the classifier of multipath components on random rooms, and its score on named ones."""
 
     kind: Literal["train_classifier"]
     channel: Literal["traced", "image_source"] = "image_source"
-    rooms: Annotated[list[LearnedRoom], Field(min_length=2)]
+    train: Annotated[int, Field(ge=2, le=10_000)] = 160
+    """Random rooms to learn from, one random walk through each."""
+    validation: Annotated[int, Field(ge=2, le=10_000)] = 40
+    """More random rooms, by which the best of the random starts is chosen."""
+    rooms: Annotated[list[TestedRoom], Field(min_length=1)]
+    """Rooms to test on, once everything is chosen."""
     walks: Annotated[int, Field(ge=2, le=1000)] = 8
-    """Random walks through each room as it is."""
-    versions: Annotated[int, Field(ge=1, le=1000)] = 16
-    """Random walks, each through a random version of the room (other materials, radii and noise)."""
+    """Random walks through each of them."""
     cycles: Annotated[int, Field(ge=20, le=10_000)] = 120
     stride: Annotated[int, Field(ge=1, le=100)] = 4
     """Every so many cycles the tracks are examples."""
-    snr_low_db: Share = 5.0
-    """Range of the reference SNR of random versions; rooms as they are have the radio's own."""
+    snr_low_db: Share = 0.0
+    """Range of the reference SNR of random rooms; the rooms of the test have the radio's own."""
     snr_high_db: Share = 30.0
     coverage: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
     """Of the intervals, by resampling whole walks."""
@@ -64,11 +66,9 @@ class ClassifierSpec(StudySpec):
     network: NetworkSection = NetworkSection()
 
     @model_validator(mode="after")
-    def _some_of_each(self) -> "ClassifierSpec":
+    def _in_order(self) -> "ClassifierSpec":
         if len({room.scene for room in self.rooms}) < len(self.rooms):
             raise ValueError("rooms: each scene at most once")
-        if {room.use for room in self.rooms} != {"train", "test"}:
-            raise ValueError("rooms: at least one to train and one to test on")
         if self.snr_high_db < self.snr_low_db:
             raise ValueError("snr_high_db: below snr_low_db")
         return self

@@ -1,6 +1,4 @@
-"""Random walks through a room, and random versions of the room: what a classifier should have met before."""
-
-from dataclasses import replace
+"""Random walks through a room."""
 
 import numpy as np
 
@@ -8,7 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.channel.compare.poses import random_poses
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import distance_to_triangles
-from rislam_rt.model import Material, Scene, Trajectory
+from rislam_rt.model import Scene, Trajectory
 
 CLEARANCE = 0.2
 """Distance [m] from every surface that a walk keeps."""
@@ -16,10 +14,6 @@ CYCLE = 0.1
 """Time [s] between cycles."""
 SPEED, TURN_RATE = (0.05, 0.2), 0.15
 """Range of speeds [m/s]; standard deviation of the rate at which a walk turns [rad/s]."""
-REFLECTION, RADIUS = (0.15, 0.95), (0.02, 0.25)
-"""Ranges of reflection coefficients, and of scatterer radii [m] (log-uniform), in random versions of a room."""
-SLABS = {"concrete": 0.2, "brick": 0.12, "plasterboard": 0.025, "chipboard": 0.02, "marble": 0.03, "plywood": 0.02}
-"""ITU materials, and thicknesses [m], of random versions; those of the room `itu_room` are not among them but one."""
 LOW, HIGH = 0.1, 0.6
 """Range of a walk's height as shares of the room's."""
 _TRIES = 40
@@ -43,25 +37,6 @@ def random_walk(scene: Scene, cycles: int, *, rng: np.random.Generator) -> Traje
                 if distance_to_triangles(walk.position, surfaces).min() > CLEARANCE:
                     return walk
     raise SceneError(f"{scene.name}: no room for a walk of {cycles} cycles; give fewer")
-
-
-def random_version(scene: Scene, *, rng: np.random.Generator) -> Scene:
-    """The same room with other walls (slabs of building materials every other time) and other scatterers' radii."""
-    slabs = rng.uniform() < 0.5
-    reflectors = tuple(replace(one, material=_material(slabs, rng)) for one in scene.reflectors)
-    radii = np.exp(rng.uniform(np.log(RADIUS[0]), np.log(RADIUS[1]), size=len(scene.scatterers)))
-    scatterers = tuple(
-        replace(one, rcs=float(np.pi * radius**2), radius=float(radius), law="constant", height=None)
-        for one, radius in zip(scene.scatterers, radii, strict=True)
-    )
-    return replace(scene, reflectors=reflectors, scatterers=scatterers)
-
-
-def _material(slab: bool, rng: np.random.Generator) -> Material:
-    if not slab:
-        return Material(reflection=float(rng.uniform(*REFLECTION)))
-    name = str(rng.choice(sorted(SLABS)))
-    return Material(itu=name, thickness=SLABS[name] * float(rng.uniform(0.7, 1.4)))
 
 
 def _arc(scene: Scene, start: Floats, cycles: int, rng: np.random.Generator) -> Trajectory:
