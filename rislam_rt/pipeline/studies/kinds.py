@@ -31,7 +31,7 @@ def load_any(path: str | Path, overrides: Sequence[str] = ()) -> AnySpec:
         return build_spec(table, CompareSpec, lambda spec: build_radio(spec.radio))
     if kind == "fig4a":
         return build_spec(table, Fig4aSpec, lambda spec: (build_radio(spec.radio), build_design(spec.design)))
-    if kind in SWEPT:
+    if isinstance(kind, str) and kind in SWEPT:
         return build_spec(table, SWEPT[kind], check_swept)
     if kind == "train_classifier":
         return build_spec(table, ClassifierSpec, lambda spec: (build_radio(spec.radio), build_receiver(spec.receiver)))

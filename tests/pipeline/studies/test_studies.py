@@ -76,7 +76,7 @@ def test_specification_survives_its_own_dump(path):
 @pytest.mark.parametrize(
     ("pipeline", "setting", "field"),
     [
-        (SLAM, "kind=fig4b", "kind"),
+        (SLAM, "kind=fig5", "kind"),
         (SLAM, "kind=3", "kind"),
         (SLAM, "kind=[1]", "kind"),
         (COMPARE, "poses=0", "poses"),
