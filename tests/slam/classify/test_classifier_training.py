@@ -9,9 +9,10 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline.studies import ClassifierSpec, load_any
 from rislam_rt.pipeline.studies.classifier.gather import CLUTTER, Examples
-from rislam_rt.pipeline.studies.classifier.score import mistakes, score
+from rislam_rt.pipeline.studies.classifier.random_rooms import random_room
+from rislam_rt.pipeline.studies.classifier.score import by_value, mean_over_rooms, mistakes, odds_over_life, score
 from rislam_rt.pipeline.studies.classifier.train import loss_and_slope, train_network
-from rislam_rt.slam.classify import FEATURES, classify
+from rislam_rt.slam.classify import FEATURES, Network, blend, classify
 
 FILE = Path(__file__).parents[3] / "pipelines" / "train_classifier.toml"
 SHAPES = [(3, 4), (4,), (4, 4), (4,), (4, 1), (1,)]
@@ -47,18 +48,74 @@ def test_scores_of_a_small_table():
     kind = np.array([PathKind.PS] * 6 + [PathKind.VT] * 3 + [CLUTTER] * 2)
     kept = np.array([1, 1, 1, 1, 0, 0, 1, 0, 0, 1, 0], dtype=bool)
     count = len(kind)
-    examples = Examples(
-        np.zeros((count, len(FEATURES))), kind, np.ones(count, dtype=int), np.ones(count), np.zeros(count, dtype=int)
-    )
+    none = np.zeros(count, dtype=int)
+    examples = Examples(np.zeros((count, len(FEATURES))), kind, none + 1, np.ones(count), none, none)
     found = score(examples, lambda _: kept, 0.95, rng=np.random.default_rng(0))
     assert found.f1 == pytest.approx(8.0 / 11.0)
     assert (found.precision, found.recall) == pytest.approx((0.8, 4.0 / 6.0))
     assert (found.removed, found.clutter_kept) == pytest.approx((2.0 / 3.0, 0.5))
     assert found.low == found.f1 == found.high  # a single walk
     assert mistakes(examples, lambda _: kept) == {"VT": (1, 3), "PS": (2, 6)}
+    # of the keep the first two have age 2: one class of age alone
+    age = np.where(np.arange(count) < 2, 2, 1)
+    assert by_value(examples, lambda _: kept, age, (1, 2, 3))["2"] == (1.0, 2)
 
 
-def test_the_committed_pipeline_is_read_and_wants_both_uses():
+def test_mean_over_rooms_gives_each_room_the_same_weight():
+    """Two rooms, of F1 1 and 0, the first of a hundred times as many components; a single walk each: no spread."""
+    rooms = []
+    for count, kept in ((200, 1.0), (2, 0.0)):
+        none = np.zeros(count, dtype=int)
+        kind = np.full(count, PathKind.PS)
+        rooms.append(Examples(np.full((count, len(FEATURES)), kept), kind, none + 1, np.ones(count), none, none))
+    mean = mean_over_rooms(rooms, lambda e: e.features[:, 0] > 0.5, 0.95, rng=np.random.default_rng(0))
+    assert mean.tolist() == [0.5, 0.5, 0.5]
+
+
+def test_odds_over_a_tracks_life_are_the_clipped_mean_at_first():
+    """Two tracks of one walk, looks of each in the order of time; the same label in another walk starts anew."""
+    network = Network(
+        np.zeros(len(FEATURES)), np.ones(len(FEATURES)),
+        (np.eye(len(FEATURES))[:, :1], np.ones((1, 1)), np.ones((1, 1))), (np.zeros(1), np.zeros(1), np.zeros(1)),
+    )  # fmt: skip
+    value = np.array([0.5, -3.0, 0.1, 0.2, -0.7])
+    features = np.zeros((5, len(FEATURES)))
+    features[:, 0] = value
+    fresh = np.tanh(np.tanh(value))
+    track, walk = np.array([1, 2, 1, 1, 1]), np.array([0, 0, 0, 0, 1])
+    examples = Examples(features, np.full(5, PathKind.PS), np.ones(5, dtype=int), np.ones(5), walk, track)
+    odds = odds_over_life(examples, network)
+    wanted = [fresh[0], fresh[1], fresh[[0, 2]].mean(), fresh[[0, 2, 3]].mean(), fresh[4]]
+    assert odds == pytest.approx(wanted, rel=1e-12)
+    assert blend(np.zeros(1), np.zeros(1, dtype=int), np.array([1e9])) == pytest.approx([8.0])
+    # many looks later the latest still counts by the least share
+    assert blend(np.ones(1), np.array([1000]), np.zeros(1)) == pytest.approx([0.7])
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_random_rooms_are_closed_and_hold_what_they_should(number):
+    """The centre of the room sees only faces: rays in all directions meet one. The panel lies in the ceiling's plane
+    to rounding; scatterers lie inside the bounds; the same seed gives the same room."""
+    scene, again = (random_room("room", rng=np.random.default_rng(number)) for _ in range(2))
+    assert (scene.bounds == again.bounds).all()
+    assert [s.rcs for s in scene.scatterers] == [s.rcs for s in again.scatterers]
+    corners = np.concatenate([one.triangles for one in scene.reflectors])
+    center = scene.bounds.mean(axis=0)
+    rays = np.random.default_rng(1).standard_normal((200, 3))
+    base, edges = corners[:, 0], corners[:, 1:] - corners[:, :1]
+    system = np.stack(np.broadcast_arrays(edges[None, :, 0], edges[None, :, 1], -rays[:, None]), axis=-1)
+    u, v, reach = np.moveaxis(np.linalg.solve(system, (center - base)[None, ..., None])[..., 0], -1, 0)
+    meets = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9) & (reach > 0.0)
+    assert meets.any(axis=1).all()
+    spheres = np.array([one.position for one in scene.scatterers])
+    assert ((spheres > scene.bounds[0]) & (spheres < scene.bounds[1])).all()
+    if scene.ris is not None:
+        ceiling = next(one for one in scene.reflectors if one.name == "ceiling").vertices
+        assert (ceiling - scene.ris.center) @ scene.ris.spec.normal == pytest.approx(0.0, abs=1e-12)
+        assert scene.ris.spec.normal[2] < 0.0
+
+
+def test_the_committed_pipeline_is_read():
     spec = load_any(FILE)
     assert isinstance(spec, ClassifierSpec)
     assert ClassifierSpec.model_validate(spec.model_dump(mode="json")) == spec

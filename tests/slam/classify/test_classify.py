@@ -23,6 +23,7 @@ from rislam_rt.slam.classify import (
     track_features,
 )
 from rislam_rt.slam.classify.echo import FAR, echo_misfit
+from rislam_rt.slam.classify.images import image_misfit
 from rislam_rt.slam.tracks import no_tracks
 
 RADIO, BODY, WINDOW = RadioConfig(), Body(), 40
@@ -111,6 +112,32 @@ def test_an_echo_is_where_both_walls_say():
     assert echo.misfit[0] == FAR
     empty = echo_misfit(seen[:1], std[:1], strength[:1], offset)
     assert empty.misfit.tolist() == [FAR]
+
+
+@pytest.mark.parametrize("mirrors", [("", "x"), ("x", ""), ("x", "x"), ("x", "y"), ("", "xy")])
+def test_an_image_is_where_point_and_walls_say(mirrors):
+    """Exact for any walls and baseline: over walls on the Tx leg, the Rx leg, both. Strengths follow from both legs."""
+    to_tx, to_rx = mirrors
+    tx, rx = BODY.ends(*_walk())
+    legs = [_mirror(POINT[None], *names)[0] for names in (to_tx, to_rx)]
+    path = _seen(np.tile(legs[1], (WINDOW, 1)), np.linalg.norm(legs[0] - tx, axis=1))
+    tracks = [_wall("x"), _wall("y"), _wall("z"), _scatterer(), path]
+    seen = np.stack(tracks)[:, -1]
+    turned = np.einsum("ij,tj->ti", rotation_z(np.array(HEADING))[:2, :2], seen[:, 1:])
+    seen = np.column_stack([seen[:, 0], turned])
+    ratio = {"x": 0.8, "y": 0.7}
+    gain = [0.05 / (np.linalg.norm(p - tx[-1]) * np.linalg.norm(q - rx[-1])) for p, q in ((POINT, POINT), legs)]
+    gain[1] *= np.prod([ratio[name] for name in to_tx + to_rx])
+    strength = np.log([0.8, 0.7, 0.6, gain[0] * seen[3, 0], gain[1] * seen[4, 0]])
+    offset = rotation_z(np.array(HEADING)) @ (BODY.tx_offset - BODY.rx_offset)
+    still, echo = np.array([0.0, 0.0, 0.0, 1.0, 1.0]), np.full(5, FAR)
+    image = image_misfit(seen, np.full(seen.shape, 1e-9), strength, offset, still, echo)
+    # doubts: a parent of probability 1 costs nothing but what echoes leave, 6 / (1 + 1e4 / 4) each
+    assert image.misfit[4] == pytest.approx(0.0, abs=0.02)
+    assert image.strength[4] == pytest.approx(0.0, abs=1e-9)
+    assert image.mirror[3] > 0.5
+    if to_rx and to_rx == to_tx:
+        assert image.mirror[4] < -0.5
 
 
 def test_features_do_not_depend_on_the_order_of_tracks_nor_on_the_rooms_axes():
