@@ -68,3 +68,27 @@ def test_a_track_that_was_missed_is_not_looked_at() -> None:
 def test_an_unknown_classifier_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"slam\.classifier: 'guess' received"):
         SlamConfig(classifier="guess")
+
+
+@pytest.mark.parametrize("case", range(6))
+def test_odds_are_finite_whatever_was_measured(case: int) -> None:
+    """Lengths of a micrometre to the filter's infinity, cosines beyond any sphere, coincident tracks, a still agent."""
+    rng = np.random.default_rng(case)
+    count, tracks = int(rng.integers(1, 12)), no_tracks(WINDOW)
+    rows, dark, ones = np.arange(count), np.zeros(count, dtype=np.bool_), np.ones(count)
+    position = rng.uniform(0.0, 5.0, (WINDOW, 3)) if case % 2 else np.ones((WINDOW, 3))
+    for cycle in range(LOOK_EVERY + 1):
+        cosines = rng.choice([-1e5, -1.0, 0.0, 0.3, 1e5], (count, 2))
+        seen = np.column_stack([10.0 ** rng.uniform(-6.0, 5.0, count), cosines])
+        seen = np.broadcast_to(seen[:1], seen.shape) if case % 3 == 0 else seen
+        std, level = 10.0 ** rng.uniform(-5.0, 5.0, (count, 3)), rng.uniform(-69.0, 69.0, count)
+        glance = Glance(seen, std, level, ones, ones, ones)
+        tracks = advance(tracks, 0.1, cycle, np.full(3, 0.02))
+        if cycle:
+            tracks = extend(tracks, rows, glance, rows, dark, cycle)
+        else:
+            tracks = begin(tracks, glance, rows, dark, np.full(3, 0.1), cycle)
+    for classifier in ("network", "geometric"):
+        found = sift(tracks, position, np.zeros(WINDOW), LOOK_EVERY, BODY, RADIO, classifier)
+        assert np.isfinite(found.odds).all()
+        assert (found.looks == 1).all()
