@@ -11,7 +11,7 @@ from rislam_rt.slam.filter import REMOVED
 from rislam_rt.slam.schemes import bp_slam, channel_slam
 
 SCHEMES = [
-    pytest.param(bp_slam, bp_slam.BpSlamConfig(num_particles=128, sigma_a=0.01), id="bp_slam"),
+    pytest.param(bp_slam, bp_slam.BpSlamConfig(sigma_a=0.01, planes=False), id="bp_slam"),
     pytest.param(channel_slam, channel_slam.ChannelSlamConfig(num_particles=60, num_directions=32), id="channel_slam"),
 ]
 

@@ -6,7 +6,7 @@ interface of the package's own filter.
 
 from rislam_rt.slam.schemes.bp_slam.association import Association, associate
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
-from rislam_rt.slam.schemes.bp_slam.monostatic import BpSlamState, estimate, init, predict, step
+from rislam_rt.slam.schemes.bp_slam.moving import BpSlamState, estimate, init, predict, step
 from rislam_rt.slam.schemes.bp_slam.static import FeatureTable, StaticResult, run_static
 
 __all__ = [

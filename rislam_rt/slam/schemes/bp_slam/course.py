@@ -1,0 +1,108 @@
+"""The agent's course: present position and velocity and, every few cycles, past ones, as one Gaussian.
+
+Given the course, what different features tell is independent; given the present state alone it is not, and a filter
+that takes it so makes up knowledge of directions that nothing measures (start; turn of map and course about it).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+
+RIDGE = 1e-10
+"""Added to correlations of past states, which are much alike."""
+
+
+class Course(NamedTuple):
+    """A Gaussian over W states of 2A numbers, A axes: position [m] and velocity [m/s]; the present one first."""
+
+    mean: Floats
+    """(2A W,)."""
+    covariance: Floats
+    """(2A W, 2A W)."""
+    nominal: Floats
+    """(2A W,) the mean as it would be had nothing been measured."""
+    axes: int
+
+    def turn(self) -> Floats:
+        """(2A W,) unit vector: how the states change as all turn about the start, as reckoned before any range.
+
+        Ranges to unknown places tell nothing of such a turn. Linearised now here and now there, they seem to (Huang,
+        Mourikis and Roumeliotis, 2010): whatever a range seems to tell of this one direction is taken off it.
+        """
+        blocks = self.nominal.reshape(-1, 2, self.axes).copy()
+        blocks[:, 0] -= blocks[-1, 0]
+        turned = np.zeros_like(blocks)
+        turned[..., 0], turned[..., 1] = -blocks[..., 1], blocks[..., 0]
+        size = float(np.linalg.norm(turned))
+        return turned.ravel() / size if size > 0.0 else turned.ravel()
+
+    @property
+    def width(self) -> int:
+        """2A."""
+        return 2 * self.axes
+
+
+class Step(NamedTuple):
+    """What of the former course is known when the new one is: a regression with an error."""
+
+    transfer: Floats
+    """(n, n') of deviations of the former course on those of the new one."""
+    residual: Floats
+    """(2A, 2A) covariance of what the regression misses of the former present state."""
+
+
+def begin(position: Floats, velocity: Floats, position_std: float, velocity_std: float) -> Course:
+    """The start prior; position and velocity (A,)."""
+    std = np.concatenate([np.full(len(position), position_std), np.full(len(velocity), velocity_std)])
+    mean = np.concatenate([position, velocity])
+    return Course(mean, np.diag(std**2), mean, len(position))
+
+
+def advance(course: Course, dt: float, accelerate: Floats, keep: bool) -> tuple[Course, Step]:
+    """Discrete white-noise acceleration of standard deviations `accelerate` (A,) [m/s^2] over `dt` [s].
+
+    With `keep` the former present state stays as a past one, and nothing is missed. Without, it is left out: what
+    hangs on it is handed to the states around it (Rauch, Tung and Striebel's gain) with a small error.
+    """
+    width, size = course.width, len(course.mean)
+    eye, zero = np.eye(course.axes), np.zeros((course.axes, course.axes))
+    move = np.block([[eye, dt * eye], [zero, eye]])
+    shake = np.concatenate([np.diag(0.5 * dt**2 * accelerate), np.diag(dt * accelerate)])
+    noise = shake @ shake.T
+    full = np.concatenate([np.pad(move, ((0, 0), (0, size - width))), np.eye(size)])
+    mean, nominal = full @ course.mean, full @ course.nominal
+    covariance = full @ course.covariance @ full.T
+    covariance[:width, :width] += noise
+    if keep:
+        return Course(mean, covariance, nominal, course.axes), Step(
+            np.eye(size + width)[width:], np.zeros((width, width))
+        )
+    kept = np.r_[0:width, 2 * width : size + width]
+    step = _regress(course, move, noise)
+    return Course(mean[kept], covariance[np.ix_(kept, kept)], nominal[kept], course.axes), step
+
+
+def _regress(course: Course, move: Floats, noise: Floats) -> Step:
+    """Former course on the new one, where the former present state is left out."""
+    width, size = course.width, len(course.mean)
+    scale = np.sqrt(np.maximum(np.diag(course.covariance), 1e-18))
+    scaled = course.covariance / np.outer(scale, scale)
+    past = scaled[width:, width:] + RIDGE * np.eye(size - width)
+    by_past = np.linalg.solve(past, scaled[width:, :width]).T * scale[:width, None] / scale[width:]
+    given = course.covariance[:width, :width] - by_past @ course.covariance[width:, :width]
+    ahead = move @ given @ move.T + noise
+    gain = given @ move.T @ _inverse(ahead)
+    transfer = np.eye(size)
+    transfer[:width, :width] = gain
+    transfer[:width, width:] = by_past - gain @ move @ by_past
+    residual = given - gain @ move @ given
+    return Step(transfer, 0.5 * (residual + residual.T))
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """Inverse of a positive semidefinite matrix, on what is not rounding."""
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-24))
+    unit = np.outer(scale, scale)
+    return np.asarray(np.linalg.pinv(matrix / unit, rcond=1e-9, hermitian=True)) / unit

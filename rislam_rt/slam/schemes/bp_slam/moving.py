@@ -1,0 +1,198 @@
+"""BP-SLAM for an agent that carries both ends: ranges `|p_T - a| + |a - p_R|`, heading known.
+
+Same functions, inputs and outputs as the package's own filter, so that a run can lead either. The panel and its code
+mean nothing to it, and angles of arrival are not used.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.model import Body, MapEstimate, Measurement, RadioConfig, RisCode, RisSpec, SlamEstimate
+from rislam_rt.slam.config import StartPrior
+from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los
+from rislam_rt.slam.schemes.bp_slam.association import Association
+from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
+from rislam_rt.slam.schemes.bp_slam.correct import absorb, claims, is_strong, newborn
+from rislam_rt.slam.schemes.bp_slam.course import Course, advance, begin
+from rislam_rt.slam.schemes.bp_slam.features import Scan, birth_ratio
+from rislam_rt.slam.schemes.bp_slam.ranges import Bistatic
+from rislam_rt.slam.schemes.bp_slam.sums import POINT, Sight, Sums, born, carry, join, look, no_sums, prune, unit_of
+
+NIS_LIMIT = 3.0
+"""Running mean of the NIS per degree of freedom above which the filter says that it has diverged."""
+STRAIN_RATE = 0.05
+"""Share of the latest cycle in that mean."""
+
+
+class BpSlamState(NamedTuple):
+    """All that the filter knows."""
+
+    course: Course
+    sums: Sums
+    undetected: float
+    """Features that exist and were never seen, expected."""
+    next_ident: int
+    cycle: int
+    height: Floats
+    """(2,) height [m] and vertical velocity [m/s], where they are known."""
+    heading: float
+    """[rad]."""
+    strain: float
+    """Running mean of the NIS per degree of freedom: 1 when all is well."""
+    body: Body
+    radio: RadioConfig
+
+    @property
+    def pose(self) -> Floats:
+        """(2, 3) position [m] and velocity [m/s]."""
+        known = self.course.mean[: self.course.width].reshape(2, -1)
+        return known if self.course.axes == 3 else np.concatenate([known, self.height[:, None]], axis=1)
+
+
+def init(
+    start: StartPrior, body: Body, ris: RisSpec | None, radio: RadioConfig, config: BpSlamConfig, *,
+    rng: np.random.Generator,
+) -> BpSlamState:  # fmt: skip
+    """The start prior, and no features. `ris` is taken for the interface and not used; nothing is drawn."""
+    axes = int(config.axes.sum())
+    course = begin(start.position[:axes], start.velocity[:axes], start.position_std, start.velocity_std)
+    height = np.array([start.position[2], start.velocity[2]])
+    sums = no_sums(len(course.mean))
+    return BpSlamState(course, sums, config.initial_features, 0, 0, height, float(start.heading), 1.0, body, radio)
+
+
+def predict(state: BpSlamState, dt: float, config: BpSlamConfig) -> SlamEstimate:
+    """The belief carried over `dt` [s] without noise."""
+    return estimate(_move(state, dt, np.zeros(state.course.axes), config), config)
+
+
+def _move(state: BpSlamState, dt: float, accelerate: Floats, config: BpSlamConfig) -> BpSlamState:
+    """Agent and features after `dt` [s]; the past state of every `course_stride` cycles is kept."""
+    if dt == 0.0:
+        return state
+    keep = len(state.course.mean) == state.course.width or state.cycle % config.course_stride == 0
+    course, step = advance(state.course, dt, accelerate, keep)
+    wander = np.array([config.drift_length_std, config.drift_angle_std, 0.0])
+    sums = carry(state.sums, step, wander)
+    sums = sums._replace(existence=config.survival_probability * sums.existence)
+    height = state.height + np.array([dt * state.height[1], 0.0])
+    unseen = config.survival_probability * (1.0 - config.moving_detection) * state.undetected
+    return state._replace(
+        course=course, sums=sums, height=height, undetected=unseen + config.birth_mean, cycle=state.cycle + 1
+    )
+
+
+def step(
+    state: BpSlamState, measurement: Measurement, code: RisCode | None, dt: float, heading: float,
+    config: BpSlamConfig, *, rng: np.random.Generator,
+) -> tuple[BpSlamState, StepInfo]:  # fmt: skip
+    """Advance by one cycle: `dt` [s] since the last, `heading` [rad]. `code` and `rng` are there for the interface."""
+    state = _move(state, dt, np.full(state.course.axes, config.sigma_a), config)._replace(heading=float(heading))
+    glance = glance_of(measurement, state.radio)
+    free = ~is_los(glance, state.body)
+    if not config.planes:
+        free &= ~is_strong(glance.ratio, config)
+    rows = np.flatnonzero(free)
+    scan = Scan(glance.seen[rows, 0], np.maximum(glance.std[rows, 0], config.smallest_std))
+    turn = rotation_z(np.asarray(heading))
+    model = Bistatic(turn @ state.body.tx_offset, turn @ state.body.rx_offset, state.radio.array.pattern == "upper")
+    fresh = 1.0 + birth_ratio(scan, state.undetected, model, 3, config)
+    sight = look(state.sums, state.course, state.pose[0], model)
+    found = claims(state.sums, sight, state.course, scan, fresh, config)
+    landmark = np.full(len(measurement), REMOVED)
+    landmark[rows], nis = _claimed(state, sight, scan, found, config)
+    dof = int((landmark >= 0).sum())
+    sums, course = absorb(state.sums, sight, state.course, scan, found, config)
+    state = state._replace(sums=sums, course=course)
+    state = _give_birth(state, scan, is_strong(glance.ratio[rows], config), found, fresh, config)
+    strain = state.strain + (STRAIN_RATE * (nis / dof - state.strain) if dof else 0.0)
+    count = int((state.sums.existence > config.detection_threshold).sum())
+    report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, count, _outcome(len(measurement), count, strain))
+    return state._replace(strain=strain), report
+
+
+def _give_birth(
+    state: BpSlamState, scan: Scan, strong: Booleans, found: Association, fresh: Floats, config: BpSlamConfig
+) -> BpSlamState:
+    rows, existence = newborn(found, fresh, config)
+    sums = state.sums
+    if len(rows):
+        kinds = np.where(strong[rows, None], config.strong_kinds, config.weak_kinds)
+        new = born(
+            scan.length[rows], scan.std[rows], kinds, existence, state.course, state.pose[0],
+            config.birth_turns, state.next_ident,
+        )  # fmt: skip
+        sums = join(sums, new)
+    sums = prune(sums, config.pruning_threshold, config.share_threshold, config.max_features)
+    return state._replace(sums=sums, next_ident=state.next_ident + len(rows))
+
+
+def estimate(state: BpSlamState, config: BpSlamConfig) -> SlamEstimate:
+    """Mean and covariance of the pose, samples of it, and the detected features as points of the map."""
+    position, velocity = state.pose
+    axes, width = state.course.axes, state.course.width
+    rows = np.r_[0:axes, 3 : 3 + axes]
+    covariance = np.zeros((6, 6))
+    covariance[np.ix_(rows, rows)] = state.course.covariance[:width, :width]
+    # the same draws in every cycle: the samples move smoothly, and nothing depends on who drew before
+    draws = np.random.default_rng(0).standard_normal((config.num_samples, 3))
+    value, vector = np.linalg.eigh(covariance[:3, :3])
+    samples = position + draws @ (vector * np.sqrt(np.maximum(value, 0.0))).T
+    samples[:, axes:] = position[axes:]
+    return SlamEstimate(position, velocity, state.heading, covariance, samples, state.body, _map(state.sums, config))
+
+
+def _claimed(
+    state: BpSlamState, sight: Sight, scan: Scan, found: Association, config: BpSlamConfig
+) -> tuple[Integers, float]:
+    """Feature number of each range (`UNUSED` for none), and the NIS over those claimed, of the features' mixtures."""
+    sums, numbers = state.sums, np.full(len(scan.length), UNUSED)
+    feature, shown = np.nonzero((found.feature[:, :-1] > 0.5) & (sums.existence > config.detection_threshold)[:, None])
+    numbers[shown] = sums.ident[feature]
+    spread = sight.own + np.sum((sight.by_course @ state.course.covariance) * sight.by_course, axis=1)
+    count = len(sums.ident)
+    mean = np.bincount(sums.owner, sums.share * sight.length, minlength=count)
+    second = np.bincount(sums.owner, sums.share * (spread + (sight.length - mean[sums.owner]) ** 2), minlength=count)
+    nis = np.sum((scan.length[shown] - mean[feature]) ** 2 / (second[feature] + scan.std[shown] ** 2))
+    return numbers, float(nis)
+
+
+def _map(sums: Sums, config: BpSlamConfig) -> MapEstimate:
+    """Features that exist and are rather points than walls or wanderers, with mean and covariance of their sums."""
+    count = len(sums.ident)
+    point = sums.kind == POINT
+    held = np.bincount(sums.owner[point], sums.share[point], minlength=count)
+    shown = np.flatnonzero((sums.existence > config.detection_threshold) & (held > 0.5))
+    mean, covariance = np.zeros((len(shown), 3)), np.zeros((len(shown), 3, 3))
+    for number, row in enumerate(shown):
+        part = np.flatnonzero((sums.owner == row) & point)
+        share = sums.share[part] / held[row]
+        place = sums.base[row] + sums.mean[part, :1] * unit_of(sums.mean[part], sums.walk[row], sums.speed[row])
+        mean[number] = share @ place
+        apart = place - mean[number]
+        covariance[number] = (apart * share[:, None]).T @ apart
+        for one, weight in zip(part, share, strict=True):
+            jacobian = _jacobian(sums.mean[one], sums.walk[row], float(sums.speed[row]))
+            covariance[number] += weight * jacobian @ sums.covariance[one] @ jacobian.T
+    return MapEstimate(
+        sums.ident[shown], mean, covariance, np.full(len(shown), -1), np.zeros(len(shown)), np.zeros(len(shown)),
+        np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2)),
+    )  # fmt: skip
+
+
+def _jacobian(mean: Floats, walk: Floats, usual: float) -> Floats:
+    """(3, 3) derivatives of the place, rows, by the numbers of a Gaussian."""
+    step = 1e-6 * np.concatenate([np.eye(3), -np.eye(3)])
+    place = (mean + step)[:, :1] * unit_of(mean + step, walk, np.asarray(usual))
+    return np.asarray((place[:3] - place[3:]).T / 2e-6)
+
+
+def _outcome(num_measurements: int, num_features: int, strain: float) -> Outcome:
+    if num_measurements == 0:
+        return Outcome.NO_MEASUREMENTS
+    if num_features == 0:
+        return Outcome.NO_LANDMARKS
+    return Outcome.DIVERGED if strain > NIS_LIMIT else Outcome.OK
