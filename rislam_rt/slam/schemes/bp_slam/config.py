@@ -13,7 +13,7 @@ class BpSlamConfig:
     """Model and effort. SI units. Defaults follow the synthetic experiment of Leitinger et al. (2019)."""
 
     num_particles: int = 1024
-    """Published form: of the agent, and of every potential feature; a power of two lets the kernels follow thin clouds best."""
+    """Published form: of the agent, and of every feature; a power of two lets the kernels follow thin clouds best."""
     num_pairings: int = 10
     """Feature particles that every agent particle meets in a message, and the other way round."""
     sigma_a: float = 0.0033
