@@ -48,9 +48,8 @@ def draw(nees: Floats, name: str, file: Path) -> None:
     time = 0.1 * np.arange(nees.shape[1])
     figure, axes = plt.subplots(figsize=(8.0, 3.6), layout="constrained")
     axes.axhspan(score.lower, score.upper, color="#0072b2", alpha=0.15, lw=0)
-    axes.annotate(
-        "95 % interval of a consistent filter", (time[-1], score.upper), ha="right", va="bottom", color="#0072b2"
-    )
+    note = "95 % interval of a consistent filter"
+    axes.annotate(note, (0.5 * time[-1], score.lower), ha="center", va="top", color="#0072b2")
     axes.axhline(1.0, color="#0072b2", lw=0.8)
     axes.plot(time, score.average, color="#d55e00", label=f"average of {len(nees)} runs")
     axes.set(xlabel="time [s]", ylabel="NEES of the position / 2", ylim=(0.0, max(2.5, 1.1 * score.average.max())))
