@@ -18,7 +18,7 @@ INSIDE, OUTSIDE = 0.9, 1.1
 TWIN_GAIN, TWIN_SPREAD = 0.2, 0.6
 """Mean and standard deviation of the log amplitude of two equal paths of random phase, over that of one."""
 PROVEN_HITS = 80
-"""Measurements of a wall by the point it was found by, before it is looked for by other points."""
+"""Measurements of a wall by the point it was found by, before images of other points in it may move the belief."""
 LANDMARK_ODDS, TRACK_ODDS = np.log(0.9), np.log(0.5)
 """Log probability that an expected return, and that a track, shows in a cycle."""
 
