@@ -5,13 +5,14 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
-from rislam_rt.design.designers import designer, random_design
+from rislam_rt.design.designers import blind_design, designer
 from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.result import Design, DesignConfig
+from rislam_rt.design.search import search_code
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import mirror, mirror_direction, plane_between
 from rislam_rt.information import GradientMode, path_gradient, prior_from_covariance, range_information
-from rislam_rt.model import MapEstimate, RadioConfig, RisSpec, SlamEstimate
+from rislam_rt.model import MapEstimate, RadioConfig, RisCode, RisSpec, SlamEstimate
 from rislam_rt.ris import leg_response
 
 _DEFAULT = DesignConfig()
@@ -29,6 +30,8 @@ def design_code(
     landmark_uncertainty: bool = False,
     least_snr: float = 0.0,
     gradient: GradientMode = "exact",
+    number: int = 0,
+    last: RisCode | None = None,
 ) -> Design:
     """A code for the next cycle from the belief predicted to it; truth is not looked at.
 
@@ -46,7 +49,12 @@ def design_code(
     gradient
         How a path's length is held to change with the agent: `exact`, or as the paper has it (see `vertex_gradient`).
 
-    If no landmark is held for the panel yet, the outcome is `NO_PATHS` and the code is a random one.
+    number
+        How many codes were asked for before: which beam of the sweep comes next.
+    last
+        The code before this one.
+
+    If no landmark is held for the panel yet, the outcome is `NO_PATHS` and the code one that looks for it.
     """
     chosen = designer(method)
     problem = problem_from_belief(
@@ -54,7 +62,7 @@ def design_code(
         gradient=gradient,
     )  # fmt: skip
     if problem is None:
-        return random_design(method, ris, rng=rng)
+        return blind_design(method, search_code(belief, ris, radio, number, last))
     return chosen(problem, rng=rng, config=config)
 
 

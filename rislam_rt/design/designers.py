@@ -16,7 +16,7 @@ from rislam_rt.design.result import Design, DesignConfig, Designer
 from rislam_rt.design.single import continuous_phases, exact_code, nearest_code
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import Outcome
-from rislam_rt.model import RisCode, RisSpec
+from rislam_rt.model import RisCode
 
 _Search = Callable[[DesignProblem, Objective, np.random.Generator, DesignConfig], tuple[Integers | Floats, Floats]]
 """Levels, or for continuous methods phases [rad], (N M,), and the history of the objective (may be empty)."""
@@ -130,8 +130,7 @@ def designer(method: str) -> Designer:
     return DESIGNERS[method]
 
 
-def random_design(method: str, ris: RisSpec, *, rng: np.random.Generator) -> Design:
-    """A random code in place of a design: nothing is known of the panel yet (outcome `NO_PATHS`)."""
-    code = RisCode(rng.integers(ris.levels, size=(ris.rows, ris.cols)), ris.levels)
+def blind_design(method: str, code: RisCode) -> Design:
+    """A code in place of a design: nothing is known of the panel yet (outcome `NO_PATHS`)."""
     infinite = float("inf")
     return Design(method, code, code.xi, infinite, -infinite, 0.0, 0.0, np.array([infinite]), 0.0, Outcome.NO_PATHS)

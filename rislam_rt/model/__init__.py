@@ -1,6 +1,6 @@
 """Floor 2: frozen data, checked once on construction. No behaviour beyond what a field's name promises."""
 
-from rislam_rt.model.estimate import MapEstimate, SlamEstimate, empty_map
+from rislam_rt.model.estimate import MapEstimate, SlamEstimate, Suspect, empty_map
 from rislam_rt.model.measurement import Measurement, PathTruth
 from rislam_rt.model.paths import PathKind, Paths, RisLegs
 from rislam_rt.model.radio import RadioConfig, RxArray
@@ -32,6 +32,7 @@ __all__ = [
     "Shade",
     "SlamEstimate",
     "SlamResult",
+    "Suspect",
     "Trajectory",
     "empty_map",
 ]

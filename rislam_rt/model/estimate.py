@@ -1,7 +1,7 @@
 """What the agent believes: its pose, and a map of landmarks and walls. Filters write it, phase design reads it."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -60,6 +60,15 @@ class MapEstimate:
         return best if self.ris_probability[best] > 0.5 else -1
 
 
+class Suspect(NamedTuple):
+    """Something that may be the panel."""
+
+    position: Floats
+    """(3,) [m]."""
+    hits: int
+    """How often it was measured."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SlamEstimate:
     """Pose and map after a cycle (or predicted for the next)."""
@@ -76,6 +85,8 @@ class SlamEstimate:
     """(S, 3) positions drawn from the belief [m], equally likely; design averages over them."""
     body: Body
     map: MapEstimate
+    suspect: Suspect | None = None
+    """What may be the panel, while the map holds no landmark for it; None if nothing is suspected."""
 
     def __post_init__(self) -> None:
         freeze(self, "position", np.float64, (3,))

@@ -23,16 +23,19 @@ def build_designer(scheme: Scheme, panel: RisSpec, room: Room, spec: PipelineSpe
 
 def _on_belief(method: str, panel: RisSpec, spec: PipelineSpec, settings: Settings) -> Designer:
     section = spec.design
+    last: RisCode | None = None
 
     def choose(belief: Callable[[], SlamEstimate], cycle: int, *, rng: np.random.Generator) -> RisCode:
+        nonlocal last
         if method == "random":  # looks at no belief
             return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)
         design = design_code(
             belief(), panel, settings.radio, method=method, rng=rng, samples=section.samples, config=settings.design,
             landmark_uncertainty=section.landmark_uncertainty, least_snr=section.least_snr,
-            gradient=section.gradient,
+            gradient=section.gradient, number=cycle, last=last,
         )  # fmt: skip
-        return design.code
+        last = design.code
+        return last
 
     return choose
 

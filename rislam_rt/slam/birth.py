@@ -10,6 +10,7 @@ from rislam_rt.model import Body
 from rislam_rt.slam.associate import inverse_3x3
 from rislam_rt.slam.book import Book, enter
 from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.identity import DOUBT
 from rislam_rt.slam.hypotheses import (
     IMAGE,
     MOVING,
@@ -51,7 +52,9 @@ PARENT_HITS = 10
 MIRROR_CYCLES = 3
 """Measurements of a wall return before it is held against new points."""
 MIRROR_MARGIN = 0.1
-"""Distance [m] by which a point must lie nearer to an image of the agent."""
+"""Distance [m], beside twice the point's own error, by which it must lie nearer to an image of the agent."""
+MAX_PANEL_ODDS = 8.0
+"""Log odds of panel against scatterer that count most for a point: amplitudes alone do not make one."""
 PARALLEL = 4.0
 """Standard deviations (and 0.02) within which a track's direction is that of a known leg."""
 
@@ -107,6 +110,10 @@ class Birth(NamedTuple):
     """(K, 3)."""
     std: Floats
     """(K, 3)."""
+    log_grid: Floats | None = None
+    """(G,) what its amplitudes told of its strength; None if they were not weighed."""
+    log_ris: float = 0.0
+    """Log odds of its being the panel."""
 
     @property
     def prior(self) -> Floats:
@@ -122,7 +129,12 @@ class Birth(NamedTuple):
         """The book with the feature in its last row."""
         parent = self.verdict.parent
         founder = int(book.ident[parent]) if parent >= 0 else -1
-        return enter(book, self.verdict.kind is not POINT, self.anchor, founder)
+        book = enter(book, self.verdict.kind is not POINT, self.anchor, founder)
+        if self.verdict.kind is not POINT or self.log_grid is None:
+            return book
+        log_grid, log_ris = book.log_grid.copy(), book.log_ris.copy()
+        log_grid[-1], log_ris[-1] = self.log_grid, np.clip(self.log_ris, -DOUBT, DOUBT)
+        return book._replace(log_grid=log_grid, log_ris=log_ris)
 
 
 def examine(
@@ -150,6 +162,8 @@ def examine(
         history, slots = track_history(tracks, row, past, doubt, free_space)
         if is_explained(tracks, row, history, scene):
             continue
+        if not (book.ris_probability > 0.5).any():
+            history = history._replace(panel=panel_surplus(float(tracks.log_ris[row])))
         verdict = judge_wall(history, scene) if tracks.specular[row] else judge(history, scene)
         if verdict is None:
             continue
@@ -158,9 +172,19 @@ def examine(
         if verdict.kind is MOVING and not (config.use_vt and _sharp(verdict)):
             moving[row] = True
             continue
-        birth = Birth(verdict, scene.anchor, slots, history.seen, history.std)
+        birth = Birth(
+            verdict, scene.anchor, slots, history.seen, history.std, tracks.log_grid[row], float(tracks.log_ris[row])
+        )  # fmt: skip
         return int(row), tracks._replace(moving=moving), birth
     return -1, tracks._replace(moving=moving), None
+
+
+def panel_surplus(log_ris: float) -> float:
+    """What amplitudes tell for a point, as chi^2: it may be the panel or a scatterer, an image is the latter alone.
+
+    Before a panel is known, that is: its own images change with the code as well.
+    """
+    return 2.0 * float(np.logaddexp(0.0, min(log_ris, MAX_PANEL_ODDS)) - np.log(2.0))
 
 
 def due_tracks(tracks: Tracks, outlook: Outlook, cycle: int, config: SlamConfig) -> Integers:
@@ -169,7 +193,8 @@ def due_tracks(tracks: Tracks, outlook: Outlook, cycle: int, config: SlamConfig)
     So a track has to wait while another that is shorter and stronger is still unexplained.
     """
     ready = (~tracks.specular | config.use_vt) & (tracks.length >= config.birth_cycles) & (tracks.misses == 0)
-    growing = tracks.length < config.window - 1
+    oldest = np.min(np.where(tracks.cycle >= 0, tracks.cycle, cycle), axis=1)
+    growing = cycle - oldest < config.window - 1
     turn = np.where(growing, tracks.length % STRIDE == 0, (np.arange(len(ready)) + cycle) % (4 * STRIDE) == 0)
     if not (ready & turn).any():
         return np.zeros(0, dtype=np.int64)
@@ -233,7 +258,9 @@ def judge(history: History, scene: Scene) -> Verdict | None:
     if best.kind is MOVING:
         return best
     ready = best.kind is POINT or (len(history.seen) >= WALL_CYCLES and best.parent in _established(scene.book))
-    if best.kind is POINT and is_behind_mirror(best.fit.feature, scene):
+    if best.kind is POINT and is_behind_mirror(
+        best.fit.feature, scene.anchor, scene.mirrored, MIRROR_MARGIN + 2.0 * _worst_std(best)
+    ):  # fmt: skip
         return None
     return best if _sharp(best) and ready else None
 
@@ -251,15 +278,15 @@ def mirror_images(tracks: Tracks, moments: Moments, book: Book, body: Body) -> F
     return np.concatenate([shown, held.reshape(-1, 3)])
 
 
-def is_behind_mirror(point: Floats, scene: Scene) -> bool:
-    """Whether a point lies nearer to an image of the agent than to the agent.
+def is_behind_mirror(point: Floats, agent: Floats, mirrored: Floats, margin: float) -> bool:
+    """Whether a point (3,) lies nearer to an image (V, 3) of the agent (3,) than to the agent.
 
     No way over walls is shorter than the straight one, so that nothing in the room does: such a point is itself an
     image, of something not yet found. Where walls end short, a point beside one has to wait until that wall's return
     is gone.
     """
-    direct = np.linalg.norm(point - scene.anchor)
-    return bool((np.linalg.norm(point - scene.mirrored, axis=1) < direct - MIRROR_MARGIN).any())
+    direct = np.linalg.norm(point - agent)
+    return bool((np.linalg.norm(point - mirrored, axis=1) < direct - margin).any())
 
 
 def judge_wall(history: History, scene: Scene) -> Verdict | None:
@@ -284,7 +311,12 @@ def upright_std(feature: Floats, anchor: Floats) -> float:
 def _sharp(verdict: Verdict) -> bool:
     """Whether the feature's worst axis is known well enough."""
     limit = MAX_POINT_STD if verdict.kind is POINT else MAX_WALL_STD
-    return bool(np.sqrt(np.linalg.eigvalsh(verdict.fit.covariance)[-1]) < limit)
+    return _worst_std(verdict) < limit
+
+
+def _worst_std(verdict: Verdict) -> float:
+    """Standard deviation [m] of the feature along its worst axis."""
+    return float(np.sqrt(np.linalg.eigvalsh(verdict.fit.covariance)[-1]))
 
 
 def _points(history: History, scene: Scene) -> list[Verdict]:
@@ -294,7 +326,7 @@ def _points(history: History, scene: Scene) -> list[Verdict]:
         start = first_guess(kind, None, scene.anchor, history)
         if start is not None:
             fit = fit_feature(kind, start, None, scene.anchor, history, 6)
-            surplus = ((history.ratio - MOVING_RATIO) / MOVING_SPREAD) ** 2 if kind is MOVING else 0.0
+            surplus = ((history.ratio - MOVING_RATIO) / MOVING_SPREAD) ** 2 if kind is MOVING else -history.panel
             verdicts.append(Verdict(kind, -1, fit._replace(cost=fit.cost + surplus)))
     return verdicts
 

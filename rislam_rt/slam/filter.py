@@ -22,6 +22,7 @@ from rislam_rt.slam.moments import POSE, Moments, poses_of
 from rislam_rt.slam.prune import keepers
 from rislam_rt.slam.returns import Poses, compact
 from rislam_rt.slam.sift import sift
+from rislam_rt.slam.suspect import weigh_tracks
 from rislam_rt.slam.tracks import Glance, Tracks, advance, begin, extend, no_tracks
 
 LOS_MARGIN = 0.1
@@ -148,10 +149,13 @@ def step(
     state = state._replace(particles=updated.particles)
     white = np.zeros((len(hit), 3))
     white[used] = updated.white
-    book, names = learn(belief, believed(state), outlook, Hits(hit, taken, white), glance, code, rng=rng)
+    book, names = learn(
+        belief, believed(state), outlook, Hits(hit, taken, white), glance, code, config.detection_snr, rng=rng
+    )  # fmt: skip
     landmark[free[taken]] = names
     tracks, removed = _follow(state, _rates(moments), tracks, glance, picks, num_returns, config)
     landmark[free[removed]] = REMOVED
+    tracks = weigh_tracks(tracks, belief, code, config.detection_snr)
     state = _tidy(state._replace(tracks=tracks, book=book), outlook, belief, config, rng=rng)
 
     engine = engine_of(config)

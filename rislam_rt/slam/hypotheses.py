@@ -62,6 +62,8 @@ class History(NamedTuple):
     doubt: Floats
     """(6, D) square root of the covariance of today's position and velocity, through which all poses err together;
     no columns where the poses are taken as certain."""
+    panel: float = 0.0
+    """By how much chi^2 its amplitudes speak for a point (see `birth.panel_surplus`)."""
 
 
 def fit_feature(

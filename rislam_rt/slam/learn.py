@@ -9,7 +9,15 @@ from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.slam.book import Book, image_ident, learn_ratio
 from rislam_rt.slam.expect import Belief, Expected
-from rislam_rt.slam.identity import add_evidence, log_panel, log_scatterer, predicted_panel_gain
+from rislam_rt.slam.identity import (
+    add_evidence,
+    amplitude_floor,
+    log_panel,
+    log_panel_missed,
+    log_scatterer,
+    log_scatterer_missed,
+    predicted_panel_gain,
+)
 from rislam_rt.slam.match import Outlook
 from rislam_rt.slam.moments import Moments, poses_of, square_root
 from rislam_rt.slam.returns import NONE, TX, Returns, compact, observe
@@ -44,6 +52,7 @@ def learn(
     hits: Hits,
     glance: Glance,
     code: RisCode | None,
+    detection_snr: float,
     *,
     rng: np.random.Generator,
 ) -> tuple[Book, Integers]:
@@ -68,6 +77,11 @@ def learn(
         pick = hits.pick[plain]
         amplitude = np.exp(glance.log_amplitude[pick])
         book = _weigh(book, belief, moments, direct, amplitude, glance.amplitude_std[pick], code, rng=rng)
+    silent = (expected.bounces == 0) & ~outlook.merger.outshone & (outlook.merger.partner < 0)
+    silent[hits.row] = False
+    if silent.any() and belief.ris is not None and code is not None:
+        direct = compact(expected.returns, np.flatnonzero(silent))
+        book = _weigh_silent(book, belief, moments, direct, code, detection_snr, rng=rng)
     return book, names
 
 
@@ -125,6 +139,29 @@ def _weigh(
     if belief.ris is None:
         all_ris[points] = -np.inf
     return book._replace(log_grid=grids, log_ris=all_ris)
+
+
+def _weigh_silent(
+    book: Book,
+    belief: Belief,
+    moments: Moments,
+    direct: Returns,
+    code: RisCode,
+    detection_snr: float,
+    *,
+    rng: np.random.Generator,
+) -> Book:
+    """Silence of direct returns weighed for the panel. Strengths stay: something may stand in the way for long."""
+    points = direct.point
+    sight = observe(direct, belief.features, book.anchor, belief.poses)
+    std = np.full(len(points), amplitude_floor(belief.radio))
+    threshold = float(np.sqrt(2.0 * detection_snr) * std[0])
+    scatterer = log_scatterer_missed(std, sight.tx_length, sight.rx_length, belief.radio, threshold)
+    panel = log_panel_missed(std, _sampled_gains(belief, moments, points, code, rng=rng), threshold)
+    _, log_ris = add_evidence(book.log_grid[points], book.log_ris[points], scatterer, panel)
+    all_ris = book.log_ris.copy()
+    all_ris[points] = np.clip(log_ris, -CERTAIN, CERTAIN)
+    return book._replace(log_ris=all_ris)
 
 
 def _sampled_gains(

@@ -1,18 +1,15 @@
 """From moments to the estimate that others read: pose, landmarks, images, walls."""
 
-from functools import lru_cache
-
 import numpy as np
-from scipy.stats import norm
-from scipy.stats.qmc import Halton
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
 from rislam_rt.slam.book import Book
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.filter import FilterState, believed
-from rislam_rt.slam.moments import POSE, Moments, square_root
+from rislam_rt.slam.moments import POSE, Moments, even_draws, square_root
 from rislam_rt.slam.returns import reflect
+from rislam_rt.slam.suspect import find_suspect
 
 IMAGE_HITS = 3
 """Measurements of an image before it is shown on the map."""
@@ -30,6 +27,7 @@ def estimate(state: FilterState, config: SlamConfig, moments: Moments | None = N
     """Mean and covariance of the pose, equally likely samples of it, and the map."""
     moments = believed(state) if moments is None else moments
     root = square_root(moments.covariance[:3, :3])
+    named = (state.book.ris_probability > 0.5).any()
     return SlamEstimate(
         moments.position,
         moments.velocity,
@@ -38,22 +36,8 @@ def estimate(state: FilterState, config: SlamConfig, moments: Moments | None = N
         moments.position + even_draws(config.num_samples, root.shape[1]) @ root.T,
         state.body,
         build_map(moments, state.book),
+        find_suspect(state.tracks, state.book, moments, state.body) if state.ris is not None and not named else None,
     )
-
-
-@lru_cache(maxsize=16)
-def even_draws(count: int, dims: int) -> Floats:
-    """(count, dims) equally likely draws of a standard normal without a random number: mean 0, covariance 1.
-
-    Halton's sequence through the normal quantile.
-    """
-    if not dims:
-        return np.zeros((count, 0))
-    draws = norm.ppf(Halton(dims, scramble=False).random(count + 1)[1:])
-    if count <= dims + 1:
-        return np.zeros((count, dims)) if count == 1 else np.asarray(draws - draws.mean(axis=0))
-    draws -= draws.mean(axis=0)
-    return np.asarray(np.linalg.solve(np.linalg.cholesky(draws.T @ draws / count), draws.T).T)
 
 
 def build_map(moments: Moments, book: Book) -> MapEstimate:

@@ -19,8 +19,8 @@ TWIN_GAIN, TWIN_SPREAD = 0.2, 0.6
 """Mean and standard deviation of the log amplitude of two equal paths of random phase, over that of one."""
 PROVEN_HITS = 80
 """Measurements of a wall by the point it was found by, before images of other points in it may move the belief."""
-LANDMARK_ODDS, TRACK_ODDS = np.log(0.9), np.log(0.5)
-"""Log probability that an expected return, and that a track, shows in a cycle."""
+LANDMARK_ODDS, TRACK_ODDS, HIDDEN_ODDS = np.log(0.9), np.log(0.5), np.log(0.01)
+"""Log probability that an expected return, a track, and a track where the map expects a return, shows in a cycle."""
 
 
 class Merger(NamedTuple):
@@ -119,8 +119,7 @@ def candidates(outlook: Outlook, tracks: Tracks, hidden: Booleans) -> Candidates
     spread[:, [0, 1, 2], [0, 1, 2]] += outlook.merger.disturbance**2
     follow = track_covariance(tracks)
     wander = np.where(tracks.specular, 0.3, AMPLITUDE_WANDER)
-    # A hidden track has no chance: it keeps its row, so that rows stay aligned.
-    odds = np.where(hidden, -1e6, TRACK_ODDS)
+    odds = np.where(hidden, HIDDEN_ODDS, TRACK_ODDS)
     return Candidates(
         np.concatenate([outlook.seen, tracks.mean[..., 0]]),
         np.concatenate([spread, follow]),
@@ -140,7 +139,7 @@ def track_covariance(tracks: Tracks) -> Floats:
 def hidden_tracks(outlook: Outlook, tracks: Tracks, gate: float) -> Booleans:
     """(T,) whether a track runs where the map expects a return of its strength (wall returns: where one is expected).
 
-    Such a track would keep the measurements that prove the map right; it must give way.
+    Such a track would keep the measurements that prove the map right; it gives way to a return that fits at all.
     """
     if not len(outlook.seen) or not len(tracks.misses):
         return np.zeros(len(tracks.misses), dtype=np.bool_)

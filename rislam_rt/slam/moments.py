@@ -1,8 +1,11 @@
 """Mean and covariance of what a filter believes: all that the front end (association, births, map) asks of it."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import norm
+from scipy.stats.qmc import Halton
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
@@ -83,3 +86,18 @@ def square_root(covariance: Floats) -> Floats:
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     keep = values > 1e-12
     return scale[:, None] * vectors[:, keep] * np.sqrt(values[keep])
+
+
+@lru_cache(maxsize=16)
+def even_draws(count: int, dims: int) -> Floats:
+    """(count, dims) equally likely draws of a standard normal without a random number: mean 0, covariance 1.
+
+    Halton's sequence through the normal quantile.
+    """
+    if not dims:
+        return np.zeros((count, 0))
+    draws = norm.ppf(Halton(dims, scramble=False).random(count + 1)[1:])
+    if count <= dims + 1:
+        return np.zeros((count, dims)) if count == 1 else np.asarray(draws - draws.mean(axis=0))
+    draws -= draws.mean(axis=0)
+    return np.asarray(np.linalg.solve(np.linalg.cholesky(draws.T @ draws / count), draws.T).T)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.identity import STRENGTHS
 
 AMPLITUDE_WANDER = 1.0
 """Standard deviation of an unexplained track's log amplitude from cycle to cycle: a panel's code may change."""
@@ -54,6 +55,10 @@ class Tracks(NamedTuple):
     """(T,) log odds of a landmark's path, where a classifier has looked."""
     looks: Integers
     """(T,) how often it has."""
+    log_grid: Floats
+    """(T, G) log posterior of its strength, were it a scatterer (see `identity`)."""
+    log_ris: Floats
+    """(T,) log odds of panel against scatterer."""
 
     @property
     def specular(self) -> Booleans:
@@ -85,6 +90,8 @@ def no_tracks(window: int) -> Tracks:
         np.zeros((0, window)),
         np.zeros(0),
         np.zeros(0, dtype=np.int64),
+        np.zeros((0, len(STRENGTHS))),
+        np.zeros(0),
     )
 
 
@@ -154,5 +161,7 @@ def begin(tracks: Tracks, glance: Glance, picks: Integers, bright: Booleans, rat
         level,
         np.zeros(count),
         np.zeros(count, dtype=np.int64),
+        np.full((count, len(STRENGTHS)), -np.log(len(STRENGTHS))),
+        np.zeros(count),
     )
     return Tracks._make(np.concatenate([old, new]) for old, new in zip(tracks, fresh, strict=True))

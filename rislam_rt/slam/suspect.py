@@ -1,0 +1,100 @@
+"""Where may the panel hang, while no landmark is held for it? Its identity, weighed for tracks as for landmarks.
+
+A track is taken for the point that its delay and direction tell. What its amplitudes say under the codes applied, and
+the cycles in which it was silent, is counted as in `identity`; the design then aims at whatever may yet be the panel.
+"""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.model import Body, RisCode, Suspect
+from rislam_rt.slam.birth import is_behind_mirror, mirror_images
+from rislam_rt.slam.book import Book
+from rislam_rt.slam.expect import Belief
+from rislam_rt.slam.identity import (
+    add_evidence,
+    amplitude_floor,
+    log_panel,
+    log_panel_missed,
+    log_scatterer,
+    log_scatterer_missed,
+    predicted_panel_gain,
+)
+from rislam_rt.slam.moments import Moments, even_draws, poses_of
+from rislam_rt.slam.returns import Poses
+from rislam_rt.slam.tracks import Tracks
+
+DRAWS = 12
+"""Places of a track over which the panel's predicted gain is averaged."""
+DISMISSAL = -2.0
+"""Log odds of panel against scatterer below which a suspect is none: under one code they tell little."""
+DEEP = 0.5
+"""Distance [m] behind a mirror at which what is seen there is held for an image; the panel hangs on a mirror itself."""
+PATIENCE = 2
+"""Cycles for which a track that is silent is still a suspect, if it was seen more often than that."""
+
+
+def places(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:
+    """Points (..., 3) at which lengths and cosines (..., 3) end, and their distances (...,) from the Rx.
+
+    A point on the ray `u` from the Rx lies as far out as the two legs have length for: `|r u - b| = l - r` with `b`
+    from Rx to Tx.
+    """
+    flat = seen[..., 1:] / np.maximum(1.0, np.linalg.norm(seen[..., 1:], axis=-1))[..., None]
+    up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=-1), 0.0))
+    ray = np.concatenate([flat, up[..., None]], axis=-1) @ rotation_z(poses.heading).T
+    base = poses.tx - poses.rx
+    length = np.maximum(seen[..., 0], np.linalg.norm(base) + 1e-3)
+    reach = (length**2 - base @ base) / (2.0 * (length - ray @ base))
+    return poses.rx + reach[..., None] * ray, reach
+
+
+def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None, detection_snr: float) -> Tracks:
+    """The tracks after what this cycle tells of each: is it the panel?"""
+    rows = np.flatnonzero(~tracks.specular)
+    if belief.ris is None or code is None or not len(rows):
+        return tracks
+    radio = belief.radio
+    spread = np.sqrt(tracks.covariance[rows][..., 0, 0])
+    looks = tracks.mean[rows, None, :, 0] + even_draws(DRAWS, 3) * spread[:, None]
+    center, _ = places(looks, belief.poses)
+    gain = predicted_panel_gain(belief.ris, code, center, belief.poses.tx, belief.poses.rx, np.ones(1), radio)
+    _, rx_length = places(tracks.mean[rows, :, 0], belief.poses)
+    tx_length = np.maximum(tracks.mean[rows, 0, 0] - rx_length, 1e-3)
+    std = np.full(len(rows), amplitude_floor(radio))
+    threshold = float(std[0] * np.sqrt(2.0 * detection_snr))
+    here = tracks.misses[rows] == 0
+    amplitude = np.exp(tracks.log_amplitude[rows])
+    panel = np.where(here, log_panel(amplitude, std, gain), log_panel_missed(std, gain, threshold))
+    scatterer = np.where(
+        here[:, None],
+        log_scatterer(amplitude, std, tx_length, rx_length, radio),
+        log_scatterer_missed(std, tx_length, rx_length, radio, threshold),
+    )
+    log_grid, log_ris = tracks.log_grid.copy(), tracks.log_ris.copy()
+    log_grid[rows], log_ris[rows] = add_evidence(log_grid[rows], log_ris[rows], scatterer, panel)
+    return tracks._replace(log_grid=log_grid, log_ris=log_ris)
+
+
+def find_suspect(tracks: Tracks, book: Book, moments: Moments, body: Body) -> Suspect | None:
+    """The landmark or track that is the likeliest to be the panel; None if nothing is likelier the panel than not.
+
+    A track that seems to come from behind a mirror may be the panel over walls: aiming there would miss it.
+    """
+    points, poses = book.points, poses_of(moments.position, np.asarray(moments.heading), body)
+    least = np.where(tracks.length > 1, DISMISSAL, 0.0)
+    alive = tracks.misses <= np.minimum(tracks.length - 1, PATIENCE)
+    rows = np.flatnonzero(~tracks.specular & alive & (tracks.log_ris > least))
+    if len(rows):
+        mirrored = mirror_images(tracks, moments, book, body)
+        spots = places(tracks.mean[rows, :, 0], poses)[0]
+        seen = [not is_behind_mirror(spot, moments.position, mirrored, DEEP) for spot in spots]
+        rows, spots = rows[seen], spots[seen]
+    odds = np.concatenate([book.log_ris[points], tracks.log_ris[rows]])
+    if not len(odds) or odds.max() <= DISMISSAL:
+        return None
+    best = int(np.argmax(odds))
+    if best < len(points):
+        return Suspect(moments.features[points[best]], int(book.hits[points[best]]))
+    return Suspect(spots[best - len(points)], int(tracks.length[rows[best - len(points)]]))
