@@ -38,7 +38,7 @@ def search_code(belief: SlamEstimate, ris: RisSpec, radio: RadioConfig, number: 
     if suspect.hits >= SETTLED and number % LOOK_ROUND == 0:
         return RisCode(beams[number // LOOK_ROUND % len(beams)], ris.levels)
     legs = [
-        leg_response(ris, suspect.position, end, np.ones(()), radio.wavelength)
+        leg_response(ris, suspect.position, end, np.ones((), dtype=np.complex128), radio.wavelength)
         for end in belief.body.ends(belief.position, np.array(belief.heading))
     ]
     index, _ = exact_code((legs[0] * legs[1]).ravel(), ris.levels)
@@ -70,7 +70,9 @@ def beam_phases(count: int, spacing: float, wavelength: float) -> Floats:
     over the share from one end of the row to the other.
     """
     place = np.arange(count) - (count - 1) / 2.0
-    width = min(1.0, 4.0 * spacing / wavelength)  # turns from element to element, from one grazing direction to the other
+    width = min(
+        1.0, 4.0 * spacing / wavelength
+    )  # turns from element to element, from one grazing direction to the other
     beams = min(int(np.ceil(count * width)), MAX_BEAMS)
     center = width * ((np.arange(beams) + 0.5) / beams - 0.5) + width / beams * np.array([[0.0], [0.5]])
     widened = max(width / beams - 1.0 / count, 0.0) / count

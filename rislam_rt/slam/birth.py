@@ -10,7 +10,6 @@ from rislam_rt.model import Body
 from rislam_rt.slam.associate import inverse_3x3
 from rislam_rt.slam.book import Book, enter
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.identity import DOUBT
 from rislam_rt.slam.hypotheses import (
     IMAGE,
     MOVING,
@@ -26,6 +25,7 @@ from rislam_rt.slam.hypotheses import (
     fit_reciprocal,
     plausible,
 )
+from rislam_rt.slam.identity import DOUBT
 from rislam_rt.slam.match import Outlook, explained, hidden_tracks
 from rislam_rt.slam.moments import Moments, poses_of, square_root
 from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe, reflect

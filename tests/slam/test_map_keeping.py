@@ -10,9 +10,9 @@ from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.expect import Belief, expected_returns
 from rislam_rt.slam.identity import STRENGTHS, point_amplitude
 from rislam_rt.slam.learn import Hits, learn
-from rislam_rt.slam.mapping import build_map, even_draws
+from rislam_rt.slam.mapping import build_map
 from rislam_rt.slam.match import Outlook, look_ahead
-from rislam_rt.slam.moments import POSE, Moments, poses_of
+from rislam_rt.slam.moments import POSE, Moments, even_draws, poses_of
 from rislam_rt.slam.prune import keepers
 from rislam_rt.slam.returns import observe, reflect
 from rislam_rt.slam.tracks import Glance, no_tracks
@@ -70,7 +70,7 @@ def live(moments: Moments, book: Book, cycles: int, shows: Booleans, *, rng: np.
         std = np.full(len(rows), 1e-8)
         glance = Glance(seen, np.full(seen.shape, 0.01), np.log(amplitude), std / amplitude, std, 0.0 * std)
         hits = Hits(rows, np.arange(len(rows)), np.zeros((len(rows), 3)))
-        book, _ = learn(belief, moments, outlook, hits, glance, None, rng=rng)
+        book, _ = learn(belief, moments, outlook, hits, glance, None, CONFIG.detection_snr, rng=rng)
     return book
 
 
