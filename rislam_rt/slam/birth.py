@@ -218,11 +218,11 @@ def is_explained(tracks: Tracks, row: int, history: History, scene: Scene) -> bo
 
 def judge(history: History, scene: Scene) -> Verdict | None:
     """The hypothesis that explains the history, if one does and no other comes near."""
-    verdicts = [*_points(history, scene), *_images(history, scene)]
-    verdicts.sort(key=lambda v: float(v.fit.cost))
-    best, margin = verdicts[0], scene.config.birth_margin
-    clear = min((float(v.fit.cost - best.fit.cost) for v in verdicts[1:]), default=np.inf) > margin
-    clear &= plausible(best.fit, len(history.seen), 3)
+    margin, verdicts = scene.config.birth_margin, _points(history, scene)
+    if len(history.seen) < WALL_CYCLES and not _promising(verdicts, history, scene):
+        return None
+    verdicts += _images(history, scene)
+    best, clear = _best(verdicts, history, margin)
     if not clear and not _floor_wanted(history, scene):
         return None
     rival = _reciprocal_cost(history, scene)
@@ -232,10 +232,28 @@ def judge(history: History, scene: Scene) -> Verdict | None:
         return None
     if best.kind is MOVING:
         return best
-    ready = best.kind is POINT or (len(history.seen) >= WALL_CYCLES and best.parent in _established(scene.book))
-    if best.kind is POINT and is_behind_mirror(best.fit.feature, scene):
-        return None
+    if best.kind is POINT:
+        return best if _is_fit_point(best, scene) else None
+    ready = len(history.seen) >= WALL_CYCLES and best.parent in _established(scene.book)
     return best if _sharp(best) and ready else None
+
+
+def _best(verdicts: list[Verdict], history: History, margin: float) -> tuple[Verdict, bool]:
+    """The cheapest, and whether it explains the history and no other comes near."""
+    best, *others = sorted(verdicts, key=lambda v: float(v.fit.cost))
+    clear = min((float(v.fit.cost - best.fit.cost) for v in others), default=np.inf) > margin
+    return best, clear and plausible(best.fit, len(history.seen), 3)
+
+
+def _promising(verdicts: list[Verdict], history: History, scene: Scene) -> bool:
+    """Whether a history too short for walls may come to anything: images would only be rivals to the other kinds."""
+    best, clear = _best(verdicts, history, scene.config.birth_margin)
+    return clear and (best.kind is MOVING or _is_fit_point(best, scene))
+
+
+def _is_fit_point(verdict: Verdict, scene: Scene) -> bool:
+    """Whether a point may enter the map: well known, and in the room as far as its walls are known."""
+    return _sharp(verdict) and not is_behind_mirror(verdict.fit.feature, scene)
 
 
 def mirror_images(tracks: Tracks, moments: Moments, book: Book, body: Body) -> Floats:
