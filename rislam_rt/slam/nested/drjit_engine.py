@@ -19,8 +19,8 @@ from rislam_rt.slam.nested.sightline import Kinds, log_likelihood
 
 PACKET = 4
 """Particles that a lane handles at once; M must be a multiple of it."""
-LANES = {"llvm": 16, "cuda": 64}
-"""Most lanes an agent particle: a vector register's worth, and enough to fill a GPU."""
+LANES = {"llvm": 8, "cuda": 64}
+"""Most lanes an agent particle: on a CPU about the fastest, on a GPU enough to fill it."""
 
 
 class DrJitEngine:
@@ -66,9 +66,8 @@ class DrJitEngine:
             dr.scatter(new, weight, agent * packets + place + step)
             return (step + lanes, *self._add(top, sums, weight, x, y, z))
 
-        start = (self._int(0), self._float(2.0 * HOPELESS), *[self._four(0.0) for _ in range(11)])
-        _, top, *sums = self._loop(start, packets, body)
-        flat = [top, *(dr.sum(part) for part in sums)]
+        start = (self._int(0), self._float(2.0 * HOPELESS), *[self._float(0.0) for _ in range(11)])
+        flat = self._loop(start, packets, body)[1:]
         dr.eval(new, *flat)
         found = combine(np.stack([part.numpy().reshape(count, lanes) for part in flat]))
         return cloud._replace(log_weight=new, row=np.arange(count), log_total=found.log_total), found
@@ -108,13 +107,19 @@ class DrJitEngine:
         weight = dr.exp(dr.maximum(log_weight - peak, DEEPEST))
         wx, wy, wz = weight * x, weight * y, weight * z
         total, square, *rest = sums
-        terms = (wx, wy, wz, wx * x, wy * y, wz * z, wx * y, wx * z, wy * z)
+        pairs = ((weight, x), (weight, y), (weight, z), (wx, x), (wy, y), (wz, z), (wx, y), (wx, z), (wy, z))
         return (
             peak,
-            dr.fma(total, scale, weight),
-            dr.fma(square, scale * scale, weight * weight),
-            *(dr.fma(old, scale, term) for old, term in zip(rest, terms, strict=True)),
+            dr.fma(total, scale, dr.sum(weight)),
+            self._dot(square * (scale * scale), weight, weight),
+            *(self._dot(old * scale, a, b) for old, (a, b) in zip(rest, pairs, strict=True)),
         )
+
+    def _dot(self, start: Any, first: Any, second: Any) -> Any:
+        """`start` plus the products of two packets: one sum a lane, so that all sums stay in registers."""
+        for a, b in zip(first, second, strict=True):
+            start = self._dr.fma(a, b, start)
+        return start
 
     def _ancestors(self, cloud: Cloud, size: int, comb: Floats) -> Any:
         """(N * size,) systematic resampling: each survivor marks its first child, and a running maximum fills in."""
@@ -188,13 +193,14 @@ class DrJitEngine:
 
         def body(step: Any, most: Any, *sums: Any) -> tuple[Any, ...]:
             x, y, z = self._mixed(children, place + step, agent * size, size, kernel)
-            most = dr.maximum(most, dr.maximum(dr.maximum(abs(x), abs(y)), abs(z)))
-            terms = (x, y, z, x * x, y * y, z * z, x * y, x * z, y * z)
-            return (step + lanes, most, *(old + term for old, term in zip(sums, terms, strict=True)))
+            most = dr.maximum(most, dr.max(dr.maximum(dr.maximum(abs(x), abs(y)), abs(z))))
+            first = [old + dr.sum(term) for old, term in zip(sums[:3], (x, y, z), strict=True)]
+            pairs = ((x, x), (y, y), (z, z), (x, y), (x, z), (y, z))
+            second = [self._dot(old, a, b) for old, (a, b) in zip(sums[3:], pairs, strict=True)]
+            return (step + lanes, most, *first, *second)
 
-        start = (self._int(0), *[self._four(0.0) for _ in range(10)])
-        _, most, *parts = self._loop(start, size // PACKET, body)
-        flat = [dr.max(most), *(dr.sum(part) for part in parts)]
+        start = (self._int(0), *[self._float(0.0) for _ in range(10)])
+        flat = self._loop(start, size // PACKET, body)[1:]
         dr.eval(*flat)
         lane_sums = np.stack([part.numpy().reshape(count, lanes) for part in flat])
         sums = lane_sums[1:].sum(axis=2, dtype=np.float64) / size
