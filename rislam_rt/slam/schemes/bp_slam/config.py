@@ -53,6 +53,8 @@ class BpSlamConfig:
     """Moving form: detection probability; the panel's paths fade with its codes."""
     wanderers: float = 0.5
     """Moving form: probability that a new weak feature is not a point that stays."""
+    moving_features: int = 60
+    """Moving form: potential features that are kept, the most probable ones."""
     course_stride: int = 40
     """Moving form: cycles from one past state of the agent that is kept to the next."""
     drift_length_std: float = 0.003
@@ -61,7 +63,7 @@ class BpSlamConfig:
     """Moving form: random walk of the cosine of its angle off the walk in one step."""
     birth_turns: int = 6
     """Moving form: Gaussians of a new feature over the turn about the walk, from horizontal to horizontal."""
-    share_threshold: float = 1e-3
+    share_threshold: float = 1e-2
     """Moving form: share below which a Gaussian of a feature is dropped."""
     birth_threshold: float = 1e-3
     """Moving form: probability above which a range starts a feature."""
@@ -77,6 +79,7 @@ class BpSlamConfig:
             "num_particles",
             "num_pairings",
             "max_features",
+            "moving_features",
             "num_samples",
             "iterations",
             "course_stride",
