@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import rotation_z, unit
 from rislam_rt.model import Body
-from rislam_rt.slam.associate import inverse_3x3
+from rislam_rt.slam.associate import squared_distance
 from rislam_rt.slam.book import Book, enter
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.hypotheses import (
@@ -179,7 +179,7 @@ def due_tracks(tracks: Tracks, outlook: Outlook, cycle: int, config: SlamConfig)
     stronger = tracks.log_amplitude[None] > tracks.log_amplitude[:, None] + 0.1
     elder = (length[None] < length[:, None] - 0.05) & (stronger | _aligned(tracks))
     waits = (elder & alive[None]).any(axis=1) & growing & ~tracks.specular
-    rows = np.flatnonzero(ready & turn & ~waits)
+    rows = (ready & turn & ~waits).nonzero()[0]
     return rows[np.argsort(tracks.mean[rows, 0, 0])]
 
 
@@ -195,7 +195,7 @@ def track_history(tracks: Tracks, row: int, past: Past, doubt: Floats, free_spac
 
     `doubt` (6, D) is the square root of the pose's covariance, `free_space` the log amplitude after 1 m.
     """
-    rows = np.flatnonzero(tracks.cycle[row] >= 0)
+    rows = (tracks.cycle[row] >= 0).nonzero()[0]
     poses = poses_of(past.position[rows], past.heading[rows], past.body)
     lag = past.time[past.cycle % len(past.time)] - past.time[rows]
     ratio = float(tracks.log_amplitude[row] - free_space + np.log(tracks.mean[row, 0, 0]))
@@ -212,8 +212,7 @@ def is_explained(tracks: Tracks, row: int, history: History, scene: Scene) -> bo
     seen = observe(returns, scene.features, scene.book.anchor, history.poses).seen
     spread = scene.outlook.covariance[near][None] + _diagonal(history.std**2)[:, None]
     gap = history.seen[:, None] - seen
-    distance = np.einsum("kri,krij,krj->r", gap, inverse_3x3(spread)[0], gap) / len(gap)
-    return bool(distance.min() < 6.0)
+    return bool(squared_distance(gap, spread)[0].mean(axis=0).min() < 6.0)
 
 
 def judge(history: History, scene: Scene) -> Verdict | None:

@@ -50,18 +50,18 @@ class Book(NamedTuple):
     @property
     def points(self) -> Integers:
         """Rows of the points."""
-        return np.flatnonzero(~self.is_wall)
+        return (~self.is_wall).nonzero()[0]
 
     @property
     def walls(self) -> Integers:
         """Rows of the walls."""
-        return np.flatnonzero(self.is_wall)
+        return self.is_wall.nonzero()[0]
 
     @property
     def ris_probability(self) -> Floats:
         """(F,) 0 for walls."""
-        probability = np.zeros(len(self.ident))
-        probability[self.points] = panel_probabilities(self.log_ris[self.points])
+        probability, points = np.zeros(len(self.ident)), self.points
+        probability[points] = panel_probabilities(self.log_ris[points])
         return probability
 
     @property
@@ -120,8 +120,8 @@ def strike(book: Book, keep: Booleans) -> Book:
 
 def image_ident(book: Book, point: int, wall: int) -> tuple[Book, int]:
     """The number of the image of a point row in a wall row, entered if it is new; its hit is counted."""
-    pair = np.array([book.ident[point], book.ident[wall]])
-    rows = np.flatnonzero((book.images[:, :2] == pair).all(axis=1))
+    pair = book.ident[point], book.ident[wall]
+    rows = ((book.images[:, 0] == pair[0]) & (book.images[:, 1] == pair[1])).nonzero()[0]
     if len(rows):
         hits = book.image_hits.copy()
         hits[rows[0]] += 1

@@ -203,8 +203,11 @@ def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats
 
 def compact(returns: Returns, rows: Integers) -> Returns:
     """Some of the returns, with only the legs that they need."""
-    used, place = np.unique(np.concatenate([returns.tx[rows], returns.rx[rows]]), return_inverse=True)
-    return Returns(returns.legs[used], place[: len(rows)], place[len(rows) :])
+    tx, rx = returns.tx[rows], returns.rx[rows]
+    used = np.zeros(len(returns.legs), dtype=np.bool_)
+    used[tx] = used[rx] = True
+    place = np.cumsum(used) - 1
+    return Returns(returns.legs[used], place[tx], place[rx])
 
 
 def _norm(vector: Floats) -> Floats:
