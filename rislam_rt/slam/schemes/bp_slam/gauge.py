@@ -66,7 +66,7 @@ def _frame(ahead: Floats, axes: int) -> Floats:
     """(2A, 2A) from room axes to along, across (and up), for position and velocity."""
     turn = np.eye(axes)
     turn[:2, :2] = [[ahead[0], ahead[1]], [-ahead[1], ahead[0]]]
-    return np.kron(np.eye(2), turn)
+    return np.asarray(np.kron(np.eye(2), turn), dtype=np.float64)
 
 
 def _of_shape(course: Course, along: Floats, ahead: Floats) -> Floats:
