@@ -63,7 +63,7 @@ class BpSlamConfig:
     """Moving form: random walk of the cosine of its angle off the walk in one step."""
     birth_turns: int = 6
     """Moving form: Gaussians of a new feature over the turn about the walk, from horizontal to horizontal."""
-    share_threshold: float = 1e-2
+    share_threshold: float = 1e-3
     """Moving form: share below which a Gaussian of a feature is dropped."""
     birth_threshold: float = 1e-3
     """Moving form: probability above which a range starts a feature."""
