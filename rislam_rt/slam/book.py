@@ -118,17 +118,16 @@ def strike(book: Book, keep: Booleans) -> Book:
     return book._replace(**fields, images=book.images[stay], image_hits=book.image_hits[stay])
 
 
-def image_ident(book: Book, point: int, wall: int) -> tuple[Book, int]:
-    """The number of the image of a point row in a wall row, entered if it is new; its hit is counted."""
-    pair = book.ident[point], book.ident[wall]
-    rows = ((book.images[:, 0] == pair[0]) & (book.images[:, 1] == pair[1])).nonzero()[0]
-    if len(rows):
-        hits = book.image_hits.copy()
-        hits[rows[0]] += 1
-        return book._replace(image_hits=hits), int(book.images[rows[0], 2])
-    images = np.concatenate([book.images, [[*pair, book.next_ident]]])
-    hits = np.append(book.image_hits, 1)
-    return book._replace(images=images, image_hits=hits, next_ident=book.next_ident + 1), book.next_ident
+def image_idents(book: Book, points: Integers, walls: Integers) -> tuple[Book, Integers]:
+    """The numbers (Q,) of the images of point rows (Q,) in wall rows (Q,), entered if new; their hits are counted."""
+    row_of = {(point, wall): row for row, (point, wall, _) in enumerate(book.images.tolist())}
+    pairs = zip(book.ident[points].tolist(), book.ident[walls].tolist(), strict=True)
+    rows = np.array([row_of.setdefault(pair, len(row_of)) for pair in pairs], dtype=np.int64)
+    fresh = [[*pair, book.next_ident + at] for at, pair in enumerate(list(row_of)[len(book.images) :])]
+    images = np.concatenate([book.images, np.array(fresh, dtype=np.int64).reshape(-1, 3)])
+    hits = np.bincount(rows, minlength=len(images))
+    hits[: len(book.images)] += book.image_hits
+    return book._replace(images=images, image_hits=hits, next_ident=book.next_ident + len(fresh)), images[rows, 2]
 
 
 def learn_ratio(book: Book, wall: int, log_ratio: float) -> Book:
