@@ -72,6 +72,7 @@ def main() -> None:
     settings = (*SETTINGS, f"slam.filter={arguments.filter}", f"cycles={arguments.cycles}", *arguments.settings)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for the workers, which are spawned
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("settings:", ", ".join(settings), flush=True)
     name = f"consistency_{arguments.filter}_{arguments.scene}_{arguments.cycles}"
     store = arguments.out / f"{name}.npz"
     key = "\n".join(settings)

@@ -27,7 +27,7 @@ def frozen(value: ArrayLike, dtype: Any, shape: tuple[int | None, ...], name: st
         array = value
     else:
         array = np.array(value, dtype=dtype)
-    if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
+    if array.shape != shape and not _fits(array.shape, shape):
         wanted = ", ".join("any" if n is None else str(n) for n in shape)
         raise GeometryError(f"{name}: shape {array.shape} received, ({wanted}) needed")
     if array.dtype.kind in "fc" and np.isnan(array).any():
@@ -36,6 +36,10 @@ def frozen(value: ArrayLike, dtype: Any, shape: tuple[int | None, ...], name: st
         )
     array.flags.writeable = False
     return array
+
+
+def _fits(have: tuple[int, ...], want: tuple[int | None, ...]) -> bool:
+    return len(have) == len(want) and all(w in (None, h) for w, h in zip(want, have, strict=True))
 
 
 def freeze(record: Any, name: str, dtype: Any, shape: tuple[int | None, ...]) -> None:

@@ -1,5 +1,6 @@
 """What a resolved path can be measured to: delay, direction cosines of the planar array, amplitude."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.information.position import range_information
-from rislam_rt.model import RadioConfig
+from rislam_rt.model import RadioConfig, RxArray
 
 
 class MeasurementStd(NamedTuple):
@@ -38,9 +39,17 @@ def cosine_information(snr_per_antenna: Floats, radio: RadioConfig) -> Floats:
     `2 SNR (2 pi / lambda)^2 sum_l x_l^2` with the element positions about their centre. For a line of L elements d
     apart this is the familiar `var(phi) = 6 / (SNR L (L^2 - 1) (2 pi d cos(phi) / lambda)^2)`.
     """
-    positions = radio.array.positions(radio.wavelength)[:, :2]
-    spread = np.sum((positions - positions.mean(axis=0)) ** 2, axis=0)
+    spread = _aperture(radio.array, radio.wavelength)
     return 2.0 * (2.0 * np.pi / radio.wavelength) ** 2 * np.asarray(snr_per_antenna)[..., None] * spread
+
+
+@lru_cache(maxsize=64)
+def _aperture(array: RxArray, wavelength: float) -> Floats:
+    """(2,) [m^2] `sum_l x_l^2` along rows and columns, about the array's centre; read-only."""
+    positions = array.positions(wavelength)[:, :2]
+    spread = np.sum((positions - positions.mean(axis=0)) ** 2, axis=0)
+    spread.flags.writeable = False
+    return np.asarray(spread)
 
 
 def amplitude_std(radio: RadioConfig) -> float:

@@ -122,8 +122,10 @@ def blind_axes(cosines: Floats, radio: RadioConfig) -> Floats:
 
 def _leaders(strength: Floats, cell: Booleans) -> Integers:
     """(N,) for each path the strongest free path of its cell, taken from the strongest down."""
-    leader = np.full(len(strength), -1)
-    for row in np.argsort(-strength, kind="stable"):
+    crowded = np.count_nonzero(cell, axis=1) > 1
+    leader = np.where(crowded, -1, np.arange(len(strength)))
+    rows = crowded.nonzero()[0]
+    for row in rows[np.argsort(-strength[rows], kind="stable")]:
         if leader[row] < 0:
             leader[cell[row] & (leader < 0)] = row
     return leader

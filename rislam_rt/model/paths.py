@@ -132,6 +132,18 @@ class Paths:
         text = " ".join([PathKind(kind).name, *names])
         return f"{text} | {' '.join(self.walls[w] for w in rx)}" if rx else text
 
+    def of_cycle(self, cycle: int) -> "Paths":
+        """The paths of one cycle alone, as views: nothing is copied and checked again."""
+        one, paths = slice(cycle, cycle + 1), copy(self)
+        for name in ("valid", "tau", "departure", "arrival", "gain", "vertices"):
+            object.__setattr__(paths, name, getattr(self, name)[one])
+        if self.ris is not None:
+            legs = copy(self.ris)
+            for name in ("tx", "rx"):
+                object.__setattr__(legs, name, getattr(self.ris, name)[one])
+            object.__setattr__(paths, "ris", legs)
+        return paths
+
     def with_gain(self, gain: Any) -> "Paths":
         """The same paths with other gains (K, P); all else is shared, not copied and checked again."""
         paths = copy(self)

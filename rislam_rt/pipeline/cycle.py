@@ -5,7 +5,6 @@ its heading; paths and poses stay on the room's side.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from time import perf_counter
 from typing import Any, NamedTuple, Protocol
@@ -13,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from rislam_rt.measurement import measure
-from rislam_rt.model import Measurement, Paths, PathTruth, RisCode, RisLegs, RisSpec, SlamEstimate, Trajectory
+from rislam_rt.model import Measurement, Paths, PathTruth, RisCode, RisSpec, SlamEstimate, Trajectory
 from rislam_rt.pipeline.control import Link, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.spec import PipelineSpec, Settings
@@ -39,13 +38,7 @@ class Room(NamedTuple):
 
     def at(self, cycle: int) -> Paths:
         """The paths of one cycle alone."""
-        one = slice(cycle, cycle + 1)
-        ris = self.paths.ris
-        per_cycle = ("valid", "tau", "departure", "arrival", "gain", "vertices")
-        fields: dict[str, Any] = {name: getattr(self.paths, name)[one] for name in per_cycle}
-        if ris is not None:
-            fields["ris"] = RisLegs(ris.tx[one], ris.rx[one], ris.tx_leg, ris.rx_leg)
-        return replace(self.paths, **fields)
+        return self.paths.of_cycle(cycle)
 
 
 class Agent(NamedTuple):

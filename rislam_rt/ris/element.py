@@ -15,7 +15,7 @@ def element_pattern(spec: RisSpec, cos_theta: Floats) -> Floats:
     `tang`: cos^3 theta. `energy`: cos theta, the projected area of the cell.
     """
     front = np.clip(cos_theta, 0.0, 1.0)
-    return front**3 if spec.element == "tang" else front
+    return front * front * front if spec.element == "tang" else front
 
 
 def element_gain_area(spec: RisSpec, wavelength: float) -> float:

@@ -25,8 +25,8 @@ def leg_response(spec: RisSpec, center: Floats, device: Floats, coefficient: Com
     Each leg takes half (in dB) of the join's `sqrt(4 pi G dx dy) A / lambda`.
     """
     ray = (device - center)[..., None, None, :] - spec.offsets()
-    distance = np.sqrt(np.einsum("...i,...i->...", ray, ray))
-    pattern = element_pattern(spec, (ray @ spec.normal) / distance)
+    distance = np.sqrt(np.vecdot(ray, ray))
+    pattern = element_pattern(spec, np.vecdot(ray, spec.normal) / distance)
     amplitude = _leg_share(spec, wavelength) * np.sqrt(pattern) * wavelength / (4.0 * np.pi * distance)
     return np.asarray(coefficient)[..., None, None] * amplitude * np.exp(-2j * np.pi / wavelength * distance)
 

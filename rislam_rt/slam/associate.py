@@ -5,8 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.tracks import Glance
+
+DIAGONAL = np.arange(3)
 
 
 class Candidates(NamedTuple):
@@ -42,18 +44,52 @@ def associate(candidates: Candidates, glance: Glance, gate: float, clutter_densi
 
 def pair_costs(candidates: Candidates, glance: Glance, gate: float, clutter_density: float) -> Floats:
     """(C, M): -2 log of the likelihood ratio of each pair against clutter, 0 where it cannot be."""
-    count, shown = len(candidates.seen), len(glance.seen)
-    noise = np.zeros((shown, 3, 3))
-    noise[:, [0, 1, 2], [0, 1, 2]] = glance.std**2
-    total = candidates.covariance[:, None] + noise[None]
-    miss = glance.seen[None] - candidates.seen[:, None]
-    inverse, log_det = inverse_3x3(total)
-    distance = np.einsum("cmi,cmij,cmj->cm", miss, inverse, miss)
-    variance = candidates.log_amplitude_std[:, None] ** 2 + glance.log_amplitude_std[None] ** 2
-    fade = (glance.log_amplitude[None] - candidates.log_amplitude[:, None]) ** 2 / variance
-    cost = distance + fade + log_det + np.log(variance) + 4.0 * np.log(2.0 * np.pi)
-    cost += 2.0 * np.log(clutter_density) - 2.0 * candidates.log_odds[:, None]
-    return np.where((distance < gate) & (fade < gate), np.minimum(cost, 0.0), 0.0).reshape(count, shown)
+    noise = np.zeros((len(glance.seen), 3, 3))
+    noise[:, DIAGONAL, DIAGONAL] = glance.std**2
+    variance = candidates.log_amplitude_std[:, None] ** 2 + glance.log_amplitude_std**2
+    fade = (glance.log_amplitude - candidates.log_amplitude[:, None]) ** 2 / variance
+    pairs = near_pairs(candidates.seen, candidates.covariance, glance.seen, noise, fade < gate, gate)
+    at = pairs.row, pairs.column
+    cost = pairs.distance + fade[at] + pairs.log_det + np.log(variance[at]) + 4.0 * np.log(2.0 * np.pi)
+    cost += 2.0 * np.log(clutter_density) - 2.0 * candidates.log_odds[pairs.row]
+    costs = np.zeros(fade.shape)
+    costs[at] = np.minimum(cost, 0.0)
+    return costs
+
+
+class Pairs(NamedTuple):
+    """P pairs of predictions whose gap lies within the gate."""
+
+    row: Integers
+    """(P,) among the first."""
+    column: Integers
+    """(P,) among the second."""
+    distance: Floats
+    """(P,) squared Mahalanobis distance."""
+    log_det: Floats
+    """(P,) of the gap's covariance."""
+
+
+def near_pairs(
+    first: Floats, first_spread: Floats, second: Floats, second_spread: Floats, allowed: Booleans, gate: float
+) -> Pairs:
+    """Pairs of (A, 3) and (B, 3), with covariances (A, 3, 3) and (B, 3, 3), that are `allowed` (A, B) and in the gate.
+
+    No distance is less than that along one axis alone, so that few pairs need a matrix.
+    """
+    own, other = (np.diagonal(spread, axis1=1, axis2=2) for spread in (first_spread, second_spread))
+    gap = first.T[..., None] - second.T[:, None]
+    close = gap**2 <= gate * (own.T[..., None] + other.T[:, None])
+    row, column = (allowed & close.all(axis=0)).nonzero()
+    distance, log_det = squared_distance(first[row] - second[column], first_spread[row] + second_spread[column])
+    inside = distance < gate
+    return Pairs(row[inside], column[inside], distance[inside], log_det[inside])
+
+
+def squared_distance(gap: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+    """Squared Mahalanobis lengths (...,) of gaps (..., 3), and log determinants of their covariances (..., 3, 3)."""
+    inverse, log_det = inverse_3x3(covariance)
+    return np.vecdot(gap, (inverse @ gap[..., None])[..., 0]), log_det
 
 
 def inverse_3x3(matrix: Floats) -> tuple[Floats, Floats]:
@@ -62,7 +98,10 @@ def inverse_3x3(matrix: Floats) -> tuple[Floats, Floats]:
     d, e, f = matrix[..., 1, 1], matrix[..., 1, 2], matrix[..., 2, 2]
     ca, cb, cc = d * f - e * e, c * e - b * f, b * e - c * d
     det = np.maximum(a * ca + b * cb + c * cc, 1e-300)
-    inverse = np.stack(
-        [ca, cb, cc, cb, a * f - c * c, b * c - a * e, cc, b * c - a * e, a * d - b * b], axis=-1
-    ).reshape(*matrix.shape)
-    return inverse / det[..., None, None], np.log(det)
+    inverse = np.empty(matrix.shape)
+    inverse[..., 0, 0], inverse[..., 1, 1], inverse[..., 2, 2] = ca, a * f - c * c, a * d - b * b
+    inverse[..., 0, 1] = inverse[..., 1, 0] = cb
+    inverse[..., 0, 2] = inverse[..., 2, 0] = cc
+    inverse[..., 1, 2] = inverse[..., 2, 1] = b * c - a * e
+    inverse /= det[..., None, None]
+    return inverse, np.log(det)

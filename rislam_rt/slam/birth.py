@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.geometry.angles import rotation_z, unit
+from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Body
-from rislam_rt.slam.associate import inverse_3x3
+from rislam_rt.slam.associate import squared_distance
 from rislam_rt.slam.book import Book, enter
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.hypotheses import (
@@ -25,10 +25,11 @@ from rislam_rt.slam.hypotheses import (
     fit_reciprocal,
     plausible,
 )
-from rislam_rt.slam.identity import DOUBT
+from rislam_rt.slam.identity import DOUBT, panel_surplus
 from rislam_rt.slam.match import Outlook, explained, hidden_tracks
+from rislam_rt.slam.mirrors import is_behind_mirror, mirror_images
 from rislam_rt.slam.moments import Moments, poses_of, square_root
-from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe, reflect
+from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe
 from rislam_rt.slam.tracks import Tracks
 
 STRIDE = 4
@@ -49,12 +50,8 @@ ELDER_CYCLES = 6
 """Cycles of history from which on a track keeps longer and weaker ones waiting."""
 PARENT_HITS = 10
 """Measurements of a point before walls are found by it."""
-MIRROR_CYCLES = 3
-"""Measurements of a wall return before it is held against new points."""
 MIRROR_MARGIN = 0.1
 """Distance [m], beside twice the point's own error, by which it must lie nearer to an image of the agent."""
-MAX_PANEL_ODDS = 8.0
-"""Log odds of panel against scatterer that count most for a point: amplitudes alone do not make one."""
 PARALLEL = 4.0
 """Standard deviations (and 0.02) within which a track's direction is that of a known leg."""
 
@@ -179,14 +176,6 @@ def examine(
     return -1, tracks._replace(moving=moving), None
 
 
-def panel_surplus(log_ris: float) -> float:
-    """What amplitudes tell for a point, as chi^2: it may be the panel or a scatterer, an image is the latter alone.
-
-    Before a panel is known, that is: its own images change with the code as well.
-    """
-    return 2.0 * float(np.logaddexp(0.0, min(log_ris, MAX_PANEL_ODDS)) - np.log(2.0))
-
-
 def due_tracks(tracks: Tracks, outlook: Outlook, cycle: int, config: SlamConfig) -> Integers:
     """Tracks to examine now, the shortest first: an image lies behind its point, and is weaker.
 
@@ -204,7 +193,7 @@ def due_tracks(tracks: Tracks, outlook: Outlook, cycle: int, config: SlamConfig)
     stronger = tracks.log_amplitude[None] > tracks.log_amplitude[:, None] + 0.1
     elder = (length[None] < length[:, None] - 0.05) & (stronger | _aligned(tracks))
     waits = (elder & alive[None]).any(axis=1) & growing & ~tracks.specular
-    rows = np.flatnonzero(ready & turn & ~waits)
+    rows = (ready & turn & ~waits).nonzero()[0]
     return rows[np.argsort(tracks.mean[rows, 0, 0])]
 
 
@@ -220,7 +209,7 @@ def track_history(tracks: Tracks, row: int, past: Past, doubt: Floats, free_spac
 
     `doubt` (6, D) is the square root of the pose's covariance, `free_space` the log amplitude after 1 m.
     """
-    rows = np.flatnonzero(tracks.cycle[row] >= 0)
+    rows = (tracks.cycle[row] >= 0).nonzero()[0]
     poses = poses_of(past.position[rows], past.heading[rows], past.body)
     lag = past.time[past.cycle % len(past.time)] - past.time[rows]
     ratio = float(tracks.log_amplitude[row] - free_space + np.log(tracks.mean[row, 0, 0]))
@@ -237,17 +226,16 @@ def is_explained(tracks: Tracks, row: int, history: History, scene: Scene) -> bo
     seen = observe(returns, scene.features, scene.book.anchor, history.poses).seen
     spread = scene.outlook.covariance[near][None] + _diagonal(history.std**2)[:, None]
     gap = history.seen[:, None] - seen
-    distance = np.einsum("kri,krij,krj->r", gap, inverse_3x3(spread)[0], gap) / len(gap)
-    return bool(distance.min() < 6.0)
+    return bool(squared_distance(gap, spread)[0].mean(axis=0).min() < 6.0)
 
 
 def judge(history: History, scene: Scene) -> Verdict | None:
     """The hypothesis that explains the history, if one does and no other comes near."""
-    verdicts = [*_points(history, scene), *_images(history, scene)]
-    verdicts.sort(key=lambda v: float(v.fit.cost))
-    best, margin = verdicts[0], scene.config.birth_margin
-    clear = min((float(v.fit.cost - best.fit.cost) for v in verdicts[1:]), default=np.inf) > margin
-    clear &= plausible(best.fit, len(history.seen), 3)
+    margin, verdicts = scene.config.birth_margin, _points(history, scene)
+    if len(history.seen) < WALL_CYCLES and not _promising(verdicts, history, scene):
+        return None
+    verdicts += _images(history, scene)
+    best, clear = _best(verdicts, history, margin)
     if not clear and not _floor_wanted(history, scene):
         return None
     rival = _reciprocal_cost(history, scene)
@@ -257,36 +245,29 @@ def judge(history: History, scene: Scene) -> Verdict | None:
         return None
     if best.kind is MOVING:
         return best
-    ready = best.kind is POINT or (len(history.seen) >= WALL_CYCLES and best.parent in _established(scene.book))
-    if best.kind is POINT and is_behind_mirror(
-        best.fit.feature, scene.anchor, scene.mirrored, MIRROR_MARGIN + 2.0 * _worst_std(best)
-    ):  # fmt: skip
-        return None
+    if best.kind is POINT:
+        return best if _is_fit_point(best, scene) else None
+    ready = len(history.seen) >= WALL_CYCLES and best.parent in _established(scene.book)
     return best if _sharp(best) and ready else None
 
 
-def mirror_images(tracks: Tracks, moments: Moments, book: Book, body: Body) -> Floats:
-    """Images (V, 3) of the agent, from the wall returns that are followed now and from the walls of the map."""
-    rows = np.flatnonzero(tracks.specular & (tracks.misses == 0) & (tracks.length >= MIRROR_CYCLES))
-    seen = tracks.mean[rows, :, 0]
-    flat = seen[:, 1:] / np.maximum(1.0, np.linalg.norm(seen[:, 1:], axis=1))[:, None]
-    ray = np.concatenate([flat, np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=1), 0.0))[:, None]], axis=1)
-    poses = poses_of(moments.position, np.asarray(moments.heading), body)
-    shown = poses.rx + seen[:, :1] * (ray @ rotation_z(np.asarray(moments.heading)).T)
-    walls = book.walls
-    held = reflect(moments.position, moments.features[walls], book.anchor[walls])
-    return np.concatenate([shown, held.reshape(-1, 3)])
+def _best(verdicts: list[Verdict], history: History, margin: float) -> tuple[Verdict, bool]:
+    """The cheapest, and whether it explains the history and no other comes near."""
+    best, *others = sorted(verdicts, key=lambda v: float(v.fit.cost))
+    clear = min((float(v.fit.cost - best.fit.cost) for v in others), default=np.inf) > margin
+    return best, clear and plausible(best.fit, len(history.seen), 3)
 
 
-def is_behind_mirror(point: Floats, agent: Floats, mirrored: Floats, margin: float) -> bool:
-    """Whether a point (3,) lies nearer to an image (V, 3) of the agent (3,) than to the agent.
+def _promising(verdicts: list[Verdict], history: History, scene: Scene) -> bool:
+    """Whether a history too short for walls may come to anything: images would only be rivals to the other kinds."""
+    best, clear = _best(verdicts, history, scene.config.birth_margin)
+    return clear and (best.kind is MOVING or _is_fit_point(best, scene))
 
-    No way over walls is shorter than the straight one, so that nothing in the room does: such a point is itself an
-    image, of something not yet found. Where walls end short, a point beside one has to wait until that wall's return
-    is gone.
-    """
-    direct = np.linalg.norm(point - agent)
-    return bool((np.linalg.norm(point - mirrored, axis=1) < direct - margin).any())
+
+def _is_fit_point(verdict: Verdict, scene: Scene) -> bool:
+    """Whether a point may enter the map: well known, and in the room as far as its walls are known."""
+    margin = MIRROR_MARGIN + 2.0 * _worst_std(verdict)
+    return _sharp(verdict) and not is_behind_mirror(verdict.fit.feature, scene.anchor, scene.mirrored, margin)
 
 
 def judge_wall(history: History, scene: Scene) -> Verdict | None:

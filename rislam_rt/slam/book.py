@@ -50,18 +50,18 @@ class Book(NamedTuple):
     @property
     def points(self) -> Integers:
         """Rows of the points."""
-        return np.flatnonzero(~self.is_wall)
+        return (~self.is_wall).nonzero()[0]
 
     @property
     def walls(self) -> Integers:
         """Rows of the walls."""
-        return np.flatnonzero(self.is_wall)
+        return self.is_wall.nonzero()[0]
 
     @property
     def ris_probability(self) -> Floats:
         """(F,) 0 for walls."""
-        probability = np.zeros(len(self.ident))
-        probability[self.points] = panel_probabilities(self.log_ris[self.points])
+        probability, points = np.zeros(len(self.ident)), self.points
+        probability[points] = panel_probabilities(self.log_ris[points])
         return probability
 
     @property
@@ -118,17 +118,16 @@ def strike(book: Book, keep: Booleans) -> Book:
     return book._replace(**fields, images=book.images[stay], image_hits=book.image_hits[stay])
 
 
-def image_ident(book: Book, point: int, wall: int) -> tuple[Book, int]:
-    """The number of the image of a point row in a wall row, entered if it is new; its hit is counted."""
-    pair = np.array([book.ident[point], book.ident[wall]])
-    rows = np.flatnonzero((book.images[:, :2] == pair).all(axis=1))
-    if len(rows):
-        hits = book.image_hits.copy()
-        hits[rows[0]] += 1
-        return book._replace(image_hits=hits), int(book.images[rows[0], 2])
-    images = np.concatenate([book.images, [[*pair, book.next_ident]]])
-    hits = np.append(book.image_hits, 1)
-    return book._replace(images=images, image_hits=hits, next_ident=book.next_ident + 1), book.next_ident
+def image_idents(book: Book, points: Integers, walls: Integers) -> tuple[Book, Integers]:
+    """The numbers (Q,) of the images of point rows (Q,) in wall rows (Q,), entered if new; their hits are counted."""
+    row_of = {(point, wall): row for row, (point, wall, _) in enumerate(book.images.tolist())}
+    pairs = zip(book.ident[points].tolist(), book.ident[walls].tolist(), strict=True)
+    rows = np.array([row_of.setdefault(pair, len(row_of)) for pair in pairs], dtype=np.int64)
+    fresh = [[*pair, book.next_ident + at] for at, pair in enumerate(list(row_of)[len(book.images) :])]
+    images = np.concatenate([book.images, np.array(fresh, dtype=np.int64).reshape(-1, 3)])
+    hits = np.bincount(rows, minlength=len(images))
+    hits[: len(book.images)] += book.image_hits
+    return book._replace(images=images, image_hits=hits, next_ident=book.next_ident + len(fresh)), images[rows, 2]
 
 
 def learn_ratio(book: Book, wall: int, log_ratio: float) -> Book:

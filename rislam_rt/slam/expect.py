@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec
+from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.slam.book import Book
-from rislam_rt.slam.identity import point_amplitude, predicted_panel_gain
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, Sight, compact, observe, reflect
+from rislam_rt.slam.identity import point_amplitude
+from rislam_rt.slam.returns import NONE, TX, Poses, Returns, Sight, bounced, compact, observe, reflect
 
 FAINT = 0.35
 """Amplitude, in units of the detection threshold, down to which a return is still looked for."""
@@ -61,21 +61,21 @@ def expected_returns(
     belief: Belief, code: RisCode | None, max_bounces: int, detection_snr: float, use_vt: bool
 ) -> Expected:
     """All returns of up to `max_bounces` bounces that arrive from above and are not hopelessly faint."""
-    returns = enumerate_returns(tuple(belief.book.points), tuple(belief.book.walls), max_bounces, use_vt)
-    anchor = belief.book.anchor
-    sight = observe(returns, belief.features, anchor, belief.poses)
-    amplitude, spread = predicted_amplitudes(belief, returns, sight, code)
-    radio = belief.radio
-    threshold = np.sqrt(detection_snr * radio.noise_psd / (radio.array.num_antennas * radio.energy))
-    direct = bounces(returns) == 0
-    faint = amplitude < FAINT * threshold
+    book, radio = belief.book, belief.radio
+    returns = enumerate_returns(tuple(book.points.tolist()), tuple(book.walls.tolist()), max_bounces, use_vt)
     real = possible_legs(belief, returns)
-    heard = sight.up > np.where(returns.point == TX, -LEVEL, HORIZON)
-    visible = heard & real[returns.tx] & real[returns.rx] & (~faint | direct)
-    kept = compact(returns, np.flatnonzero(visible))
-    amplitude = amplitude[visible]
+    rows = (real[returns.tx] & real[returns.rx]).nonzero()[0]
+    returns = Returns(returns.legs, returns.tx[rows], returns.rx[rows])
+    sight = observe(returns, belief.features, book.anchor, belief.poses)
+    heard = (sight.up > np.where(returns.point == TX, -LEVEL, HORIZON)).nonzero()[0]
+    returns = Returns(returns.legs, returns.tx[heard], returns.rx[heard])
+    sight = Sight._make(field[heard] for field in sight)
+    amplitude, spread = predicted_amplitudes(belief, returns, sight, code)
+    threshold = np.sqrt(detection_snr * radio.noise_psd / (radio.array.num_antennas * radio.energy))
+    visible = ((amplitude >= FAINT * threshold) | (bounces(returns) == 0)).nonzero()[0]
+    kept, amplitude = compact(returns, visible), amplitude[visible]
     log_amplitude = np.log(np.maximum(amplitude, 1e-30))
-    number, owner, founding = _roles(belief.book, kept)
+    number, owner, founding = _roles(book, kept)
     likely = amplitude > 2.0 * threshold
     return Expected(kept, log_amplitude, spread[visible], number, owner, founding, twins(kept), likely)
 
@@ -107,7 +107,7 @@ def enumerate_returns(points: tuple[int, ...], walls: tuple[int, ...], max_bounc
 
 def bounces(returns: Returns) -> Integers:
     """(R,) wall bounces of each return."""
-    walls = np.sum(returns.legs[:, 1:] != NONE, axis=1)
+    walls = (returns.legs[:, 1:] != NONE).sum(axis=1)
     return walls[returns.tx] + walls[returns.rx]
 
 
@@ -148,9 +148,10 @@ def predicted_amplitudes(belief: Belief, returns: Returns, sight: Sight, code: R
     free = radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * sight.rx_length)
     amplitude = np.where(moving, free * np.exp(log_ratio), amplitude)
     spread = np.sqrt(np.where(moving, 0.0, strength_std[point] ** 2) + variance)
-    panel = int(np.argmax(book.ris_probability))
-    if belief.ris is not None and code is not None and book.ris_probability[panel] > 0.5:
-        rows = np.flatnonzero(point == panel)
+    probability = book.ris_probability
+    panel = int(np.argmax(probability))
+    if belief.ris is not None and code is not None and probability[panel] > 0.5:
+        rows = (point == panel).nonzero()[0]
         amplitude[rows] = _panel_amplitudes(belief, Returns(returns.legs, returns.tx[rows], returns.rx[rows]), code)
         amplitude[rows] *= np.exp(log_ratio[rows])
         spread[rows] = np.sqrt(PANEL_AMPLITUDE_STD**2 + variance[rows])
@@ -160,31 +161,30 @@ def predicted_amplitudes(belief: Belief, returns: Returns, sight: Sight, code: R
 def _panel_amplitudes(belief: Belief, returns: Returns, code: RisCode) -> Floats:
     """|gain| (R,) of the panel's returns with perfect walls."""
     assert belief.ris is not None
-    ends = [_unfolded(belief, returns.legs[rows], end) for rows, end in
-            ((returns.tx, belief.poses.tx), (returns.rx, belief.poses.rx))]  # fmt: skip
-    center = belief.features[returns.point]
-    gain = predicted_panel_gain(belief.ris, code, center, ends[0], ends[1], np.ones(1), belief.radio)
-    return np.abs(gain)
+    radio, returns = belief.radio, compact(returns, np.arange(len(returns.tx)))
+    center, legs = belief.features[returns.legs[:, 0]], returns.legs
+    tx, rx = (
+        leg_response(belief.ris, center, _unfolded(belief, legs, device), np.sqrt(gain), radio.wavelength)
+        for device, gain in ((belief.poses.tx, radio.tx_gain), (belief.poses.rx, radio.rx_gain))
+    )
+    return np.abs(panel_gain(tx[returns.tx], rx[returns.rx], code))
 
 
 def _unfolded(belief: Belief, legs: Integers, device: Floats) -> Floats:
-    """Device (R, 3) mirrored in the walls of each leg, so that it lies where the panel's ray seems to come from."""
-    end = np.broadcast_to(device, (len(legs), 3)).copy()
+    """Device (G, 3) mirrored in the walls of each leg, so that it lies where the panel's ray seems to come from."""
+    end = np.tile(device, (len(legs), 1))
     for column in (2, 1):
-        rows = np.flatnonzero(legs[:, column] != NONE)
-        walls = legs[rows, column]
+        rows, walls = bounced(legs, column)
         end[rows] = reflect(end[rows], belief.features[walls], belief.book.anchor[walls])
     return end
 
 
 def _leg_ratio(book: Book, returns: Returns) -> tuple[Floats, Floats]:
     """Log amplitude ratio (G,) of each leg's walls, and its variance (G,)."""
-    near, far = returns.legs[:, 1], returns.legs[:, 2]
-    total, variance = np.zeros(len(returns.legs)), np.zeros(len(returns.legs))
-    for column in (near, far):
-        total += np.where(column == NONE, 0.0, book.ratio[column])
-        variance += np.where(column == NONE, 0.0, book.ratio_variance[column])
-    return total, variance
+    walls, none = returns.legs[:, 1:], returns.legs[:, 1:] == NONE
+    total, variance = book.ratio[walls], book.ratio_variance[walls]
+    total[none] = variance[none] = 0.0
+    return total.sum(axis=1), variance.sum(axis=1)
 
 
 def possible_legs(belief: Belief, returns: Returns) -> Booleans:
@@ -197,13 +197,12 @@ def possible_legs(belief: Belief, returns: Returns) -> Booleans:
     base = np.where((legs[:, 0] == TX)[:, None], belief.poses.tx, belief.features[legs[:, 0]])
     possible = np.ones(len(legs), dtype=np.bool_)
     for column in (1, 2):
-        rows = np.flatnonzero(legs[:, column] != NONE)
-        walls = legs[rows, column]
+        rows, walls = bounced(legs, column)
         wall, anchor = belief.features[walls], belief.book.anchor[walls]
-        normal = unit(wall - anchor)
-        middle = 0.5 * (wall + anchor)
-        depth = np.sum((base[rows] - middle) * normal, axis=-1)
-        own = np.sum((belief.poses.rx - middle) * normal, axis=-1)
+        span, middle = wall - anchor, 0.5 * (wall + anchor)
+        normal = span / np.sqrt(np.vecdot(span, span))[:, None]
+        depth = np.vecdot(base[rows] - middle, normal)
+        own = np.vecdot(belief.poses.rx - middle, normal)
         possible[rows] &= (depth * own > 0.0) & (np.abs(depth) > DEPTH)
-        base[rows] = reflect(base[rows], wall, anchor)
+        base[rows] -= 2.0 * depth[:, None] * normal
     return possible

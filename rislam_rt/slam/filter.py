@@ -142,7 +142,7 @@ def step(
     picks = associate(candidates(outlook, tracks, hidden), glance, config.gate, config.clutter_density)
 
     num_returns = len(expected.log_amplitude)
-    hit = np.flatnonzero(picks[:num_returns] >= 0)
+    hit = (picks[:num_returns] >= 0).nonzero()[0]
     taken = picks[hit]
     used = outlook.measures[hit]
     updated = _correct(state, outlook, hit[used], glance, taken[used], rng=rng)
@@ -162,8 +162,8 @@ def step(
     ess = engine.effective_size(state.particles)
     particles, resampled = engine.thin(state.particles, config, rng=rng)
     dof = 3 * int(used.sum())
-    certain = np.flatnonzero(expected.likely & expected.founding & ~outlook.merger.outshone)
-    health = check(state.health, updated.nis, dof, int(np.isin(certain, hit).sum()), len(certain))
+    certain = expected.likely & expected.founding & ~outlook.merger.outshone
+    health = check(state.health, updated.nis, dof, int(certain[hit].sum()), int(certain.sum()))
     outcome = _outcome(len(measurement), len(state.book.ident), health)
     count = len(state.book.points)
     info = StepInfo(landmark, ess, resampled, updated.nis, dof, updated.log_evidence, count, outcome)
@@ -230,10 +230,12 @@ def _follow(
 ) -> tuple[Tracks, Integers]:
     """Tracks extended, begun and ended; and which measurements were taken for wall returns."""
     bright = glance.ratio > config.specular_ratio
-    kept = np.flatnonzero(picks[num_returns:] >= 0)
+    kept = (picks[num_returns:] >= 0).nonzero()[0]
     used = picks[num_returns:][kept]
     tracks = extend(tracks, kept, glance, used, bright, state.cycle)
-    spare, count = np.setdiff1d(np.arange(len(bright)), picks), len(tracks.misses)
+    free = np.ones(len(bright), dtype=np.bool_)
+    free[picks[picks >= 0]] = False
+    spare, count = free.nonzero()[0], len(tracks.misses)
     tracks = begin(tracks, glance, spare, bright, rates, state.cycle)
     if config.classifier != "amplitude":
         position, heading = engine_of(config).trail(state.particles, np.arange(config.window))

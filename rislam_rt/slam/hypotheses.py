@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z, unit
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, linearise, reflect
+from rislam_rt.slam.returns import AXES, NONE, TX, Poses, Returns, linearise, reflect
 
 POINT = Returns(np.array([[0, NONE, NONE]]), np.array([0]), np.array([0]))
 """A static point; the feature sought is row 0."""
@@ -63,7 +63,12 @@ class History(NamedTuple):
     """(6, D) square root of the covariance of today's position and velocity, through which all poses err together;
     no columns where the poses are taken as certain."""
     panel: float = 0.0
-    """By how much chi^2 its amplitudes speak for a point (see `birth.panel_surplus`)."""
+    """By how much chi^2 its amplitudes speak for a point (see `identity.panel_surplus`)."""
+
+    @property
+    def pose_doubt(self) -> Floats:
+        """(K, 3, D) the same for the positions at the measurements."""
+        return self.doubt[:3] - self.lag[:, None, None] * self.doubt[3:]
 
 
 def fit_feature(
@@ -84,9 +89,9 @@ def fit_feature(
     anchors = np.stack([anchor, anchor])
     solution = _solve(kind, np.array(start), parent, anchors, history, None, upright)
     for _ in range(steps):
-        damping = DAMPING * np.trace(solution.normal, axis1=-2, axis2=-1)[..., None, None] * np.eye(3)
+        damping = DAMPING * np.trace(solution.normal, axis1=-2, axis2=-1)[..., None, None] * AXES
         step = np.linalg.solve(solution.normal + damping, solution.slope[..., None])[..., 0]
-        length = np.linalg.norm(step, axis=-1, keepdims=True)
+        length = np.sqrt(np.vecdot(step, step))[..., None]
         feature = solution.feature + step * np.minimum(1.0, 1.0 / np.maximum(length, 1e-12))
         solution = _solve(kind, feature, parent, anchors, history, solution.trust, upright)
         if length.max() < CONVERGED:
@@ -117,29 +122,27 @@ def _solve(
     trust: Floats | None,
     upright: float = np.inf,
 ) -> _Solution:
-    known = _features(feature, parent)
-    linear = linearise(kind, known, anchors, history.poses)
-    residual = (history.seen - linear.seen.mean(axis=-2)) / history.std
-    jacobian = linear.by_feature[..., 0, :].mean(axis=-3) / history.std[..., None]
-    by_pose = linear.by_pose.mean(axis=-3) / history.std[..., None]
-    by_doubt = by_pose @ history.doubt[:3] - history.lag[:, None, None] * (by_pose @ history.doubt[3:])
-    columns = np.concatenate([jacobian, by_doubt, residual[..., None]], axis=-1)
+    linear = linearise(kind, _features(feature, parent), anchors, history.poses)
+    by_doubt = linear.by_pose @ history.pose_doubt[:, None]
+    # what comes out as one lies halfway between: by the doubt's D numbers, by the feature's three, and the prediction
+    columns = np.concatenate([by_doubt, linear.by_feature[..., 0, :], linear.seen[..., None]], axis=-1)
+    columns = columns[..., 0, :, :] if len(kind.tx) == 1 else columns.mean(axis=-3)
+    columns[..., -1] = history.seen - columns[..., -1]
+    columns /= history.std[..., None]
     weighted = columns if trust is None else columns * trust[..., None, None]
     tall = (*columns.shape[:-3], -1, columns.shape[-1])
     gram = np.swapaxes(weighted.reshape(tall), -1, -2) @ columns.reshape(tall)
     size = history.doubt.shape[1]
-    inner = gram[..., 3:-1, 3:-1] + np.eye(size)
-    outer = np.concatenate([gram[..., 3:-1, :3], gram[..., 3:-1, -1:]], axis=-1)
-    solved = np.linalg.solve(inner, outer)
-    normal = gram[..., :3, :3] - gram[..., :3, 3:-1] @ solved[..., :3] + RIDGE * np.eye(3)
-    slope = gram[..., :3, -1] - (gram[..., :3, 3:-1] @ solved[..., 3:])[..., 0]
+    solved = np.linalg.solve(gram[..., :size, :size] + np.eye(size), gram[..., :size, size:])
+    rest = gram[..., size:, size:] - gram[..., size:, :size] @ solved
+    normal, slope = rest[..., :3, :3] + RIDGE * AXES, rest[..., :3, 3]
     lean = feature[..., 2] - anchors[0, 2]
     normal[..., 2, 2] += upright**-2
     slope[..., 2] -= upright**-2 * lean
     pose_error = solved[..., 3]
-    left = residual - (by_doubt @ pose_error[..., None, :, None])[..., 0]
-    squared = np.einsum("...ki,...ki->...k", left, left)
-    cost = np.sum((TAIL + 3.0) * np.log1p(squared / TAIL), axis=-1) + np.sum(pose_error**2, axis=-1)
+    left = columns[..., -1] - (columns[..., :size] @ pose_error[..., None, :, None])[..., 0]
+    squared = np.vecdot(left, left)
+    cost = (TAIL + 3.0) * np.log1p(squared / TAIL).sum(axis=-1) + np.vecdot(pose_error, pose_error)
     cost = cost + (lean / upright) ** 2
     return _Solution(feature, normal, slope, cost, (TAIL + 3.0) / (TAIL + squared))
 
@@ -153,7 +156,8 @@ def plausible(fit: Fit, count: int, parameters: int) -> bool:
 
 def first_guess(kind: Returns, parent: Floats | None, anchor: Floats, history: History) -> Floats | None:
     """A start (3,) for `fit_feature` from the averages over the history, or None where the geometry forbids it."""
-    seen = np.average(history.seen, axis=0, weights=1.0 / history.std[:, 0] ** 2)
+    weight = 1.0 / history.std[:, 0] ** 2
+    seen = weight @ history.seen / weight.sum()
     tx, rx = history.poses.tx.mean(axis=-2), history.poses.rx.mean(axis=-2)
     up = np.sqrt(max(1.0 - seen[1] ** 2 - seen[2] ** 2, 0.01))
     ray = rotation_z(np.asarray(np.mean(history.poses.heading))) @ np.array([seen[1], seen[2], up])
@@ -237,5 +241,8 @@ def wall_between(point: Floats, image: Floats, anchor: Floats) -> Floats | None:
 
 def _features(feature: Floats, parent: Floats | None) -> Floats:
     """(..., 1, F, 3): the axis of ones broadcasts over the K measurements."""
-    rows = [feature] if parent is None else [feature, np.broadcast_to(parent, feature.shape)]
-    return np.stack(rows, axis=-2)[..., None, :, :]
+    if parent is None:
+        return feature[..., None, None, :]
+    known = np.empty((*feature.shape[:-1], 1, 2, 3))
+    known[..., 0, 0, :], known[..., 0, 1, :] = feature, parent
+    return known

@@ -20,6 +20,8 @@ DOUBT = 4.0
 """Largest log-likelihood ratio that one cycle may add, so that one freak amplitude decides nothing."""
 SHOWN = 0.9
 """Probability that a path above the threshold is reported at all: others may shade it or merge with it."""
+MAX_PANEL_ODDS = 8.0
+"""Log odds of panel against scatterer that count most for a point: amplitudes alone do not make one."""
 BEYOND = 8.0
 """Standard deviations above the threshold from which on no amplitude stays below it."""
 
@@ -107,6 +109,14 @@ def add_evidence(log_grid: Floats, log_ris: Floats, scatterer: Floats, panel: Fl
     after = np.logaddexp.reduce(grid, axis=1)
     ratio = np.clip(panel - (after - before), -DOUBT, DOUBT)
     return grid - after[:, None], log_ris + ratio
+
+
+def panel_surplus(log_ris: float) -> float:
+    """What amplitudes tell for a point, as chi^2: it may be the panel or a scatterer, an image is the latter alone.
+
+    Before a panel is known, that is: its own images change with the code as well.
+    """
+    return 2.0 * float(np.logaddexp(0.0, min(log_ris, MAX_PANEL_ODDS)) - np.log(2.0))
 
 
 def panel_probabilities(log_ris: Floats) -> Floats:

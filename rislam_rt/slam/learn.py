@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.model import RisCode
-from rislam_rt.slam.book import Book, image_ident, learn_ratio
+from rislam_rt.slam.book import Book, image_idents, learn_ratio
 from rislam_rt.slam.expect import Belief, Expected
 from rislam_rt.slam.identity import (
     add_evidence,
@@ -61,13 +61,13 @@ def learn(
     owner, number = expected.owner[hits.row], expected.bounces[hits.row]
     book, names = _name(book, expected, hits.row)
     drift, count = book.drift.copy(), book.hits.copy()
-    for place in np.flatnonzero(outlook.measures[hits.row]):
+    for place in outlook.measures[hits.row].nonzero()[0]:
         count[owner[place]] += 1
         drift[owner[place]] += DRIFT_RATE * (hits.white[place] - drift[owner[place]])
     book = book._replace(hits=count, drift=drift, shown=_shown(book, outlook, hits.row))
     # beside something of its strength an amplitude tells of the sum, not of the landmark
     alone = ~outlook.merger.outshone[hits.row] & (outlook.merger.partner[hits.row] < 0)
-    for place in np.flatnonzero(alone & (number == 1)):
+    for place in (alone & (number == 1)).nonzero()[0]:
         wall, row = int(owner[place]), hits.row[place]
         surplus = glance.log_amplitude[hits.pick[place]] - expected.log_amplitude[row]
         book = learn_ratio(book, wall, float(book.ratio[wall] + surplus))
@@ -87,14 +87,11 @@ def learn(
 
 def _name(book: Book, expected: Expected, rows: Integers) -> tuple[Book, Integers]:
     """The ident of the landmark (point, image, or wall of a moving image) that each of the returns belongs to."""
-    names = np.full(len(rows), -1)
-    for place, row in enumerate(rows):
-        point, owner, returns = int(expected.returns.point[row]), int(expected.owner[row]), expected.returns
-        if point == TX or expected.bounces[row] == 0:
-            names[place] = book.ident[owner]
-            continue
-        walls = returns.legs[[returns.rx[row], returns.tx[row]], 1]
-        book, names[place] = image_ident(book, point, int(walls[0] if walls[0] != NONE else walls[1]))
+    returns, owner = expected.returns, expected.owner[rows]
+    names, point = book.ident[owner], returns.point[rows]
+    images = ((point != TX) & (expected.bounces[rows] > 0)).nonzero()[0]
+    on_rx, on_tx = returns.legs[returns.rx[rows[images]], 1], returns.legs[returns.tx[rows[images]], 1]
+    book, names[images] = image_idents(book, point[images], np.where(on_rx != NONE, on_rx, on_tx))
     return book, names
 
 
@@ -108,7 +105,7 @@ def _shown(book: Book, outlook: Outlook, hit: Integers) -> Floats:
     here = np.zeros(len(expected.owner), dtype=np.bool_)
     here[hit] = True
     shown = book.shown.copy()
-    for row in np.flatnonzero(expected.likely & ~outlook.merger.outshone & expected.founding):
+    for row in (expected.likely & ~outlook.merger.outshone & expected.founding).nonzero()[0]:
         feature, column = expected.owner[row], int(on_tx[row])
         shown[feature, column] += SHOWN_RATE[column] * (here[row] - shown[feature, column])
     return shown

@@ -8,7 +8,7 @@ from rislam_rt.slam.book import Book
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.filter import FilterState, believed
 from rislam_rt.slam.moments import POSE, Moments, even_draws, square_root
-from rislam_rt.slam.returns import reflect
+from rislam_rt.slam.returns import AXES, reflect
 from rislam_rt.slam.suspect import find_suspect
 
 IMAGE_HITS = 3
@@ -45,19 +45,17 @@ def build_map(moments: Moments, book: Book) -> MapEstimate:
     if not len(book.ident):
         return empty_map()
     mean, covariance = moments.features, moments.covariance[POSE:, POSE:]
-    points, row = book.points, {int(ident): place for place, ident in enumerate(book.ident)}
-    images = book.images[book.image_hits >= IMAGE_HITS]
-    parent = np.array([row[int(p)] for p in images[:, 0]], dtype=np.int64)
-    wall = np.array([row[int(w)] for w in images[:, 1]], dtype=np.int64)
+    points, images = book.points, book.images[book.image_hits >= IMAGE_HITS]
+    # idents only grow, and rows keep their order
+    parent, wall = np.searchsorted(book.ident, images[:, :2].T)
     image, spread = _images(mean, covariance, book, parent, wall)
-    place_of = {int(p): order for order, p in enumerate(points)}
     strength, ratio = np.exp(book.log_strength[0][points]), np.exp(book.ratio[wall])
     normal, offset, std = _walls(mean, covariance, book)
     return MapEstimate(
         np.concatenate([book.ident[points], images[:, 2]]),
         np.concatenate([mean[points], image]),
         np.concatenate([_blocks(covariance, points), spread]),
-        np.concatenate([np.full(len(points), -1), [place_of[int(p)] for p in parent]]),
+        np.concatenate([np.full(len(points), -1), np.searchsorted(points, parent)]),
         np.concatenate([book.ris_probability[points], np.zeros(len(images))]),
         np.concatenate([strength, ratio]),
         normal,
@@ -70,11 +68,11 @@ def _walls(mean: Floats, covariance: Floats, book: Book) -> tuple[Floats, Floats
     """Normals (W, 3) away from the agent, offsets (W,), standard deviations (W, 2) of angle and offset at the foot."""
     rows = book.walls
     span = mean[rows] - book.anchor[rows]
-    length = np.linalg.norm(span, axis=-1)
+    length = np.sqrt(np.vecdot(span, span))
     normal = span / length[:, None]
-    offset = 0.5 * np.sum(normal * (mean[rows] + book.anchor[rows]), axis=-1)
+    offset = 0.5 * np.vecdot(normal, mean[rows] + book.anchor[rows])
     blocks = _blocks(covariance, rows)
-    along = np.einsum("wi,wij,wj->w", normal, blocks, normal)
+    along = np.vecdot(normal, (blocks @ normal[..., None])[..., 0])
     across = np.maximum(np.trace(blocks, axis1=1, axis2=2) - along, 0.0) / 2.0
     return normal, offset, np.stack([np.sqrt(across) / length, 0.5 * np.sqrt(np.maximum(along, 0.0))], axis=-1)
 
@@ -83,11 +81,11 @@ def _images(mean: Floats, covariance: Floats, book: Book, points: Integers, wall
     """Mirror images (Q, 3) of points in walls, and their covariances (Q, 3, 3) from both."""
     point, wall, anchor = mean[points], mean[walls], book.anchor[walls]
     span = wall - anchor
-    square = np.einsum("qi,qi->q", span, span)[:, None, None]
+    square = np.vecdot(span, span)[:, None, None]
     image = reflect(point, wall, anchor)
-    depth = np.einsum("qi,qi->q", span, point - 0.5 * (wall + anchor))[:, None, None] / square
-    by_point = np.eye(3) - 2.0 * span[:, :, None] * span[:, None, :] / square
-    by_wall = -2.0 * (depth * np.eye(3) + span[:, :, None] * (image - wall)[:, None, :] / square)
+    depth = np.vecdot(span, point - 0.5 * (wall + anchor))[:, None, None] / square
+    by_point = AXES - 2.0 * span[:, :, None] * span[:, None, :] / square
+    by_wall = -2.0 * (depth * AXES + span[:, :, None] * (image - wall)[:, None, :] / square)
     axes = np.arange(3)
     index = np.concatenate([3 * points[:, None] + axes, 3 * walls[:, None] + axes], axis=1)
     jacobian = np.concatenate([by_point, by_wall], axis=2)
@@ -97,4 +95,5 @@ def _images(mean: Floats, covariance: Floats, book: Book, points: Integers, wall
 
 def _blocks(covariance: Floats, rows: Integers) -> Floats:
     """Diagonal blocks (R, 3, 3) of some features."""
-    return np.array([covariance[3 * r : 3 * r + 3, 3 * r : 3 * r + 3] for r in rows]).reshape(-1, 3, 3)
+    columns = 3 * rows[:, None] + np.arange(3)
+    return covariance[columns[:, :, None], columns[:, None, :]]

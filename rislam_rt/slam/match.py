@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import RadioConfig
-from rislam_rt.slam.associate import Candidates, inverse_3x3
+from rislam_rt.slam.associate import DIAGONAL, Candidates, near_pairs, squared_distance
 from rislam_rt.slam.expect import Belief, Expected
 from rislam_rt.slam.moments import POSE, Moments
 from rislam_rt.slam.returns import TX, linearise
@@ -65,13 +65,14 @@ def look_ahead(belief: Belief, expected: Expected, moments: Moments, tracks: Tra
     flat[..., POSE:] = by_feature.reshape(len(seen), 3, 3 * len(book.ident))
     cell = resolution_cell(belief.radio)
     merger = merge_returns(seen, expected, tracks, cell)
-    both = np.flatnonzero(merger.partner >= 0)
+    both = (merger.partner >= 0).nonzero()[0]
     log_amplitude, log_amplitude_std = expected.log_amplitude.copy(), expected.log_amplitude_std.copy()
     log_amplitude[both] += TWIN_GAIN
     log_amplitude_std[both] = np.hypot(log_amplitude_std[both], TWIN_SPREAD)
     for field in (seen, flat):
         field[both] = 0.5 * (field[both] + field[merger.partner[both]])
-    covariance = flat @ moments.covariance @ np.swapaxes(flat, 1, 2)
+    spread = (flat.reshape(-1, flat.shape[-1]) @ moments.covariance).reshape(flat.shape)
+    covariance = spread @ np.swapaxes(flat, 1, 2)
     measures = expected.founding | ((expected.bounces == 1) & (book.hits[expected.owner] >= PROVEN_HITS))
     return Outlook(expected, seen, covariance, log_amplitude, log_amplitude_std, measures, merger, cell)
 
@@ -90,33 +91,41 @@ def merge_returns(seen: Floats, expected: Expected, tracks: Tracks, cell: Floats
     wavelength of motion a weaker path shifts the stronger by its amplitude ratio times the gap, in root mean square
     over sqrt(2). A reciprocal is as strong as its twin, so that the two come out halfway between, whatever the phases.
     """
-    count, shiny = len(seen), np.flatnonzero(tracks.specular)
+    count, shiny = len(seen), tracks.specular.nonzero()[0]
     place = np.concatenate([seen, tracks.mean[shiny, :, 0]])
     strength = np.concatenate([expected.log_amplitude, tracks.log_amplitude[shiny]])
-    weaker = strength[None] <= strength[:, None]
-    gap = place[None] - place[:, None]
-    reach = np.max(np.abs(gap) / cell, axis=2)
+    surplus = strength[None] - strength[:, None]
+    reach = np.zeros(surplus.shape)
+    for axis in (place / cell).T:  # axis by axis: half the time of one three-dimensional array
+        np.maximum(reach, np.abs(axis - axis[:, None]), out=reach)
     np.fill_diagonal(reach, np.inf)
-    inside, around = reach < INSIDE, (reach < OUTSIDE) & weaker
-    partner, taken, leads = np.full(count, -1), np.zeros(len(place), bool), np.zeros(len(place), bool)
-    for leader in np.argsort(-strength, kind="stable"):
-        if not taken[leader]:
-            leads[leader] = True
-            taken |= inside[leader]
-            twin = expected.twin[leader] if leader < count else -1
-            if twin >= 0 and reach[leader, twin] < 1.0:
-                partner[leader], taken[twin] = twin, True
-    ratio = np.where(around & leads[:, None], np.exp(np.minimum(strength[None] - strength[:, None], 0.0)), 0.0)
-    ratio[np.flatnonzero(partner >= 0), partner[partner >= 0]] = 0.0
-    disturbance = np.sqrt(0.5 * np.sum((ratio[..., None] * gap) ** 2, axis=1))[:count]
-    outshone = (ratio > 0.5).any(axis=1) | (around & leads[:, None]).any(axis=0) | taken
-    return Merger(partner, taken[:count], disturbance, outshone[:count])
+    inside, around = reach < INSIDE, (reach < OUTSIDE) & (surplus <= 0.0)
+    partner, taken, leads = np.full(count, -1), np.zeros(len(strength), bool), np.ones(len(strength), bool)
+    crowded = np.flatnonzero((reach < 1.0).any(axis=1))
+    for leader in crowded[np.argsort(-strength[crowded], kind="stable")]:
+        if taken[leader]:
+            leads[leader] = False
+            continue
+        taken |= inside[leader]
+        twin = expected.twin[leader] if leader < count else -1
+        if twin >= 0 and reach[leader, twin] < 1.0:
+            partner[leader], taken[twin] = twin, True
+    strong, weak = (around & leads[:, None]).nonzero()
+    ratio = np.exp(surplus[strong, weak])
+    twins = np.append(partner, np.full(len(shiny), -1))[strong] == weak
+    shift = np.where(twins, 0.0, ratio)[:, None] * (place[weak] - place[strong])
+    variance = np.zeros(place.shape)
+    np.add.at(variance, strong, 0.5 * shift**2)
+    outshone = taken.copy()
+    outshone[weak] = True
+    outshone[strong[(ratio > 0.5) & ~twins]] = True
+    return Merger(partner, taken[:count], np.sqrt(variance[:count]), outshone[:count])
 
 
 def candidates(outlook: Outlook, tracks: Tracks, hidden: Booleans) -> Candidates:
     """Expected returns, then the tracks that are not `hidden` (T,) behind one."""
     spread = outlook.covariance.copy()
-    spread[:, [0, 1, 2], [0, 1, 2]] += outlook.merger.disturbance**2
+    spread[:, DIAGONAL, DIAGONAL] += outlook.merger.disturbance**2
     follow = track_covariance(tracks)
     wander = np.where(tracks.specular, 0.3, AMPLITUDE_WANDER)
     odds = np.where(hidden, HIDDEN_ODDS, TRACK_ODDS)
@@ -132,7 +141,7 @@ def candidates(outlook: Outlook, tracks: Tracks, hidden: Booleans) -> Candidates
 def track_covariance(tracks: Tracks) -> Floats:
     """(T, 3, 3) of the predicted measurement of each track."""
     follow = np.zeros((len(tracks.misses), 3, 3))
-    follow[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
+    follow[:, DIAGONAL, DIAGONAL] = tracks.covariance[..., 0, 0]
     return follow
 
 
@@ -143,19 +152,18 @@ def hidden_tracks(outlook: Outlook, tracks: Tracks, gate: float) -> Booleans:
     """
     if not len(outlook.seen) or not len(tracks.misses):
         return np.zeros(len(tracks.misses), dtype=np.bool_)
-    spread = outlook.covariance[None] + track_covariance(tracks)[:, None]
-    spread[..., [0, 1, 2], [0, 1, 2]] += outlook.merger.disturbance**2
-    gap = tracks.mean[:, None, :, 0] - outlook.seen[None]
-    inverse, _ = inverse_3x3(spread)
-    distance = np.einsum("tri,trij,trj->tr", gap, inverse, gap)
     fade = np.abs(tracks.log_amplitude[:, None] - outlook.log_amplitude)
-    near = (distance < gate) & (fade < 3.0 * np.hypot(outlook.log_amplitude_std, 0.3))
-    near &= ~tracks.specular[:, None] | (outlook.expected.returns.point == TX)
-    return near.any(axis=1)
+    alike = fade < 3.0 * np.hypot(outlook.log_amplitude_std, 0.3)
+    alike &= ~tracks.specular[:, None] | (outlook.expected.returns.point == TX)
+    spread = outlook.covariance.copy()
+    spread[:, DIAGONAL, DIAGONAL] += outlook.merger.disturbance**2
+    pairs = near_pairs(tracks.mean[..., 0], track_covariance(tracks), outlook.seen, spread, alike, gate)
+    hidden = np.zeros(len(tracks.misses), dtype=np.bool_)
+    hidden[pairs.row] = True
+    return hidden
 
 
 def explained(outlook: Outlook, seen: Floats, covariance: Floats, gate: float) -> Integers:
     """Returns within the gate of one prediction (3,) with covariance (3, 3), whatever their strength."""
-    gap = seen - outlook.seen
-    inverse, _ = inverse_3x3(outlook.covariance + covariance)
-    return np.flatnonzero(np.einsum("ri,rij,rj->r", gap, inverse, gap) < gate)
+    distance, _ = squared_distance(seen - outlook.seen, outlook.covariance + covariance)
+    return (distance < gate).nonzero()[0]

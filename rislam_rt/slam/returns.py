@@ -17,6 +17,7 @@ TX = -1
 """In the first column of `Returns.legs`: the base of the leg is the transmitter itself."""
 NONE = -1
 """In the wall columns of `Returns.legs`: no wall."""
+AXES = np.eye(3)
 
 
 class Returns(NamedTuple):
@@ -62,9 +63,14 @@ class Poses(NamedTuple):
 def reflect(point: Floats, wall: Floats, anchor: Floats) -> Floats:
     """Mirror images (..., 3) of points in walls given as images (..., 3) of anchors (..., 3)."""
     span = wall - anchor
-    across = np.einsum("...i,...i->...", span, point - 0.5 * (wall + anchor))
-    depth = across / np.einsum("...i,...i->...", span, span)
+    depth = np.vecdot(span, point - 0.5 * (wall + anchor)) / np.vecdot(span, span)
     return point - 2.0 * depth[..., None] * span
+
+
+def bounced(legs: Integers, column: int) -> tuple[Integers, Integers]:
+    """Rows of the legs (G, 3) that meet a wall in column 1 or 2, and the feature rows of those walls."""
+    rows = (legs[:, column] != NONE).nonzero()[0]
+    return rows, legs[rows, column]
 
 
 def leg_images(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -> Floats:
@@ -74,9 +80,8 @@ def leg_images(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -
     if moving.any():  # only then do images differ from pose to pose
         base = np.where(moving[:, None], tx[..., None, :], base)
     for column in (1, 2):
-        rows = np.flatnonzero(legs[:, column] != NONE)
+        rows, walls = bounced(legs, column)
         if len(rows):
-            walls = legs[rows, column]
             base[..., rows, :] = reflect(base[..., rows, :], features[..., walls, :], anchor[walls])
     return base
 
@@ -84,20 +89,19 @@ def leg_images(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -
 def observe(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Sight:
     """Predict every return from features (..., F, 3)."""
     image = leg_images(returns, features, anchor, poses.tx)
-    to_tx = image[..., returns.tx, :] - poses.tx[..., None, :]
-    to_rx = image[..., returns.rx, :] - poses.rx[..., None, :]
-    tx_length, rx_length = _norm(to_tx), np.maximum(_norm(to_rx), 1e-9)
+    # leg by leg, as many returns share one
+    tx_length = _norm(image - poses.tx[..., None, :])[..., returns.tx]
+    to_rx = image - poses.rx[..., None, :]
+    rx_length = np.maximum(_norm(to_rx), 1e-9)
     arrival = to_rx / rx_length[..., None]
     cos, sin = np.cos(poses.heading)[..., None], np.sin(poses.heading)[..., None]
-    seen = np.stack(
-        [
-            tx_length + rx_length,
-            arrival[..., 0] * cos + arrival[..., 1] * sin,
-            arrival[..., 1] * cos - arrival[..., 0] * sin,
-        ],
-        axis=-1,
-    )
-    return Sight(seen, tx_length, rx_length, arrival[..., 2])
+    by_leg = np.empty(arrival.shape)
+    by_leg[..., 0] = rx_length
+    by_leg[..., 1] = arrival[..., 0] * cos + arrival[..., 1] * sin
+    by_leg[..., 2] = arrival[..., 1] * cos - arrival[..., 0] * sin
+    seen = by_leg[..., returns.rx, :]
+    seen[..., 0] += tx_length
+    return Sight(seen, tx_length, rx_length[..., returns.rx], arrival[..., returns.rx, 2])
 
 
 class Linear(NamedTuple):
@@ -123,8 +127,7 @@ class Linear(NamedTuple):
         turned[..., 1], turned[..., 2] = self.seen[..., 2], -self.seen[..., 1]
         for jacobian, end in ((self.by_tx, poses.tx), (self.by_rx, poses.rx)):
             arm = end - position
-            swing = np.stack([-arm[..., 1], arm[..., 0], np.zeros(arm.shape[:-1])], axis=-1)
-            turned += (jacobian @ swing[..., None, :, None])[..., 0]
+            turned += jacobian[..., 1] * arm[..., None, None, 0] - jacobian[..., 0] * arm[..., None, None, 1]
         return turned
 
 
@@ -133,8 +136,8 @@ def linearise(returns: Returns, features: Floats, anchor: Floats, poses: Poses) 
     image, by_feature, by_base = _leg_jacobian(returns, features, anchor, poses.tx)
     seen, by_tx, by_rx = _sight_jacobians(image, returns, poses)
     # features side by side, so that one product of matrices serves all of them
-    count = by_feature.shape[-3]
-    wide = np.swapaxes(by_feature, -3, -2).reshape(*image.shape, 3 * count)
+    count = by_feature.shape[-2]
+    wide = by_feature.reshape(*image.shape, 3 * count)
     features_jacobian = by_rx @ wide[..., returns.rx, :, :]
     features_jacobian[..., 0, :] += (by_tx[..., None, :] @ wide[..., returns.tx, :, :])[..., 0, :]
     features_jacobian = features_jacobian.reshape(*features_jacobian.shape[:-1], count, 3)
@@ -142,7 +145,7 @@ def linearise(returns: Returns, features: Floats, anchor: Floats, poses: Poses) 
     if moving.any():  # the images of a moving base move with it
         moves = np.where(moving[:, None, None], by_base, 0.0)
         tx_jacobian = by_rx @ moves[..., returns.rx, :, :]
-        tx_jacobian[..., 0, :] += np.einsum("...ra,...rab->...rb", by_tx, moves[..., returns.tx, :, :])
+        tx_jacobian[..., 0, :] += (by_tx[..., None, :] @ moves[..., returns.tx, :, :])[..., 0, :]
     else:
         tx_jacobian = np.zeros(by_rx.shape)
     tx_jacobian[..., 0, :] -= by_tx
@@ -164,40 +167,48 @@ def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Flo
 
 
 def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -> tuple[Floats, Floats, Floats]:
-    """Images (..., G, 3) of the legs, their derivatives (..., G, F, 3, 3) by the features, and by the base."""
+    """Images (..., G, 3) of the legs, their derivatives (..., G, 3, F, 3) by the features, (..., G, 3, 3) by the base.
+
+    A leg moves with three features at most: its point, through both mirrors, the wall next to it, through the other
+    mirror, and that other wall.
+    """
     legs = returns.legs
     moving, image = legs[:, 0] == TX, features[..., legs[:, 0], :]
     if moving.any():  # only then do images differ from pose to pose
         image = np.where(moving[:, None], tx[..., None, :], image)
-    by_feature = np.zeros((*image.shape[:-1], features.shape[-2], 3, 3))
-    by_base = np.zeros((*image.shape, 3)) + np.eye(3)
-    own = np.flatnonzero(legs[:, 0] != TX)
-    by_feature[..., own, legs[own, 0], :, :] = np.eye(3)
+    by_feature = np.zeros((*image.shape, features.shape[-2], 3))
+    block = np.swapaxes(by_feature, -3, -2)
+    by_base = np.zeros((*image.shape, 3)) + AXES
     for column in (1, 2):
-        rows = np.flatnonzero(legs[:, column] != NONE)
+        rows, walls = bounced(legs, column)
         if not len(rows):
             continue
-        walls = legs[rows, column]
         wall, start = features[..., walls, :], image[..., rows, :]
         span = wall - anchor[walls]
-        square = np.einsum("...i,...i->...", span, span)[..., None, None]
-        mirrored = reflect(start, wall, anchor[walls])
-        depth = np.einsum("...i,...i->...", span, start - 0.5 * (wall + anchor[walls]))[..., None, None] / square
-        householder = np.eye(3) - 2.0 * span[..., :, None] * span[..., None, :] / square
-        by_feature[..., rows, :, :, :] = householder[..., None, :, :] @ by_feature[..., rows, :, :, :]
-        if moving.any():
-            by_base[..., rows, :, :] = householder @ by_base[..., rows, :, :]
-        by_wall = -2.0 * (depth * np.eye(3) + span[..., :, None] * (mirrored - wall)[..., None, :] / square)
-        by_feature[..., rows, walls, :, :] += by_wall
+        scaled = span / np.vecdot(span, span)[..., None]
+        depth = np.vecdot(scaled, start - 0.5 * (wall + anchor[walls]))[..., None]
+        mirrored = start - 2.0 * depth * span
+        householder = AXES - 2.0 * span[..., :, None] * scaled[..., None, :]
+        by_base[..., rows, :, :] = householder @ by_base[..., rows, :, :]
+        if column == 2:
+            near = legs[rows, 1]
+            block[..., rows, near, :, :] = householder @ block[..., rows, near, :, :]
+        by_wall = -2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :])
+        block[..., rows, walls, :, :] += by_wall
         image[..., rows, :] = mirrored
+    own = (~moving).nonzero()[0]
+    block[..., own, legs[own, 0], :, :] = by_base[..., own, :, :]
     return image, by_feature, by_base
 
 
 def compact(returns: Returns, rows: Integers) -> Returns:
     """Some of the returns, with only the legs that they need."""
-    used, place = np.unique(np.concatenate([returns.tx[rows], returns.rx[rows]]), return_inverse=True)
-    return Returns(returns.legs[used], place[: len(rows)], place[len(rows) :])
+    tx, rx = returns.tx[rows], returns.rx[rows]
+    used = np.zeros(len(returns.legs), dtype=np.bool_)
+    used[tx] = used[rx] = True
+    place = np.cumsum(used) - 1
+    return Returns(returns.legs[used], place[tx], place[rx])
 
 
 def _norm(vector: Floats) -> Floats:
-    return np.sqrt(np.einsum("...i,...i->...", vector, vector))
+    return np.asarray(np.sqrt(np.vecdot(vector, vector)))

@@ -7,9 +7,7 @@ the cycles in which it was silent, is counted as in `identity`; the design then 
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, RisCode, Suspect
-from rislam_rt.slam.birth import is_behind_mirror, mirror_images
 from rislam_rt.slam.book import Book
 from rislam_rt.slam.expect import Belief
 from rislam_rt.slam.identity import (
@@ -21,6 +19,7 @@ from rislam_rt.slam.identity import (
     log_scatterer_missed,
     predicted_panel_gain,
 )
+from rislam_rt.slam.mirrors import is_behind_mirror, mirror_images, rays
 from rislam_rt.slam.moments import Moments, even_draws, poses_of
 from rislam_rt.slam.returns import Poses
 from rislam_rt.slam.tracks import Tracks
@@ -41,10 +40,7 @@ def places(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:
     A point on the ray `u` from the Rx lies as far out as the two legs have length for: `|r u - b| = l - r` with `b`
     from Rx to Tx.
     """
-    flat = seen[..., 1:] / np.maximum(1.0, np.linalg.norm(seen[..., 1:], axis=-1))[..., None]
-    up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=-1), 0.0))
-    ray = np.concatenate([flat, up[..., None]], axis=-1) @ rotation_z(poses.heading).T
-    base = poses.tx - poses.rx
+    ray, base = rays(seen, poses.heading), poses.tx - poses.rx
     length = np.maximum(seen[..., 0], np.linalg.norm(base) + 1e-3)
     reach = (length**2 - base @ base) / (2.0 * (length - ray @ base))
     return poses.rx + reach[..., None] * ray, reach

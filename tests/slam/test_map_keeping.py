@@ -5,7 +5,7 @@ import pytest
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import Body, RadioConfig
-from rislam_rt.slam.book import Book, empty_book, enter, image_ident, learn_ratio, strike
+from rislam_rt.slam.book import Book, empty_book, enter, image_idents, learn_ratio, strike
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.expect import Belief, expected_returns
 from rislam_rt.slam.identity import STRENGTHS, point_amplitude
@@ -29,6 +29,12 @@ STRENGTH = np.sqrt(np.pi) * 0.05
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(20240623)
+
+
+def image_ident(book: Book, point: int, wall: int) -> tuple[Book, int]:
+    """The number of one image."""
+    book, idents = image_idents(book, np.array([point]), np.array([wall]))
+    return book, int(idents[0])
 
 
 def strong(book: Book) -> Book:

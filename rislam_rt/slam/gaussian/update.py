@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_factor, solve_triangular
+from scipy.linalg import solve_triangular
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
@@ -56,15 +56,17 @@ def update(
         return Update(particles, 0.0, np.zeros((0, 3)), 0.0)
     predicted, jacobian = predict_returns(particles, returns, twin, anchor, body)
     innovation = (seen - predicted).reshape(len(predicted), -1)
-    cross = particles.covariance[:, :, particles.shown] @ np.swapaxes(jacobian, 1, 2)
-    inner = jacobian @ cross[:, particles.shown]
+    shown = particles.shown
+    cross = particles.covariance[:, :, shown] @ np.swapaxes(jacobian, 1, 2)
+    inner = jacobian @ cross[:, shown]
     noise = (std**2 + FLOOR**2).ravel()
     weight = np.exp(particles.log_weight)
     mean, total = mixture(weight, innovation, inner + np.diag(noise))
     white = _each(mean, total)
     noise = noise * np.repeat(np.maximum(1.0, (TAIL + np.sum(white**2, axis=1)) / (TAIL + 3.0)), 3)
-    mean, total = mixture(weight, innovation, inner + np.diag(noise))
-    moved, log_likelihood = correct(particles, cross, inner + np.diag(noise), innovation)
+    spread = inner + np.diag(noise)
+    mean, total = mixture(weight, innovation, spread)
+    moved, log_likelihood = correct(particles, cross, spread, innovation)
     log_weight, evidence = normalised(particles.log_weight + log_likelihood)
     return Update(moved._replace(log_weight=log_weight), evidence, white, float(mean @ np.linalg.solve(total, mean)))
 
@@ -103,12 +105,13 @@ def correct(particles: Particles, cross: Floats, spread: Floats, innovation: Flo
     mean, covariance = particles.mean.copy(), particles.covariance.copy()
     log_likelihood = np.zeros(len(mean))
     for n in range(len(mean)):
-        factor = cho_factor(spread[n], lower=True)
-        root = solve_triangular(factor[0], cross[n].T, lower=True)
-        scaled = solve_triangular(factor[0], innovation[n], lower=True)
+        factor = np.linalg.cholesky(spread[n])
+        both = np.concatenate([cross[n].T, innovation[n][:, None]], axis=1)
+        solved = solve_triangular(factor, both, lower=True, check_finite=False)
+        root, scaled = solved[:, :-1], solved[:, -1]
         mean[n] += root.T @ scaled
         covariance[n] -= root.T @ root
-        log_likelihood[n] = -0.5 * scaled @ scaled - np.sum(np.log(np.diag(factor[0])))
+        log_likelihood[n] = -0.5 * scaled @ scaled - np.log(np.diagonal(factor)).sum()
     log_likelihood -= 0.5 * innovation.shape[1] * np.log(2.0 * np.pi)
     return particles._replace(mean=mean, covariance=covariance), log_likelihood
 

@@ -1,9 +1,9 @@
 """Landmark particles of one landmark for all agent particles: M points about a centre, shared through indices.
 
-Points are stored as float32 offsets from a centre in float64, so that single precision costs nothing: an offset of
-0.1 m is exact to 1e-8 m. An agent particle finds its points in block `block[i]` and its weights in row `row[i]`. When
-agent particles are resampled only the indices are: nothing is copied until weights change, and points are written anew
-only when landmark particles are resampled themselves.
+Points are stored as offsets from a centre in float64, in single precision (numpy) or as numbers of 21 bits (Dr.Jit,
+`grid.py`), which costs nothing: an offset of 0.1 m is exact to 1e-7 m. An agent particle finds its points in block
+`block[i]` and its weights in row `row[i]`. When agent particles are resampled only the indices are: nothing is copied
+until weights change, and points are written anew only when landmark particles are resampled themselves.
 """
 
 from typing import Any, NamedTuple, Protocol
@@ -31,7 +31,7 @@ class Cloud(NamedTuple):
     """Landmark particles. The arrays belong to the engine, numpy's or Dr.Jit's."""
 
     points: Any
-    """B blocks of M points, float32 offsets from the centre [m]."""
+    """B blocks of M points, offsets from the centre [m]."""
     log_weight: Any
     """R rows of M, float32, not normalised."""
     block: Integers

@@ -34,7 +34,7 @@ class NestedConfig:
     resample_below: float = 0.5
     """Fraction of the particles below which the effective sample size must not fall, agents and landmarks alike."""
     capacity: int = 150_000_000
-    """Most landmark particles in all: at most 24 bytes each, and the passes' own 0.5 GB."""
+    """Most landmark particles in all: at most 20 bytes each, and the passes' own 0.5 GB."""
     engine: str = "auto"
 
     def __post_init__(self) -> None:

@@ -12,7 +12,7 @@ from rislam_rt.slam.schemes import bp_slam, channel_slam
 
 SCHEMES = [
     pytest.param(bp_slam, bp_slam.BpSlamConfig(sigma_a=0.01, planes=False), id="bp_slam"),
-    pytest.param(channel_slam, channel_slam.ChannelSlamConfig(num_particles=60, num_directions=32), id="channel_slam"),
+    pytest.param(channel_slam, channel_slam.ChannelSlamConfig(planes=False), id="channel_slam"),
 ]
 
 
@@ -33,6 +33,10 @@ def test_a_short_walk_stays_within_bounds(scheme: Any, config: Any) -> None:
         assert np.linalg.eigvalsh(belief.covariance)[0] > -1e-12
         assert len(info.landmark) == len(measurement)
         assert np.isfinite([info.nis, info.log_evidence, info.ess]).all()
+        way, told = (belief.position - room.start.position)[:2], room.start.velocity[:2]
+        off = told[0] * way[1] - told[1] * way[0]
+        # mirrored course and map give the same delays: the mean is on the line that was told, up to rounding
+        assert abs(off) < 1e-12
     assert info.num_landmarks >= 1
     assert info.outcome == Outcome.OK
     assert len(belief.samples) == config.num_samples
@@ -55,7 +59,7 @@ def test_direct_path_and_wall_returns_are_set_aside(scheme: Any, config: Any) ->
 
 @pytest.mark.parametrize(("scheme", "config"), SCHEMES)
 def test_a_known_height_stays(scheme: Any, config: Any) -> None:
-    """Every particle keeps the height that it was told, exactly."""
+    """The filter keeps the height that it was told, exactly."""
     room, rng = build_room(5, 1), np.random.default_rng(4)
     state = scheme.init(room.start, BODY, None, RADIO, config, rng=rng)
     for measurement in room.measurements:

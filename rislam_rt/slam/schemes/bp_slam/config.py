@@ -53,6 +53,8 @@ class BpSlamConfig:
     """Moving form: detection probability; the panel's paths fade with its codes."""
     wanderers: float = 0.5
     """Moving form: probability that a new weak feature is not a point that stays."""
+    moving_features: int = 60
+    """Moving form: potential features that are kept, the most probable ones."""
     course_stride: int = 40
     """Moving form: cycles from one past state of the agent that is kept to the next."""
     drift_length_std: float = 0.003
@@ -77,6 +79,7 @@ class BpSlamConfig:
             "num_particles",
             "num_pairings",
             "max_features",
+            "moving_features",
             "num_samples",
             "iterations",
             "course_stride",

@@ -5,7 +5,7 @@ is a mixture over its Gaussians, over the ranges that it may have made, over "mi
 multiplied in and the product brought back to one Gaussian of the same mean and covariance.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -14,10 +14,28 @@ from rislam_rt.slam.schemes.bp_slam.association import Association, associate
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
 from rislam_rt.slam.schemes.bp_slam.course import Course
 from rislam_rt.slam.schemes.bp_slam.features import Scan
-from rislam_rt.slam.schemes.bp_slam.sums import Sight, Sums
+from rislam_rt.slam.schemes.bp_slam.sums import Sight, Sums, spread_of
 
 NO_VARIANCE = 1e12
 """Variance [m^2] of a range that tells nothing."""
+
+
+ROUNDS, TOLERANCE = 30, 1e-3
+"""Loopy association ends at this many rounds, or as messages change by less: finer than the sums that it weighs."""
+
+
+class Odds(Protocol):
+    """What a range is weighed against."""
+
+    @property
+    def moving_detection(self) -> float:
+        """Probability that a feature makes a range."""
+        ...
+
+    @property
+    def clutter_density(self) -> float:
+        """Expected false ranges per metre."""
+        ...
 
 
 class Pull(NamedTuple):
@@ -34,46 +52,41 @@ class Pull(NamedTuple):
 def claims(sums: Sums, sight: Sight, course: Course, scan: Scan, fresh: Floats, config: BpSlamConfig) -> Association:
     """Marginals of the association of K features and M ranges."""
     pair = np.zeros((len(sums.ident), len(scan.length)))
-    np.add.at(pair, sums.owner, sums.share[:, None] * _ratios(sight, _spread(sight, course), scan, config))
+    np.add.at(pair, sums.owner, sums.share[:, None] * _ratios(sight.length, spread_of(sight, course), scan, config))
     missed = 1.0 - sums.existence * config.moving_detection
-    return associate(missed, sums.existence[:, None] * pair, fresh, config.iterations, config.tolerance)
+    return associate(missed, sums.existence[:, None] * pair, fresh, ROUNDS, TOLERANCE)
 
 
-def _spread(sight: Sight, course: Course) -> Floats:
-    """Variance (C,) of predicted ranges."""
-    return sight.own + np.sum((sight.by_course @ course.covariance) * sight.by_course, axis=1)
-
-
-def _ratios(sight: Sight, spread: Floats, scan: Scan, config: BpSlamConfig) -> Floats:
+def _ratios(length: Floats, spread: Floats, scan: Scan, odds: Odds) -> Floats:
     """Likelihood ratios (C, M) `p_d f(z) / clutter`."""
     variance = spread[:, None] + scan.std**2
-    square = (scan.length - sight.length[:, None]) ** 2 / variance
-    peak = config.moving_detection / (config.clutter_density * np.sqrt(2.0 * np.pi * variance))
+    square = (scan.length - length[:, None]) ** 2 / variance
+    peak = odds.moving_detection / (odds.clutter_density * np.sqrt(2.0 * np.pi * variance))
     return np.where(square < 60.0, np.exp(-0.5 * square), 0.0) * peak
 
 
-def absorb(
-    sums: Sums, sight: Sight, course: Course, scan: Scan, found: Association, config: BpSlamConfig
-) -> tuple[Sums, Course]:
+def absorb(sums: Sums, sight: Sight, course: Course, scan: Scan, found: Association, odds: Odds) -> tuple[Sums, Course]:
     """Features and course after the ranges, feature by feature, the surest first."""
     ref, edges = course.mean.copy(), np.searchsorted(sums.owner, np.arange(len(sums.ident) + 1))
     existence, share = sums.existence.copy(), sums.share.copy()
     pulls = np.zeros((2, len(sums.owner)))
     for row in np.argsort(-existence, kind="stable"):
         part = slice(edges[row], edges[row + 1])
-        local = Sight(*(column[part] for column in sight))
-        gain = local.by_course @ course.covariance
-        spread = local.own + np.sum(gain * local.by_course, axis=1)
-        seen = local._replace(length=local.length + local.by_course @ (course.mean - ref))
-        near = np.flatnonzero(found.feature[row, :-1] > 1e-4)
-        pull = _pull(seen, spread, Scan(scan.length[near], scan.std[near]), found.to_feature[row, near], config)
+        by_course, own = sight.by_course[part], sight.own[part]
+        gain = by_course @ course.covariance
+        spread = own + np.einsum("cn,cn->c", gain, by_course)
+        seen = sight.length[part] + by_course @ (course.mean - ref)
+        near = (found.feature[row, :-1] > 1e-4).nonzero()[0]
+        pull = _pull(seen, spread, Scan(scan.length[near], scan.std[near]), found.to_feature[row, near], odds)
         weight = share[part] * np.exp(pull.log_factor)
         total = weight.sum()
         existence[row] = existence[row] * total / (existence[row] * total + 1.0 - existence[row])
         share[part] = weight / total
         course = _mix(course, gain, spread + pull.variance, pull.miss, existence[row] * share[part])
-        pulls[:, part] = pull.miss + seen.length - local.length, pull.variance
+        pulls[:, part] = pull.miss + seen - sight.length[part], pull.variance
     inner = np.einsum("cij,cj->ci", sums.covariance, sight.by_mean)
+    # products of the messages are symmetric but for rounding
+    course = course._replace(covariance=0.5 * (course.covariance + course.covariance.T))
     gain = inner / (sight.own + pulls[1])[:, None]
     slope = sums.slope - gain[:, :, None] * sight.by_course[:, None]
     change = course.mean - ref
@@ -89,18 +102,19 @@ def absorb(
     return moved, course
 
 
-def _pull(seen: Sight, spread: Floats, scan: Scan, message: Floats, config: BpSlamConfig) -> Pull:
+def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds) -> Pull:
     """What C Gaussians of one feature learn: moments over the ranges and "missed", as one range."""
-    ratio = _ratios(seen, spread, scan, config) * message
-    none = 1.0 - config.moving_detection
+    ratio = _ratios(seen, spread, scan, odds) * message
+    none = 1.0 - odds.moving_detection
     total = none + ratio.sum(axis=1)
     belief = ratio / total[:, None]
     shrink = spread[:, None] / (spread[:, None] + scan.std**2)
-    shift = shrink * (scan.length - seen.length[:, None])
-    mean = np.sum(belief * shift, axis=1)
-    after = (none / total) * spread + np.sum(belief * (spread[:, None] * (1.0 - shrink) + shift**2), axis=1) - mean**2
+    shift = shrink * (scan.length - seen[:, None])
+    mean = (belief * shift).sum(axis=1)
+    after = (none / total) * spread + (belief * (spread[:, None] * (1.0 - shrink) + shift**2)).sum(axis=1) - mean**2
     told = after < (1.0 - 1e-9) * spread
-    variance = np.where(told, 1.0 / np.where(told, 1.0 / np.maximum(after, 1e-18) - 1.0 / spread, 1.0), NO_VARIANCE)
+    lost = np.where(told, 1.0 - after / spread, 1.0)
+    variance = np.where(told, np.maximum(after, 1e-18) / lost, NO_VARIANCE)
     miss = np.where(told, mean * (spread + variance) / spread, 0.0)
     return Pull(miss, variance, np.log(total))
 
@@ -110,12 +124,12 @@ def _mix(course: Course, gain: Floats, variance: Floats, miss: Floats, weight: F
     rows = np.flatnonzero(weight > 1e-4)
     if not len(rows):
         return course
-    part, weight = gain[rows] / variance[rows, None], weight[rows]
-    shift = part * miss[rows, None]
-    mean = weight @ shift
-    covariance = course.covariance - (part * (weight * variance[rows])[:, None]).T @ part
-    covariance += (shift * weight[:, None]).T @ shift - np.outer(mean, mean)
-    return course._replace(mean=course.mean + mean, covariance=0.5 * (covariance + covariance.T))
+    weight, miss, variance = weight[rows], miss[rows], variance[rows]
+    part = gain[rows] / variance[:, None]
+    mean = (weight * miss) @ part
+    parts = np.concatenate([part, mean[None]])
+    scale = np.concatenate([weight * (miss**2 - variance), [-1.0]])
+    return course._replace(mean=course.mean + mean, covariance=course.covariance + (parts.T * scale) @ parts)
 
 
 def newborn(found: Association, fresh: Floats, config: BpSlamConfig) -> tuple[Integers, Floats]:
@@ -125,6 +139,6 @@ def newborn(found: Association, fresh: Floats, config: BpSlamConfig) -> tuple[In
     return rows, alive[rows]
 
 
-def is_strong(ratio: Floats, config: BpSlamConfig) -> Booleans:
+def is_strong(ratio: Floats, specular_ratio: float | None) -> Booleans:
     """(M,) whether a component is as strong as only a wall return is."""
-    return ratio > (np.inf if config.specular_ratio is None else config.specular_ratio)
+    return ratio > (np.inf if specular_ratio is None else specular_ratio)

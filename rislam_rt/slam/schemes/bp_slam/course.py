@@ -24,6 +24,10 @@ class Course(NamedTuple):
     nominal: Floats
     """(2A W,) the mean as it would be had nothing been measured."""
     axes: int
+    blind: Floats
+    """(2A, 2A) covariance of the present state as it would be had nothing been measured."""
+    start_variance: float
+    """Of the position that was told at the start, per axis [m^2]."""
 
     def turn(self) -> Floats:
         """(2A W,) unit vector: how the states change as all turn about the start, as reckoned before any range.
@@ -57,7 +61,7 @@ def begin(position: Floats, velocity: Floats, position_std: float, velocity_std:
     """The start prior; position and velocity (A,)."""
     std = np.concatenate([np.full(len(position), position_std), np.full(len(velocity), velocity_std)])
     mean = np.concatenate([position, velocity])
-    return Course(mean, np.diag(std**2), mean, len(position))
+    return Course(mean, np.diag(std**2), mean, len(position), np.diag(std**2), position_std**2)
 
 
 def advance(course: Course, dt: float, accelerate: Floats, keep: bool) -> tuple[Course, Step]:
@@ -75,13 +79,14 @@ def advance(course: Course, dt: float, accelerate: Floats, keep: bool) -> tuple[
     mean, nominal = full @ course.mean, full @ course.nominal
     covariance = full @ course.covariance @ full.T
     covariance[:width, :width] += noise
+    moved = course._replace(
+        mean=mean, covariance=covariance, nominal=nominal, blind=move @ course.blind @ move.T + noise
+    )
     if keep:
-        return Course(mean, covariance, nominal, course.axes), Step(
-            np.eye(size + width)[width:], np.zeros((width, width))
-        )
+        return moved, Step(np.eye(size + width)[width:], np.zeros((width, width)))
     kept = np.r_[0:width, 2 * width : size + width]
     step = _regress(course, move, noise)
-    return Course(mean[kept], covariance[np.ix_(kept, kept)], nominal[kept], course.axes), step
+    return moved._replace(mean=mean[kept], covariance=covariance[np.ix_(kept, kept)], nominal=nominal[kept]), step
 
 
 def _regress(course: Course, move: Floats, noise: Floats) -> Step:

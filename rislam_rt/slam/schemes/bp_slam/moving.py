@@ -10,7 +10,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.model import Body, MapEstimate, Measurement, RadioConfig, RisCode, RisSpec, SlamEstimate
+from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec, SlamEstimate
 from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los
 from rislam_rt.slam.schemes.bp_slam.association import Association
@@ -19,7 +19,8 @@ from rislam_rt.slam.schemes.bp_slam.correct import absorb, claims, is_strong, ne
 from rislam_rt.slam.schemes.bp_slam.course import Course, advance, begin
 from rislam_rt.slam.schemes.bp_slam.features import Scan, birth_ratio
 from rislam_rt.slam.schemes.bp_slam.ranges import Bistatic
-from rislam_rt.slam.schemes.bp_slam.sums import POINT, Sight, Sums, born, carry, join, look, no_sums, prune, unit_of
+from rislam_rt.slam.schemes.bp_slam.report import ahead_of, known_points, lift, reported
+from rislam_rt.slam.schemes.bp_slam.sums import Sight, Sums, born, carry, join, look, no_sums, prune, spread_of
 
 NIS_LIMIT = 3.0
 """Running mean of the NIS per degree of freedom above which the filter says that it has diverged."""
@@ -47,9 +48,8 @@ class BpSlamState(NamedTuple):
 
     @property
     def pose(self) -> Floats:
-        """(2, 3) position [m] and velocity [m/s]."""
-        known = self.course.mean[: self.course.width].reshape(2, -1)
-        return known if self.course.axes == 3 else np.concatenate([known, self.height[:, None]], axis=1)
+        """(2, 3) position [m] and velocity [m/s] that the filter works at."""
+        return lift(self.course.mean[: self.course.width], self.height)
 
 
 def init(
@@ -66,7 +66,7 @@ def init(
 
 def predict(state: BpSlamState, dt: float, config: BpSlamConfig) -> SlamEstimate:
     """The belief carried over `dt` [s] without noise."""
-    return estimate(_move(state, dt, np.zeros(state.course.axes), config), config)
+    return ahead_of(estimate(state, config), dt)
 
 
 def _move(state: BpSlamState, dt: float, accelerate: Floats, config: BpSlamConfig) -> BpSlamState:
@@ -94,7 +94,7 @@ def step(
     glance = glance_of(measurement, state.radio)
     free = ~is_los(glance, state.body)
     if not config.planes:
-        free &= ~is_strong(glance.ratio, config)
+        free &= ~is_strong(glance.ratio, config.specular_ratio)
     rows = np.flatnonzero(free)
     scan = Scan(glance.seen[rows, 0], np.maximum(glance.std[rows, 0], config.smallest_std))
     turn = rotation_z(np.asarray(heading))
@@ -107,7 +107,7 @@ def step(
     dof = int((landmark >= 0).sum())
     sums, course = absorb(state.sums, sight, state.course, scan, found, config)
     state = state._replace(sums=sums, course=course)
-    state = _give_birth(state, scan, is_strong(glance.ratio[rows], config), found, fresh, config)
+    state = _give_birth(state, scan, is_strong(glance.ratio[rows], config.specular_ratio), found, fresh, config)
     strain = state.strain + (STRAIN_RATE * (nis / dof - state.strain) if dof else 0.0)
     count = int((state.sums.existence > config.detection_threshold).sum())
     report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, count, _outcome(len(measurement), count, strain))
@@ -126,23 +126,14 @@ def _give_birth(
             config.birth_turns, state.next_ident,
         )  # fmt: skip
         sums = join(sums, new)
-    sums = prune(sums, config.pruning_threshold, config.share_threshold, config.max_features)
+    sums = prune(sums, config.pruning_threshold, config.share_threshold, config.moving_features)
     return state._replace(sums=sums, next_ident=state.next_ident + len(rows))
 
 
 def estimate(state: BpSlamState, config: BpSlamConfig) -> SlamEstimate:
     """Mean and covariance of the pose, samples of it, and the detected features as points of the map."""
-    position, velocity = state.pose
-    axes, width = state.course.axes, state.course.width
-    rows = np.r_[0:axes, 3 : 3 + axes]
-    covariance = np.zeros((6, 6))
-    covariance[np.ix_(rows, rows)] = state.course.covariance[:width, :width]
-    # the same draws in every cycle: the samples move smoothly, and nothing depends on who drew before
-    draws = np.random.default_rng(0).standard_normal((config.num_samples, 3))
-    value, vector = np.linalg.eigh(covariance[:3, :3])
-    samples = position + draws @ (vector * np.sqrt(np.maximum(value, 0.0))).T
-    samples[:, axes:] = position[axes:]
-    return SlamEstimate(position, velocity, state.heading, covariance, samples, state.body, _map(state.sums, config))
+    found = known_points(state.sums, config.detection_threshold)
+    return reported(state.course, state.height, state.heading, state.body, found, config.num_samples)
 
 
 def _claimed(
@@ -152,42 +143,12 @@ def _claimed(
     sums, numbers = state.sums, np.full(len(scan.length), UNUSED)
     feature, shown = np.nonzero((found.feature[:, :-1] > 0.5) & (sums.existence > config.detection_threshold)[:, None])
     numbers[shown] = sums.ident[feature]
-    spread = sight.own + np.sum((sight.by_course @ state.course.covariance) * sight.by_course, axis=1)
+    spread = spread_of(sight, state.course)
     count = len(sums.ident)
     mean = np.bincount(sums.owner, sums.share * sight.length, minlength=count)
     second = np.bincount(sums.owner, sums.share * (spread + (sight.length - mean[sums.owner]) ** 2), minlength=count)
     nis = np.sum((scan.length[shown] - mean[feature]) ** 2 / (second[feature] + scan.std[shown] ** 2))
     return numbers, float(nis)
-
-
-def _map(sums: Sums, config: BpSlamConfig) -> MapEstimate:
-    """Features that exist and are rather points than walls or wanderers, with mean and covariance of their sums."""
-    count = len(sums.ident)
-    point = sums.kind == POINT
-    held = np.bincount(sums.owner[point], sums.share[point], minlength=count)
-    shown = np.flatnonzero((sums.existence > config.detection_threshold) & (held > 0.5))
-    mean, covariance = np.zeros((len(shown), 3)), np.zeros((len(shown), 3, 3))
-    for number, row in enumerate(shown):
-        part = np.flatnonzero((sums.owner == row) & point)
-        share = sums.share[part] / held[row]
-        place = sums.base[row] + sums.mean[part, :1] * unit_of(sums.mean[part], sums.walk[row], sums.speed[row])
-        mean[number] = share @ place
-        apart = place - mean[number]
-        covariance[number] = (apart * share[:, None]).T @ apart
-        for one, weight in zip(part, share, strict=True):
-            jacobian = _jacobian(sums.mean[one], sums.walk[row], float(sums.speed[row]))
-            covariance[number] += weight * jacobian @ sums.covariance[one] @ jacobian.T
-    return MapEstimate(
-        sums.ident[shown], mean, covariance, np.full(len(shown), -1), np.zeros(len(shown)), np.zeros(len(shown)),
-        np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2)),
-    )  # fmt: skip
-
-
-def _jacobian(mean: Floats, walk: Floats, usual: float) -> Floats:
-    """(3, 3) derivatives of the place, rows, by the numbers of a Gaussian."""
-    step = 1e-6 * np.concatenate([np.eye(3), -np.eye(3)])
-    place = (mean + step)[:, :1] * unit_of(mean + step, walk, np.asarray(usual))
-    return np.asarray((place[:3] - place[3:]).T / 2e-6)
 
 
 def _outcome(num_measurements: int, num_features: int, strain: float) -> Outcome:

@@ -156,6 +156,11 @@ def look(sums: Sums, course: Course, place: Floats, model: Bistatic) -> Sight:
     return Sight(seen[0] + 0.5 * bend.sum(axis=1), by_mean, by_course, own)
 
 
+def spread_of(sight: Sight, course: Course) -> Floats:
+    """Variance (C,) of predicted ranges [m^2]."""
+    return np.asarray(sight.own + np.sum((sight.by_course @ course.covariance) * sight.by_course, axis=1))
+
+
 def born(
     length: Floats, std: Floats, kinds: Floats, existence: Floats, course: Course, place: Floats, turns: int,
     first: int,
