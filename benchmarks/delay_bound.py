@@ -30,8 +30,8 @@ from rislam_rt.pipeline.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[1]
-PLACE_STD, TILT_STD = 10.0, 0.5
-"""Of an unknown point or offset [m], and of an unknown tilt [rad], beforehand."""
+PLACE_STD, TILT_STD = 200.0, 10.0
+"""Of an unknown point or offset [m], and of an unknown tilt [rad], beforehand: so wide that no direction is told."""
 
 
 class Columns:
