@@ -30,14 +30,14 @@ def genetic_search(
     element = np.arange(num_elements)
     children = np.empty((2 * pairs, num_elements), dtype=population.dtype)
     for generation in range(config.iterations):
-        wheel = np.cumsum(1.0 / value)
-        parent = population[np.minimum(np.searchsorted(wheel, spin[generation] * wheel[-1]), size - 1)]
+        wheel = (1.0 / value).cumsum()
+        parent = population[np.minimum(wheel.searchsorted(spin[generation] * wheel[-1]), size - 1)]
         first, second, swap = parent[:pairs], parent[pairs:], element >= cuts[generation]
         children[:pairs] = np.where(swap, second, first)
         children[pairs:] = np.where(swap, first, second)
         now = slice(bounds[generation], bounds[generation + 1])
         children.ravel()[place[now] - generation * children.size] = gene[now]
-        fittest = np.argsort(value, kind="stable")[:elite]
+        fittest = value.argsort(kind="stable")[:elite]
         population = np.concatenate([population[fittest], children])
         value = np.concatenate([value[fittest], objective.of_index(children)])
         history[generation + 1] = value.min()

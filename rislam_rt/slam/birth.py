@@ -8,7 +8,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Body
 from rislam_rt.slam.associate import squared_distance
-from rislam_rt.slam.book import Book, enter
+from rislam_rt.slam.book import Book, enter, named_panel
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.hypotheses import (
     IMAGE,
@@ -159,7 +159,7 @@ def examine(
         history, slots = track_history(tracks, row, past, doubt, free_space)
         if is_explained(tracks, row, history, scene):
             continue
-        if not (book.ris_probability > 0.5).any():
+        if not named_panel(book):
             history = history._replace(panel=panel_surplus(float(tracks.log_ris[row])))
         verdict = judge_wall(history, scene) if tracks.specular[row] else judge(history, scene)
         if verdict is None:

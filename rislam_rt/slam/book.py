@@ -90,6 +90,11 @@ def empty_book() -> Book:
     )
 
 
+def named_panel(book: Book) -> bool:
+    """Whether a landmark is held for the panel: its probability is above one half."""
+    return bool((book.ris_probability > 0.5).any())
+
+
 def enter(book: Book, is_wall: bool, anchor: Floats, founder: int) -> Book:
     """The book with one more feature, in the last row."""
     flat = np.full((1, len(STRENGTHS)), -np.log(len(STRENGTHS)))

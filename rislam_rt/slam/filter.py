@@ -11,7 +11,7 @@ from rislam_rt.geometry.angles import wrap
 from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec
 from rislam_rt.slam.associate import associate
 from rislam_rt.slam.birth import Past, examine
-from rislam_rt.slam.book import Book, empty_book, strike
+from rislam_rt.slam.book import Book, empty_book, named_panel, strike
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.engine import Told, engine_of
 from rislam_rt.slam.expect import Belief, expected_returns
@@ -155,7 +155,8 @@ def step(
     landmark[free[taken]] = names
     tracks, removed = _follow(state, _rates(moments), tracks, glance, picks, num_returns, config)
     landmark[free[removed]] = REMOVED
-    tracks = weigh_tracks(tracks, belief, code, config.detection_snr)
+    if not named_panel(book):  # once it is known, no track needs to be it
+        tracks = weigh_tracks(tracks, belief, code, config.detection_snr)
     state = _tidy(state._replace(tracks=tracks, book=book), outlook, belief, config, rng=rng)
 
     engine = engine_of(config)

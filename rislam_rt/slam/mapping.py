@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
-from rislam_rt.slam.book import Book
+from rislam_rt.slam.book import Book, named_panel
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.filter import FilterState, believed
 from rislam_rt.slam.moments import POSE, Moments, even_draws, square_root
@@ -27,7 +27,7 @@ def estimate(state: FilterState, config: SlamConfig, moments: Moments | None = N
     """Mean and covariance of the pose, equally likely samples of it, and the map."""
     moments = believed(state) if moments is None else moments
     root = square_root(moments.covariance[:3, :3])
-    named = (state.book.ris_probability > 0.5).any()
+    open_question = state.ris is not None and not named_panel(state.book)
     return SlamEstimate(
         moments.position,
         moments.velocity,
@@ -36,7 +36,7 @@ def estimate(state: FilterState, config: SlamConfig, moments: Moments | None = N
         moments.position + even_draws(config.num_samples, root.shape[1]) @ root.T,
         state.body,
         build_map(moments, state.book),
-        find_suspect(state.tracks, state.book, moments, state.body) if state.ris is not None and not named else None,
+        find_suspect(state.tracks, state.book, moments, state.body) if open_question else None,
     )
 
 
