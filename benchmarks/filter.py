@@ -1,11 +1,12 @@
 """How fast are the filters, what does the nested one need, and how does it grow?
 
 Four questions: time of the default filter for 600 cycles of the paper's room, against those 60 s; particle updates a
-second of the nested one against plain numpy (in blocks that fit the cache) and against the machine's copy bandwidth; its
-time and memory in a run at the paper's scale (2000 agent particles, 6000 of each landmark for each of them), from a
-stated number of measured cycles; and the time of its cycle against each of the three numbers, as a figure.
-But for the first, times are of the processor, over all threads, so that other programs on the machine count little; with `t` threads and
-an idle machine the clock shows about one t-th. Run: `RISLAM_RT_THREADS=2 python benchmarks/filter.py`.
+second of the nested one against plain numpy (in blocks that fit the cache) and against the machine's copy bandwidth;
+its time and memory in a run at the paper's scale (2000 agent particles, 6000 of each landmark for each of them), from
+a stated number of measured cycles; and the time of its cycle against each of the three numbers, as a figure. But for
+the first, times are of the processor, over all threads, so that other programs on the machine count little; with `t`
+threads and an idle machine the clock shows about one t-th.
+Run: `RISLAM_RT_THREADS=2 python benchmarks/filter.py`.
 """
 
 import argparse
