@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.tracks import Glance
+from rislam_rt.slam.tracks import Glance, same_side
 
 DIAGONAL = np.arange(3)
 
@@ -24,6 +24,8 @@ class Candidates(NamedTuple):
     """(C,)."""
     log_odds: Floats
     """(C,) logarithm of the probability that it shows at all."""
+    side: Integers
+    """(C,) (see `tracks.Glance`)."""
 
 
 def associate(candidates: Candidates, glance: Glance, gate: float, clutter_density: float) -> Integers:
@@ -48,7 +50,8 @@ def pair_costs(candidates: Candidates, glance: Glance, gate: float, clutter_dens
     noise[:, DIAGONAL, DIAGONAL] = glance.std**2
     variance = candidates.log_amplitude_std[:, None] ** 2 + glance.log_amplitude_std**2
     fade = (glance.log_amplitude - candidates.log_amplitude[:, None]) ** 2 / variance
-    pairs = near_pairs(candidates.seen, candidates.covariance, glance.seen, noise, fade < gate, gate)
+    allowed = (fade < gate) & same_side(candidates.side, glance.sides)
+    pairs = near_pairs(candidates.seen, candidates.covariance, glance.seen, noise, allowed, gate)
     at = pairs.row, pairs.column
     cost = pairs.distance + fade[at] + pairs.log_det + np.log(variance[at]) + 4.0 * np.log(2.0 * np.pi)
     cost += 2.0 * np.log(clutter_density) - 2.0 * candidates.log_odds[pairs.row]

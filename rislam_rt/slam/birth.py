@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Body
 from rislam_rt.slam.associate import squared_distance
@@ -26,14 +26,13 @@ from rislam_rt.slam.hypotheses import (
     plausible,
 )
 from rislam_rt.slam.identity import DOUBT, panel_surplus
-from rislam_rt.slam.match import Outlook, explained, hidden_tracks
+from rislam_rt.slam.match import Outlook, explained
 from rislam_rt.slam.mirrors import is_behind_mirror, mirror_images
 from rislam_rt.slam.moments import Moments, poses_of, square_root
 from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe
-from rislam_rt.slam.tracks import Tracks
+from rislam_rt.slam.tracks import PANEL, UNTOLD, Tracks, same_side
+from rislam_rt.slam.turns import PARALLEL, due_tracks
 
-STRIDE = 4
-"""Tracks are examined every so many measurements, and four times less often once their history is full."""
 MAX_POINT_STD = 0.2
 """Largest standard deviation [m] of a new point along its worst axis."""
 MAX_WALL_STD = 0.3
@@ -46,14 +45,10 @@ MOVING_RATIO, MOVING_SPREAD = np.log(0.6), 0.7
 """Log amplitude, over that of free space, expected of wall returns, and its standard deviation."""
 WALL_CYCLES = 20
 """Cycles of history that a wall needs: two legs leave more room for error than one."""
-ELDER_CYCLES = 6
-"""Cycles of history from which on a track keeps longer and weaker ones waiting."""
 PARENT_HITS = 10
 """Measurements of a point before walls are found by it."""
 MIRROR_MARGIN = 0.1
 """Distance [m], beside twice the point's own error, by which it must lie nearer to an image of the agent."""
-PARALLEL = 4.0
-"""Standard deviations (and 0.02) within which a track's direction is that of a known leg."""
 
 
 class Verdict(NamedTuple):
@@ -176,34 +171,6 @@ def examine(
     return -1, tracks._replace(moving=moving), None
 
 
-def due_tracks(tracks: Tracks, outlook: Outlook, cycle: int, config: SlamConfig) -> Integers:
-    """Tracks to examine now, the shortest first: an image lies behind its point, and is weaker.
-
-    So a track has to wait while another that is shorter and stronger is still unexplained.
-    """
-    ready = (~tracks.specular | config.use_vt) & (tracks.length >= config.birth_cycles) & (tracks.misses == 0)
-    oldest = np.min(np.where(tracks.cycle >= 0, tracks.cycle, cycle), axis=1)
-    growing = cycle - oldest < config.window - 1
-    turn = np.where(growing, tracks.length % STRIDE == 0, (np.arange(len(ready)) + cycle) % (4 * STRIDE) == 0)
-    if not (ready & turn).any():
-        return np.zeros(0, dtype=np.int64)
-    hidden = hidden_tracks(outlook, tracks, config.gate)
-    alive = ~tracks.specular & ~hidden & (tracks.length >= ELDER_CYCLES) & (tracks.misses <= 2)
-    length = tracks.mean[:, 0, 0]
-    stronger = tracks.log_amplitude[None] > tracks.log_amplitude[:, None] + 0.1
-    elder = (length[None] < length[:, None] - 0.05) & (stronger | _aligned(tracks))
-    waits = (elder & alive[None]).any(axis=1) & growing & ~tracks.specular
-    rows = (ready & turn & ~waits).nonzero()[0]
-    return rows[np.argsort(tracks.mean[rows, 0, 0])]
-
-
-def _aligned(tracks: Tracks) -> Booleans:
-    """(T, T) whether two tracks come from one direction: the longer is likely the shorter over a wall on the Tx leg."""
-    gap = np.abs(tracks.mean[None, :, 1:, 0] - tracks.mean[:, None, 1:, 0])
-    variance = tracks.covariance[..., 1:, 0, 0]
-    return np.asarray((gap < PARALLEL * np.sqrt(variance[None] + variance[:, None] + 0.02**2)).all(axis=-1))
-
-
 def track_history(tracks: Tracks, row: int, past: Past, doubt: Floats, free_space: float) -> tuple[History, Integers]:
     """A track's measurements with the mean believed poses, and the rows of the past that they belong to.
 
@@ -213,13 +180,14 @@ def track_history(tracks: Tracks, row: int, past: Past, doubt: Floats, free_spac
     poses = poses_of(past.position[rows], past.heading[rows], past.body)
     lag = past.time[past.cycle % len(past.time)] - past.time[rows]
     ratio = float(tracks.log_amplitude[row] - free_space + np.log(tracks.mean[row, 0, 0]))
-    return History(tracks.seen[row, rows], tracks.std[row, rows], poses, lag, ratio, doubt), rows
+    seen, std = tracks.seen[row, rows], tracks.std[row, rows]
+    return History(seen, std, poses, lag, ratio, doubt, side=int(tracks.side[row])), rows
 
 
 def is_explained(tracks: Tracks, row: int, history: History, scene: Scene) -> bool:
     """Whether a return of the map runs along the track's whole history."""
     covariance = np.diag(tracks.covariance[row, :, 0, 0] + np.mean(history.std**2, axis=0))
-    near = explained(scene.outlook, tracks.mean[row, :, 0], covariance, scene.config.gate)
+    near = explained(scene.outlook, tracks.mean[row, :, 0], covariance, scene.config.gate, history.side)
     if not len(near):
         return False
     returns = compact(scene.outlook.expected.returns, near)
@@ -232,9 +200,11 @@ def is_explained(tracks: Tracks, row: int, history: History, scene: Scene) -> bo
 def judge(history: History, scene: Scene) -> Verdict | None:
     """The hypothesis that explains the history, if one does and no other comes near."""
     margin, verdicts = scene.config.birth_margin, _points(history, scene)
-    if len(history.seen) < WALL_CYCLES and not _promising(verdicts, history, scene):
+    if len(history.seen) < WALL_CYCLES and not (verdicts and _promising(verdicts, history, scene)):
         return None
     verdicts += _images(history, scene)
+    if not verdicts:
+        return None
     best, clear = _best(verdicts, history, margin)
     if not clear and not _floor_wanted(history, scene):
         return None
@@ -247,7 +217,7 @@ def judge(history: History, scene: Scene) -> Verdict | None:
         return best
     if best.kind is POINT:
         return best if _is_fit_point(best, scene) else None
-    ready = len(history.seen) >= WALL_CYCLES and best.parent in _established(scene.book)
+    ready = len(history.seen) >= WALL_CYCLES and best.parent in _established(scene.book, history.side)
     return best if _sharp(best) and ready else None
 
 
@@ -301,9 +271,10 @@ def _worst_std(verdict: Verdict) -> float:
 
 
 def _points(history: History, scene: Scene) -> list[Verdict]:
-    """A static point, and a moving image."""
+    """A static point, and a moving image; over the panel there are no moving images, and it is one point alone."""
     verdicts = []
-    for kind in (POINT, MOVING):
+    kinds = (POINT, MOVING) if history.side != PANEL else () if named_panel(scene.book) else (POINT,)
+    for kind in kinds:
         start = first_guess(kind, None, scene.anchor, history)
         if start is not None:
             fit = fit_feature(kind, start, None, scene.anchor, history, 6)
@@ -316,7 +287,10 @@ def _images(history: History, scene: Scene) -> list[Verdict]:
     """The image of each known point in a new wall on the Rx leg."""
     verdicts = []
     for kind in (IMAGE, TWIN):
-        starts = {int(p): first_guess(kind, scene.features[p], scene.anchor, history) for p in scene.book.points}
+        starts = {
+            int(p): first_guess(kind, scene.features[p], scene.anchor, history)
+            for p in _sources(scene.book, history.side)
+        }
         good = {p: start for p, start in starts.items() if start is not None}
         if kind is TWIN:  # a wall far from throwing both into one cell is not worth a fit
             good = {p: start for p, start in good.items() if _one_cell(start, scene.features[p], scene, history, 2.0)}
@@ -330,6 +304,14 @@ def _images(history: History, scene: Scene) -> list[Verdict]:
     return verdicts
 
 
+def _sources(book: Book, side: int) -> Integers:
+    """Points whose paths are on one side: those that may be the panel, or may not."""
+    points = book.points
+    if side == UNTOLD or not named_panel(book):
+        return points[:0] if side == PANEL else points
+    return points[(points == int(np.argmax(book.log_ris))) == (side == PANEL)]
+
+
 def _one_cell(wall: Floats, parent: Floats, scene: Scene, history: History, cells: float) -> bool:
     """Whether a wall would throw both its returns within so many resolution cells, halfway through the history."""
     middle = len(history.seen) // 2
@@ -338,9 +320,10 @@ def _one_cell(wall: Floats, parent: Floats, scene: Scene, history: History, cell
     return bool(np.all(np.abs(seen[0] - seen[1]) < cells * scene.outlook.cell))
 
 
-def _established(book: Book) -> Integers:
-    """Points that are known well enough to be looked for in mirrors."""
-    return book.points[book.hits[book.points] >= PARENT_HITS]
+def _established(book: Book, side: int) -> Integers:
+    """Points of a side that are known well enough to be looked for in mirrors."""
+    points = _sources(book, side)
+    return points[book.hits[points] >= PARENT_HITS]
 
 
 def _reciprocal_cost(history: History, scene: Scene) -> float:
@@ -349,7 +332,8 @@ def _reciprocal_cost(history: History, scene: Scene) -> float:
     What arrives from where something is already known to be, only later, is most likely the same thing over a wall.
     """
     returns = scene.outlook.expected.returns
-    rows = np.unique(returns.rx[returns.point != TX]) if len(returns.tx) else np.zeros(0, dtype=np.int64)
+    known = (returns.point != TX) & same_side(np.array([history.side]), scene.outlook.side)[0]
+    rows = np.unique(returns.rx[known]) if len(returns.tx) else np.zeros(0, dtype=np.int64)
     if not len(rows):
         return np.inf
     poses = history.poses
@@ -376,7 +360,9 @@ def _floor(history: History, scene: Scene, rival: float) -> Verdict | None:
     """The floor under a known point, if it fits as well as any wall that one could choose freely."""
     if not _floor_wanted(history, scene):
         return None
-    fits = [(int(p), fit_floor(scene.features[p], scene.anchor, history)) for p in _established(scene.book)]
+    fits = [
+        (int(p), fit_floor(scene.features[p], scene.anchor, history)) for p in _established(scene.book, history.side)
+    ]
     verdicts = [Verdict(RECIPROCAL, parent, fit) for parent, fit in fits if fit is not None]
     if not verdicts:
         return None

@@ -23,7 +23,7 @@ from rislam_rt.slam.prune import keepers
 from rislam_rt.slam.returns import Poses, compact
 from rislam_rt.slam.sift import sift
 from rislam_rt.slam.suspect import weigh_tracks
-from rislam_rt.slam.tracks import Glance, Tracks, advance, begin, extend, no_tracks
+from rislam_rt.slam.tracks import OTHER, PANEL, Glance, Tracks, advance, begin, extend, no_tracks
 
 LOS_MARGIN = 0.1
 """Length [m] beyond the baseline below which a component is the direct path: no landmark can be that near."""
@@ -132,12 +132,12 @@ def step(
     # by delay and direction, so that nothing (whose turn it is, ties) hangs on the order of the report
     order = np.lexsort(glance.seen.T[::-1])
     free = order[landmark[order] == UNUSED]
-    glance = Glance._make(field[free] for field in glance)
+    glance = glance.take(free)
     moments = believed(state)
     belief = Belief(moments.features, state.book, _poses(state, moments), state.body, state.radio, state.ris)
     expected = expected_returns(belief, code, config.max_bounces, config.detection_snr, config.use_vt)
     tracks = advance(state.tracks, dt, state.cycle, _bend(moments))
-    outlook = look_ahead(belief, expected, moments, tracks)
+    outlook = look_ahead(belief, expected, moments, tracks, glance.side is not None)
     hidden = hidden_tracks(outlook, tracks, config.gate)
     picks = associate(candidates(outlook, tracks, hidden), glance, config.gate, config.clutter_density)
 
@@ -230,7 +230,7 @@ def _follow(
     config: SlamConfig,
 ) -> tuple[Tracks, Integers]:
     """Tracks extended, begun and ended; and which measurements were taken for wall returns."""
-    bright = glance.ratio > config.specular_ratio
+    bright = (glance.ratio > config.specular_ratio) & (glance.sides != PANEL)
     kept = (picks[num_returns:] >= 0).nonzero()[0]
     used = picks[num_returns:][kept]
     tracks = extend(tracks, kept, glance, used, bright, state.cycle)
@@ -259,6 +259,7 @@ def glance_of(measurement: Measurement, radio: RadioConfig) -> Glance:
         np.minimum(measurement.amplitude_std / amplitude, 1.0),
         np.clip(measurement.amplitude_std, 1e-30, 1e30),
         amplitude / free,
+        None if measurement.from_panel is None else np.where(measurement.from_panel, PANEL, OTHER),
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z, unit
 from rislam_rt.slam.returns import AXES, NONE, TX, Poses, Returns, linearise, reflect
+from rislam_rt.slam.tracks import UNTOLD
 
 POINT = Returns(np.array([[0, NONE, NONE]]), np.array([0]), np.array([0]))
 """A static point; the feature sought is row 0."""
@@ -64,6 +65,8 @@ class History(NamedTuple):
     no columns where the poses are taken as certain."""
     panel: float = 0.0
     """By how much chi^2 its amplitudes speak for a point (see `identity.panel_surplus`)."""
+    side: int = UNTOLD
+    """Whether it runs over the panel (see `tracks.Glance`)."""
 
     @property
     def pose_doubt(self) -> Floats:

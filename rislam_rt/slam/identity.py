@@ -18,6 +18,8 @@ MODEL_ERROR = 0.05
 """Relative error of predicted amplitudes: geometry, and what the amplitude law leaves out."""
 DOUBT = 4.0
 """Largest log-likelihood ratio that one cycle may add, so that one freak amplitude decides nothing."""
+TOLD = 2.0
+"""Log-likelihood ratio for the panel of a component that only the panel's paths can cause: it may come over walls."""
 SHOWN = 0.9
 """Probability that a path above the threshold is reported at all: others may shade it or merge with it."""
 MAX_PANEL_ODDS = 8.0

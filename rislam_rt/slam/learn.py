@@ -10,6 +10,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.slam.book import Book, image_idents, learn_ratio
 from rislam_rt.slam.expect import Belief, Expected
 from rislam_rt.slam.identity import (
+    TOLD,
     add_evidence,
     amplitude_floor,
     log_panel,
@@ -21,7 +22,7 @@ from rislam_rt.slam.identity import (
 from rislam_rt.slam.match import Outlook
 from rislam_rt.slam.moments import Moments, poses_of, square_root
 from rislam_rt.slam.returns import NONE, TX, Returns, compact, observe
-from rislam_rt.slam.tracks import Glance
+from rislam_rt.slam.tracks import OTHER, PANEL, Glance
 
 BELIEF_SAMPLES = 24
 """Samples of the belief over which the panel's predicted gain is averaged."""
@@ -76,7 +77,8 @@ def learn(
         direct = compact(expected.returns, hits.row[plain])
         pick = hits.pick[plain]
         amplitude = np.exp(glance.log_amplitude[pick])
-        book = _weigh(book, belief, moments, direct, amplitude, glance.amplitude_std[pick], code, rng=rng)
+        told = glance.sides[pick]
+        book = _weigh(book, belief, moments, direct, amplitude, glance.amplitude_std[pick], told, code, rng=rng)
     silent = (expected.bounces == 0) & ~outlook.merger.outshone & (outlook.merger.partner < 0)
     silent[hits.row] = False
     if silent.any() and belief.ris is not None and code is not None:
@@ -118,6 +120,7 @@ def _weigh(
     direct: Returns,
     amplitude: Floats,
     std: Floats,
+    side: Integers,
     code: RisCode | None,
     *,
     rng: np.random.Generator,
@@ -129,8 +132,9 @@ def _weigh(
     panel: Floats = np.full(len(points), -np.inf)
     if belief.ris is not None and code is not None:
         gain = _sampled_gains(belief, moments, points, code, rng=rng)
-        panel = log_panel(amplitude, std, gain)
+        panel = np.where(side == OTHER, -np.inf, log_panel(amplitude, std, gain))
     grid, log_ris = add_evidence(book.log_grid[points], book.log_ris[points], scatterer, panel)
+    log_ris += np.where(side == PANEL, TOLD, 0.0)
     grids, all_ris = book.log_grid.copy(), book.log_ris.copy()
     grids[points], all_ris[points] = grid, np.clip(log_ris, -CERTAIN, CERTAIN)
     if belief.ris is None:

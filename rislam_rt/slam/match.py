@@ -8,10 +8,11 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import RadioConfig
 from rislam_rt.slam.associate import DIAGONAL, Candidates, near_pairs, squared_distance
+from rislam_rt.slam.book import Book, named_panel
 from rislam_rt.slam.expect import Belief, Expected
 from rislam_rt.slam.moments import POSE, Moments
-from rislam_rt.slam.returns import TX, linearise
-from rislam_rt.slam.tracks import AMPLITUDE_WANDER, Tracks
+from rislam_rt.slam.returns import TX, Returns, linearise
+from rislam_rt.slam.tracks import AMPLITUDE_WANDER, OTHER, PANEL, UNTOLD, Tracks, same_side
 
 INSIDE, OUTSIDE = 0.9, 1.1
 """Gap in units of the resolution cell below which two paths certainly, and above which they certainly do not, merge."""
@@ -19,6 +20,8 @@ TWIN_GAIN, TWIN_SPREAD = 0.2, 0.6
 """Mean and standard deviation of the log amplitude of two equal paths of random phase, over that of one."""
 PROVEN_HITS = 80
 """Measurements of a wall by the point it was found by, before images of other points in it may move the belief."""
+SURE = 8.0
+"""Log odds from which on the panel's landmark is held to have the panel's returns, and no other."""
 LANDMARK_ODDS, TRACK_ODDS, HIDDEN_ODDS = np.log(0.9), np.log(0.5), np.log(0.01)
 """Log probability that an expected return, a track, and a track where the map expects a return, shows in a cycle."""
 
@@ -53,10 +56,12 @@ class Outlook(NamedTuple):
     merger: Merger
     cell: Floats
     """(3,) resolution cell."""
+    side: Integers
+    """(R,) (see `tracks.Glance`)."""
 
 
-def look_ahead(belief: Belief, expected: Expected, moments: Moments, tracks: Tracks) -> Outlook:
-    """Predicted returns with their uncertainty."""
+def look_ahead(belief: Belief, expected: Expected, moments: Moments, tracks: Tracks, apart: bool = False) -> Outlook:
+    """Predicted returns with their uncertainty; `apart`: the receiver sets the panel's returns apart."""
     returns, book = expected.returns, belief.book
     linear = linearise(returns, belief.features, book.anchor, belief.poses)
     seen, by_feature = linear.seen, linear.by_feature
@@ -64,7 +69,10 @@ def look_ahead(belief: Belief, expected: Expected, moments: Moments, tracks: Tra
     flat[..., :3], flat[..., 6] = linear.by_pose, linear.by_heading(belief.poses, moments.position)
     flat[..., POSE:] = by_feature.reshape(len(seen), 3, 3 * len(book.ident))
     cell = resolution_cell(belief.radio)
-    merger = merge_returns(seen, expected, tracks, cell)
+    side, likely = (
+        return_sides(returns, book, odds) if apart else np.full(len(seen), UNTOLD) for odds in (SURE, -np.inf)
+    )
+    merger = merge_returns(seen, expected, tracks, cell, likely)
     both = (merger.partner >= 0).nonzero()[0]
     log_amplitude, log_amplitude_std = expected.log_amplitude.copy(), expected.log_amplitude_std.copy()
     log_amplitude[both] += TWIN_GAIN
@@ -74,7 +82,15 @@ def look_ahead(belief: Belief, expected: Expected, moments: Moments, tracks: Tra
     spread = (flat.reshape(-1, flat.shape[-1]) @ moments.covariance).reshape(flat.shape)
     covariance = spread @ np.swapaxes(flat, 1, 2)
     measures = expected.founding | ((expected.bounces == 1) & (book.hits[expected.owner] >= PROVEN_HITS))
-    return Outlook(expected, seen, covariance, log_amplitude, log_amplitude_std, measures, merger, cell)
+    return Outlook(expected, seen, covariance, log_amplitude, log_amplitude_std, measures, merger, cell, side)
+
+
+def return_sides(returns: Returns, book: Book, odds: float) -> Integers:
+    """(R,) which returns run over the panel, once that is named and its log odds are above `odds`."""
+    point = returns.point
+    if not (named_panel(book) and book.log_ris.max() > odds):
+        return np.where(point == TX, OTHER, UNTOLD)
+    return np.where(point == int(np.argmax(book.log_ris)), PANEL, OTHER)
 
 
 def resolution_cell(radio: RadioConfig) -> Floats:
@@ -84,7 +100,7 @@ def resolution_cell(radio: RadioConfig) -> Floats:
     return np.array([SPEED_OF_LIGHT / radio.bandwidth, *beams])
 
 
-def merge_returns(seen: Floats, expected: Expected, tracks: Tracks, cell: Floats) -> Merger:
+def merge_returns(seen: Floats, expected: Expected, tracks: Tracks, cell: Floats, side: Integers) -> Merger:
     """Foresee what the receiver cannot resolve: from the strongest down, each takes in all that is in its cell.
 
     What comes out lies at `Re sum alpha_i conj(alpha) z_i / |alpha|^2`. With phases that change by a turn every half
@@ -99,6 +115,8 @@ def merge_returns(seen: Floats, expected: Expected, tracks: Tracks, cell: Floats
     for axis in (place / cell).T:  # axis by axis: half the time of one three-dimensional array
         np.maximum(reach, np.abs(axis - axis[:, None]), out=reach)
     np.fill_diagonal(reach, np.inf)
+    sides = np.append(side, tracks.side[shiny])
+    reach[~same_side(sides, sides)] = np.inf
     inside, around = reach < INSIDE, (reach < OUTSIDE) & (surplus <= 0.0)
     partner, taken, leads = np.full(count, -1), np.zeros(len(strength), bool), np.ones(len(strength), bool)
     crowded = np.flatnonzero((reach < 1.0).any(axis=1))
@@ -135,6 +153,7 @@ def candidates(outlook: Outlook, tracks: Tracks, hidden: Booleans) -> Candidates
         np.concatenate([outlook.log_amplitude, tracks.log_amplitude]),
         np.concatenate([outlook.log_amplitude_std, wander]),
         np.concatenate([np.where(outlook.merger.absorbed, -1e6, LANDMARK_ODDS), odds]),
+        np.concatenate([outlook.side, tracks.side]),
     )
 
 
@@ -155,6 +174,7 @@ def hidden_tracks(outlook: Outlook, tracks: Tracks, gate: float) -> Booleans:
     fade = np.abs(tracks.log_amplitude[:, None] - outlook.log_amplitude)
     alike = fade < 3.0 * np.hypot(outlook.log_amplitude_std, 0.3)
     alike &= ~tracks.specular[:, None] | (outlook.expected.returns.point == TX)
+    alike &= same_side(tracks.side, outlook.side)
     spread = outlook.covariance.copy()
     spread[:, DIAGONAL, DIAGONAL] += outlook.merger.disturbance**2
     pairs = near_pairs(tracks.mean[..., 0], track_covariance(tracks), outlook.seen, spread, alike, gate)
@@ -163,7 +183,7 @@ def hidden_tracks(outlook: Outlook, tracks: Tracks, gate: float) -> Booleans:
     return hidden
 
 
-def explained(outlook: Outlook, seen: Floats, covariance: Floats, gate: float) -> Integers:
-    """Returns within the gate of one prediction (3,) with covariance (3, 3), whatever their strength."""
+def explained(outlook: Outlook, seen: Floats, covariance: Floats, gate: float, side: int = UNTOLD) -> Integers:
+    """Returns of a side within the gate of one prediction (3,) with covariance (3, 3), whatever their strength."""
     distance, _ = squared_distance(seen - outlook.seen, outlook.covariance + covariance)
-    return (distance < gate).nonzero()[0]
+    return ((distance < gate) & same_side(np.array([side]), outlook.side)[0]).nonzero()[0]

@@ -11,6 +11,7 @@ from rislam_rt.model import Body, RisCode, Suspect
 from rislam_rt.slam.book import Book
 from rislam_rt.slam.expect import Belief
 from rislam_rt.slam.identity import (
+    TOLD,
     add_evidence,
     amplitude_floor,
     log_panel,
@@ -22,7 +23,7 @@ from rislam_rt.slam.identity import (
 from rislam_rt.slam.mirrors import is_behind_mirror, mirror_images, rays
 from rislam_rt.slam.moments import Moments, even_draws, poses_of
 from rislam_rt.slam.returns import Poses
-from rislam_rt.slam.tracks import Tracks
+from rislam_rt.slam.tracks import OTHER, PANEL, Tracks
 
 DRAWS = 12
 """Places of a track over which the panel's predicted gain is averaged."""
@@ -63,6 +64,7 @@ def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None, detection
     here = tracks.misses[rows] == 0
     amplitude = np.exp(tracks.log_amplitude[rows])
     panel = np.where(here, log_panel(amplitude, std, gain), log_panel_missed(std, gain, threshold))
+    panel[here & (tracks.side[rows] == OTHER)] = -np.inf
     scatterer = np.where(
         here[:, None],
         log_scatterer(amplitude, std, tx_length, rx_length, radio),
@@ -70,6 +72,7 @@ def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None, detection
     )
     log_grid, log_ris = tracks.log_grid.copy(), tracks.log_ris.copy()
     log_grid[rows], log_ris[rows] = add_evidence(log_grid[rows], log_ris[rows], scatterer, panel)
+    log_ris[rows] += np.where(here & (tracks.side[rows] == PANEL), TOLD, 0.0)
     return tracks._replace(log_grid=log_grid, log_ris=log_ris)
 
 

@@ -11,6 +11,10 @@ AMPLITUDE_WANDER = 1.0
 """Standard deviation of an unexplained track's log amplitude from cycle to cycle: a panel's code may change."""
 
 
+UNTOLD, OTHER, PANEL = -1, 0, 1
+"""Which side a component is on, where the receiver sets the panel's paths apart by alternating codes."""
+
+
 class Glance(NamedTuple):
     """One cycle's measurement in the units of the filter."""
 
@@ -26,6 +30,17 @@ class Glance(NamedTuple):
     """(M,)."""
     ratio: Floats
     """(M,) amplitude over that of free space of the same length."""
+    side: Integers | None = None
+    """(M,) `PANEL` or `OTHER`; None where the receiver does not tell."""
+
+    @property
+    def sides(self) -> Integers:
+        """(M,) with `UNTOLD` where the receiver does not tell."""
+        return np.full(len(self.ratio), UNTOLD) if self.side is None else self.side
+
+    def take(self, rows: Integers) -> "Glance":
+        """Only some of the measurements."""
+        return Glance._make(None if field is None else field[rows] for field in self)
 
 
 class Tracks(NamedTuple):
@@ -59,6 +74,8 @@ class Tracks(NamedTuple):
     """(T, G) log posterior of its strength, were it a scatterer (see `identity`)."""
     log_ris: Floats
     """(T,) log odds of panel against scatterer."""
+    side: Integers
+    """(T,) that of its measurements."""
 
     @property
     def specular(self) -> Booleans:
@@ -73,6 +90,11 @@ class Tracks(NamedTuple):
     def keep(self, rows: Booleans) -> "Tracks":
         """Only some of the tracks."""
         return Tracks._make(field[rows] for field in self)
+
+
+def same_side(first: Integers, second: Integers) -> Booleans:
+    """(A, B) whether things of two sides (A,), (B,) may be one."""
+    return np.asarray((first[:, None] == second) | (first[:, None] == UNTOLD) | (second == UNTOLD))
 
 
 def no_tracks(window: int) -> Tracks:
@@ -92,6 +114,7 @@ def no_tracks(window: int) -> Tracks:
         np.zeros(0, dtype=np.int64),
         np.zeros((0, len(STRENGTHS))),
         np.zeros(0),
+        np.zeros(0, dtype=np.int64),
     )
 
 
@@ -120,6 +143,8 @@ def extend(tracks: Tracks, rows: Integers, glance: Glance, picks: Integers, brig
     slot = cycle % cycles.shape[1]
     seen[rows, slot], std[rows, slot], cycles[rows, slot] = glance.seen[picks], glance.std[picks], cycle
     level[rows, slot] = glance.log_amplitude[picks]
+    side = tracks.side.copy()
+    side[rows] = glance.sides[picks]
     return tracks._replace(
         mean=mean,
         covariance=covariance,
@@ -130,6 +155,7 @@ def extend(tracks: Tracks, rows: Integers, glance: Glance, picks: Integers, brig
         std=std,
         cycle=cycles,
         level=level,
+        side=side,
     )
 
 
@@ -163,5 +189,6 @@ def begin(tracks: Tracks, glance: Glance, picks: Integers, bright: Booleans, rat
         np.zeros(count, dtype=np.int64),
         np.full((count, len(STRENGTHS)), -np.log(len(STRENGTHS))),
         np.zeros(count),
+        glance.sides[picks],
     )
     return Tracks._make(np.concatenate([old, new]) for old, new in zip(tracks, fresh, strict=True))

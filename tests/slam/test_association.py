@@ -14,7 +14,7 @@ from rislam_rt.slam.associate import Candidates, associate, inverse_3x3, pair_co
 from rislam_rt.slam.expect import Expected
 from rislam_rt.slam.match import Merger, Outlook, candidates, hidden_tracks, merge_returns, resolution_cell
 from rislam_rt.slam.returns import NONE, Returns
-from rislam_rt.slam.tracks import Glance, Tracks, no_tracks
+from rislam_rt.slam.tracks import UNTOLD, Glance, Tracks, no_tracks
 
 GATE, CLUTTER = 16.3, 0.016
 
@@ -33,6 +33,7 @@ def draw_candidates(count: int, *, rng: np.random.Generator) -> Candidates:
         0.2 * rng.normal(size=count),
         np.full(count, 0.3),
         np.log(rng.uniform(0.3, 0.95, count)),
+        np.full(count, UNTOLD),
     )
 
 
@@ -83,7 +84,7 @@ def test_cost_is_the_likelihood_ratio_against_clutter(rng: np.random.Generator) 
 def test_beyond_the_gate_nothing_is_paired(axis: int) -> None:
     """Just inside the squared distance in delay, either cosine or log amplitude, and just outside."""
     found = Candidates(
-        np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, 0.05), np.zeros(1)
+        np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, 0.05), np.zeros(1), np.full(1, UNTOLD)
     )  # fmt: skip
     for factor, paired in ((0.99, True), (1.01, False)):
         seen, fade = np.zeros((1, 3)), np.zeros(1)
@@ -123,17 +124,20 @@ def outlook(seen: Floats, log_amplitude: Floats) -> Outlook:
     )
     spread = np.tile(1e-4 * np.eye(3), (count, 1, 1))
     cell = np.array([0.3, 0.5, 0.5])
-    return Outlook(expected, seen, spread, log_amplitude, np.full(count, 0.2), ones, alone, cell)
+    return Outlook(
+        expected, seen, spread, log_amplitude, np.full(count, 0.2), ones, alone, cell, np.full(count, UNTOLD)
+    )
 
 
-def follow(seen: Floats, log_amplitude: Floats, shine: Floats) -> Tracks:
+def follow(seen: Floats, log_amplitude: Floats, shine: Floats, side: int = UNTOLD) -> Tracks:
     """Tracks at some places."""
     count = len(seen)
     fields = {name: np.zeros((count, *field.shape[1:]), field.dtype) for name, field in no_tracks(4)._asdict().items()}
     mean = np.stack([seen, np.zeros((count, 3))], axis=-1)
     spread = np.tile(1e-4 * np.eye(2), (count, 3, 1, 1))
     return Tracks(
-        **{**fields, "mean": mean, "covariance": spread, "log_amplitude": log_amplitude, "shine": shine}
+        **{**fields, "mean": mean, "covariance": spread, "log_amplitude": log_amplitude, "shine": shine,
+           "side": np.full(count, side)}
     )  # fmt: skip
 
 
@@ -167,7 +171,7 @@ def test_what_the_filter_expects_to_merge_the_receiver_merges() -> None:
         if ((reach > 0.88) & (reach < 1.12)).any():
             continue
         strength = np.exp(rng.normal(size=count))
-        foreseen = merge_returns(place, _expected(strength), no_tracks(4), cell)
+        foreseen = merge_returns(place, _expected(strength), no_tracks(4), cell, np.full(count, UNTOLD))
         taken = _taken_by_receiver(place, strength, radio)
         np.testing.assert_array_equal(foreseen.absorbed, taken)
         agreed += int(taken.any())
@@ -198,7 +202,7 @@ def test_reciprocals_come_out_halfway_and_shift_nothing() -> None:
     """A pair in one cell names each other's place; alone in its cell it is disturbed by nobody."""
     place = np.array([[5.0, 0.1, 0.1], [5.05, 0.12, 0.1], [9.0, 0.1, 0.1]])
     expected = _expected(np.array([1.0, 1.0, 1.0]))._replace(twin=np.array([1, 0, -1]))
-    merger = merge_returns(place, expected, no_tracks(4), np.array([0.3, 0.5, 0.5]))
+    merger = merge_returns(place, expected, no_tracks(4), np.array([0.3, 0.5, 0.5]), np.full(len(place), UNTOLD))
     leader = int(np.flatnonzero(~merger.absorbed[:2])[0])
     assert merger.partner[leader] == 1 - leader
     assert merger.partner[2] == -1
@@ -213,7 +217,9 @@ def test_disturbance_is_what_random_phases_make_of_a_weaker_path() -> None:
     """
     rng = np.random.default_rng(3)
     place = np.array([[5.0, 0.1, 0.1], [5.1, 0.2, 0.05]])
-    merger = merge_returns(place, _expected(np.array([1.0, 0.2])), no_tracks(4), np.array([0.3, 0.5, 0.5]))
+    merger = merge_returns(
+        place, _expected(np.array([1.0, 0.2])), no_tracks(4), np.array([0.3, 0.5, 0.5]), np.full(2, UNTOLD)
+    )
     gain = np.stack([np.ones(20_000, complex), 0.2 * np.exp(2j * np.pi * rng.uniform(size=20_000))])
     total = gain.sum(axis=0)
     came = np.einsum("pn,pa->na", (gain * total.conj()).real / np.abs(total) ** 2, place)

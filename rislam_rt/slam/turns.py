@@ -1,0 +1,44 @@
+"""Whose turn it is to be born: which tracks to examine in a cycle, and which have to wait for another."""
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Integers
+from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.match import Outlook, hidden_tracks
+from rislam_rt.slam.tracks import Tracks, same_side
+
+STRIDE = 4
+"""Tracks are examined every so many measurements, and four times less often once their history is full."""
+ELDER_CYCLES = 6
+"""Cycles of history from which on a track keeps longer and weaker ones waiting."""
+PARALLEL = 4.0
+"""Standard deviations (and 0.02) within which a track's direction is that of a known leg."""
+
+
+def due_tracks(tracks: Tracks, outlook: Outlook, cycle: int, config: SlamConfig) -> Integers:
+    """Tracks to examine now, the shortest first: an image lies behind its point, and is weaker.
+
+    So a track has to wait while another that is shorter and stronger is still unexplained.
+    """
+    ready = (~tracks.specular | config.use_vt) & (tracks.length >= config.birth_cycles) & (tracks.misses == 0)
+    oldest = np.min(np.where(tracks.cycle >= 0, tracks.cycle, cycle), axis=1)
+    growing = cycle - oldest < config.window - 1
+    turn = np.where(growing, tracks.length % STRIDE == 0, (np.arange(len(ready)) + cycle) % (4 * STRIDE) == 0)
+    if not (ready & turn).any():
+        return np.zeros(0, dtype=np.int64)
+    hidden = hidden_tracks(outlook, tracks, config.gate)
+    alive = ~tracks.specular & ~hidden & (tracks.length >= ELDER_CYCLES) & (tracks.misses <= 2)
+    length = tracks.mean[:, 0, 0]
+    stronger = tracks.log_amplitude[None] > tracks.log_amplitude[:, None] + 0.1
+    elder = (length[None] < length[:, None] - 0.05) & (stronger | _aligned(tracks))
+    elder &= same_side(tracks.side, tracks.side)
+    waits = (elder & alive[None]).any(axis=1) & growing & ~tracks.specular
+    rows = (ready & turn & ~waits).nonzero()[0]
+    return rows[np.argsort(tracks.mean[rows, 0, 0])]
+
+
+def _aligned(tracks: Tracks) -> Booleans:
+    """(T, T) whether two tracks come from one direction: the longer is likely the shorter over a wall on the Tx leg."""
+    gap = np.abs(tracks.mean[None, :, 1:, 0] - tracks.mean[:, None, 1:, 0])
+    variance = tracks.covariance[..., 1:, 0, 0]
+    return np.asarray((gap < PARALLEL * np.sqrt(variance[None] + variance[:, None] + 0.02**2)).all(axis=-1))
