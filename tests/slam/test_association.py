@@ -14,7 +14,7 @@ from rislam_rt.slam.associate import Candidates, associate, inverse_3x3, pair_co
 from rislam_rt.slam.expect import Expected
 from rislam_rt.slam.match import Merger, Outlook, candidates, hidden_tracks, merge_returns, resolution_cell
 from rislam_rt.slam.returns import NONE, Returns
-from rislam_rt.slam.tracks import UNTOLD, Glance, Tracks, no_tracks
+from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance, Tracks, begin, no_tracks
 
 GATE, CLUTTER = 16.3, 0.016
 
@@ -224,3 +224,37 @@ def test_disturbance_is_what_random_phases_make_of_a_weaker_path() -> None:
     total = gain.sum(axis=0)
     came = np.einsum("pn,pa->na", (gain * total.conj()).real / np.abs(total) ** 2, place)
     np.testing.assert_allclose(merger.disturbance[0], np.sqrt(np.mean((came - place[0]) ** 2, axis=0)), rtol=0.06)
+
+
+@pytest.mark.parametrize(
+    ("mine", "other", "paired"), [(PANEL, OTHER, False), (PANEL, PANEL, True), (UNTOLD, OTHER, True)]
+)
+def test_what_runs_over_the_panel_is_not_paired_with_what_does_not(mine: int, other: int, paired: bool) -> None:
+    found = Candidates(
+        np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, 0.05), np.zeros(1), np.full(1, mine)
+    )
+    seen = glance(np.zeros((1, 3)), np.zeros(1))._replace(side=np.full(1, other))
+    assert (associate(found, seen, GATE, 1e-9)[0] == 0) == paired
+
+
+def test_under_alternated_codes_the_panel_merges_with_nothing_else() -> None:
+    """Three in one cell: the weaker of one side is taken in, and neither side shifts or outshines the other."""
+    place = np.array([[5.0, 0.0, 0.0], [5.05, 0.1, 0.0], [5.1, 0.0, 0.1]])
+    expected, cell = _expected(np.array([3.0, 1.0, 0.2])), np.array([0.3, 0.5, 0.5])
+    apart = merge_returns(place, expected, no_tracks(4), cell, np.array([OTHER, PANEL, PANEL]))
+    np.testing.assert_array_equal(apart.absorbed, [False, False, True])
+    np.testing.assert_array_equal(apart.outshone, [False, False, True])
+    np.testing.assert_array_equal(apart.disturbance[0], 0.0)
+    together = merge_returns(place, expected, no_tracks(4), cell, np.full(3, UNTOLD))
+    np.testing.assert_array_equal(together.absorbed, [False, True, True])
+
+
+def test_a_track_keeps_the_side_of_its_measurements() -> None:
+    place = np.array([[3.0, 0.2, 0.1], [4.0, 0.0, 0.0]])
+    seen = glance(place, np.zeros(2))._replace(side=np.array([PANEL, OTHER]))
+    dull = np.zeros(2, dtype=np.bool_)
+    tracks = begin(no_tracks(4), seen, np.arange(2), dull, np.full(3, 0.1), 0)
+    np.testing.assert_array_equal(tracks.side, [PANEL, OTHER])
+    np.testing.assert_array_equal(hidden_tracks(outlook(place, np.zeros(2)), tracks, GATE), [True, True])
+    known = outlook(place, np.zeros(2))._replace(side=np.array([OTHER, OTHER]))
+    np.testing.assert_array_equal(hidden_tracks(known, tracks, GATE), [False, True])
