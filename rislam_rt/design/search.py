@@ -70,9 +70,8 @@ def beam_phases(count: int, spacing: float, wavelength: float) -> Floats:
     over the share from one end of the row to the other.
     """
     place = np.arange(count) - (count - 1) / 2.0
-    width = min(
-        1.0, 4.0 * spacing / wavelength
-    )  # turns from element to element, from one grazing direction to the other
+    # turns from element to element, from one grazing direction to the other
+    width = min(1.0, 4.0 * spacing / wavelength)
     beams = min(int(np.ceil(count * width)), MAX_BEAMS)
     center = width * ((np.arange(beams) + 0.5) / beams - 0.5) + width / beams * np.array([[0.0], [0.5]])
     widened = max(width / beams - 1.0 / count, 0.0) / count

@@ -86,7 +86,8 @@ class SlamEstimate:
     body: Body
     map: MapEstimate
     suspect: Suspect | None = None
-    """What may be the panel, while the map holds no landmark for it; None if nothing is suspected."""
+    """What may be the panel, while the map holds no landmark for it; None if nothing is suspected, or where no
+    design is to follow (see `slam.predict`)."""
 
     def __post_init__(self) -> None:
         freeze(self, "position", np.float64, (3,))

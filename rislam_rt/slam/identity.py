@@ -46,11 +46,6 @@ def log_missed(mean: Floats, std: Floats, threshold: float) -> Floats:
     return np.asarray(np.log(1.0 - SHOWN * (1.0 - below)))
 
 
-def amplitude_floor(radio: RadioConfig) -> float:
-    """Standard deviation of a lone path's amplitude in a real dimension."""
-    return float(np.sqrt(radio.noise_psd / (2.0 * radio.array.num_antennas * radio.energy)))
-
-
 def point_amplitude(strength: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig) -> Floats:
     """|alpha| of eq. `a2` for `strength`, the square root of a cross-section [m]."""
     scale = radio.wavelength * np.sqrt(4.0 * np.pi * radio.tx_gain * radio.rx_gain) / (4.0 * np.pi) ** 2

@@ -6,13 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.information import amplitude_std
 from rislam_rt.model import RisCode
 from rislam_rt.slam.book import Book, image_idents, learn_ratio
 from rislam_rt.slam.expect import Belief, Expected
 from rislam_rt.slam.identity import (
     TOLD,
     add_evidence,
-    amplitude_floor,
     log_panel,
     log_panel_missed,
     log_scatterer,
@@ -155,7 +155,7 @@ def _weigh_silent(
     """Silence of direct returns weighed for the panel. Strengths stay: something may stand in the way for long."""
     points = direct.point
     sight = observe(direct, belief.features, book.anchor, belief.poses)
-    std = np.full(len(points), amplitude_floor(belief.radio))
+    std = np.full(len(points), amplitude_std(belief.radio))
     threshold = float(np.sqrt(2.0 * detection_snr) * std[0])
     scatterer = log_scatterer_missed(std, sight.tx_length, sight.rx_length, belief.radio, threshold)
     panel = log_panel_missed(std, _sampled_gains(belief, moments, points, code, rng=rng), threshold)

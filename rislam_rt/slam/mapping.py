@@ -1,5 +1,7 @@
 """From moments to the estimate that others read: pose, landmarks, images, walls."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
@@ -16,18 +18,21 @@ IMAGE_HITS = 3
 
 
 def predict(state: FilterState, dt: float, config: SlamConfig) -> SlamEstimate:
-    """The belief carried over `dt` [s] without noise: where the next cycle will find the agent."""
+    """The belief carried over `dt` [s] without noise: where the next cycle finds the agent; with what may be the panel."""
     moments = believed(state)
     mean = moments.mean.copy()
     mean[:3] += dt * moments.velocity
-    return estimate(state, config, moments._replace(mean=mean))
+    moments = moments._replace(mean=mean)
+    ahead = estimate(state, config, moments)
+    if state.ris is None or named_panel(state.book):
+        return ahead
+    return replace(ahead, suspect=find_suspect(state.tracks, state.book, moments, state.body))
 
 
 def estimate(state: FilterState, config: SlamConfig, moments: Moments | None = None) -> SlamEstimate:
     """Mean and covariance of the pose, equally likely samples of it, and the map."""
     moments = believed(state) if moments is None else moments
     root = square_root(moments.covariance[:3, :3])
-    open_question = state.ris is not None and not named_panel(state.book)
     return SlamEstimate(
         moments.position,
         moments.velocity,
@@ -36,7 +41,6 @@ def estimate(state: FilterState, config: SlamConfig, moments: Moments | None = N
         moments.position + even_draws(config.num_samples, root.shape[1]) @ root.T,
         state.body,
         build_map(moments, state.book),
-        find_suspect(state.tracks, state.book, moments, state.body) if open_question else None,
     )
 
 

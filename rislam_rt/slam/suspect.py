@@ -7,13 +7,13 @@ the cycles in which it was silent, is counted as in `identity`; the design then 
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.information import amplitude_std
 from rislam_rt.model import Body, RisCode, Suspect
 from rislam_rt.slam.book import Book
 from rislam_rt.slam.expect import Belief
 from rislam_rt.slam.identity import (
     TOLD,
     add_evidence,
-    amplitude_floor,
     log_panel,
     log_panel_missed,
     log_scatterer,
@@ -59,7 +59,7 @@ def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None, detection
     gain = predicted_panel_gain(belief.ris, code, center, belief.poses.tx, belief.poses.rx, np.ones(1), radio)
     _, rx_length = places(tracks.mean[rows, :, 0], belief.poses)
     tx_length = np.maximum(tracks.mean[rows, 0, 0] - rx_length, 1e-3)
-    std = np.full(len(rows), amplitude_floor(radio))
+    std = np.full(len(rows), amplitude_std(radio))
     threshold = float(std[0] * np.sqrt(2.0 * detection_snr))
     here = tracks.misses[rows] == 0
     amplitude = np.exp(tracks.log_amplitude[rows])
