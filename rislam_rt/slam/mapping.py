@@ -18,7 +18,7 @@ IMAGE_HITS = 3
 
 
 def predict(state: FilterState, dt: float, config: SlamConfig) -> SlamEstimate:
-    """The belief carried over `dt` [s] without noise: where the next cycle finds the agent; with what may be the panel."""
+    """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent; with the suspect."""
     moments = believed(state)
     mean = moments.mean.copy()
     mean[:3] += dt * moments.velocity
