@@ -76,12 +76,7 @@ def look(position: Floats, features: Floats, heading: Floats | float = HEADING) 
 
 def with_features(particles: Particles, guess: Floats, std: float = FEATURE_STD) -> Particles:
     """Particles that know of features, each by itself."""
-    count, size = particles.mean.shape
-    covariance = np.zeros((count, size + guess.size, size + guess.size))
-    covariance[:, :size, :size] = particles.covariance
-    covariance[:, size:, size:] = std**2 * np.eye(guess.size)
-    mean = np.concatenate([particles.mean, np.tile(guess.ravel(), (count, 1))], axis=1)
-    return particles._replace(mean=mean, covariance=covariance)
+    return gaussian.furnish(particles, guess, std**2 * np.eye(guess.size))
 
 
 def lead(

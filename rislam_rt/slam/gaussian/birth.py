@@ -7,6 +7,7 @@ from rislam_rt.model import Body
 from rislam_rt.slam.birth import Birth
 from rislam_rt.slam.gaussian.particles import SLOT, Particles, slot_columns
 from rislam_rt.slam.gaussian.update import FLOOR, TAIL, correct
+from rislam_rt.slam.hypotheses import POINT
 from rislam_rt.slam.moments import normalised, poses_of
 from rislam_rt.slam.returns import Returns, linearise
 
@@ -23,7 +24,8 @@ def settle(particles: Particles, birth: Birth, body: Body, *, rng: np.random.Gen
     covariance = np.zeros((count, size + 3, size + 3))
     covariance[:, :size, :size] = particles.covariance
     covariance[:, size:, size:] = birth.prior
-    wide = particles._replace(mean=mean, covariance=covariance)
+    own = np.full(3, np.nan) if kind is POINT else birth.anchor
+    wide = particles._replace(mean=mean, covariance=covariance, anchor=np.vstack([particles.anchor, own]))
     columns = np.concatenate([slot_columns(birth.slots), size + np.arange(3)])
     if parent >= 0:
         columns = np.concatenate([columns, particles.first_feature + 3 * parent + np.arange(3)])

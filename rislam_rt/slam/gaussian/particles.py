@@ -5,6 +5,11 @@ measures: the error of the start, which SLAM carries to the end. Here a particle
 enough to be linear in, and everything within it is a Gaussian: no sampling error where the belief is Gaussian, and
 particles only where it is not. Past poses stay in the Gaussian as long as a track may still become a landmark (clones,
 as in Roumeliotis and Burdick 2002), so that its whole history enters with the right correlations.
+
+Nothing that is measured tells where the start was: agent, trail and map may be shifted together. In a covariance that
+holds this shift, derivatives taken at one normal of a wall, then at a better one, seem to tell of it (the inconsistency
+of the EKF in SLAM, Huang, Mourikis and Roumeliotis 2010): the position becomes surer than its start, and wrong. So the
+Gaussians are relative to the start, and its error stands beside them, untouched.
 """
 
 from typing import NamedTuple
@@ -14,6 +19,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.moments import POSE, Moments, normalised, systematic_ancestors
+from rislam_rt.slam.returns import AXES
 
 SLOT = 4
 """Numbers of a past pose: position and heading."""
@@ -31,9 +37,13 @@ class Particles(NamedTuple):
     mean: Floats
     """(N, D)."""
     covariance: Floats
-    """(N, D, D)."""
+    """(N, D, D), without the shift of everything together."""
     window: int
     """W; the pose of cycle k is in slot k % W."""
+    shift: Floats
+    """(3,) variance [m^2] of that shift along each axis: of the start's position, which no measurement tells."""
+    anchor: Floats
+    """(F, 3) [m] fixed points of the walls, NaN for points."""
 
     @property
     def first_feature(self) -> int:
@@ -63,17 +73,25 @@ def begin(start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) ->
     pose = centre + np.sqrt(share) * std * _standard_draws(count, POSE, rng=rng)
     mean = np.concatenate([pose, np.tile(pose[:, CLONED], (1, window))], axis=1)
     rows = np.concatenate([np.arange(POSE), np.tile(CLONED, window)])
-    within = np.diag((1.0 - share) * std**2)[np.ix_(rows, rows)]
-    return Particles(np.full(count, -np.log(count)), mean, np.tile(within, (count, 1, 1)), window)
+    variance = (1.0 - share) * std**2
+    within = np.diag(np.where(np.arange(POSE) < 3, 0.0, variance))[np.ix_(rows, rows)]
+    log_weight, covariance = np.full(count, -np.log(count)), np.tile(within, (count, 1, 1))
+    return Particles(log_weight, mean, covariance, window, variance[:3], np.zeros((0, 3)))
 
 
 def furnish(particles: Particles, features: Floats, covariance: Floats) -> Particles:
-    """Particles that know F features (F, 3) beforehand, with a covariance (3F, 3F)."""
+    """Particles that know F features (F, 3) beforehand, with a covariance (3F, 3F): these tell where the start was."""
+    if not len(features):
+        return particles
     count, size, more = *particles.mean.shape, len(covariance)
     mean = np.concatenate([particles.mean, np.tile(features.ravel(), (count, 1))], axis=1)
     wide = np.zeros((count, size + more, size + more))
-    wide[:, :size, :size], wide[:, size:, size:] = particles.covariance, covariance
-    return particles._replace(mean=mean, covariance=wide)
+    moved, past = _moved(particles), np.tile(np.eye(SLOT, 3), (count, particles.window, 1))
+    moved = np.concatenate([moved[:, :POSE], past, moved[:, POSE:]], axis=1)
+    wide[:, :size, :size] = particles.covariance + (moved * particles.shift) @ np.swapaxes(moved, 1, 2)
+    wide[:, size:, size:] = covariance
+    anchor = np.concatenate([particles.anchor, np.full(features.shape, np.nan)])
+    return particles._replace(mean=mean, covariance=wide, shift=np.zeros(3), anchor=anchor)
 
 
 def propagate(
@@ -124,7 +142,25 @@ def moments(particles: Particles) -> Moments:
     columns = particles.shown
     weight, mean = np.exp(particles.log_weight), particles.mean[:, columns]
     inner = particles.covariance[:, columns[:, None], columns]
+    if particles.shift.any():
+        moved = _moved(particles)
+        inner += (moved * particles.shift) @ np.swapaxes(moved, 1, 2)
     return Moments(*mixture(weight, mean, inner))
+
+
+def _moved(particles: Particles) -> Floats:
+    """(N, 7 + 3F, 3) how pose and features go along with a shift of everything: walls only along their normals."""
+    count, anchor = len(particles.mean), particles.anchor
+    moved = np.zeros((count, POSE + anchor.size, 3))
+    moved[:, :3] = AXES
+    features = moved[:, POSE:].reshape(count, -1, 3, 3)
+    span = particles.features - anchor
+    walls = np.isfinite(span[0, :, 0])
+    features[:] = AXES
+    span = span[:, walls]
+    along = span / np.sqrt(0.5 * np.vecdot(span, span))[..., None]
+    features[:, walls] = along[..., :, None] * along[..., None, :]
+    return moved
 
 
 def mixture(weight: Floats, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
@@ -151,7 +187,8 @@ def slot_columns(slots: Integers) -> Integers:
 def drop(particles: Particles, keep: Booleans) -> Particles:
     """Particles with only some of the features."""
     wide = np.concatenate([np.ones(particles.first_feature, dtype=np.bool_), np.repeat(keep, 3)])
-    return particles._replace(mean=particles.mean[:, wide], covariance=particles.covariance[:, wide][:, :, wide])
+    mean, covariance = particles.mean[:, wide], particles.covariance[:, wide][:, :, wide]
+    return particles._replace(mean=mean, covariance=covariance, anchor=particles.anchor[keep])
 
 
 def thin(particles: Particles, config: SlamConfig, *, rng: np.random.Generator) -> tuple[Particles, bool]:
@@ -165,9 +202,10 @@ def thin(particles: Particles, config: SlamConfig, *, rng: np.random.Generator) 
     weight = np.exp(particles.log_weight)
     centre, total = mixture(weight, particles.mean[:, :6], particles.covariance[:, :6, :6])
     apart = np.sqrt(weight @ (particles.mean[:, :6] - centre) ** 2)
-    if np.all(apart <= 0.5 * np.sqrt(np.diag(total)) + ROUNDING):
+    spread = np.sqrt(np.diag(total) + np.append(particles.shift, np.zeros(3)))
+    if np.all(apart <= 0.5 * spread + ROUNDING):
         mean, covariance = mixture(weight, particles.mean, particles.covariance)
-        return Particles(np.zeros(1), mean[None], covariance[None], particles.window), True
+        return particles._replace(log_weight=np.zeros(1), mean=mean[None], covariance=covariance[None]), True
     if effective_size(particles) >= config.resample_below * count:
         return particles, False
     # copies of one Gaussian would stay copies: those that are drawn again only add their weight
