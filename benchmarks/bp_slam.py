@@ -153,7 +153,7 @@ def run_moving(seed: int, scheme: str, settings: Sequence[str]) -> tuple[float, 
     # the first estimate is the start as it was told: ranges of one cycle tell nothing of it
     reckoned = found.position[0] + (truth.time[:count, None] - truth.time[0]) * found.velocity[0]
     blind = np.linalg.norm((reckoned - truth.position[:count])[:, :2], axis=1)
-    bound = scheme_bound(result.scene, result.paths, found.gain, scheme, result.config)
+    bound = scheme_bound(result.scene, result.paths, found.gain, scheme, result.config).agent
     size = np.linalg.norm(error, axis=1)
     nees = float(np.mean(normalised_squares(error, found.covariance[:, :2, :2]))) / 2.0
     rmse = (float(np.sqrt(np.mean(each**2))) for each in (size, blind, bound))

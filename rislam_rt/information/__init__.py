@@ -19,7 +19,15 @@ from rislam_rt.information.gradient import (
     path_gradient,
     vertex_gradient,
 )
-from rislam_rt.information.landmarks import Chain, LandmarkModel, Rows, build_landmark_model, mirror_chain
+from rislam_rt.information.landmarks import (
+    Chain,
+    LandmarkModel,
+    Rows,
+    WallSpread,
+    build_landmark_model,
+    mirror_chain,
+    plane_tangents,
+)
 from rislam_rt.information.maps import dilution, position_error_map
 from rislam_rt.information.outcome import Outcome
 from rislam_rt.information.position import Bound, position_bound, position_information, range_information
@@ -39,6 +47,7 @@ __all__ = [
     "Outcome",
     "PosteriorBound",
     "Rows",
+    "WallSpread",
     "amplitude_std",
     "build_landmark_model",
     "cosine_gradient",
@@ -55,6 +64,7 @@ __all__ = [
     "measurement_std",
     "mirror_chain",
     "path_gradient",
+    "plane_tangents",
     "position_bound",
     "position_error_map",
     "position_information",

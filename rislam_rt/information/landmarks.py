@@ -34,6 +34,15 @@ class Rows(NamedTuple):
     """(M,) inverse variances."""
 
 
+class WallSpread(NamedTuple):
+    """RMS errors of a plane."""
+
+    angle: float
+    """[rad] between the normals, both tilts together."""
+    distance: float
+    """[m] along the normal, at one point of the wall."""
+
+
 class Chain(NamedTuple):
     """A point mirrored in D walls, one after the other."""
 
@@ -54,7 +63,7 @@ def mirror_chain(point: Floats, normal: Floats, offset: Floats) -> Chain:
         reflection = np.eye(3) - 2.0 * np.outer(normal[d], normal[d])
         planes[..., :d, :, :] = reflection @ planes[..., :d, :, :]
         distance = (point @ normal[d] - offset[d])[..., None]
-        for column, tangent in enumerate(_tangents(normal[d])):
+        for column, tangent in enumerate(plane_tangents(normal[d])):
             planes[..., d, :, column] = -2.0 * ((point @ tangent)[..., None] * normal[d] + distance * tangent)
         planes[..., d, :, 2] = 2.0 * normal[d]
         point = mirror(point, normal[d], offset[d])
@@ -62,7 +71,7 @@ def mirror_chain(point: Floats, normal: Floats, offset: Floats) -> Chain:
     return Chain(point, linear, planes)
 
 
-def _tangents(normal: Floats) -> tuple[Floats, Floats]:
+def plane_tangents(normal: Floats) -> tuple[Floats, Floats]:
     """Two unit vectors at right angles to a unit vector and to each other."""
     first = unit(np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))]))
     return first, np.cross(normal, first)
@@ -99,6 +108,28 @@ class LandmarkModel:
     def prior_std(self, length: float = 10.0, tilt: float = 0.5) -> Floats:
         """(U,) the same standard deviation for every coordinate and offset [m], and for every tilt [rad]."""
         return np.array([tilt if " tilt " in label else length for label in self.labels])
+
+    def landmark_error(self, covariance: Floats) -> dict[str, float]:
+        """RMS distance [m] of each landmark whose position is among the unknowns, of covariance (U, U)."""
+        variance = np.diagonal(covariance)
+        column = {label: number for number, label in enumerate(self.labels)}
+        first = {name: column.get(f"{name} x") for name in self.paths.landmarks}
+        return {name: float(np.sqrt(variance[c : c + 3].sum())) for name, c in first.items() if c is not None}
+
+    def wall_error(self, covariance: Floats, at: Floats) -> dict[str, WallSpread]:
+        """RMS errors of each unknown wall, of covariance (U, U).
+
+        `at` (W, 3) holds the point of each wall where its distance is asked for.
+        """
+        found = {}
+        for wall in np.flatnonzero(self.wall_column >= 0):
+            own = self.wall_column[wall] + np.arange(3)
+            block = covariance[np.ix_(own, own)]
+            # a point x of the wall lies normal . x - offset off it: both tilts and the offset move that
+            slope = np.array([*(tangent @ at[wall] for tangent in plane_tangents(self.wall_normal[wall])), -1.0])
+            angle, distance = np.sqrt(block[0, 0] + block[1, 1]), np.sqrt(slope @ block @ slope)
+            found[self.paths.walls[wall]] = WallSpread(float(angle), float(distance))
+        return found
 
     def rows(self, least_snr: float = 10.0, *, angles: bool = True, use_vt: bool = False) -> Iterator[Rows]:
         """Measurements of each cycle in turn.

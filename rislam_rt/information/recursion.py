@@ -39,10 +39,13 @@ class PosteriorBound:
     """(K, 2 D, 2 D) covariance of position and velocity [m, m/s], D axes."""
     unknown: Floats
     """(K, U) variances of landmarks and walls."""
+    last: Floats
+    """(U, U) covariance of landmarks and walls after the last cycle."""
 
     def __post_init__(self) -> None:
         freeze(self, "agent", np.float64, (None, None, None))
         freeze(self, "unknown", np.float64, (len(self.agent), None))
+        freeze(self, "last", np.float64, (self.unknown.shape[1],) * 2)
 
     @property
     def rms(self) -> Floats:
@@ -82,7 +85,7 @@ def posterior_bound(
         covariance = _update(covariance, slope)
         agent[cycle] = covariance[: 2 * axes, : 2 * axes]
         unknown[cycle] = np.diagonal(covariance)[2 * axes :]
-    return PosteriorBound(agent, unknown)
+    return PosteriorBound(agent, unknown, covariance[2 * axes :, 2 * axes :])
 
 
 def _advance(covariance: Floats, dt: float, motion: MotionPrior) -> Floats:

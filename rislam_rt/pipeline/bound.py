@@ -3,13 +3,21 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import repeat
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.channel.walls import build_walls
-from rislam_rt.information import MotionPrior, Rows, build_landmark_model, posterior_bound
+from rislam_rt.channel.walls import Walls, build_walls
+from rislam_rt.information import (
+    LandmarkModel,
+    MotionPrior,
+    Rows,
+    WallSpread,
+    build_landmark_model,
+    plane_tangents,
+    posterior_bound,
+)
 from rislam_rt.measurement.bound import detection_probability
 from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.model import PathKind, Paths, Scene
@@ -21,16 +29,33 @@ SILENT = 1e-4
 """Information over that at the detection threshold below which a path counts as not heard."""
 NO_ROWS = Rows(np.zeros((0, 3)), np.zeros((0, 0)), np.zeros(0))
 """A cycle in which nothing is heard."""
+FLOOR_TILT, UPRIGHT_TILT = 0.05, 0.01
+"""Standard deviations [rad] that the project's filter takes for granted: of the floor from level, and, with wall
+returns in the map, of upright walls from upright."""
+LEVEL, UPRIGHT = 0.99, 0.03
+"""Vertical part of a wall's normal above which it counts as level, and below which as upright."""
 
 
-def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Mapping[str, Any]) -> Floats:
-    """Least RMS position error (K,) [m] of a scheme, over the axes that are filtered.
+class SchemeBound(NamedTuple):
+    """Least RMS errors of one scheme in one run."""
+
+    agent: Floats
+    """(K,) position [m], over the axes that are filtered."""
+    landmarks: Mapping[str, float]
+    """[m] at the end of the run, of each landmark that a path was heard from."""
+    walls: Mapping[str, WallSpread]
+    """At the end of the run, of each wall that a counted path meets; its distance at the middle of its surface."""
+
+
+def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Mapping[str, Any]) -> SchemeBound:
+    """Least RMS errors of agent, landmarks and walls under a scheme.
 
     Linearised at the true motion, under the codes that were applied. Landmarks and walls are unknown, the start is
     known to its prior. A path that the array hears and whose delay is reported counts with its information times the
     probability of its detection (the information reduction factor of Niu, Willett and Bar-Shalom, 2001); which path
     each component is counts as known, and paths as resolved. A scheme of delays alone has no angles, and one that holds
-    every mirror image as a point of its own has no walls.
+    every mirror image as a point of its own has no walls. Of walls nothing is known beforehand but what the filter
+    takes for granted (`FLOOR_TILT`, `UPRIGHT_TILT`).
 
     Parameters
     ----------
@@ -49,17 +74,48 @@ def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Map
     use_vt = settings.slam.use_vt and estimator.walls == "planes"
     audible = heard_paths(paths.with_gain(gain), settings, threshold, use_vt=use_vt)
     motion = MotionPrior(settings.slam.sigma_a, spec.start.position_std_m, spec.start.velocity_std_m_s, axes)
-    unknown_std = np.zeros(0)
-    rows: Iterable[Rows] = repeat(NO_ROWS, len(scene.agent))
-    if audible.num_paths:
-        model = build_landmark_model(
-            audible, scene.agent, scene.landmark_positions, walls.normal, walls.offset, settings.radio,
-            walls=estimator.walls,
-        )  # fmt: skip
-        rows = map(fewer_rows, model.rows(SILENT * threshold, angles=estimator.angles, use_vt=use_vt))
-        unknown_std = model.prior_std()
-    bound = posterior_bound(rows, scene.agent.time, motion, unknown_std)
-    return np.asarray(np.sqrt(np.einsum("kii->k", bound.agent[:, :axes, :axes])))
+    if not audible.num_paths:
+        silence: Iterable[Rows] = repeat(NO_ROWS, len(scene.agent))
+        bound = posterior_bound(silence, scene.agent.time, motion, np.zeros(0))
+        return SchemeBound(_position_rms(bound.agent, axes), {}, {})
+    model = build_landmark_model(
+        audible, scene.agent, scene.landmark_positions, walls.normal, walls.offset, settings.radio,
+        walls=estimator.walls,
+    )  # fmt: skip
+    rows = map(fewer_rows, model.rows(SILENT * threshold, angles=estimator.angles, use_vt=use_vt))
+    bound = posterior_bound(rows, scene.agent.time, motion, prior_std(model, scene, upright=use_vt))
+    heard = {scene.landmarks[number] for number in audible.landmark if number >= 0}
+    landmarks = {name: error for name, error in model.landmark_error(bound.last).items() if name in heard}
+    middle = np.array([wall_surface(walls, number)[0] for number in range(len(walls))]).reshape(-1, 3)
+    return SchemeBound(_position_rms(bound.agent, axes), landmarks, model.wall_error(bound.last, middle))
+
+
+def prior_std(model: LandmarkModel, scene: Scene, *, upright: bool) -> Floats:
+    """(U,) standard deviations beforehand: the floor is nearly level and, if `upright`, walls that are upright so."""
+    std = model.prior_std()
+    height = float(scene.agent.position[:, 2].min())
+    for wall in np.flatnonzero(model.wall_column >= 0):
+        normal, tilts = model.wall_normal[wall], model.wall_column[wall] + np.arange(2)
+        if abs(normal[2]) > LEVEL and model.wall_offset[wall] / normal[2] < height:
+            std[tilts] = FLOOR_TILT
+        elif upright and abs(normal[2]) < UPRIGHT:
+            lean = int(np.argmax(np.abs([tangent[2] for tangent in plane_tangents(normal)])))
+            std[tilts[lean]] = UPRIGHT_TILT
+    return std
+
+
+def wall_surface(walls: Walls, number: int) -> tuple[Floats, Floats]:
+    """Centroid (3,) of a wall and the share (T,) of each of its triangles in its area."""
+    triangles = walls.triangles[walls.wall_of_triangle == number]
+    edges = triangles[:, 1:] - triangles[:, :1]
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
+    weight = area / area.sum()
+    return weight @ triangles.mean(axis=1), weight
+
+
+def _position_rms(agent: Floats, axes: int) -> Floats:
+    """(K,) from covariances (K, 2 D, 2 D) of position and velocity."""
+    return np.asarray(np.sqrt(np.einsum("kii->k", agent[:, :axes, :axes])))
 
 
 def fewer_rows(rows: Rows) -> Rows:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.evaluate import (
     association_score,
@@ -18,7 +18,7 @@ from rislam_rt.evaluate import (
     trajectory_error,
 )
 from rislam_rt.model import NOTHING, STEPS, MapEstimate, PathKind, Paths, Scene, SchemeResult, SlamResult
-from rislam_rt.pipeline.bound import scheme_bound
+from rislam_rt.pipeline.bound import SchemeBound, scheme_bound, wall_surface
 from rislam_rt.pipeline.schemes import SCHEMES
 
 DIVERGED = 0.5
@@ -58,7 +58,8 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     """The scores of one scheme."""
     scene, truth = result.scene, result.scene.agent.position
     errors = position_errors(scheme.position, truth)
-    limit = bound_course(result, scheme)
+    least = run_bound(result, scheme)
+    limit = least.agent if least else None
     rmse, bound = root_mean_square(errors), None if limit is None else root_mean_square(limit)
     motion = trajectory_error(scheme.position, truth) if len(truth) > 1 else None
     axes = np.flatnonzero(np.einsum("kii->ki", scheme.covariance[:, :3, :3]).min(axis=0) > 0.0)
@@ -68,6 +69,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         nees = float(np.mean(normalised_squares((scheme.position - truth)[:, axes], block))) / len(axes)
     score = association_score(*component_labels(result.paths, scheme))
     largest = float(errors.max())
+    walls = wall_scores(scene, scheme.map, least)
     seconds = dict(zip(STEPS, scheme.seconds.mean(axis=0).tolist(), strict=True))
     return {
         "rmse_m": rmse,
@@ -79,8 +81,9 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "nees_per_dof": nees if nees is None or np.isfinite(nees) else None,
         "diverged": has_diverged(errors, limit),
         "outcomes": {name: scheme.outcome.count(name) for name in sorted(set(scheme.outcome))},
-        "landmarks": landmark_scores(scene, scheme),
-        "walls": wall_scores(scene, scheme.map),
+        "landmarks": landmark_scores(scene, scheme, least),
+        "walls": walls,
+        "ghost_walls": len(scheme.map.wall_offset) - sum(wall["angle_deg"] is not None for wall in walls.values()),
         "map": map_score(scene, scheme.map, panel=bool(scheme.levels)),
         "association": {"accuracy": score.accuracy, "precision": score.precision, "recall": score.recall},
         "step_seconds": seconds,
@@ -89,8 +92,8 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     }
 
 
-def bound_course(result: SlamResult, scheme: SchemeResult) -> Floats | None:
-    """The posterior bound (K,) [m]; None where the scheme's name says nothing of it."""
+def run_bound(result: SlamResult, scheme: SchemeResult) -> SchemeBound | None:
+    """The posterior bound of agent, landmarks and walls; None where the scheme's name says nothing of it."""
     if scheme.scheme not in SCHEMES:
         return None
     return scheme_bound(result.scene, result.paths, scheme.gain, scheme.scheme, result.config)
@@ -135,8 +138,11 @@ def landmark_track(scene: Scene, scheme: SchemeResult) -> LandmarkTrack:
     return LandmarkTrack(error, column)
 
 
-def landmark_scores(scene: Scene, scheme: SchemeResult) -> dict[str, dict[str, Any]]:
-    """Error of each landmark: RMS over the cycles that hold it, and at the end; null where it was never found."""
+def landmark_scores(scene: Scene, scheme: SchemeResult, least: SchemeBound | None = None) -> dict[str, dict[str, Any]]:
+    """Error of each landmark: RMS over the cycles that hold it, and at the end; null where it was never found.
+
+    With its bound at the end, null where nothing was heard of it.
+    """
     track = landmark_track(scene, scheme)
     scores: dict[str, dict[str, Any]] = {}
     for number, name in enumerate(scene.landmarks):
@@ -145,6 +151,7 @@ def landmark_scores(scene: Scene, scheme: SchemeResult) -> dict[str, dict[str, A
         entry: dict[str, Any] = {
             "rmse_m": float(np.sqrt(np.mean(error[cycles] ** 2))) if len(cycles) else None,
             "final_m": float(error[-1]) if column[-1] >= 0 else None,
+            "bound_m": least.landmarks.get(name) if least else None,
             "cycles_held": len(cycles),
         }
         if scene.ris is not None and number == len(scene.landmarks) - 1:
@@ -153,38 +160,50 @@ def landmark_scores(scene: Scene, scheme: SchemeResult) -> dict[str, dict[str, A
     return scores
 
 
-def wall_scores(scene: Scene, estimate: MapEstimate) -> dict[str, dict[str, Any]]:
-    """Each wall of the last map: RMS distance over its true surface, angle, offset at its middle; null if missing."""
+def wall_scores(scene: Scene, estimate: MapEstimate, least: SchemeBound | None = None) -> dict[str, dict[str, Any]]:
+    """Each wall of the last map: RMS distance over its true surface, angle, offset at its middle; null if missing.
+
+    With the deviation of the angle, both tilts together, that the map itself reckons with, and the bounds of angle and
+    offset. A wall that no path meets cannot be found: it has no bound, and no plane stands for it.
+    """
     walls = build_walls(scene)
-    match = match_walls(walls, estimate)
+    heard = None if least is None else np.array([name in least.walls for name in walls.names], dtype=np.bool_)
+    match = match_walls(walls, estimate, heard)
     scores: dict[str, dict[str, Any]] = {}
     for number, name in enumerate(walls.names):
-        row = match[number]
+        row, bound = match[number], least.walls.get(name) if least else None
+        bounds = {
+            "bound_deg": float(np.degrees(bound.angle)) if bound else None,
+            "bound_m": bound.distance if bound else None,
+        }
         if row < 0:
-            scores[name] = {"rmse_m": None, "angle_deg": None, "offset_m": None}
+            scores[name] = {"rmse_m": None, "angle_deg": None, "offset_m": None, "std_deg": None, **bounds}
             continue
         normal, offset = estimate.wall_normal[row], estimate.wall_offset[row]
         cosine = abs(float(normal @ walls.normal[number]))
         sine = float(np.linalg.norm(np.cross(normal, walls.normal[number])))
-        middle, _ = _surface(walls, number)
+        middle, _ = wall_surface(walls, number)
         scores[name] = {
             "rmse_m": surface_rms(walls, number, normal, offset),
             "angle_deg": float(np.degrees(np.arctan2(sine, cosine))),
             "offset_m": abs(float(normal @ middle - offset)),
+            "std_deg": float(np.degrees(np.sqrt(2.0) * estimate.wall_std[row, 0])),
+            **bounds,
         }
     return scores
 
 
-def match_walls(walls: Walls, estimate: MapEstimate) -> Integers:
-    """Row (W,) of the estimated plane that stands for each true wall, -1 for none; one to one."""
+def match_walls(walls: Walls, estimate: MapEstimate, heard: Booleans | None = None) -> Integers:
+    """Row (W,) of the estimated plane that stands for each true wall that is `heard` (W,), -1 for none; one to one."""
     match = np.full(len(walls), -1)
+    asked = np.arange(len(walls)) if heard is None else np.flatnonzero(heard)
     planes = list(zip(estimate.wall_normal, estimate.wall_offset, strict=True))
-    if not planes or not len(walls):
+    if not planes or not len(asked):
         return match
-    cost = np.array([[surface_rms(walls, w, n, float(d)) for n, d in planes] for w in range(len(walls))])
+    cost = np.array([[surface_rms(walls, int(w), n, float(d)) for n, d in planes] for w in asked])
     rows, columns = linear_sum_assignment(np.minimum(cost, 10.0 * NEAR_WALL))
     good = cost[rows, columns] <= NEAR_WALL
-    match[rows[good]] = columns[good]
+    match[asked[rows[good]]] = columns[good]
     return match
 
 
@@ -193,7 +212,7 @@ def surface_rms(walls: Walls, number: int, normal: Floats, offset: float) -> flo
 
     The distance is linear in the point: over a triangle its mean square is (sum of squares + square of the sum) / 12.
     """
-    _, weight = _surface(walls, number)
+    _, weight = wall_surface(walls, number)
     distance = walls.triangles[walls.wall_of_triangle == number] @ normal - offset
     square = (np.sum(distance**2, axis=1) + np.sum(distance, axis=1) ** 2) / 12.0
     return float(np.sqrt(weight @ square))
@@ -214,12 +233,3 @@ def component_labels(paths: Paths, scheme: SchemeResult) -> tuple[Integers, Inte
             wall = rx[0] if rx else tx[-1] if tx else -1
             identity[path] = numbers.setdefault((landmark, wall), len(numbers))
     return label, identity[scheme.component_path[shown]]
-
-
-def _surface(walls: Walls, number: int) -> tuple[Floats, Floats]:
-    """Centroid (3,) of a wall and the share (T,) of each of its triangles in its area."""
-    triangles = walls.triangles[walls.wall_of_triangle == number]
-    edges = triangles[:, 1:] - triangles[:, :1]
-    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
-    weight = area / area.sum()
-    return weight @ triangles.mean(axis=1), weight

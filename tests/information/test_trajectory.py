@@ -9,7 +9,14 @@ from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
-from rislam_rt.information import MotionPrior, Rows, build_landmark_model, mirror_chain, posterior_bound
+from rislam_rt.information import (
+    MotionPrior,
+    Rows,
+    build_landmark_model,
+    mirror_chain,
+    plane_tangents,
+    posterior_bound,
+)
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.scene import load_scene
 
@@ -145,6 +152,7 @@ def test_recursion_equals_the_inverse_of_the_whole_trajectory():
         inverse = np.linalg.inv(joint)
         np.testing.assert_allclose(bound.agent[cycle], state @ inverse @ state.T, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(bound.unknown[cycle], np.diag(inverse)[-unknowns:], rtol=1e-9)
+    np.testing.assert_allclose(bound.last, inverse[-unknowns:, -unknowns:], rtol=1e-9, atol=1e-12)
 
 
 def test_without_measurements_the_bound_is_the_motion_alone():
@@ -175,6 +183,64 @@ def test_order_of_knowledge(room):
     assert posterior_bound(louder.rows(), motion.time, loose, model.prior_std(1.0)).rms[-1] < planes
     deaf = posterior_bound(model.rows(np.inf), motion.time, loose, model.prior_std())
     np.testing.assert_allclose(deaf.unknown[-1], model.prior_std() ** 2)
+
+
+def test_errors_of_walls_are_those_of_planes_drawn_from_the_covariance(room):
+    """Planes turned and shifted by draws: mean square angle between the normals, and distance at a point."""
+    _, _, _, normal, offset = room
+    model = build(room, "planes")
+    rng = np.random.default_rng(3)
+    root = 1e-3 * rng.standard_normal((model.num_unknowns, model.num_unknowns))
+    at = rng.uniform(-3.0, 3.0, (len(offset), 3))
+    at += (offset - np.sum(at * normal, axis=1))[:, None] * normal
+    found = model.wall_error(root @ root.T, at)
+    draws = rng.standard_normal((20_000, model.num_unknowns)) @ root.T
+    met = [wall for wall in range(len(offset)) if model.wall_column[wall] >= 0]
+    assert set(found) == {model.paths.walls[wall] for wall in met}
+    for wall in met:
+        first, second, away = draws[:, model.wall_column[wall] + np.arange(3)].T
+        turned = normal[wall] + np.stack([first, second], axis=1) @ np.stack(plane_tangents(normal[wall]))
+        turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+        angle = np.linalg.norm(np.cross(turned, normal[wall]), axis=1)
+        distance = turned @ at[wall] - (offset[wall] + away)
+        spread = found[model.paths.walls[wall]]
+        assert spread.angle == pytest.approx(np.sqrt(np.mean(angle**2)), rel=0.02)
+        assert spread.distance == pytest.approx(np.sqrt(np.mean(distance**2)), rel=0.02)
+    landmarks = model.landmark_error(root @ root.T)
+    assert list(landmarks) == list(model.paths.landmarks)
+    size = np.sqrt(np.mean(np.sum(draws[:, :3] ** 2, axis=1)))
+    assert landmarks[model.paths.landmarks[0]] == pytest.approx(size, rel=0.02)
+
+
+def test_a_wall_known_by_one_image_is_as_sharp_as_that_image_seen_from_its_point(room):
+    """Landmark and motion known, one path over one wall: its normal is along the line from point to image, whose
+    position the same measurements give by themselves."""
+    paths, motion, landmark, normal, offset = room
+    single = (paths.kind == PathKind.VS) & (paths.rx_walls[:, 0] >= 0) & (paths.rx_walls[:, 1:] < 0).all(axis=1)
+    single &= (paths.tx_walls < 0).all(axis=1)
+    column = np.flatnonzero(single)[0]
+    kept = np.arange(paths.num_paths) == column
+    per_path = {n: getattr(paths, n)[kept] for n in ("kind", "landmark", "tx_walls", "rx_walls", "num_vertices")}
+    names = ("valid", "tau", "departure", "arrival", "vertices", "gain")
+    one = replace(paths, **per_path, **{n: getattr(paths, n)[:, kept] for n in names}, ris=None)
+    wall, point = int(paths.rx_walls[column, 0]), landmark[paths.landmark[column]]
+    still = MotionPrior(0.0, 0.0, 0.0)
+    bounds = {}
+    for mode in ("planes", "images"):
+        model = build((one, *room[1:]), mode)
+        image = " | " in model.labels[-1]
+        assert image == (mode == "images")
+        # the plane's own prior is wide, and so is the image's; the landmark is known
+        std = np.where([" | " in name or name.startswith(paths.walls[wall]) for name in model.labels], 1e3, 1e-9)
+        bounds[mode] = (model, posterior_bound(model.rows(0.0), motion.time, still, std).last)
+    model, covariance = bounds["planes"]
+    middle = np.zeros((len(offset), 3))
+    spread = model.wall_error(covariance, middle)[paths.walls[wall]]
+    model, covariance = bounds["images"]
+    block = covariance[-3:, -3:]
+    across = np.trace(block) - normal[wall] @ block @ normal[wall]
+    gap = 2.0 * abs(float(point @ normal[wall] - offset[wall]))
+    assert spread.angle == pytest.approx(np.sqrt(across) / gap, rel=1e-3)
 
 
 def test_bad_settings_are_refused(room):

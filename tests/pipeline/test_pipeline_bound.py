@@ -7,11 +7,11 @@ import pytest
 from scipy.stats import ncx2
 
 from rislam_rt.channel.walls import build_walls
-from rislam_rt.information import MotionPrior, build_landmark_model, posterior_bound
+from rislam_rt.information import MotionPrior, build_landmark_model, plane_tangents, posterior_bound
 from rislam_rt.information.landmarks import Rows
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.bound import fewer_rows, heard_paths, scheme_bound
+from rislam_rt.pipeline.bound import FLOOR_TILT, UPRIGHT_TILT, fewer_rows, heard_paths, prior_std, scheme_bound
 from rislam_rt.pipeline.run import set_stage, without_panel
 from rislam_rt.pipeline.spec import build_settings
 from rislam_rt.pipeline.summary import map_score, summarise
@@ -29,7 +29,7 @@ def stage(room):
 
 def bound(stage, scheme, *settings, gain=None):
     config = load_spec(PIPELINE, [*SHORT, *settings]).model_dump(mode="json")
-    return scheme_bound(stage.scene, stage.paths, stage.paths.gain if gain is None else gain, scheme, config)
+    return scheme_bound(stage.scene, stage.paths, stage.paths.gain if gain is None else gain, scheme, config).agent
 
 
 def test_it_is_the_recursion_over_all_paths_times_their_detection_probability(stage):
@@ -42,7 +42,8 @@ def test_it_is_the_recursion_over_all_paths_times_their_detection_probability(st
     model = build_landmark_model(
         stage.paths.with_gain(gain), motion, stage.scene.landmark_positions, walls.normal, walls.offset, settings.radio
     )
-    expected = posterior_bound(model.rows(1e-6), motion.time, MotionPrior(), model.prior_std()).rms
+    beforehand = prior_std(model, stage.scene, upright=False)
+    expected = posterior_bound(model.rows(1e-6), motion.time, MotionPrior(), beforehand).rms
     # the table of probabilities has steps of 0.1 dB, and paths of less than 1e-3 in SNR are left out
     np.testing.assert_allclose(bound(stage, "random"), expected, rtol=2e-3)
 
@@ -87,6 +88,43 @@ def test_what_the_receiver_does_not_report_does_not_count(stage):
     assert (heard_paths(stage.paths, settings, 10.0, use_vt=False).kind != PathKind.VT).all()
 
 
+def test_what_the_filter_takes_for_granted_is_in_the_bound(stage):
+    """A level floor always; walls upright with wall returns alone. Nothing of their direction, nor of the ceiling."""
+    walls = build_walls(stage.scene)
+    model = build_landmark_model(
+        stage.paths, stage.scene.agent, stage.scene.landmark_positions, walls.normal, walls.offset,
+        build_settings(load_spec(PIPELINE, SHORT)).radio,
+    )  # fmt: skip
+    for upright in (False, True):
+        std = prior_std(model, stage.scene, upright=upright)
+        tilts = {w: std[model.wall_column[n] + np.arange(2)] for n, w in enumerate(walls.names)}
+        np.testing.assert_array_equal(tilts["floor"], FLOOR_TILT)
+        np.testing.assert_array_equal(tilts["ceiling"], 0.5)
+        for name in ("wall_x0", "wall_y0", "wall_x6", "wall_y6"):
+            assert sorted(tilts[name]) == [UPRIGHT_TILT if upright else 0.5, 0.5]
+            lean = plane_tangents(walls.normal[walls.names.index(name)])[int(np.argmin(tilts[name]))]
+            assert not upright or abs(lean[2]) == 1.0
+
+
+def test_landmarks_and_walls_have_bounds_where_they_are_heard(stage):
+    """Louder is sharper; nothing heard, nothing known."""
+    found = [
+        scheme_bound(
+            stage.scene, stage.paths, stage.paths.gain, "random",
+            load_spec(PIPELINE, [*SHORT, f"radio.reference_snr_db={snr}"]).model_dump(mode="json"),
+        )
+        for snr in (60.0, 30.0, -200.0)
+    ]  # fmt: skip
+    loud, quiet, silent = found
+    assert set(loud.landmarks) == set(stage.scene.landmarks)
+    assert set(loud.walls) == set(build_walls(stage.scene).names)
+    for name in set(loud.walls) & set(quiet.walls):
+        assert loud.walls[name].angle < quiet.walls[name].angle
+        assert loud.walls[name].distance < quiet.walls[name].distance
+    assert all(loud.landmarks[name] < quiet.landmarks.get(name, np.inf) for name in loud.landmarks)
+    assert (dict(silent.landmarks), dict(silent.walls)) == ({}, {})
+
+
 def test_fewer_rows_hold_the_same_information():
     rng = np.random.default_rng(2)
     rows = Rows(rng.standard_normal((50, 3)), rng.standard_normal((50, 4)), rng.uniform(0.1, 2.0, 50))
@@ -104,9 +142,10 @@ def test_summary_holds_the_bound_and_the_map_score(short_result):
     for name, scheme in summarise(short_result)["schemes"].items():
         own = scheme_bound(
             short_result.scene, short_result.paths, short_result.schemes[name].gain, name, short_result.config
-        )
+        ).agent
         assert scheme["bound_m"] == pytest.approx(np.sqrt(np.mean(own**2)))
         assert scheme["over_bound"] == pytest.approx(scheme["rmse_m"] / scheme["bound_m"])
+        assert scheme["landmarks"]["ris"]["bound_m"] > 0.0
         assert set(scheme["map"]) == {"gospa_m", "localisation_m", "missed", "false"}
 
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.walls import build_walls
+from rislam_rt.information import WallSpread
 from rislam_rt.model import MapEstimate
+from rislam_rt.pipeline.bound import SchemeBound
 from rislam_rt.pipeline.dataset import SCHEME
 from rislam_rt.pipeline.summary import (
     component_labels,
@@ -62,6 +64,20 @@ def test_one_plane_stands_for_one_wall(room):
     number = walls.names.index("wall_x0")
     assert match[number] == 1
     assert (np.delete(match, number) == -1).all()
+
+
+def test_a_plane_stands_for_no_wall_that_no_path_meets(room):
+    """The same plane, with and without a bound for the wall that it lies in."""
+    estimate = map_of_walls([[1.0, 0.0, 0.0]], [0.01])
+    heard = SchemeBound(np.zeros(1), {}, {"wall_x0": WallSpread(np.radians(0.5), 0.02)})
+    scores = wall_scores(room, estimate, heard)["wall_x0"]
+    assert (scores["offset_m"], scores["bound_m"]) == (pytest.approx(0.01), 0.02)
+    assert scores["bound_deg"] == pytest.approx(0.5)
+    elsewhere = heard._replace(walls={"ceiling": heard.walls["wall_x0"]})
+    scores = wall_scores(room, estimate, elsewhere)
+    assert all(wall["angle_deg"] is None for wall in scores.values())
+    assert scores["ceiling"]["bound_m"] == 0.02
+    assert scores["wall_x0"]["bound_m"] is None
 
 
 def test_images_never_stand_for_landmarks(room, short_result):

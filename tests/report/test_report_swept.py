@@ -13,8 +13,8 @@ from rislam_rt.pipeline.sweeps.axes import Cell
 from rislam_rt.pipeline.sweeps.store import Row
 from rislam_rt.report.claims import claims_page, write_claims
 from rislam_rt.report.swept import write_swept
-from rislam_rt.report.swept.entries import scheme_entry, what_limits
-from rislam_rt.report.swept.rooms import missed_aims
+from rislam_rt.report.swept.entries import bound_beside, scheme_entry, what_limits
+from rislam_rt.report.swept.rooms import budget, missed_aims
 
 RECORD = {
     "kind": "made up", "seed": 7, "scenes": {"paper_room": {"sha256": "0" * 64}}, "versions": {},
@@ -28,10 +28,15 @@ def scores(rmse, bound, *, diverged=False, panel=0.05):
         "rmse_m": rmse, "bound_m": bound, "over_bound": rmse / bound, "diverged": diverged, "nees_per_dof": 1.1,
         "association": {"accuracy": 0.97}, "map": {"gospa_m": 0.3},
         "landmarks": {
-            "sphere": {"final_m": 0.04, "rmse_m": 0.05, "cycles_held": 9},
-            "ris": {"final_m": panel, "rmse_m": panel, "cycles_held": 9, "cycles_identified": 8},
+            "sphere": {"final_m": 0.04, "rmse_m": 0.05, "cycles_held": 9, "bound_m": 0.03},
+            "ris": {"final_m": panel, "rmse_m": panel, "cycles_held": 9, "cycles_identified": 8, "bound_m": 0.01},
         },
-        "walls": {"floor": {"angle_deg": 1.0, "offset_m": 0.02}, "ceiling": {"angle_deg": None, "offset_m": None}},
+        "walls": {
+            "floor": {"angle_deg": 1.0, "offset_m": 0.02, "std_deg": 0.6, "bound_deg": 0.5, "bound_m": 0.01},
+            "ceiling": {"angle_deg": None, "offset_m": None, "std_deg": None, "bound_deg": 7.0, "bound_m": 3.0},
+            "table": {"angle_deg": None, "offset_m": None, "std_deg": None, "bound_deg": None, "bound_m": None},
+        },
+        "ghost_walls": 2,
     }  # fmt: skip
 
 
@@ -151,11 +156,36 @@ def test_rooms_say_which_aims_are_missed(tmp_path):
     spec = RoomsSpec(kind="rooms", name="rooms", repetitions=6, scenes=[p["scene"] for p in points])
     page = write_swept(rows(points, lambda p, f: 0.02 * f), spec, RECORD, tmp_path).read_text()
     assert "| office | optimized |" in page
+    assert "1.00, bound 0.50 (50%)" in page
     entry = scheme_entry(group_rows(rows(points, lambda p, f: 0.02 * f))[0], "optimized")
     assert missed_aims(entry) == []
     assert missed_aims({**entry, "ris_m": None, "wall_deg": 2.1, "diverged": 1}) == ["ris_m", "wall_deg", "diverged"]
     assert missed_aims({**entry, "ris_m": None, "ris_found": None}) == []
-    assert entry["wall_found"] == 0.5
+    assert entry["wall_found"] == 0.5  # nothing is heard of the table
+    assert entry["ghost_walls"] == 2.0
+
+
+def test_bounds_are_those_of_what_was_found():
+    """The ceiling was not: its bound of 7 degrees is in none. Where nothing was found, the bounds are all there is."""
+    entry = scheme_entry(group_rows(rows([{"scene": "a/b"}], lambda p, f: 0.02))[0], "optimized")
+    assert (entry["wall_bound_deg"], entry["wall_bound_m"]) == (pytest.approx(0.5), pytest.approx(0.01))
+    assert (entry["scatterer_bound_m"], entry["ris_bound_m"]) == (pytest.approx(0.03), pytest.approx(0.01))
+    error = np.array([np.nan, 2.0, np.nan])
+    assert bound_beside(np.array([3.0, 0.5, np.nan]), error) == 0.5
+    assert bound_beside(np.array([3.0, 3.0, np.nan]), error * np.nan) == pytest.approx(3.0)
+    assert bound_beside(np.full(3, np.nan), error) is None
+
+
+def test_budget_of_each_missed_aim():
+    entry = {"over_bound": 2.0, "association": 0.99, "wall_deg": 3.0, "wall_bound_deg": 2.5}
+    entry |= {"ris_m": None, "ris_bound_m": 0.2}
+    assert budget(entry, "rmse_m") == "filter"
+    assert budget(entry, "wall_deg") == "bound"
+    assert budget({**entry, "wall_bound_deg": 0.1}, "wall_deg") == "filter"
+    assert budget({**entry, "wall_bound_deg": 0.1, "association": 0.5}, "wall_deg") == "association"
+    assert budget({**entry, "wall_bound_deg": None}, "wall_deg") == "not heard"
+    assert budget(entry, "ris_m") == "bound"  # never found, and known to 0.2 m at best
+    assert budget({**entry, "ris_bound_m": 0.02}, "ris_m") == "filter"
 
 
 def test_ablations_hold_every_variant_against_the_reference(tmp_path):

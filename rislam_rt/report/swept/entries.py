@@ -49,11 +49,12 @@ def interval_entry(name: str, interval: Interval | None, unit: str = "") -> dict
     return {f"{name}{unit}": value, f"{name}_low{unit}": _finite(low), f"{name}_high{unit}": _finite(high)}
 
 
-def what_limits(entry: Mapping[str, Any]) -> str:
-    """The first of bound, association and filter that explains an error."""
-    if entry["over_bound"] is None:
+def what_limits(entry: Mapping[str, Any], over_bound: float | None = None) -> str:
+    """The first of bound, association and filter that explains an error: the agent's, or one so far over its bound."""
+    over_bound = entry["over_bound"] if over_bound is None else over_bound
+    if over_bound is None:
         return NOTHING
-    if entry["over_bound"] <= NEAR_BOUND:
+    if over_bound <= NEAR_BOUND:
         return "bound"
     return "association" if (entry["association"] or 0.0) < GOOD_ASSOCIATION else "filter"
 
@@ -123,32 +124,52 @@ def panel_of(group: Group, scheme: str) -> str | None:
 
 
 def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
-    """Errors at the end of the run, and the share of (landmark, run) pairs in which it was in the map then.
+    """Errors at the end of the run with their bounds, and the share of (landmark, run) pairs that were in the map then.
 
-    Both are None where there is nothing to be found.
+    None where there is nothing to be found.
     """
     panel = panel_of(group, scheme)
     names = group.parts(scheme, "landmarks")
-    others = [group.column(scheme, "landmarks", name, "final_m") for name in names if name != panel]
-    there = panel is not None and SCHEMES[scheme].panel
-    own = group.column(scheme, "landmarks", str(panel), "final_m") if there else np.zeros(0)
-    rest = np.concatenate(others) if others else np.zeros(0)
-    return {
-        "ris_m": _rms(own),
-        "ris_found": _share(own),
-        "scatterer_m": _rms(rest),
-        "scatterer_found": _share(rest),
-    }
+    own = [panel] if panel is not None and SCHEMES[scheme].panel else []
+    found: dict[str, float | None] = {}
+    for kind, members in (("ris", own), ("scatterer", [name for name in names if name != panel])):
+        error, bound = (_pooled(group, scheme, "landmarks", members, part) for part in ("final_m", "bound_m"))
+        found |= {f"{kind}_m": _rms(error), f"{kind}_bound_m": bound_beside(bound, error)}
+        found[f"{kind}_found"] = _share(error)
+    return found
 
 
 def _walls(group: Group, scheme: str) -> dict[str, float | None]:
-    """Angle and distance errors at the end of the run over all walls that were found, and the share of those."""
+    """Angle and distance errors at the end of the run over all walls that were found, with bounds and own deviation.
+
+    The share is that of those found among the walls that have a bound: no path meets the others.
+    """
     names = group.parts(scheme, "walls")
-    angle, offset = (
-        np.concatenate([group.column(scheme, "walls", name, part) for name in names]) if names else np.zeros(0)
-        for part in ("angle_deg", "offset_m")
+    angle, offset, own, least, near = (
+        _pooled(group, scheme, "walls", names, part)
+        for part in ("angle_deg", "offset_m", "std_deg", "bound_deg", "bound_m")
     )
-    return {"wall_deg": _rms(angle), "wall_m": _rms(offset), "wall_found": _share(angle)}
+    heard = ~np.isnan(least) if not np.isnan(least).all() else np.ones(len(least), dtype=np.bool_)
+    return {
+        "wall_deg": _rms(angle),
+        "wall_bound_deg": bound_beside(least, angle),
+        "wall_own_deg": _rms(own),
+        "wall_m": _rms(offset),
+        "wall_bound_m": bound_beside(near, offset),
+        "wall_found": _share(angle[heard]),
+        "ghost_walls": _mean(group.column(scheme, "ghost_walls")),
+    }
+
+
+def _pooled(group: Group, scheme: str, name: str, members: Sequence[str], part: str) -> Floats:
+    """A score of all members, e.g. walls, in all repetitions, one after the other."""
+    return np.concatenate([np.zeros(0), *(group.column(scheme, name, member, part) for member in members)])
+
+
+def bound_beside(bound: Floats, error: Floats) -> float | None:
+    """RMS of the bounds of those that were found, so that it compares with their error; of all, if none was."""
+    found = ~np.isnan(error)
+    return _rms(bound[found] if found.any() else bound)
 
 
 def _rms(values: Floats) -> float | None:
