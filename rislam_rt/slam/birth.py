@@ -30,7 +30,7 @@ from rislam_rt.slam.match import Outlook, explained
 from rislam_rt.slam.mirrors import is_behind_mirror, mirror_images
 from rislam_rt.slam.moments import Moments, poses_of, square_root
 from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe
-from rislam_rt.slam.tracks import PANEL, UNTOLD, Tracks, same_side
+from rislam_rt.slam.tracks import PANEL, UNTOLD, Tracks, overstatement, same_side
 from rislam_rt.slam.turns import PARALLEL, due_tracks
 
 MAX_POINT_STD = 0.2
@@ -151,7 +151,7 @@ def examine(
     moving = tracks.moving.copy()
     doubt = square_root(moments.covariance[:6, :6])
     for row in due:
-        history, slots = track_history(tracks, row, past, doubt, free_space)
+        history, slots = track_history(tracks, row, past, doubt, free_space, config.detection_snr)
         if is_explained(tracks, row, history, scene):
             continue
         if not named_panel(book):
@@ -171,7 +171,9 @@ def examine(
     return -1, tracks._replace(moving=moving), None
 
 
-def track_history(tracks: Tracks, row: int, past: Past, doubt: Floats, free_space: float) -> tuple[History, Integers]:
+def track_history(
+    tracks: Tracks, row: int, past: Past, doubt: Floats, free_space: float, detection_snr: float
+) -> tuple[History, Integers]:
     """A track's measurements with the mean believed poses, and the rows of the past that they belong to.
 
     `doubt` (6, D) is the square root of the pose's covariance, `free_space` the log amplitude after 1 m.
@@ -180,7 +182,8 @@ def track_history(tracks: Tracks, row: int, past: Past, doubt: Floats, free_spac
     poses = poses_of(past.position[rows], past.heading[rows], past.body)
     lag = past.time[past.cycle % len(past.time)] - past.time[rows]
     ratio = float(tracks.log_amplitude[row] - free_space + np.log(tracks.mean[row, 0, 0]))
-    seen, std = tracks.seen[row, rows], tracks.std[row, rows]
+    faint = overstatement(tracks, past.cycle, detection_snr)[row]
+    seen, std = tracks.seen[row, rows], tracks.std[row, rows] * faint
     return History(seen, std, poses, lag, ratio, doubt, side=int(tracks.side[row])), rows
 
 

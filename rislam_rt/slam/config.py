@@ -46,13 +46,14 @@ class SlamConfig:
     classifier: str = "amplitude"
     """Who tells wall returns from landmark paths: the rule above, `geometric`, or the trained `network`."""
     birth_cycles: int = 12
-    """Cycles of history that a track needs before a landmark can come of it."""
+    """Cycles of history that a track needs before a landmark can come of it, two in three of them with a measurement;
+    all of them where the panel's codes may make the gaps."""
     window: int = 40
     """Cycles of history that are kept."""
     birth_margin: float = 9.0
     """By how much chi^2 a hypothesis must win over the next one."""
     max_misses: int = 4
-    """Cycles without a component after which a track dies."""
+    """Cycles without a component after which a track dies, unless its past lets expect longer gaps."""
     merge_distance: float = 9.0
     """Squared Mahalanobis distance below which two landmarks are one."""
     resample_below: float = 0.5

@@ -23,7 +23,7 @@ from rislam_rt.slam.prune import keepers
 from rislam_rt.slam.returns import Poses, compact
 from rislam_rt.slam.sift import sift
 from rislam_rt.slam.suspect import weigh_tracks
-from rislam_rt.slam.tracks import OTHER, PANEL, Glance, Tracks, advance, begin, extend, no_tracks
+from rislam_rt.slam.tracks import OTHER, PANEL, Glance, Tracks, advance, begin, extend, has_ended, no_tracks
 
 LOS_MARGIN = 0.1
 """Length [m] beyond the baseline below which a component is the direct path: no landmark can be that near."""
@@ -243,7 +243,7 @@ def _follow(
         tracks = sift(tracks, position, heading, state.cycle, state.body, state.radio, config.classifier)
     rows = np.concatenate([kept, count + np.arange(len(spare))])
     removed = np.concatenate([used, spare])[tracks.specular[rows]]
-    return tracks.keep(tracks.misses <= config.max_misses), removed
+    return tracks.keep(~has_ended(tracks, state.cycle, config.max_misses)), removed
 
 
 def glance_of(measurement: Measurement, radio: RadioConfig) -> Glance:

@@ -28,6 +28,8 @@ TAIL = 4.0
 """Degrees of freedom of Student's t: paths that nobody expected, in the same cell, make the errors' tails heavy."""
 COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(TAIL + 3) log(1 + chi^2 / TAIL)` for chi^2 with 3 degrees of freedom."""
+HELD = 1e-3
+"""Standard deviation [m] of a position that is held."""
 RIDGE = 1e-4
 """Prior information [1/m^2], (100 m)^-2, that keeps blind directions finite."""
 UPRIGHT_TILT = 0.01
@@ -42,7 +44,7 @@ class Fit(NamedTuple):
     feature: Floats
     """(..., 3) [m]."""
     covariance: Floats
-    """(..., 3, 3) [m^2]."""
+    """(..., 3, 3) [m^2] about where the agent is: its own error moves the feature along and is no reason to wait."""
     cost: Floats
     """(...,) twice the negative log likelihood under Student's t, without its constants."""
 
@@ -99,7 +101,15 @@ def fit_feature(
         solution = _solve(kind, feature, parent, anchors, history, solution.trust, upright)
         if length.max() < CONVERGED:
             break
-    return Fit(solution.feature, np.asarray(np.linalg.inv(solution.normal), dtype=np.float64), solution.cost)
+    return Fit(solution.feature, np.asarray(np.linalg.inv(_held(solution.gram, history.doubt))), solution.cost)
+
+
+def _held(gram: Floats, doubt: Floats) -> Floats:
+    """Information (..., 3, 3) on the feature, today's position held and the velocity as uncertain as it is."""
+    size = doubt.shape[1]
+    inner = gram[..., :size, :size] + np.eye(size) + doubt[:3].T @ doubt[:3] / HELD**2
+    lost = gram[..., size:-1, :size] @ np.linalg.solve(inner, gram[..., :size, size:-1])
+    return np.asarray(gram[..., size:-1, size:-1] - lost)
 
 
 class _Solution(NamedTuple):
@@ -114,6 +124,8 @@ class _Solution(NamedTuple):
     """(...,)."""
     trust: Floats
     """(..., K) weight that Student's t gives each measurement."""
+    gram: Floats
+    """(..., D + 4, D + 4) before that: the pose's D numbers, without their prior, the feature's three, the residual."""
 
 
 def _solve(
@@ -136,18 +148,18 @@ def _solve(
     tall = (*columns.shape[:-3], -1, columns.shape[-1])
     gram = np.swapaxes(weighted.reshape(tall), -1, -2) @ columns.reshape(tall)
     size = history.doubt.shape[1]
+    gram[..., size:-1, size:-1] += np.diag([RIDGE, RIDGE, RIDGE + upright**-2])
     solved = np.linalg.solve(gram[..., :size, :size] + np.eye(size), gram[..., :size, size:])
     rest = gram[..., size:, size:] - gram[..., size:, :size] @ solved
-    normal, slope = rest[..., :3, :3] + RIDGE * AXES, rest[..., :3, 3]
+    normal, slope = rest[..., :3, :3], rest[..., :3, 3]
     lean = feature[..., 2] - anchors[0, 2]
-    normal[..., 2, 2] += upright**-2
     slope[..., 2] -= upright**-2 * lean
     pose_error = solved[..., 3]
     left = columns[..., -1] - (columns[..., :size] @ pose_error[..., None, :, None])[..., 0]
     squared = np.vecdot(left, left)
     cost = (TAIL + 3.0) * np.log1p(squared / TAIL).sum(axis=-1) + np.vecdot(pose_error, pose_error)
     cost = cost + (lean / upright) ** 2
-    return _Solution(feature, normal, slope, cost, (TAIL + 3.0) / (TAIL + squared))
+    return _Solution(feature, normal, slope, cost, (TAIL + 3.0) / (TAIL + squared), gram)
 
 
 def plausible(fit: Fit, count: int, parameters: int) -> bool:

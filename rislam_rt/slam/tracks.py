@@ -3,13 +3,19 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import gammaln, ndtri
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.identity import STRENGTHS
 
 AMPLITUDE_WANDER = 1.0
 """Standard deviation of an unexplained track's log amplitude from cycle to cycle: a panel's code may change."""
-
+PATIENT_CYCLES = 6
+"""Measurements from which on gaps of a track are weighed by its own; younger ones may be chance."""
+LOST = np.log(0.01)
+"""Log probability of a gap below which a track has ended."""
+FAINTEST = 0.1
+"""Least share of cycles from which the strength of a path is reckoned."""
 
 UNTOLD, OTHER, PANEL = -1, 0, 1
 """Which side a component is on, where the receiver sets the panel's paths apart by alternating codes."""
@@ -87,6 +93,14 @@ class Tracks(NamedTuple):
         """(T,) measurements held."""
         return np.sum(self.cycle >= 0, axis=1)
 
+    def age(self, cycle: int) -> Integers:
+        """(T,) cycles since the oldest measurement that is held."""
+        return np.asarray(cycle - np.min(np.where(self.cycle >= 0, self.cycle, cycle), axis=1))
+
+    def earlier_misses(self, cycle: int) -> Integers:
+        """(T,) cycles without a measurement between the oldest and the latest that are held."""
+        return np.asarray(np.maximum(self.age(cycle) + 1 - self.length - self.misses, 0))
+
     def keep(self, rows: Booleans) -> "Tracks":
         """Only some of the tracks."""
         return Tracks._make(field[rows] for field in self)
@@ -95,6 +109,38 @@ class Tracks(NamedTuple):
 def same_side(first: Integers, second: Integers) -> Booleans:
     """(A, B) whether things of two sides (A,), (B,) may be one."""
     return np.asarray((first[:, None] == second) | (first[:, None] == UNTOLD) | (second == UNTOLD))
+
+
+def log_silence(tracks: Tracks, cycle: int) -> Floats:
+    """(T,) log probability of gaps as long as the present ones, by the tracks' own past.
+
+    What shows in every cycle has ended after a few without it; what lies near the detection threshold comes and goes.
+    With a flat prior on the probability of its showing, n cycles with and m without a measurement leave
+    `prod_j (m + j) / (n + m + 1 + j)`, j = 1 .. k, for a gap of k.
+    """
+    missed, gap = tracks.earlier_misses(cycle), tracks.misses
+    total = tracks.length + missed
+    return np.asarray(gammaln(missed + gap + 1) - gammaln(missed + 1) - gammaln(total + gap + 2) + gammaln(total + 2))
+
+
+def has_ended(tracks: Tracks, cycle: int, max_misses: int) -> Booleans:
+    """(T,) tracks that were not seen for longer than `max_misses`, and than their past lets expect."""
+    patient = (tracks.length >= PATIENT_CYCLES) & (log_silence(tracks, cycle) > LOST)
+    return np.asarray((tracks.misses > max_misses) & ~patient)
+
+
+def overstatement(tracks: Tracks, cycle: int, detection_snr: float) -> Floats:
+    """(T,) factor by which the amplitudes of a track exceed its path's, and its reported deviations fall short.
+
+    Of a path near the threshold only those amplitudes are measured that noise lifts above it. The share p of cycles in
+    which it shows tells how far below it lies: `tau + x` with `x = Phi^-1(p)`, in standard deviations of the noise, of
+    which what is measured has the mean `tau + x + phi(x) / p`.
+    """
+    seen, missed = tracks.length, tracks.earlier_misses(cycle)
+    share = np.clip((seen + 1.0) / (seen + missed + 2.0), FAINTEST, 1.0 - 1e-9)
+    quantile = ndtri(share)
+    mean = np.sqrt(2.0 * detection_snr) + quantile
+    return np.asarray(1.0 + np.exp(-0.5 * quantile**2) / np.sqrt(2.0 * np.pi) / share / mean)
 
 
 def no_tracks(window: int) -> Tracks:

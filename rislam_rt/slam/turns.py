@@ -5,12 +5,16 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Integers
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.match import Outlook, hidden_tracks
-from rislam_rt.slam.tracks import Tracks, same_side
+from rislam_rt.slam.tracks import OTHER, Tracks, log_silence, same_side
 
 STRIDE = 4
 """Tracks are examined every so many measurements, and four times less often once their history is full."""
 ELDER_CYCLES = 6
 """Cycles of history from which on a track keeps longer and weaker ones waiting."""
+ASLEEP = np.log(0.05)
+"""Log probability of its present gap down to which a faint track does so in its silence."""
+FEWEST = 2.0 / 3.0
+"""Share of the cycles of a history that need a measurement: the way made meanwhile counts as well."""
 PARALLEL = 4.0
 """Standard deviations (and 0.02) within which a track's direction is that of a known leg."""
 
@@ -20,14 +24,17 @@ def due_tracks(tracks: Tracks, outlook: Outlook, cycle: int, config: SlamConfig)
 
     So a track has to wait while another that is shorter and stronger is still unexplained.
     """
-    ready = (~tracks.specular | config.use_vt) & (tracks.length >= config.birth_cycles) & (tracks.misses == 0)
-    oldest = np.min(np.where(tracks.cycle >= 0, tracks.cycle, cycle), axis=1)
-    growing = cycle - oldest < config.window - 1
+    age = tracks.age(cycle)
+    fewest = np.where(tracks.side == OTHER, FEWEST, 1.0) * config.birth_cycles
+    long = (age + 1 >= config.birth_cycles) & (tracks.length >= fewest)
+    ready = (~tracks.specular | config.use_vt) & long & (tracks.misses == 0)
+    growing = age < config.window - 1
     turn = np.where(growing, tracks.length % STRIDE == 0, (np.arange(len(ready)) + cycle) % (4 * STRIDE) == 0)
     if not (ready & turn).any():
         return np.zeros(0, dtype=np.int64)
     hidden = hidden_tracks(outlook, tracks, config.gate)
-    alive = ~tracks.specular & ~hidden & (tracks.length >= ELDER_CYCLES) & (tracks.misses <= 2)
+    alive = ~tracks.specular & ~hidden & (tracks.length >= ELDER_CYCLES)
+    alive &= (tracks.misses <= 2) | (log_silence(tracks, cycle) > ASLEEP)
     length = tracks.mean[:, 0, 0]
     stronger = tracks.log_amplitude[None] > tracks.log_amplitude[:, None] + 0.1
     elder = (length[None] < length[:, None] - 0.05) & (stronger | _aligned(tracks))

@@ -179,3 +179,18 @@ def test_outliers_move_a_fit_little() -> None:
 def test_a_floor_mirrors_what_it_should() -> None:
     """The scene itself: the floor's image of the parent lies as far below it as the parent above."""
     np.testing.assert_allclose(reflect(PARENT, FLOOR, ANCHOR), PARENT * [1.0, 1.0, -1.0], atol=1e-12)
+
+
+def test_a_point_is_known_as_well_where_the_agent_is_not() -> None:
+    """An error of the position moves the point along and leaves its own covariance; one of the speed does not."""
+    history = draw(POINT, SOUGHT["point"], rng=np.random.default_rng(3)).history
+    history = history._replace(lag=np.linspace(4.0, 0.0, CYCLES))
+    fits = []
+    for position, velocity in ((0.0, 0.0), (1.0, 0.0), (0.0, 0.02)):
+        doubt = np.diag([position, position, 0.0, velocity, velocity, 0.0])[:, [0, 1, 3, 4]]
+        first = first_guess(POINT, None, ANCHOR, history)
+        assert first is not None
+        fits.append(fit_feature(POINT, first, None, ANCHOR, history._replace(doubt=doubt), 10))
+    spread = [np.sqrt(np.linalg.eigvalsh(fit.covariance)[-1]) for fit in fits]
+    np.testing.assert_allclose(spread[1], spread[0], rtol=0.1)
+    assert spread[2] > 1.2 * spread[0]
