@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
-from rislam_rt.slam.book import Book, named_panel
+from rislam_rt.slam.book import RATIO_SPREAD, Book, named_panel
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.filter import FilterState, believed
 from rislam_rt.slam.moments import POSE, Moments, even_draws, square_root
@@ -15,6 +15,11 @@ from rislam_rt.slam.suspect import find_suspect
 
 IMAGE_HITS = 3
 """Measurements of an image before it is shown on the map."""
+WALL_HITS = 40
+"""The same for a wall."""
+MAX_LEAN = np.radians(1.0)
+"""RMS angle [rad] between a wall's normal and its mean above which the belief does not know how the wall stands, and it
+is not shown on the map."""
 
 
 def predict(state: FilterState, dt: float, config: SlamConfig) -> SlamEstimate:
@@ -45,7 +50,12 @@ def estimate(state: FilterState, config: SlamConfig, moments: Moments | None = N
 
 
 def build_map(moments: Moments, book: Book) -> MapEstimate:
-    """Points, first-order images that were seen, and walls."""
+    """Points, first-order images that were seen, and walls that are known.
+
+    Ghosts, such as a corner's image taken for that of one slanted wall, seldom throw a return of their own: a wall is
+    shown once it was measured `WALL_HITS` times, its reflection by itself (`Book.ratio`), and its normal is known to
+    `MAX_LEAN`.
+    """
     if not len(book.ident):
         return empty_map()
     mean, covariance = moments.features, moments.covariance[POSE:, POSE:]
@@ -55,6 +65,8 @@ def build_map(moments: Moments, book: Book) -> MapEstimate:
     image, spread = _images(mean, covariance, book, parent, wall)
     strength, ratio = np.exp(book.log_strength[0][points]), np.exp(book.ratio[wall])
     normal, offset, std = _walls(mean, covariance, book)
+    known = (book.ratio_variance[book.walls] < RATIO_SPREAD**2) & (book.hits[book.walls] >= WALL_HITS)
+    known &= np.sqrt(2.0) * std[:, 0] < MAX_LEAN
     return MapEstimate(
         np.concatenate([book.ident[points], images[:, 2]]),
         np.concatenate([mean[points], image]),
@@ -62,9 +74,9 @@ def build_map(moments: Moments, book: Book) -> MapEstimate:
         np.concatenate([np.full(len(points), -1), np.searchsorted(points, parent)]),
         np.concatenate([book.ris_probability[points], np.zeros(len(images))]),
         np.concatenate([strength, ratio]),
-        normal,
-        offset,
-        std,
+        normal[known],
+        offset[known],
+        std[known],
     )
 
 

@@ -10,7 +10,7 @@ from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.expect import Belief, expected_returns
 from rislam_rt.slam.identity import STRENGTHS, point_amplitude
 from rislam_rt.slam.learn import Hits, learn
-from rislam_rt.slam.mapping import build_map
+from rislam_rt.slam.mapping import WALL_HITS, build_map
 from rislam_rt.slam.match import Outlook, look_ahead
 from rislam_rt.slam.moments import POSE, Moments, even_draws, poses_of
 from rislam_rt.slam.prune import keepers
@@ -210,10 +210,29 @@ def test_images_on_the_map_have_the_covariance_of_what_they_hang_on(rng: np.rand
     np.testing.assert_array_equal(shown.parent, [-1, 0])
 
 
+def proven(book: Book) -> Book:
+    """Every wall measured often enough to be shown, its reflection too."""
+    return book._replace(hits=np.full(len(book.ident), WALL_HITS), ratio_variance=np.full(len(book.ident), 0.01))
+
+
+def test_walls_are_on_the_map_once_they_are_known() -> None:
+    """Not those of few measurements, of no reflection of their own, or of an unknown lean."""
+    moments, book = room()
+    sure = proven(book)
+    span = np.linalg.norm(CEILING - PLACE)
+    assert len(build_map(moments, sure).wall_offset) == 1
+    assert len(build_map(moments, sure._replace(hits=sure.hits - 1)).wall_offset) == 0
+    assert len(build_map(moments, sure._replace(ratio_variance=book.ratio_variance)).wall_offset) == 0
+    for angle, count in ((0.9, 1), (1.1, 0)):  # degrees, of both tilts together
+        wide = moments.covariance.copy()
+        wide[-3:, -3:] = 0.5 * (np.radians(angle) * span) ** 2 * np.eye(3)
+        assert len(build_map(Moments(moments.mean, wide), sure).wall_offset) == count
+
+
 def test_walls_on_the_map_err_as_told(rng: np.random.Generator) -> None:
     """Normal, offset and their deviations against 20 000 draws of the image: 1 % for a deviation, and curvature."""
     moments, book = room()
-    shown = build_map(moments, book)
+    shown = build_map(moments, proven(book))
     np.testing.assert_allclose(shown.wall_normal, [[0.0, 0.0, 1.0]], atol=1e-12)
     np.testing.assert_allclose(shown.wall_offset, [3.0])
     draws = CEILING + 0.01 * rng.normal(size=(20_000, 3))
