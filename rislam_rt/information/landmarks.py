@@ -219,12 +219,13 @@ def build_landmark_model(
         (W, 3), (W,) planes of `paths.walls`.
     walls
         `known`: landmarks alone are unknown; `planes`: and two tilts and the offset of every wall that a landmark
-        path meets; `images`: every landmark and every image of it is a point of its own, as a filter without walls
+        path or a wall return meets; `images`: every landmark and every image of it is a point of its own, as a filter without walls
         holds them.
     """
     keys, seen = _points_seen(paths)
     names = [paths.landmarks[key[0]] + "".join(f" | {paths.walls[w]}" for w in key[1:]) for key in keys]
-    met = sorted({w for key in keys for w in key[1:]})
+    returned = paths.tx_walls[paths.kind == PathKind.VT]
+    met = sorted({w for key in keys for w in key[1:]} | set(returned[returned >= 0].tolist()))
     column = np.full(len(wall_offset), -1, dtype=np.int64)
     if walls == "images":
         labels = [f"{name} {axis}" for name in names for axis in "xyz"]

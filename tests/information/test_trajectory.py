@@ -212,6 +212,21 @@ def test_errors_of_walls_are_those_of_planes_drawn_from_the_covariance(room):
     assert landmarks[model.paths.landmarks[0]] == pytest.approx(size, rel=0.02)
 
 
+def test_wall_returns_alone_do_not_tell_where_the_agent_is(room):
+    """Their walls are unknown: the whole may be shifted, so that the start's own error stays."""
+    paths, motion, *_ = room
+    kept = paths.kind == PathKind.VT
+    per_path = {n: getattr(paths, n)[kept] for n in ("kind", "landmark", "tx_walls", "rx_walls", "num_vertices")}
+    names = ("valid", "tau", "departure", "arrival", "vertices", "gain")
+    returns = replace(paths, **per_path, **{n: getattr(paths, n)[:, kept] for n in names}, ris=None)
+    model = build((returns, *room[1:]), "planes")
+    faint = replace(model, radio=RadioConfig(noise_psd=1e-11))
+    prior = MotionPrior(0.0, 0.1, 0.0)
+    found = posterior_bound(faint.rows(0.0, use_vt=True), motion.time, prior, model.prior_std())
+    # 0.1 m beside walls known to 10 m, of which some ten are met
+    np.testing.assert_allclose(found.rms, np.sqrt(2.0) * 0.1, rtol=5e-3)
+
+
 def test_a_wall_known_by_one_image_is_as_sharp_as_that_image_seen_from_its_point(room):
     """Landmark and motion known, one path over one wall: its normal is along the line from point to image, whose
     position the same measurements give by themselves."""
