@@ -165,6 +165,16 @@ def test_rooms_say_which_aims_are_missed(tmp_path):
     assert entry["ghost_walls"] == 2.0
 
 
+def test_rooms_under_several_settings_have_a_line_each(tmp_path):
+    points = [{"variant": name, "scene": "../scenes/office"} for name in ("paper", "use_vt")]
+    variants = [{"name": "paper"}, {"name": "use_vt", "set": {"slam.use_vt": True}}]
+    spec = RoomsSpec(kind="rooms", name="rooms", repetitions=6, scenes=["../scenes/office"], variants=variants)
+    write_swept(rows(points, lambda p, f: 0.02 * f * (1 + (p["variant"] == "paper"))), spec, RECORD, tmp_path)
+    own = [e for e in json.loads((tmp_path / "rooms.json").read_text())["entries"] if e["scheme"] == "optimized"]
+    assert [entry["room"] for entry in own] == ["office (paper)", "office (use_vt)"]
+    assert own[0]["rmse_m"] == pytest.approx(2.0 * own[1]["rmse_m"])
+
+
 def test_bounds_are_those_of_what_was_found():
     """The ceiling was not: its bound of 7 degrees is in none. Where nothing was found, the bounds are all there is."""
     entry = scheme_entry(group_rows(rows([{"scene": "a/b"}], lambda p, f: 0.02))[0], "optimized")

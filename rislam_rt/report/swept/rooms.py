@@ -46,6 +46,8 @@ def rooms_content(groups: Sequence[Group]) -> dict[str, Any]:
     entries = []
     for group in groups:
         room = PurePosixPath(str(group.point["scene"])).name
+        if variant := group.point.get("variant"):
+            room = f"{room} ({variant})"
         for scheme in group.schemes:
             entry = scheme_entry(group, scheme)
             missed = missed_aims(entry)

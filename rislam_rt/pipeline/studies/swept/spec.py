@@ -79,6 +79,18 @@ class RoomsSpec(SweptSpec):
     kind: Literal["rooms"]
     scenes: Annotated[list[str], Field(min_length=1)]
     """Scene folders, relative to the pipeline file."""
+    variants: list[VariantSection] = Field(default=[])
+    """Settings under which every room is run; the main job's alone by default."""
+
+    @property
+    def all_variants(self) -> list[VariantSection]:
+        """The variants."""
+        return self.variants
+
+    @model_validator(mode="after")
+    def _each_once(self) -> "RoomsSpec":
+        _check_names(self.variants)
+        return self
 
 
 class AblationsSpec(_OneRoom):

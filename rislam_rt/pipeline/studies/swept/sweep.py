@@ -76,7 +76,8 @@ def _axes(spec: SweptSpec) -> tuple[Axis, ...]:
     if isinstance(spec, AblationsSpec):
         return (Axis("variant", tuple(variant.name for variant in spec.variants)),)
     assert isinstance(spec, RoomsSpec)
-    return (Axis("scene", tuple(spec.scenes)),)
+    rooms = Axis("scene", tuple(spec.scenes))
+    return (Axis("variant", tuple(variant.name for variant in spec.variants)), rooms) if spec.variants else (rooms,)
 
 
 def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
