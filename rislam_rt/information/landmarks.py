@@ -219,8 +219,8 @@ def build_landmark_model(
         (W, 3), (W,) planes of `paths.walls`.
     walls
         `known`: landmarks alone are unknown; `planes`: and two tilts and the offset of every wall that a landmark
-        path or a wall return meets; `images`: every landmark and every image of it is a point of its own, as a filter without walls
-        holds them.
+        path or a wall return meets; `images`: every landmark and every image of it is a point of its own, as a filter
+        without walls holds them.
     """
     keys, seen = _points_seen(paths)
     names = [paths.landmarks[key[0]] + "".join(f" | {paths.walls[w]}" for w in key[1:]) for key in keys]
