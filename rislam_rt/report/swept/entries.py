@@ -32,6 +32,7 @@ def scheme_entry(group: Group, scheme: str) -> dict[str, Any]:
         "failed": group.failed(scheme),
         "diverged": group.diverged(scheme),
         **interval_entry("rmse", overall, "_m"),
+        **interval_entry("aligned", spread(group.column(scheme, "rmse_aligned_m")), "_m"),
         "median_m": float(np.median(known)) if len(known) else None,
         "bound_m": least.value if least else None,
         "over_bound": overall.value / least.value if overall and least and least.value else None,
@@ -74,13 +75,12 @@ def metres(value: float | None) -> str:
     return NOTHING if value is None or np.isnan(value) else f"{value:.3f}"
 
 
-def metres_between(entry: Mapping[str, Any]) -> str:
-    """RMSE with its interval."""
-    if entry["rmse_m"] is None:
-        return NOTHING
-    if entry["rmse_low_m"] is None:
-        return metres(entry["rmse_m"])
-    return f"{entry['rmse_m']:.3f} ({entry['rmse_low_m']:.3f} to {entry['rmse_high_m']:.3f})"
+def metres_between(entry: Mapping[str, Any], name: str = "rmse") -> str:
+    """An error with its interval."""
+    value, low, high = (entry[f"{name}{end}_m"] for end in ("", "_low", "_high"))
+    if value is None or low is None:
+        return metres(value)
+    return f"{value:.3f} ({low:.3f} to {high:.3f})"
 
 
 def ratio(value: float | None) -> str:
