@@ -172,7 +172,8 @@ def test_rooms_under_several_settings_have_a_line_each(tmp_path):
     spec = RoomsSpec(kind="rooms", name="rooms", repetitions=6, scenes=["../scenes/office"], variants=variants)
     write_swept(rows(points, lambda p, f: 0.02 * f * (1 + (p["variant"] == "paper"))), spec, RECORD, tmp_path)
     own = [e for e in json.loads((tmp_path / "rooms.json").read_text())["entries"] if e["scheme"] == "optimized"]
-    assert [entry["room"] for entry in own] == ["office (paper)", "office (use_vt)"]
+    assert [entry["room"] for entry in own] == ["office", "office"]
+    assert [entry["series"] for entry in own] == ["optimized", "optimized, use_vt"]
     assert own[0]["rmse_m"] == pytest.approx(2.0 * own[1]["rmse_m"])
 
 

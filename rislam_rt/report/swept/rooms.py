@@ -42,17 +42,18 @@ BOUND_OF = {
 
 
 def rooms_content(groups: Sequence[Group]) -> dict[str, Any]:
-    """Plain data: one entry a room and scheme, and the aims."""
+    """Plain data: one entry a room, variant and scheme, and the aims. A series is a scheme in one variant."""
     entries = []
+    usual = groups[0].point.get("variant", "") if groups else ""
     for group in groups:
-        room = PurePosixPath(str(group.point["scene"])).name
-        if variant := group.point.get("variant"):
-            room = f"{room} ({variant})"
+        room, variant = PurePosixPath(str(group.point["scene"])).name, group.point.get("variant", "")
         for scheme in group.schemes:
+            series = scheme if variant == usual else f"{scheme}, {variant}"
             entry = scheme_entry(group, scheme)
             missed = missed_aims(entry)
             limits = {name: budget(entry, name) for name in missed}
-            entries.append({"room": room, **entry, "limit": what_limits(entry), "missed": missed, "limits": limits})
+            found = {"limit": what_limits(entry), "missed": missed, "limits": limits}
+            entries.append({"room": room, "series": series, **entry, **found})
     return {"entries": entries, "aims": AIMS}
 
 
@@ -79,13 +80,13 @@ def draw_rooms(content: Mapping[str, Any]) -> Figure:
     """Agent's RMSE in every room, the bound as a bar across, and the aim."""
     entries = content["entries"]
     rooms = list(dict.fromkeys(entry["room"] for entry in entries))
-    schemes = list(dict.fromkeys(entry["scheme"] for entry in entries))
+    series = {entry["series"]: entry["scheme"] for entry in entries}
     with styled():
         figure = Figure(figsize=(max(6.0, 2.5 + 1.05 * len(rooms)), 4.6))
         axis = figure.subplots()
-        for number, scheme in enumerate(schemes):
-            shift = 0.14 * (number - 0.5 * (len(schemes) - 1))
-            own = {entry["room"]: entry for entry in entries if entry["scheme"] == scheme}
+        for number, (name, scheme) in enumerate(series.items()):
+            shift = 0.14 * (number - 0.5 * (len(series) - 1))
+            own = {entry["room"]: entry for entry in entries if entry["series"] == name}
             shown = [room for room in rooms if room in own and own[room]["rmse_m"]]
             x = np.array([rooms.index(room) + shift for room in shown])
             value = np.array([own[room]["rmse_m"] for room in shown])
@@ -96,7 +97,7 @@ def draw_rooms(content: Mapping[str, Any]) -> Figure:
             colour = scheme_colour(scheme)
             axis.errorbar(
                 x, value, np.abs(ends.T - value), color=colour, ls="none", marker=MARKER.get(scheme, "o"), ms=5,
-                capsize=2, label=scheme,
+                capsize=2, label=name, mfc=colour if name == scheme else "white",
             )  # fmt: skip
             axis.hlines(bound, x - 0.06, x + 0.06, color=colour, lw=2.0, ls=(0, (1, 0.6)))
         axis.axhline(AIMS["rmse_m"], color="black", lw=0.9, ls=":")
@@ -135,7 +136,7 @@ def rooms_page(content: Mapping[str, Any], groups: Sequence[Group], about: Seque
     ]  # fmt: skip
     rows = [
         [
-            entry["room"], entry["scheme"], metres_between(entry), metres(entry["bound_m"]), ratio(entry["over_bound"]),
+            entry["room"], entry["series"], metres_between(entry), metres(entry["bound_m"]), ratio(entry["over_bound"]),
             ratio(entry["nees_per_dof"]), _found(entry, "ris_m", "ris_found"),
             _found(entry, "scatterer_m", "scatterer_found"), _found(entry, "wall_deg", "wall_found", 2),
             ratio(entry["wall_own_deg"]), _found(entry, "wall_m", "wall_found"), ratio(entry["ghost_walls"]),

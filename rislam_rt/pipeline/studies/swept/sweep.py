@@ -77,7 +77,7 @@ def _axes(spec: SweptSpec) -> tuple[Axis, ...]:
         return (Axis("variant", tuple(variant.name for variant in spec.variants)),)
     assert isinstance(spec, RoomsSpec)
     rooms = Axis("scene", tuple(spec.scenes))
-    return (Axis("variant", tuple(variant.name for variant in spec.variants)), rooms) if spec.variants else (rooms,)
+    return (rooms, Axis("variant", tuple(variant.name for variant in spec.variants))) if spec.variants else (rooms,)
 
 
 def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
