@@ -90,7 +90,7 @@ def draw_fig4b(content: Mapping[str, Any], spec: Fig4bSpec) -> Figure:
             top = axis.secondary_xaxis("top", functions=(lambda x, s=shift: x + s, lambda x, s=shift: x - s))
             top.set_xlabel("SNR as the paper defines it [dB]", fontsize=9)
         axes[0].set_ylabel("RMSE of the agent's position [m]")
-        explain_lines(axes[0])
+        explain_lines(figure, axes[0])
     return figure
 
 

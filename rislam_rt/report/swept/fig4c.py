@@ -43,7 +43,7 @@ def draw_fig4c(content: Mapping[str, Any]) -> Figure:
         figure = Figure(figsize=(11.0, 4.8))
         agent, panel = figure.subplots(1, 2)
         draw_schemes(agent, sizes, curves)
-        explain_lines(agent)
+        explain_lines(figure, agent)
         ends = {}
         for scheme, own in curves.items():
             value, low, high = (

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from rislam_rt.report.style import MARKER, TRUTH, scheme_colour
@@ -56,11 +57,11 @@ def label_ends(axis: Axes, ends: Mapping[str, float]) -> None:
         )  # fmt: skip
 
 
-def explain_lines(axis: Axes) -> None:
-    """What solid and dashed lines are."""
-    axis.plot([], [], color=TRUTH, lw=1.7, label="RMSE over seeds, band: 95 % interval")
-    axis.plot([], [], color=TRUTH, lw=1.1, ls="--", label="posterior bound")
-    axis.legend(loc="best", fontsize=8)
+def explain_lines(figure: Figure, axis: Axes) -> None:
+    """What solid and dashed lines are, below the figure."""
+    error = axis.plot([], [], color=TRUTH, lw=1.7, label="RMSE over seeds, band: 95 % interval")
+    bound = axis.plot([], [], color=TRUTH, lw=1.1, ls="--", label="posterior bound")
+    figure.legend(handles=[*error, *bound], loc="outside lower center", ncols=2, fontsize=8)
 
 
 def _last(entries: Sequence[Mapping[str, Any]]) -> float | None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import Interval, bootstrap, bootstrap_ratio, rms_over_runs
+from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.sweeps import Row
 from rislam_rt.pipeline.sweeps.store import DONE, MISSING
 
@@ -25,8 +26,9 @@ class Group(NamedTuple):
 
     @property
     def schemes(self) -> list[str]:
-        """Names, in the order in which they ran."""
-        return list(dict.fromkeys(name for result in self.results if result for name in result["schemes"]))
+        """Names, in the order of `SCHEMES`: what is read back from a cell's file has lost its own."""
+        ran = {name for result in self.results if result for name in result["schemes"]}
+        return [name for name in SCHEMES if name in ran]
 
     def column(self, scheme: str, *name: str) -> Floats:
         """(R,) a score by its names, outermost first, e.g. `"landmarks", "ris", "rmse_m"`; NaN where there is none."""
