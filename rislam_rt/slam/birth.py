@@ -16,14 +16,15 @@ from rislam_rt.slam.hypotheses import (
     POINT,
     RECIPROCAL,
     TWIN,
-    UPRIGHT_TILT,
     Fit,
     History,
     first_guess,
+    fit_doubles,
     fit_feature,
     fit_floor,
     fit_reciprocal,
     plausible,
+    slack_of_height,
 )
 from rislam_rt.slam.identity import DOUBT, panel_surplus
 from rislam_rt.slam.match import Outlook, explained
@@ -111,7 +112,7 @@ class Birth(NamedTuple):
     def prior(self) -> Floats:
         """(3, 3) [m^2] what is known of it without its measurements: a floor is level, the rest is anywhere."""
         if self.verdict.kind is MOVING and self.verdict.upright:
-            return np.diag([BROAD**2, BROAD**2, upright_std(self.verdict.fit.feature, self.anchor) ** 2])
+            return np.diag([BROAD**2, BROAD**2, slack_of_height(self.verdict.fit.feature, self.anchor) ** 2])
         if self.verdict.kind is not RECIPROCAL:
             return BROAD**2 * np.eye(3)
         tilt = np.diag(self.verdict.fit.covariance)[:2]
@@ -156,13 +157,12 @@ def examine(
             continue
         if not named_panel(book):
             history = history._replace(panel=panel_surplus(float(tracks.log_ris[row])))
-        verdict = judge_wall(history, scene) if tracks.specular[row] else judge(history, scene)
-        if verdict is None:
-            continue
-        if verdict.kind is MOVING and config.use_vt and not tracks.specular[row]:
-            verdict = judge_wall(history, scene) or verdict
-        if verdict.kind is MOVING and not (config.use_vt and _sharp(verdict)):
+        verdict = None if tracks.specular[row] else judge(history, scene)
+        if verdict is not None and verdict.kind is MOVING:
             moving[row] = True
+        if moving[row] or tracks.specular[row]:
+            verdict = judge_wall(history, scene) if config.use_vt else None
+        if verdict is None or (verdict.kind is MOVING and not _sharp(verdict)):
             continue
         birth = Birth(
             verdict, scene.anchor, slots, history.seen, history.std, tracks.log_grid[row], float(tracks.log_ris[row])
@@ -244,22 +244,27 @@ def _is_fit_point(verdict: Verdict, scene: Scene) -> bool:
 
 
 def judge_wall(history: History, scene: Scene) -> Verdict | None:
-    """The wall that throws a wall return; upright, if that explains it as well as any lean would."""
+    """The wall that throws a wall return; upright, if that explains it as well as any lean would.
+
+    It has to win over the images that two walls make together: until the agent has moved enough, they look alike.
+    """
     start = first_guess(MOVING, None, scene.anchor, history)
     if start is None:
         return None
     free = fit_feature(MOVING, start, None, scene.anchor, history, 6)
     level = start * np.array([1.0, 1.0, 0.0]) + scene.anchor * np.array([0.0, 0.0, 1.0])
     if np.linalg.norm(level - scene.anchor) > 0.1:
-        held = fit_feature(MOVING, level, None, scene.anchor, history, 6, upright_std(level, scene.anchor))
+        held = fit_feature(MOVING, level, None, scene.anchor, history, 6, slack_of_height(level, scene.anchor))
         if held.cost < free.cost + scene.config.birth_margin and plausible(held, len(history.seen), 2):
-            return Verdict(MOVING, -1, held, upright=True)
-    return Verdict(MOVING, -1, free) if plausible(free, len(history.seen), 3) else None
+            return Verdict(MOVING, -1, held, upright=True) if _is_single(held, history, scene) else None
+    single = plausible(free, len(history.seen), 3) and _is_single(free, history, scene)
+    return Verdict(MOVING, -1, free) if single else None
 
 
-def upright_std(feature: Floats, anchor: Floats) -> float:
-    """Standard deviation [m] of the height of an upright wall's image of the anchor."""
-    return max(float(np.linalg.norm(feature - anchor)) * UPRIGHT_TILT, 1e-3)
+def _is_single(wall: Fit, history: History, scene: Scene) -> bool:
+    """Whether one wall explains the history better than any two would."""
+    rivals = fit_doubles(wall.feature, scene.anchor, history)
+    return min(float(rival.cost) for rival in rivals) > float(wall.cost) + scene.config.birth_margin
 
 
 def _sharp(verdict: Verdict) -> bool:
@@ -276,14 +281,23 @@ def _worst_std(verdict: Verdict) -> float:
 def _points(history: History, scene: Scene) -> list[Verdict]:
     """A static point, and a moving image; over the panel there are no moving images, and it is one point alone."""
     verdicts = []
-    kinds = (POINT, MOVING) if history.side != PANEL else () if named_panel(scene.book) else (POINT,)
-    for kind in kinds:
-        start = first_guess(kind, None, scene.anchor, history)
+    if history.side != PANEL or not named_panel(scene.book):
+        start = first_guess(POINT, None, scene.anchor, history)
         if start is not None:
-            fit = fit_feature(kind, start, None, scene.anchor, history, 6)
-            surplus = ((history.ratio - MOVING_RATIO) / MOVING_SPREAD) ** 2 if kind is MOVING else -history.panel
-            verdicts.append(Verdict(kind, -1, fit._replace(cost=fit.cost + surplus)))
+            fit = fit_feature(POINT, start, None, scene.anchor, history, 6)
+            verdicts.append(Verdict(POINT, -1, fit._replace(cost=fit.cost - history.panel)))
+    start = first_guess(MOVING, None, scene.anchor, history) if history.side != PANEL else None
+    if start is not None:
+        single = fit_feature(MOVING, start, None, scene.anchor, history, 6)
+        fits = [single._replace(cost=single.cost + _dimness(history, 1))]
+        fits += [f._replace(cost=f.cost + _dimness(history, 2)) for f in fit_doubles(start, scene.anchor, history)]
+        verdicts.append(Verdict(MOVING, -1, min(fits, key=lambda fit: float(fit.cost))))
     return verdicts
+
+
+def _dimness(history: History, walls: int) -> float:
+    """What the strength tells against a moving image over so many walls, as chi^2."""
+    return (history.ratio - walls * MOVING_RATIO) ** 2 / (walls * MOVING_SPREAD**2)
 
 
 def _images(history: History, scene: Scene) -> list[Verdict]:

@@ -223,6 +223,54 @@ def fit_floor(parent: Floats, anchor: Floats, history: History) -> Fit | None:
     return Fit(image, np.diag(spread**2), cost)
 
 
+def fit_doubles(wall: Floats, anchor: Floats, history: History) -> list[Fit]:
+    """What two walls may throw together, where the one `wall` (3,) throws a moving image: opposite, edge, corner.
+
+    Until the agent has moved enough these look like the image in one wall, or like a point.
+    """
+    return [
+        _fit_opposite(wall, anchor, history),
+        _fit_edge(wall, anchor, history),
+        _fit_corner(wall, anchor, history),
+    ]
+
+
+def _fit_opposite(wall: Floats, anchor: Floats, history: History) -> Fit:
+    """Opposite walls: the image goes along with the agent, so that all is as if the agent stood still."""
+    poses = history.poses
+    tx = np.broadcast_to(poses.tx.mean(axis=-2, keepdims=True), poses.tx.shape)
+    still = Poses(tx, tx + poses.rx - poses.tx, poses.heading)
+    return fit_feature(MOVING, wall, None, anchor, history._replace(poses=still, doubt=np.zeros((6, 0))), 6)
+
+
+def _fit_edge(wall: Floats, anchor: Floats, history: History) -> Fit:
+    """An upright wall and the ceiling: the image moves as that in the wall alone, at another height."""
+    tx, rx, seen = history.poses.tx.mean(axis=-2), history.poses.rx.mean(axis=-2), history.seen
+    up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.0))
+    rise = (np.mean(seen[:, 0] * up) + rx[2] - tx[2]) * AXES[2]
+    image = reflect(tx, wall, anchor)
+    image[2] = tx[2] + rise[2]
+    upright = wall_between(tx + rise, image, anchor)
+    upright = wall if upright is None else upright  # right above: the ceiling alone
+    raised = history._replace(poses=history.poses._replace(tx=history.poses.tx + rise))
+    return fit_feature(MOVING, upright, None, anchor, raised, 6, slack_of_height(upright, anchor))
+
+
+def _fit_corner(wall: Floats, anchor: Floats, history: History) -> Fit:
+    """Two upright walls: the image is turned about their edge, which is met there and back from between both ends."""
+    middle = 0.5 * (history.poses.tx + history.poses.rx)
+    centre = middle.mean(axis=-2)
+    edge = 0.5 * (centre + reflect(centre, wall, anchor))
+    edge[2] = centre[2]
+    turned = history._replace(poses=Poses(middle, middle, history.poses.heading))
+    return fit_feature(POINT, edge, None, centre, turned, 6, slack_of_height(edge, centre))
+
+
+def slack_of_height(feature: Floats, anchor: Floats) -> float:
+    """Standard deviation [m] of the height of what upright walls throw."""
+    return max(float(np.linalg.norm(feature - anchor)) * UPRIGHT_TILT, 1e-3)
+
+
 def floor_height(parent: Floats, history: History) -> tuple[Floats, Floats]:
     """Height (...,) [m] of a level mirror on the Tx leg to `parent` (..., 3), and its information [1/m^2]."""
     tx, rx = history.poses.tx, history.poses.rx

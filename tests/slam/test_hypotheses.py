@@ -8,6 +8,9 @@ import pytest
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import consistency, normalised_squares
 from rislam_rt.model import Body
+from rislam_rt.slam.birth import Scene, judge_wall
+from rislam_rt.slam.book import empty_book
+from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.hypotheses import (
     IMAGE,
     MOVING,
@@ -17,13 +20,14 @@ from rislam_rt.slam.hypotheses import (
     Fit,
     History,
     first_guess,
+    fit_doubles,
     fit_feature,
     fit_floor,
     fit_reciprocal,
     plausible,
 )
 from rislam_rt.slam.moments import poses_of
-from rislam_rt.slam.returns import Returns, observe, reflect
+from rislam_rt.slam.returns import NONE, TX, Returns, observe, reflect
 
 BODY = Body()
 CYCLES, STD = 40, np.array([0.004, 0.004, 0.004])
@@ -194,3 +198,49 @@ def test_a_point_is_known_as_well_where_the_agent_is_not() -> None:
     spread = [np.sqrt(np.linalg.eigvalsh(fit.covariance)[-1]) for fit in fits]
     np.testing.assert_allclose(spread[1], spread[0], rtol=0.1)
     assert spread[2] > 1.2 * spread[0]
+
+
+DOUBLES = {
+    "opposite": (np.array([0.5, -1.3, 0.5]), np.array([0.5, 10.7, 0.5])),
+    "edge": (np.array([9.5, 0.7, 0.5]), np.array([0.5, 0.7, 5.5])),
+    "corner": (np.array([9.5, 0.7, 0.5]), np.array([0.5, -1.3, 0.5])),
+}
+"""Two walls of a room of 5 x 6 x 3 m, as images of the anchor."""
+
+
+def double(name: str, reach: float, *, rng: np.random.Generator) -> History:
+    """What both walls throw together, on an arc that begins along x and turns by `reach` [rad]."""
+    kind = Returns(np.array([[TX, NONE, NONE], [TX, 0, 1]]), np.array([0]), np.array([1]))
+    turn = np.linspace(0.0, reach, CYCLES)
+    position = ANCHOR + np.stack([np.sin(turn), 1.0 - np.cos(turn), np.zeros(CYCLES)], axis=1)
+    poses = poses_of(position, turn, BODY)
+    seen = observe(kind, np.stack(DOUBLES[name]), np.stack([ANCHOR, ANCHOR]), poses).seen[:, 0]
+    seen = seen + STD * rng.standard_normal(seen.shape)
+    return History(seen, np.tile(STD, (CYCLES, 1)), poses, np.zeros(CYCLES), 0.0, np.zeros((6, 0)))
+
+
+@pytest.mark.parametrize(("name", "place"), [("opposite", 0), ("edge", 1), ("corner", 2)])
+def test_what_two_walls_throw_is_told_from_a_wall_and_a_point(name: str, place: int) -> None:
+    """On a curve, its own hypothesis costs what noise costs; the image in one wall costs more by far more than 9."""
+    for seed in range(5):
+        history = double(name, 0.8, rng=np.random.default_rng([9, seed]))
+        wall = first_guess(MOVING, None, ANCHOR, history)
+        assert wall is not None
+        fit = fit_doubles(wall, ANCHOR, history)[place]
+        assert plausible(fit, CYCLES, 2)
+        assert fit_feature(MOVING, wall, None, ANCHOR, history, 10).cost > fit.cost + 100.0
+
+
+def test_a_wall_is_not_born_before_its_image_moves_as_one_walls_does() -> None:
+    """Along opposite walls the image that both throw together looks like that in one, until the agent turns."""
+    scene = Scene(np.zeros((0, 3)), empty_book(), ANCHOR, None, np.zeros((0, 3)), SlamConfig())  # type: ignore[arg-type]
+    rng = np.random.default_rng(10)
+    straight = double("opposite", 0.03, rng=rng)
+    wall = first_guess(MOVING, None, ANCHOR, straight)
+    assert wall is not None
+    assert plausible(fit_feature(MOVING, wall, None, ANCHOR, straight, 10), CYCLES, 3)
+    assert judge_wall(straight, scene) is None
+    case = draw(MOVING, ROOF, rng=rng)
+    verdict = judge_wall(case.history, scene)
+    assert verdict is not None
+    assert np.linalg.norm(verdict.fit.feature - ROOF) < 0.05
