@@ -37,6 +37,9 @@ class Book(NamedTuple):
     """(F, G) log posterior of the strength on the grid; unused for walls."""
     log_ris: Floats
     """(F,) log odds of panel against scatterer, from amplitudes."""
+    hidden: Floats
+    """(F, 2) probability that something stands in the way of a point since it last showed, were it the panel, or a
+    scatterer."""
     ratio: Floats
     """(F,) log amplitude ratio of a wall's reflection."""
     ratio_variance: Floats
@@ -82,6 +85,7 @@ def empty_book() -> Book:
         np.zeros((0, 3)),
         np.zeros((0, len(STRENGTHS))),
         np.zeros(0),
+        np.zeros((0, 2)),
         np.zeros(0),
         np.zeros(0),
         np.zeros((0, 3), dtype=np.int64),
@@ -108,6 +112,7 @@ def enter(book: Book, is_wall: bool, anchor: Floats, founder: int) -> Book:
         drift=np.concatenate([book.drift, np.zeros((1, 3))]),
         log_grid=np.concatenate([book.log_grid, flat]),
         log_ris=np.append(book.log_ris, -np.inf if is_wall else 0.0),
+        hidden=np.concatenate([book.hidden, np.zeros((1, 2))]),
         ratio=np.append(book.ratio, UNSEEN_RATIO),
         ratio_variance=np.append(book.ratio_variance, RATIO_SPREAD**2),
         next_ident=book.next_ident + 1,

@@ -24,6 +24,8 @@ SHOWN = 0.9
 """Probability that a path above the threshold is reported at all: others may shade it or merge with it."""
 MAX_PANEL_ODDS = 8.0
 """Log odds of panel against scatterer that count most for a point: amplitudes alone do not make one."""
+BLOCKED = 0.02
+"""Probability that in a cycle something comes to stand in the way of a path; it stays until the path shows again."""
 BEYOND = 8.0
 """Standard deviations above the threshold from which on no amplitude stays below it."""
 
@@ -106,6 +108,19 @@ def add_evidence(log_grid: Floats, log_ris: Floats, scatterer: Floats, panel: Fl
     after = np.logaddexp.reduce(grid, axis=1)
     ratio = np.clip(panel - (after - before), -DOUBT, DOUBT)
     return grid - after[:, None], log_ris + ratio
+
+
+def weigh_silence(hidden: Floats, missed: Floats) -> tuple[Floats, Floats]:
+    """One more silent cycle of P points that are the panel, or a scatterer.
+
+    `missed` (P, 2) is the probability of silence while nothing is in the way, `hidden` (P, 2) that something is. What
+    is blocked is silent whatever it is: a gap tells as much as its first cycles, not more with each.
+    Returns the new `hidden`, and what to add to the log odds (P,).
+    """
+    before = hidden + BLOCKED * (1.0 - hidden)
+    silence = before + (1.0 - before) * missed
+    surplus = np.log(silence[:, 0]) - np.log(silence[:, 1])
+    return before / silence, np.clip(surplus, -DOUBT, DOUBT)
 
 
 def panel_surplus(log_ris: float) -> float:

@@ -18,6 +18,7 @@ from rislam_rt.slam.identity import (
     log_scatterer,
     log_scatterer_missed,
     predicted_panel_gain,
+    weigh_silence,
 )
 from rislam_rt.slam.match import Outlook
 from rislam_rt.slam.moments import Moments, poses_of, square_root
@@ -65,7 +66,9 @@ def learn(
     for place in outlook.measures[hits.row].nonzero()[0]:
         count[owner[place]] += 1
         drift[owner[place]] += DRIFT_RATE * (hits.white[place] - drift[owner[place]])
-    book = book._replace(hits=count, drift=drift, shown=_shown(book, outlook, hits.row))
+    hidden = book.hidden.copy()
+    hidden[owner[number == 0]] = 0.0
+    book = book._replace(hits=count, drift=drift, shown=_shown(book, outlook, hits.row), hidden=hidden)
     # beside something of its strength an amplitude tells of the sum, not of the landmark
     alone = ~outlook.merger.outshone[hits.row] & (outlook.merger.partner[hits.row] < 0)
     for place in (alone & (number == 1)).nonzero()[0]:
@@ -159,10 +162,12 @@ def _weigh_silent(
     threshold = float(np.sqrt(2.0 * detection_snr) * std[0])
     scatterer = log_scatterer_missed(std, sight.tx_length, sight.rx_length, belief.radio, threshold)
     panel = log_panel_missed(std, _sampled_gains(belief, moments, points, code, rng=rng), threshold)
-    _, log_ris = add_evidence(book.log_grid[points], book.log_ris[points], scatterer, panel)
-    all_ris = book.log_ris.copy()
-    all_ris[points] = np.clip(log_ris, -CERTAIN, CERTAIN)
-    return book._replace(log_ris=all_ris)
+    weight = np.exp(book.log_grid[points])
+    missed = np.stack([np.exp(panel), np.sum(weight * np.exp(scatterer), axis=1) / weight.sum(axis=1)], axis=1)
+    hidden, log_ris = book.hidden.copy(), book.log_ris.copy()
+    hidden[points], surplus = weigh_silence(book.hidden[points], missed)
+    log_ris[points] = np.clip(log_ris[points] + surplus, -CERTAIN, CERTAIN)
+    return book._replace(log_ris=log_ris, hidden=hidden)
 
 
 def _sampled_gains(

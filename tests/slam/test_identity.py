@@ -7,6 +7,7 @@ import pytest
 
 from rislam_rt.model import RadioConfig, RisCode, RisSpec
 from rislam_rt.slam.identity import (
+    BLOCKED,
     DOUBT,
     MODEL_ERROR,
     SHOWN,
@@ -21,6 +22,7 @@ from rislam_rt.slam.identity import (
     panel_probabilities,
     point_amplitude,
     predicted_panel_gain,
+    weigh_silence,
 )
 
 RADIO = RadioConfig()
@@ -146,3 +148,15 @@ def test_changing_codes_find_the_panel_where_a_held_one_cannot():
 
 def test_empty_map_has_no_probabilities():
     assert panel_probabilities(np.zeros(0)).shape == (0,)
+
+
+def test_a_long_gap_tells_no_more_than_its_beginning():
+    """What is blocked is silent, be it the panel or not: of a scatterer that should show, silence must not make one."""
+    hidden, odds, missed = np.zeros((1, 2)), [0.0], np.array([[1.0, 0.1]])
+    for _ in range(200):
+        hidden, surplus = weigh_silence(hidden, missed)
+        odds.append(odds[-1] + float(surplus[0]))
+    assert odds[1] == pytest.approx(-np.log(BLOCKED + (1.0 - BLOCKED) * 0.1))
+    assert odds[100] == pytest.approx(odds[-1], abs=1e-6)
+    assert odds[-1] < -np.log(BLOCKED)
+    assert weigh_silence(np.zeros((1, 2)), np.array([[0.3, 0.3]]))[1] == pytest.approx(0.0)
