@@ -130,6 +130,12 @@ def twins(returns: Returns) -> Integers:
     return np.array([row_of.get((rx, tx), -1) if rx != tx else -1 for rx, tx in pairs], dtype=np.int64)
 
 
+def shown_share(book: Book, expected: Expected) -> Floats:
+    """(R,) share of the cycles in which what each return speaks about showed lately, of those in which it should."""
+    over_tx = expected.returns.legs[expected.returns.tx, 1] != NONE
+    return book.shown[expected.owner, over_tx.astype(np.int64)]
+
+
 def predicted_amplitudes(belief: Belief, returns: Returns, sight: Sight, code: RisCode | None) -> tuple[Floats, Floats]:
     """Amplitude (R,) and standard deviation of its logarithm (R,)."""
     book, radio = belief.book, belief.radio

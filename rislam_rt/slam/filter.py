@@ -14,7 +14,7 @@ from rislam_rt.slam.birth import Past, examine
 from rislam_rt.slam.book import Book, empty_book, named_panel, strike
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.engine import Told, engine_of
-from rislam_rt.slam.expect import Belief, expected_returns
+from rislam_rt.slam.expect import Belief, expected_returns, shown_share
 from rislam_rt.slam.health import Health, check
 from rislam_rt.slam.learn import Hits, learn
 from rislam_rt.slam.match import Outlook, candidates, hidden_tracks, look_ahead
@@ -164,7 +164,8 @@ def step(
     particles, resampled = engine.thin(state.particles, config, rng=rng)
     dof = 3 * int(used.sum())
     certain = expected.likely & expected.founding & ~outlook.merger.outshone
-    health = check(state.health, updated.nis, dof, int(certain[hit].sum()), int(certain.sum()))
+    weight = certain * shown_share(belief.book, expected)
+    health = check(state.health, updated.nis, dof, float(weight[hit].sum()), float(weight.sum()))
     outcome = _outcome(len(measurement), len(state.book.ident), health)
     count = len(state.book.points)
     info = StepInfo(landmark, ess, resampled, updated.nis, dof, updated.log_evidence, count, outcome)

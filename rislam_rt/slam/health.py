@@ -33,8 +33,12 @@ class Health(NamedTuple):
         return self.strain > MAX_STRAIN or self.found < 0.2
 
 
-def check(health: Health, nis: float, dof: int, seen: int, due: int) -> Health:
-    """After a cycle with a NIS of `dof` degrees of freedom, in which `seen` of `due` certain returns showed."""
+def check(health: Health, nis: float, dof: int, seen: float, due: float) -> Health:
+    """After a cycle with a NIS of `dof` degrees of freedom, in which `seen` of `due` certain returns showed.
+
+    Both count a return by the share of the cycles in which it showed lately: what has long been silent is blocked, or
+    was never there, and says nothing of the agent.
+    """
     ratio = nis / dof if dof else health.quick
     strain = health.strain + SLOW * (ratio - health.strain)
     quick = health.quick + QUICK * (ratio - health.quick)

@@ -7,7 +7,7 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import Body, RadioConfig
 from rislam_rt.slam.book import Book, empty_book, enter, image_idents, learn_ratio, strike
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.expect import Belief, expected_returns
+from rislam_rt.slam.expect import Belief, expected_returns, shown_share
 from rislam_rt.slam.identity import STRENGTHS, point_amplitude
 from rislam_rt.slam.learn import Hits, learn
 from rislam_rt.slam.mapping import WALL_HITS, build_map
@@ -99,6 +99,20 @@ def test_a_ghost_dies_and_what_shows_lives(rng: np.random.Generator) -> None:
     shows = np.array([True, True, False])
     assert kept(moments, live(moments, book, 10, shows, rng=rng)).all()
     np.testing.assert_array_equal(kept(moments, live(moments, book, 60, shows, rng=rng)), [True, True, False])
+
+
+def test_what_has_long_been_silent_does_not_say_that_the_agent_is_lost(rng: np.random.Generator) -> None:
+    """A return that should certainly show counts by the share of the cycles in which its landmark showed lately."""
+    moments, book = room(np.array([1.0, 2.0, 1.5]))
+    before = outlook_of(moments, book)[0].expected
+    np.testing.assert_array_equal(shown_share(book, before), 1.0)
+    book = live(moments, book, 60, np.array([True, True, False]), rng=rng)
+    expected = outlook_of(moments, book)[0].expected
+    ghost = (expected.bounces == 0) & (expected.owner == 2)
+    assert ghost.any()
+    assert expected.likely[ghost].all()
+    assert (shown_share(book, expected)[ghost] < 0.1).all()
+    assert (shown_share(book, expected)[(expected.bounces == 0) & ~ghost] == 1.0).all()
 
 
 def test_a_landmark_that_contradicts_the_measurements_dies() -> None:
