@@ -262,7 +262,11 @@ def judge_wall(history: History, scene: Scene) -> Verdict | None:
 
 
 def _is_single(wall: Fit, history: History, scene: Scene) -> bool:
-    """Whether one wall explains the history better than any two would."""
+    """Whether the image is one wall's: behind no other mirror, as all images in two walls are, or no two explain it."""
+    reach = np.linalg.norm(wall.feature - scene.anchor)
+    nearer = np.linalg.norm(scene.mirrored - scene.anchor, axis=1) < reach - 2.0 * MIRROR_MARGIN
+    if not is_behind_mirror(wall.feature, scene.anchor, scene.mirrored[nearer], 0.0):
+        return True
     rivals = fit_doubles(wall.feature, scene.anchor, history)
     return min(float(rival.cost) for rival in rivals) > float(wall.cost) + scene.config.birth_margin
 

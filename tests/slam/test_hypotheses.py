@@ -231,15 +231,27 @@ def test_what_two_walls_throw_is_told_from_a_wall_and_a_point(name: str, place: 
         assert fit_feature(MOVING, wall, None, ANCHOR, history, 10).cost > fit.cost + 100.0
 
 
+def shown(*images: Floats) -> Scene:
+    """A judgement where the agent sees itself in so many mirrors."""
+    mirrored = np.array(images).reshape(-1, 3)
+    return Scene(np.zeros((0, 3)), empty_book(), ANCHOR, None, mirrored, SlamConfig())  # type: ignore[arg-type]
+
+
 def test_a_wall_is_not_born_before_its_image_moves_as_one_walls_does() -> None:
-    """Along opposite walls the image that both throw together looks like that in one, until the agent turns."""
-    scene = Scene(np.zeros((0, 3)), empty_book(), ANCHOR, None, np.zeros((0, 3)), SlamConfig())  # type: ignore[arg-type]
+    """Along opposite walls the image that both throw together looks like that in one, until the agent turns.
+
+    The nearer image from the same side is what makes it suspect: without one it can only be a single wall's.
+    """
+    near, far = DOUBLES["opposite"]
+    scene = shown(near, far)
     rng = np.random.default_rng(10)
     straight = double("opposite", 0.03, rng=rng)
     wall = first_guess(MOVING, None, ANCHOR, straight)
     assert wall is not None
     assert plausible(fit_feature(MOVING, wall, None, ANCHOR, straight, 10), CYCLES, 3)
     assert judge_wall(straight, scene) is None
+    for harmless in (shown(), shown(wall), shown(ANCHOR + np.array([4.0, 0.0, 0.0]))):
+        assert judge_wall(straight, harmless) is not None
     case = draw(MOVING, ROOF, rng=rng)
     verdict = judge_wall(case.history, scene)
     assert verdict is not None
