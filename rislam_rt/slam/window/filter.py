@@ -1,0 +1,276 @@
+"""One cycle of the window filter: predict, expect, associate, solve, learn, births and deaths."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec
+from rislam_rt.model.sensor import SensorModel
+from rislam_rt.slam.associate import Candidates, pair_costs
+from rislam_rt.slam.config import SlamConfig, StartPrior
+from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los
+from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.returns import Poses
+from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance
+from rislam_rt.slam.window import gauss, motion, tracks
+from rislam_rt.slam.window.births import Context, births
+from rislam_rt.slam.window.book import Book, empty_book, idents
+from rislam_rt.slam.window.expect import Clusters, Expected, Scene, cluster, conditioned_share, expect
+from rislam_rt.slam.window.forms import UNKNOWN
+from rislam_rt.slam.window.gauss import HEAD, Window
+from rislam_rt.slam.window.learn import Sights, learn, no_sights, recall, visible
+from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
+from rislam_rt.slam.window.prune import prune
+from rislam_rt.slam.window.tracks import Tracks
+
+REFRESH = 5
+"""Cycles between two re-linearisations of the whole window."""
+
+
+class WindowState(NamedTuple):
+    """All that the filter knows."""
+
+    cycle: int
+    config: SlamConfig
+    window: Window
+    book: Book
+    log: Log
+    tracks: Tracks
+    sights: Sights
+    gait: Floats
+    """(L,) probabilities of the liveliness of the step before the window's first."""
+    level: Floats
+    """(L,) of the last step's, filtered."""
+    heading: Floats
+    """(K,) [rad] that the compass told."""
+    shift: Floats
+    """(3,) [m] standard deviation of the start's position: what no measurement tells."""
+    scene: Scene
+    doubt: float
+    """Running log odds that the map explains nothing of what is heard."""
+
+
+def init(
+    start: StartPrior, body: Body, ris: RisSpec | None, radio: RadioConfig, config: SlamConfig,
+    *, rng: np.random.Generator,
+) -> WindowState:  # fmt: skip
+    """The start prior, and an empty map."""
+    axes = np.array([0, 1, 2] if config.height == "estimated" else [0, 1])
+    free = np.isin(np.arange(3), axes).astype(np.float64)
+    compass = start.heading_std if config.heading == "estimated" else 0.0
+    std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [compass]])
+    window = gauss.begin(start.position, start.velocity, axes, std)
+    sensor = SensorModel(radio, threshold=config.detection_snr)
+    scene = Scene(body, radio, sensor, ris, config.max_bounces, config.use_vt)
+    gait = motion.first_gait(config.sigma_a)
+    return WindowState(
+        0, config, window, empty_book(), empty_log(), tracks.no_tracks(), no_sights(), gait, gait,
+        np.array([start.heading]), start.position_std * free, scene, 0.0,
+    )  # fmt: skip
+
+
+def step(
+    state: WindowState, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: SlamConfig,
+    *, rng: np.random.Generator,
+) -> tuple[WindowState, StepInfo]:  # fmt: skip
+    """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied."""
+    turn = heading - state.heading[-1]
+    state = _move(state, dt, heading)
+    scene, book = state.scene, state.book
+    glance = glance_of(measurement, scene.radio)
+    landmark = np.where(is_los(glance, scene.body), REMOVED, UNUSED)
+    order = np.lexsort(glance.seen.T[::-1])
+    free = order[landmark[order] == UNUSED]
+    glance = glance.take(free)
+
+    mean, covariance = gauss.now(state.window)
+    features = mean[HEAD:].reshape(-1, 3)
+    poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
+    expected = expect(features, book, poses, mean[:3], scene, code)
+    sides = _sides(expected, book) if glance.side is not None else None
+    clear, scatter = recall(state.sights, expected, book)
+    groups = cluster(expected, scene.sensor.cell_length, clear, sides)
+    shows = visible(expected, groups, clear)
+    bend = np.sqrt(float(motion.expected_variance(state.level @ motion.transition(LEVELS.stay))))
+    row, pick = _associate(expected, groups, shows, scatter, covariance, glance, sides)
+
+    log = append(state.log, glance, state.cycle, state.cycle - state.window.num_poses + 1)
+    log = _explain(log, expected, groups, book, scatter, row, pick, len(glance.seen))
+    state = state._replace(log=log)
+    state, left, nis = _solve(state)
+    raw = np.zeros(len(row))
+    if len(row):
+        at = np.searchsorted(left.row, len(log.cycle) - len(glance.seen) + pick)
+        raw = np.mean(left.left[at] ** 2 * (1.0 + log.extra[left.row[at]] / log.std[left.row[at]] ** 2), axis=1)
+
+    taken = np.zeros(len(glance.seen), dtype=np.bool_)
+    taken[pick] = True
+    followed = _follow(state, mean, glance, (~taken).nonzero()[0], dt, turn, bend)
+    state = state._replace(tracks=followed.tracks, log=followed.log)
+    sights, book = learn(state.sights, book, state.window, expected, groups, shows, row, pick, raw, glance, poses, scene, code)
+    state = state._replace(sights=sights, book=book)
+    landmark[free[pick]] = _names(state.book, expected, groups, row)
+
+    context = Context(state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle)
+    grown = births(context, expected, groups)
+    if grown is not context:
+        state = state._replace(window=grown.window, book=grown.book, log=grown.log, tracks=grown.tracks)
+    if state.cycle % REFRESH == 0:
+        window, book, log = prune(state.window, state.book, state.log, state.heading, scene, state.cycle)
+        state = state._replace(window=window, book=book, log=log)
+    outcome = _outcome(len(measurement), len(state.book.ident), state.doubt)
+    info = StepInfo(
+        landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome
+    )
+    return state._replace(cycle=state.cycle + 1), info
+
+
+def _move(state: WindowState, dt: float, heading: float) -> WindowState:
+    """The window with a new pose, without its oldest one when it is full."""
+    if dt <= 0.0 and state.cycle == 0:
+        return state._replace(heading=np.array([heading]))
+    window, gait, headings = state.window, state.gait, state.heading
+    while window.num_poses >= LEVELS.window:
+        spread = _accel_spread(window)
+        like = motion.log_likelihood(window.accel[:1], spread[:1], window.precision[:1])
+        gait = motion.smooth(gait, like, LEVELS.stay)[1][0]
+        window, headings = gauss.slide(window), headings[1:]
+    level = state.level @ motion.transition(LEVELS.stay)
+    window = gauss.extend(window, dt, float(motion.expected_precision(level)))
+    return state._replace(window=window, gait=gait, heading=np.append(headings, heading))
+
+
+def _accel_spread(window: Window) -> Floats:
+    """(K - 1, A, A) covariances of the accelerations."""
+    size, free = len(window.head), len(window.axes)
+    count = len(window.accel)
+    block = window.covariance[size:, size:].reshape(count, free, count, free)
+    return block[np.arange(count), :, np.arange(count)]
+
+
+def _sides(expected: Expected, book: Book) -> Integers:
+    """(R,) which returns run over the panel."""
+    panel = book.panel
+    return np.where(expected.forms[:, 0] == panel, PANEL, OTHER) if panel >= 0 else np.full(len(expected.seen), UNTOLD)
+
+
+def _associate(
+    expected: Expected, groups: Clusters, shows: Floats, scatter: Floats, covariance: Floats, glance: Glance,
+    sides: Integers | None,
+) -> tuple[Integers, Integers]:  # fmt: skip
+    """Rows of the clusters that were seen, and the components that they were seen as: the best assignment."""
+    if not len(groups.leader) or not len(glance.seen):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    lead, mate = groups.leader, groups.partner
+    share = groups.share[:, None]
+    gap = np.where(mate[:, None] >= 0, expected.seen[mate] - expected.seen[lead], 0.0)
+    seen = expected.seen[lead] + share * gap
+    jacobian = expected.jacobian[lead] + share[..., None] * (expected.jacobian[mate] - expected.jacobian[lead])
+    spread = (jacobian.reshape(-1, jacobian.shape[-1]) @ covariance).reshape(jacobian.shape)
+    spread = spread @ np.swapaxes(jacobian, 1, 2)
+    extra = groups.disturbance + groups.share_variance[:, None] * gap**2
+    extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(glance.std, axis=0) ** 2
+    spread[:, [0, 1, 2], [0, 1, 2]] += extra
+    odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))
+    side = np.full(len(lead), UNTOLD) if sides is None else sides[lead]
+    candidates = Candidates(seen, spread, groups.log_amplitude, np.hypot(groups.log_amplitude_std, 0.15), odds, side)
+    cost = pair_costs(candidates, glance, LEVELS.gate, LEVELS.clutter)
+    rows, columns = linear_sum_assignment(cost)
+    good = cost[rows, columns] < 0.0
+    return rows[good], columns[good]
+
+
+def _explain(
+    log: Log, expected: Expected, groups: Clusters, book: Book, scatter: Floats, row: Integers, pick: Integers, count: int
+) -> Log:
+    """The log's last `count` components with what they were taken for."""
+    if not len(row):
+        return log
+    at = len(log.cycle) - count + pick
+    lead, mate = groups.leader[row], groups.partner[row]
+    share, variance = conditioned_share(groups, expected, row, log.log_amplitude[at], log.log_amplitude_std[at])
+    form, shares, extra = log.form.copy(), log.share.copy(), log.extra.copy()
+    form[at, 0] = idents(book, expected.forms[lead])
+    both = mate >= 0
+    form[at[both], 1] = idents(book, expected.forms[mate[both]])
+    gap = np.where(both[:, None], expected.seen[mate] - expected.seen[lead], 0.0)
+    shares[at], extra[at] = np.where(both, share, 0.0), groups.disturbance[row] + variance[:, None] * gap**2
+    extra[at] += LEVELS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
+    return log._replace(form=form, share=shares, extra=extra)
+
+
+def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
+    """The window after this cycle's components: two Gauss-Newton steps; the whole of it again now and then."""
+    window, log, book, body = state.window, state.log, state.book, state.scene.body
+    last = np.array([window.num_poses - 1])
+    window, found = renew(window, log, book, body, state.heading, last, even=True)
+    nis = float(np.sum(found.left**2))
+    window = gauss.solve(window)
+    slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else last
+    window, left = renew(window, log, book, body, state.heading, slots)
+    window = gauss.solve(window)
+    return liven(state._replace(window=window)), left, nis
+
+
+def liven(state: WindowState) -> WindowState:
+    """The prior of every step's acceleration, by what the measurements say of its liveliness."""
+    window = state.window
+    if not len(window.accel):
+        return state
+    like = motion.log_likelihood(window.accel, _accel_spread(window), window.precision)
+    posterior, forward = motion.smooth(state.gait, like, LEVELS.stay)
+    return state._replace(
+        window=window._replace(precision=motion.expected_precision(posterior)), level=forward[-1]
+    )
+
+
+class _Followed(NamedTuple):
+    tracks: Tracks
+    log: Log
+
+
+def _follow(
+    state: WindowState, mean: Floats, glance: Glance, free: Integers, dt: float, turn: float, bend: float
+) -> _Followed:
+    """Tracks extended, begun and ended by the components that nothing explains."""
+    speed = float(np.linalg.norm(mean[3:6]))
+    length = np.maximum(state.tracks.mean[:, 0, 0], 0.5) if len(state.tracks.ident) else np.ones(1)
+    drift = np.array([2.0 * bend + speed**2, 0.1, 0.1]) if len(length) else np.zeros(3)
+    found = tracks.advance(state.tracks, dt, turn, drift)
+    rows, picks = tracks.match(found, glance, free, state.cycle)
+    found = tracks.extend(found, rows, glance, picks, state.cycle)
+    spare = np.setdiff1d(free, picks)
+    reach = np.maximum(glance.seen[spare, 0], 0.5)
+    rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * (speed + 0.05)
+    found, fresh = tracks.start(found, glance, spare, rate, state.cycle)
+    base = len(state.log.cycle) - len(glance.seen)
+    track = state.log.track.copy()
+    track[base + picks], track[base + spare] = found.ident[rows], fresh
+    return _Followed(found.keep(tracks.alive(found, state.cycle)), state.log._replace(track=track))
+
+
+def _names(book: Book, expected: Expected, groups: Clusters, row: Integers) -> Integers:
+    """Ident of the feature that each of the clusters `row` (A,) speaks about first."""
+    forms = expected.forms[groups.leader[row]]
+    first = np.where(forms[:, 0] >= 0, forms[:, 0], forms[:, 3])
+    return book.ident[first] if len(row) else np.zeros(0, dtype=np.int64)
+
+
+def _outcome(heard: int, features: int, doubt: float) -> Outcome:
+    if not heard:
+        return Outcome.NO_MEASUREMENTS
+    if doubt > 5.0:
+        return Outcome.DIVERGED
+    return Outcome.OK if features else Outcome.NO_LANDMARKS
+
+
+def poses_now(state: WindowState) -> Poses:
+    """Ends of the agent at the mean belief."""
+    mean, _ = gauss.now(state.window)
+    return poses_of(mean[:3], np.asarray(state.heading[-1] + mean[6]), state.scene.body)
+
+
+__all__ = ["UNKNOWN", "WindowState", "init", "step"]

@@ -1,0 +1,332 @@
+"""What could a track be? Every hypothesis with at most one new feature, its prior, and its evidence."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.identity import point_amplitude
+from rislam_rt.slam.moments import square_root
+from rislam_rt.slam.returns import AXES, NONE, TX, reflect
+from rislam_rt.slam.window.book import Book
+from rislam_rt.slam.window.digest import Digest
+from rislam_rt.slam.window.expect import Scene
+from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.trial import Fits, Trials, smooth_paths, try_all
+
+KINDS = ("wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same")
+"""Names of the kinds, by their number."""
+WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME = range(len(KINDS))
+LOG_KIND = np.log(np.array([0.3, 0.1, 0.1, 0.3, 0.05, 0.05, 0.02]))
+"""Log prior of each kind; over known walls, of all walls together."""
+LOG_NONE = np.log(0.05)
+"""Of a path of no kind here: over walls that the map lacks."""
+LOG_VOLUME = float(np.log(4.0 / 3.0 * np.pi * LEVELS.size**3))
+BEHIND = -4.0
+"""Log probability of a thing behind a wall that stands between it and the agent, or of a wall that stands before known
+things: the walls of a room that is not convex end somewhere."""
+DEPTH = 0.15
+"""Distance [m] beyond a wall from which on a thing is behind it, and not on it."""
+
+
+class Known(NamedTuple):
+    """Features of the map as affine maps and places; walls as images of the agent's present place."""
+
+    place: Floats
+    """(F, 3)."""
+    root: Floats
+    """(F, 3, 3) square roots of their covariances."""
+    turn: Floats
+    """(F, 3, 3) reflection of each wall; the identity for points."""
+    shift: Floats
+    """(F, 3)."""
+
+
+class Hypotheses(NamedTuple):
+    """H hypotheses for T tracks."""
+
+    kind: Integers
+    """(H,)."""
+    known: Integers
+    """(H,) row of the known wall, -1 for none."""
+    trials: Trials
+
+
+class Verdict(NamedTuple):
+    """What a track is held to be."""
+
+    kind: int
+    """-1: of no kind here."""
+    probability: float
+    known: int
+    """Row of the known wall, -1 for none."""
+    place: Floats
+    """(3,) of the new feature."""
+    covariance: Floats
+    """(3, 3), the poses held."""
+    information: Floats
+    """(3, 3) of its prior..."""
+    mean: Floats
+    """(3,)."""
+    misfit: float
+    """Standard deviations by which it costs more than noise makes it."""
+
+    @property
+    def form(self) -> tuple[int, int, int, int, int]:
+        """Five rows, the new feature being -5."""
+        return _FORMS[self.kind](self.known)
+
+    @property
+    def is_wall(self) -> bool:
+        """Whether the new feature is one."""
+        return self.kind in (WALL, KNOWN_WALL, WALL_KNOWN)
+
+
+NEW = -5
+_FORMS = {
+    WALL: lambda k: (TX, NONE, NONE, NEW, NONE),
+    KNOWN_WALL: lambda k: (TX, NONE, NONE, k, NEW),
+    WALL_KNOWN: lambda k: (TX, NONE, NONE, NEW, k),
+    POINT: lambda k: (NEW, NONE, NONE, NONE, NONE),
+    OVER_RX: lambda k: (NEW, NONE, NONE, k, NONE),
+    OVER_TX: lambda k: (NEW, k, NONE, NONE, NONE),
+    OVER_SAME: lambda k: (NEW, k, NONE, k, NONE),
+}
+
+
+def known_features(mean: Floats, covariance: Floats, book: Book, middle: Floats) -> Known:
+    """The map's features (F, 3), walls as images of `middle`, with their covariances (3F, 3F) block by block."""
+    place, count = mean.copy(), len(mean)
+    blocks = covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
+    turn, shift = np.tile(AXES, (count, 1, 1)), np.zeros((count, 3))
+    walls = book.walls
+    if len(walls):
+        wall, anchor = place[walls], book.anchor[walls]
+        blocks[walls] = (slope := by_wall(middle, wall, anchor)) @ blocks[walls] @ np.swapaxes(slope, 1, 2)
+        place[walls] = reflect(np.broadcast_to(middle, wall.shape), wall, anchor)
+        span = place[walls] - middle
+        square = np.vecdot(span, span)[:, None]
+        turn[walls] = AXES - 2.0 * span[:, :, None] * (span / square)[:, None, :]
+        shift[walls] = span * (np.vecdot(span, place[walls] + middle)[:, None] / square)
+    roots = np.zeros((count, 3, 3))
+    for row in range(count):
+        root = square_root(blocks[row])
+        roots[row, :, : root.shape[1]] = root
+    return Known(place, roots, turn, shift)
+
+
+def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
+    """Derivatives (..., 3, 3) of the mirror images of points (..., 3) by the walls (..., 3)."""
+    span = wall - anchor
+    scaled = span / np.vecdot(span, span)[..., None]
+    depth = np.vecdot(scaled, point - 0.5 * (wall + anchor))[..., None]
+    mirrored = point - 2.0 * depth * span
+    return np.asarray(-2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]))
+
+
+def hypotheses(digest: Digest, known: Known, book: Book) -> Hypotheses:
+    """Every kind for every track, with its first guess."""
+    count, walls = len(digest.seen), book.walls
+    seen, tx, rx, _ = digest.mean
+    ray, length = digest.direction, digest.mean[0][:, 0]
+    middle, image = digest.middle, rx + length[:, None] * digest.direction
+    kinds, knowns, tracks, starts, turns, shifts, doubts = [], [], [], [], [], [], []
+    plain = (AXES, np.zeros(3), np.zeros((3, 3)))
+    every = np.arange(count)
+
+    def add(kind: int, wall: int, start: Floats, first: int, second: int, at: tuple[Floats, Floats]) -> None:
+        kinds.append(np.full(count, kind))
+        knowns.append(np.full(count, wall))
+        tracks.append(every)
+        starts.append(start)
+        parts = []
+        for row, spot in ((first, at[0]), (second, at[1])):
+            if row < 0:
+                parts.append(tuple(np.broadcast_to(part, (count, *part.shape)) for part in plain))
+            else:
+                slope = by_wall(spot, known.place[row], middle)
+                parts.append((
+                    np.broadcast_to(known.turn[row], (count, 3, 3)), np.broadcast_to(known.shift[row], (count, 3)),
+                    slope @ known.root[row],
+                ))  # fmt: skip
+        turns.append(np.stack([part[0] for part in parts], axis=1))
+        shifts.append(np.stack([part[1] for part in parts], axis=1))
+        doubts.append(np.stack([part[2] for part in parts], axis=1))
+
+    anchor = np.broadcast_to(middle, image.shape)
+    direct = place_on_ray(ray, length, tx, rx)
+    add(WALL, NONE, reflect(anchor, image, tx), NONE, NONE, (tx, tx))
+    add(POINT, NONE, direct, NONE, NONE, (tx, tx))
+    for wall in walls.tolist():
+        turn, shift = known.turn[wall], known.shift[wall]
+        tx_image, behind = tx @ turn.T + shift, image @ turn.T + shift
+        add(KNOWN_WALL, wall, reflect(anchor, image, tx_image), wall, NONE, (tx, tx))
+        add(WALL_KNOWN, wall, reflect(anchor, behind, tx), NONE, wall, (tx, behind))
+        apparent = place_on_ray(ray, length, tx_image, rx)
+        mirrored, same = apparent @ turn.T + shift, direct @ turn.T + shift
+        add(OVER_RX, wall, mirrored, NONE, wall, (tx, mirrored))
+        add(OVER_TX, wall, apparent, wall, NONE, (apparent, tx))
+        add(OVER_SAME, wall, same, wall, wall, (same, same))
+    kind = np.concatenate(kinds)
+    trials = Trials(
+        np.concatenate(tracks), kind <= WALL_KNOWN, np.concatenate(starts), np.concatenate(turns),
+        np.concatenate(shifts), np.concatenate(doubts),
+    )  # fmt: skip
+    return Hypotheses(kind, np.concatenate(knowns), trials)
+
+
+def place_on_ray(ray: Floats, length: Floats, tx: Floats, rx: Floats) -> Floats:
+    """Points (..., 3) on rays (..., 3) from Rx whose way from (mirrored) Tx positions (..., 3) has that length."""
+    base = tx - rx
+    reach = (length**2 - np.vecdot(base, base)) / np.maximum(2.0 * (length - np.vecdot(base, ray)), 1e-3)
+    return np.asarray(rx + np.maximum(reach, 0.05)[..., None] * ray)
+
+
+def judge(
+    digest: Digest, known: Known, book: Book, scene: Scene, explained: list[tuple[int, float]]
+) -> tuple[list[Verdict], Floats]:
+    """Verdicts of T tracks, and the posterior (E,) of each of the explanations (track, log evidence) by the map."""
+    table = hypotheses(digest, known, book)
+    fits = try_all(table.trials, digest)
+    track = table.trials.track
+    rivals = np.where(table.known >= 0, np.log(max(len(book.walls), 1)), 0.0)
+    evidence = fits.log_evidence - LOG_VOLUME - np.where(table.trials.is_wall, np.log(8.0), 0.0)
+    evidence += LOG_KIND[table.kind] - rivals
+    evidence += _amplitudes(table, fits, digest, book, scene) + _opacity(table, fits, digest, known, book)
+    gain, information, mean = _upright(table, fits, digest, known, book)
+    evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
+    smooth, _ = smooth_paths(digest)
+    seen = digest.mean[0]
+    up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
+    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LOG_VOLUME + LOG_NONE
+    verdicts, shares = [], np.zeros(len(explained))
+    for row in range(len(digest.seen)):
+        own = (track == row).nonzero()[0]
+        told = [i for i, (which, _) in enumerate(explained) if which == row]
+        weight = np.concatenate([[none[row]], evidence[own], [explained[i][1] for i in told]])
+        total = np.logaddexp.reduce(weight)
+        shares[told] = np.exp(weight[1 + len(own) :] - total)
+        best = int(np.argmax(weight[: 1 + len(own)]))
+        probability = float(np.exp(weight[best] - total))
+        if best == 0:
+            verdicts.append(Verdict(-1, probability, -1, np.zeros(3), AXES, AXES, np.zeros(3), 0.0))
+            continue
+        at = own[best - 1]
+        count = int((digest.weight[row, :, 0] > 0.0).sum())
+        misfit = (fits.cost[at] - COST_MEAN * (count - 1.0)) / (COST_STD * np.sqrt(count))
+        verdicts.append(
+            Verdict(
+                int(table.kind[at]), probability, int(table.known[at]), fits.place[at], fits.held[at],
+                information[at], mean[at], float(misfit),
+            )
+        )  # fmt: skip
+    return verdicts, shares
+
+
+COST_MEAN, COST_STD = 3.56, 2.17
+"""Mean and standard deviation of `(4 + 3) log(1 + chi^2 / 4)` for chi^2 with 3 degrees of freedom."""
+
+
+def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: Book, scene: Scene) -> Floats:
+    """(H,) log density of the tracks' mean amplitudes, given what walls leave and how points scatter."""
+    radio, track = scene.radio, table.trials.track
+    level, seen, rx = digest.log_amplitude[track], digest.mean[0][track], digest.mean[2][track]
+    free = np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * seen[:, 0]))
+    has = table.known >= 0
+    ratio = np.where(has, book.ratio[table.known], 0.0) if len(book.ident) else np.zeros(len(track))
+    variance = np.where(has, book.ratio_variance[table.known], 0.0) if len(book.ident) else np.zeros(len(track))
+    mirror = free + ratio + LEVELS.wall_ratio
+    spread = variance + LEVELS.wall_ratio_std**2 + LEVELS.fading**2
+    surplus = np.maximum(level - free - 0.2, 0.0)  # a mirror does not amplify
+    wall = -0.5 * (level - mirror) ** 2 / spread - 0.5 * np.log(spread) - 20.0 * surplus**2
+    reach = np.linalg.norm(fits.place - rx, axis=1)
+    far = np.where(np.isin(table.kind, (POINT, OVER_TX)), reach, 0.5 * seen[:, 0])
+    far = np.clip(far, 0.05, np.maximum(seen[:, 0] - 0.05, 0.06))
+    unit = np.log(point_amplitude(np.ones(len(far)), np.maximum(seen[:, 0] - far, 0.05), far, radio))
+    bounces = np.where(table.kind == OVER_SAME, 2.0, 1.0)
+    mean = unit + np.log(LEVELS.strength) + ratio * bounces
+    spread = LEVELS.strength_std**2 + variance * bounces**2 + LEVELS.fading**2
+    point = -0.5 * (level - mean) ** 2 / spread - 0.5 * np.log(spread)
+    return np.where(table.trials.is_wall, wall, point)
+
+
+def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: Book) -> Floats:
+    """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known."""
+    middle, walls, wall = digest.middle, book.walls, table.trials.is_wall
+    foot = np.where(wall[:, None], 0.5 * (fits.place + middle), fits.place)
+    slack = DEPTH + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
+    total = np.zeros(len(foot))
+    span = fits.place - middle
+    normal = span / np.maximum(np.linalg.norm(span, axis=1), 1e-6)[:, None]
+    if len(walls):
+        out = known.place[walls] - middle
+        reach = np.linalg.norm(out, axis=1)
+        feet = 0.5 * (known.place[walls] + middle)
+        depth = foot @ (out / reach[:, None]).T - np.vecdot(feet, out) / reach
+        total += BEHIND * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        before = normal @ feet.T - np.vecdot(foot, normal)[:, None]
+        total += np.where(wall, BEHIND, 0.0) * (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+    if len(book.points):
+        depth = normal @ known.place[book.points].T - np.vecdot(foot, normal)[:, None]
+        total += np.where(wall, BEHIND, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+    return total
+
+
+def _upright(
+    table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: Book
+) -> tuple[Floats, Floats, Floats]:
+    """What walls may be beforehand: upright, at right angles to others, level, or anyhow.
+
+    Returns the gain in log evidence (H,), and information (H, 3, 3) and mean (H, 3) of the alternative that fits best.
+    """
+    count = len(fits.cost)
+    information, mean = np.zeros((count, 3, 3)) + RIDGE_OFF, fits.place.copy()
+    gain = np.zeros(count)
+    middle = digest.middle
+    others = known.place[book.walls] - middle
+    others = others[np.abs(others[:, 2]) < 0.2 * np.linalg.norm(others, axis=1)] if len(others) else np.zeros((0, 3))
+    yaws = np.arctan2(others[:, 1], others[:, 0])
+    width = np.log(2.0 * LEVELS.size * 2.0)
+    for row in (table.trials.is_wall & np.isfinite(fits.cost)).nonzero()[0]:
+        span = fits.place[row] - middle
+        reach = max(float(np.linalg.norm(span)), 0.1)
+        std, rise = LEVELS.lean * reach, abs(span[2]) / reach
+        options: list[tuple[float, Floats, Floats]] = []
+        yaw = np.arctan2(span[1], span[0])
+        if rise > 0.9:
+            options.append((np.log(LEVELS.upright), AXES[:2], np.zeros(2)))
+        elif rise < 0.35:
+            off = (yaws - yaw + np.pi / 4.0) % (np.pi / 2.0) - np.pi / 4.0
+            square = len(off) > 0 and float(np.min(np.abs(off))) < 0.2
+            options.append((np.log(LEVELS.upright * (1.0 - LEVELS.square if len(off) else 1.0)), AXES[2:], np.zeros(1)))
+            if square:
+                aim = yaw + off[np.argmin(np.abs(off))]
+                across = np.array([-np.sin(aim), np.cos(aim), 0.0])
+                prior = np.log(LEVELS.upright * LEVELS.square / 4.0)
+                options.append((prior, np.stack([across, AXES[2]]), np.zeros(2)))
+        logs = [np.log(1.0 - LEVELS.upright)]
+        for prior, axes, aim_at in options:
+            spread = axes @ fits.covariance[row] @ axes.T + std**2 * np.eye(len(axes))
+            off_axis = axes @ span - aim_at
+            value = -0.5 * off_axis @ np.linalg.solve(spread, off_axis) - 0.5 * np.linalg.slogdet(spread)[1]
+            logs.append(prior + value + len(axes) * (width - 0.5 * np.log(2.0 * np.pi)))
+        gain[row] = np.logaddexp.reduce(logs)
+        best = int(np.argmax(logs))
+        if best:
+            _, axes, aim_at = options[best - 1]
+            information[row] += axes.T @ axes / std**2
+            mean[row] = fits.place[row] - axes.T @ (axes @ span - aim_at)
+    return gain, information, mean
+
+
+RIDGE_OFF = 1e-6
+"""Information [1/m^2] of a feature's place beforehand, as good as none."""
+
+
+def wanted(verdict: Verdict, length: float) -> Booleans:
+    """Whether a verdict is clear enough to enter the map: likely, a fit, and known well enough to be linear in."""
+    if verdict.kind < 0:
+        return np.bool_(False)
+    information = np.linalg.inv(verdict.covariance) + verdict.information
+    worst = np.sqrt(1.0 / np.linalg.eigvalsh(information)[0])
+    return np.bool_(verdict.probability > LEVELS.born and verdict.misfit < LEVELS.fit and worst < 0.1 * length)
