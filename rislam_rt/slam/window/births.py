@@ -13,6 +13,7 @@ from rislam_rt.slam.window.expect import Clusters, Expected, Scene
 from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.gauss import HEAD, Window
 from rislam_rt.slam.window.kinds import NEW, Verdict, judge, known_features, wanted
+from rislam_rt.slam.window.learn import Sights, seed
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, renew
 from rislam_rt.slam.window.tracks import Tracks
@@ -35,6 +36,7 @@ class Context(NamedTuple):
     heading: Floats
     scene: Scene
     cycle: int
+    sights: Sights
 
 
 def births(context: Context, expected: Expected, groups: Clusters) -> Context:
@@ -154,9 +156,9 @@ def _enter(
     context: Context, at: Integers, verdict: Verdict, histories: Digest, row: int
 ) -> tuple[Context, bool]:
     """The map with a new feature and its history, solved anew; as it was, if they do not agree."""
-    slope = verdict.information @ (verdict.place - verdict.mean)
-    window = gauss.add_feature(context.window, verdict.place, verdict.information, slope)
     new = len(context.book.ident)
+    holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))
+    window = gauss.add_feature(context.window, verdict.place, holds)
     book = enter(context.book, verdict.is_wall, histories.middle, len(at), 5.0)
     forms = np.full((2, 5), UNKNOWN)
     forms[0] = [new if part == NEW else part for part in verdict.form]
@@ -167,7 +169,8 @@ def _enter(
     fresh = np.isin(left.row, at)
     if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > 3.0 * LEVELS.fit:
         return context, False
-    return grown._replace(window=window), True
+    square = float(np.mean(histories.scatter[row] ** 2))
+    return grown._replace(window=window, sights=seed(context.sights, forms[:1], book, square)), True
 
 
 def resolve(context: Context, steps: int) -> tuple[Window, Residuals]:
@@ -175,5 +178,5 @@ def resolve(context: Context, steps: int) -> tuple[Window, Residuals]:
     window, every = context.window, np.arange(context.window.num_poses)
     for _ in range(steps):
         window, left = renew(window, context.log, context.book, context.scene.body, context.heading, every)
-        window = gauss.solve(window)
+        window = gauss.weigh_holds(gauss.solve(window))
     return window, left

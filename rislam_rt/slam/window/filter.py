@@ -114,10 +114,14 @@ def step(
     state = state._replace(sights=sights, book=book)
     landmark[free[pick]] = _names(state.book, expected, groups, row)
 
-    context = Context(state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle)
+    context = Context(
+        state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle, state.sights
+    )  # fmt: skip
     grown = births(context, expected, groups)
     if grown is not context:
-        state = state._replace(window=grown.window, book=grown.book, log=grown.log, tracks=grown.tracks)
+        state = state._replace(
+            window=grown.window, book=grown.book, log=grown.log, tracks=grown.tracks, sights=grown.sights
+        )  # fmt: skip
     if state.cycle % REFRESH == 0:
         window, book, log = prune(state.window, state.book, state.log, state.heading, scene, state.cycle)
         state = state._replace(window=window, book=book, log=log)
@@ -211,7 +215,7 @@ def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
     window = gauss.solve(window)
     slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else last
     window, left = renew(window, log, book, body, state.heading, slots)
-    window = gauss.solve(window)
+    window = gauss.weigh_holds(gauss.solve(window))
     return liven(state._replace(window=window)), left, nis
 
 

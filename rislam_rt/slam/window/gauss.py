@@ -41,6 +41,29 @@ class Quadratic(NamedTuple):
         return self.gradient + (self.hessian @ (x - self.middle)[..., None])[..., 0]
 
 
+class Holds(NamedTuple):
+    """N beliefs about single directions of features: a wall is upright, level, at right angles to another, or not."""
+
+    feature: Integers
+    """(N,)."""
+    axis: Floats
+    """(N, 3) unit vectors."""
+    aim: Floats
+    """(N,) [m] where the feature lies along the axis, if the belief is right..."""
+    std: Floats
+    """(N,) [m] ...within so much."""
+    log_odds: Floats
+    """(N,) beforehand: of "right" against a place anywhere along the axis, times its width [m]."""
+    probability: Floats
+    """(N,) that it is right, at the last look: the weight with which it counts."""
+
+
+def no_holds() -> Holds:
+    """Nothing believed beforehand."""
+    none = np.zeros(0)
+    return Holds(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), none, none, none, none)
+
+
 class Window(NamedTuple):
     """The belief over the last K poses and F features, relative to the run's start."""
 
@@ -60,6 +83,7 @@ class Window(NamedTuple):
     """(K, 4 + 3F): on each pose and the features."""
     covariance: Floats
     """(D, D) of head and accelerations, at the last solution."""
+    holds: Holds
 
     @property
     def num_poses(self) -> int:
@@ -79,7 +103,7 @@ def begin(position: Floats, velocity: Floats, axes: Integers, std: Floats) -> Wi
     prior = Quadratic(information, np.zeros(HEAD), head)
     slots = Quadratic(np.zeros((1, POSE, POSE)), np.zeros((1, POSE)), np.concatenate([position, [0.0]])[None])
     none = np.zeros(0)
-    return Window(head, none.reshape(0, len(axes)), none, none, axes, prior, slots, np.diag(np.maximum(std, 1e-6) ** 2))
+    return Window(head, none.reshape(0, len(axes)), none, none, axes, prior, slots, np.diag(np.maximum(std, 1e-6) ** 2), no_holds())
 
 
 def pose_design(step: Floats, axes: Integers) -> Floats:
@@ -207,6 +231,10 @@ def solve(window: Window) -> Window:
     gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
     hessian[:size, :size] += window.prior.hessian
     gradient[:size] += window.prior.slope(window.head)
+    for feature, pull, information in zip(*_pulls(window), strict=True):
+        own = slice(HEAD + 3 * feature, HEAD + 3 * feature + 3)
+        hessian[own, own] += information
+        gradient[own] += pull
     free = np.repeat(window.precision, len(window.axes))
     at = np.arange(size, total)
     hessian[at, at] += free
@@ -218,6 +246,35 @@ def solve(window: Window) -> Window:
         accel=window.accel + change[size:].reshape(window.accel.shape),
         covariance=covariance,
     )
+
+
+def _pulls(window: Window) -> tuple[Integers, Floats, Floats]:
+    """Features (N,), gradients (N, 3) and information (N, 3, 3) of what is held of them."""
+    holds = window.holds
+    weight = holds.probability / holds.std**2
+    off = np.vecdot(holds.axis, window.features[holds.feature]) - holds.aim if len(weight) else weight
+    return (
+        holds.feature, (weight * off)[:, None] * holds.axis,
+        weight[:, None, None] * holds.axis[:, :, None] * holds.axis[:, None, :],
+    )  # fmt: skip
+
+
+def weigh_holds(window: Window) -> Window:
+    """Each belief about a direction by what all else tells of it (its cavity): is it right?"""
+    holds = window.holds
+    if not len(holds.feature):
+        return window
+    rows = HEAD + 3 * holds.feature[:, None] + np.arange(3)
+    block = window.covariance[rows[:, :, None], rows[:, None, :]]
+    variance = np.vecdot(holds.axis, (block @ holds.axis[..., None])[..., 0])
+    middle = np.vecdot(holds.axis, window.features[holds.feature])
+    own = holds.probability / holds.std**2
+    left = np.maximum(1.0 / variance - own, 1e-3)
+    cavity = (middle / variance - own * holds.aim) / left
+    spread = 1.0 / left + holds.std**2
+    log_right = -0.5 * (cavity - holds.aim) ** 2 / spread - 0.5 * np.log(2.0 * np.pi * spread)
+    odds = np.clip(holds.log_odds + log_right, -30.0, 30.0)
+    return window._replace(holds=holds._replace(probability=1.0 / (1.0 + np.exp(-odds))))
 
 
 def inverse(matrix: Floats) -> Floats:
@@ -233,13 +290,13 @@ def inverse(matrix: Floats) -> Floats:
     return np.asarray(full * scale * scale[:, None])
 
 
-def add_feature(window: Window, place: Floats, information: Floats, slope: Floats) -> Window:
-    """One more feature at `place` (3,), with a prior of that information (3, 3) and gradient (3,) there."""
+def add_feature(window: Window, place: Floats, holds: Holds, ridge: float = 1e-6) -> Window:
+    """One more feature at `place` (3,), with what is held of it; all else is open, `ridge` [1/m^2] apart."""
     size = len(window.head)
     hessian = np.zeros((size + 3, size + 3))
-    hessian[:size, :size], hessian[size:, size:] = window.prior.hessian, information
+    hessian[:size, :size], hessian[size:, size:] = window.prior.hessian, ridge * np.eye(3)
     prior = Quadratic(
-        hessian, np.concatenate([window.prior.gradient, slope]), np.concatenate([window.prior.middle, place])
+        hessian, np.concatenate([window.prior.gradient, np.zeros(3)]), np.concatenate([window.prior.middle, place])
     )
     count, old = window.num_poses, window.slots
     wide = np.zeros((count, POSE + size - HEAD + 3, POSE + size - HEAD + 3))
@@ -248,7 +305,9 @@ def add_feature(window: Window, place: Floats, information: Floats, slope: Float
     middle = np.concatenate([old.middle, np.broadcast_to(place, (count, 3))], axis=1)
     covariance = np.insert(np.insert(window.covariance, size * np.ones(3, int), 0.0, axis=0), [size] * 3, 0.0, axis=1)
     covariance[size : size + 3, size : size + 3] = np.eye(3)
+    joined = Holds(*(np.concatenate(pair) for pair in zip(window.holds, holds, strict=True)))
     return window._replace(
+        holds=joined,
         head=np.concatenate([window.head, place]),
         prior=prior,
         slots=Quadratic(wide, gradient, middle),
@@ -271,6 +330,9 @@ def drop_features(window: Window, keep: Booleans) -> Window:
     old = window.slots
     slots = Quadratic(old.hessian[:, rows[:, None], rows], old.gradient[:, rows], old.middle[:, rows])
     kept = np.concatenate([inside, np.arange(size, len(window.covariance))])
+    stay = keep[window.holds.feature]
+    holds = window.holds._replace(feature=(np.cumsum(keep) - 1)[window.holds.feature])
+    holds = Holds(*(field[stay] for field in holds))
     return window._replace(
-        head=window.head[inside], prior=prior, slots=slots, covariance=window.covariance[np.ix_(kept, kept)]
+        holds=holds, head=window.head[inside], prior=prior, slots=slots, covariance=window.covariance[np.ix_(kept, kept)]
     )

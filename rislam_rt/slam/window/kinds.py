@@ -11,6 +11,7 @@ from rislam_rt.slam.returns import AXES, NONE, TX, reflect
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.digest import Digest
 from rislam_rt.slam.window.expect import Scene
+from rislam_rt.slam.window.gauss import Holds, no_holds
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.trial import Fits, Trials, smooth_paths, try_all
 
@@ -64,10 +65,8 @@ class Verdict(NamedTuple):
     """(3,) of the new feature."""
     covariance: Floats
     """(3, 3), the poses held."""
-    information: Floats
-    """(3, 3) of its prior..."""
-    mean: Floats
-    """(3,)."""
+    holds: Holds
+    """What may be held of it beforehand; its row is 0."""
     misfit: float
     """Standard deviations by which it costs more than noise makes it."""
 
@@ -193,7 +192,7 @@ def judge(
     evidence = fits.log_evidence - LOG_VOLUME - np.where(table.trials.is_wall, np.log(8.0), 0.0)
     evidence += LOG_KIND[table.kind] - rivals
     evidence += _amplitudes(table, fits, digest, book, scene) + _opacity(table, fits, digest, known, book)
-    gain, information, mean = _upright(table, fits, digest, known, book)
+    gain = _upright(table, fits, digest, known, book)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
@@ -209,7 +208,7 @@ def judge(
         best = int(np.argmax(weight[: 1 + len(own)]))
         probability = float(np.exp(weight[best] - total))
         if best == 0:
-            verdicts.append(Verdict(-1, probability, -1, np.zeros(3), AXES, AXES, np.zeros(3), 0.0))
+            verdicts.append(Verdict(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0))
             continue
         at = own[best - 1]
         count = int((digest.weight[row, :, 0] > 0.0).sum())
@@ -217,7 +216,8 @@ def judge(
         verdicts.append(
             Verdict(
                 int(table.kind[at]), probability, int(table.known[at]), fits.place[at], fits.held[at],
-                information[at], mean[at], float(misfit),
+                beliefs(fits.place[at], digest, known, book) if table.trials.is_wall[at] else no_holds(),
+                float(misfit),
             )
         )  # fmt: skip
     return verdicts, shares
@@ -272,61 +272,59 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
     return total
 
 
-def _upright(
-    table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: Book
-) -> tuple[Floats, Floats, Floats]:
-    """What walls may be beforehand: upright, at right angles to others, level, or anyhow.
+def beliefs(place: Floats, digest: Digest, known: Known, book: Book) -> Holds:
+    """What may be held beforehand of a wall at `place` (3,): upright, at right angles to another; or level."""
+    span = place - digest.middle
+    reach = max(float(np.linalg.norm(span)), 0.1)
+    rise, std = abs(span[2]) / reach, LEVELS.lean * reach
+    axes: list[Floats] = []
+    log_odds: list[float] = []
+    even = np.log(LEVELS.upright / (1.0 - LEVELS.upright))
+    if rise > 0.9:
+        axes += [AXES[0], AXES[1]]
+        log_odds += 2 * [even + np.log(reach)]
+    elif rise < 0.35:
+        axes.append(AXES[2])
+        log_odds.append(even + np.log(reach))
+        others = known.place[book.walls] - digest.middle
+        if len(others):
+            flat = np.linalg.norm(others[:, :2], axis=1) > 0.95 * np.linalg.norm(others, axis=1)
+            off = np.arctan2(others[flat, 1], others[flat, 0]) - np.arctan2(span[1], span[0])
+            off = (off + np.pi / 4.0) % (np.pi / 2.0) - np.pi / 4.0
+            if len(off) and np.min(np.abs(off)) < 0.15:
+                aim = np.arctan2(span[1], span[0]) + off[np.argmin(np.abs(off))]
+                axes.append(np.array([-np.sin(aim), np.cos(aim), 0.0]))
+                log_odds.append(np.log(LEVELS.square / (1.0 - LEVELS.square)) + np.log(np.pi / 2.0 * reach))
+    count = len(axes)
+    axis = np.array(axes).reshape(count, 3)
+    return Holds(
+        np.zeros(count, dtype=np.int64), axis, axis @ digest.middle, np.full(count, std), np.array(log_odds),
+        np.full(count, 0.5),
+    )  # fmt: skip
 
-    Returns the gain in log evidence (H,), and information (H, 3, 3) and mean (H, 3) of the alternative that fits best.
-    """
-    count = len(fits.cost)
-    information, mean = np.zeros((count, 3, 3)) + RIDGE_OFF, fits.place.copy()
-    gain = np.zeros(count)
-    middle = digest.middle
-    others = known.place[book.walls] - middle
-    others = others[np.abs(others[:, 2]) < 0.2 * np.linalg.norm(others, axis=1)] if len(others) else np.zeros((0, 3))
-    yaws = np.arctan2(others[:, 1], others[:, 0])
-    width = np.log(2.0 * LEVELS.size * 2.0)
+
+def _upright(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: Book) -> Floats:
+    """Gain (H,) in log evidence by what walls are beforehand: each direction held, or anywhere in its width."""
+    gain = np.zeros(len(fits.cost))
     for row in (table.trials.is_wall & np.isfinite(fits.cost)).nonzero()[0]:
-        span = fits.place[row] - middle
-        reach = max(float(np.linalg.norm(span)), 0.1)
-        std, rise = LEVELS.lean * reach, abs(span[2]) / reach
-        options: list[tuple[float, Floats, Floats]] = []
-        yaw = np.arctan2(span[1], span[0])
-        if rise > 0.9:
-            options.append((np.log(LEVELS.upright), AXES[:2], np.zeros(2)))
-        elif rise < 0.35:
-            off = (yaws - yaw + np.pi / 4.0) % (np.pi / 2.0) - np.pi / 4.0
-            square = len(off) > 0 and float(np.min(np.abs(off))) < 0.2
-            options.append((np.log(LEVELS.upright * (1.0 - LEVELS.square if len(off) else 1.0)), AXES[2:], np.zeros(1)))
-            if square:
-                aim = yaw + off[np.argmin(np.abs(off))]
-                across = np.array([-np.sin(aim), np.cos(aim), 0.0])
-                prior = np.log(LEVELS.upright * LEVELS.square / 4.0)
-                options.append((prior, np.stack([across, AXES[2]]), np.zeros(2)))
-        logs = [np.log(1.0 - LEVELS.upright)]
-        for prior, axes, aim_at in options:
-            spread = axes @ fits.covariance[row] @ axes.T + std**2 * np.eye(len(axes))
-            off_axis = axes @ span - aim_at
-            value = -0.5 * off_axis @ np.linalg.solve(spread, off_axis) - 0.5 * np.linalg.slogdet(spread)[1]
-            logs.append(prior + value + len(axes) * (width - 0.5 * np.log(2.0 * np.pi)))
-        gain[row] = np.logaddexp.reduce(logs)
-        best = int(np.argmax(logs))
-        if best:
-            _, axes, aim_at = options[best - 1]
-            information[row] += axes.T @ axes / std**2
-            mean[row] = fits.place[row] - axes.T @ (axes @ span - aim_at)
-    return gain, information, mean
+        holds = beliefs(fits.place[row], digest, known, book)
+        span = fits.place[row] - digest.middle
+        variance = np.vecdot(holds.axis, holds.axis @ fits.covariance[row]) + holds.std**2
+        log_right = -0.5 * (holds.axis @ span) ** 2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
+        # odds hold the width: right against a density of one over it
+        gain[row] = (np.logaddexp(0.0, holds.log_odds + log_right) - np.log1p(EVEN)).sum()
+    return gain
 
 
-RIDGE_OFF = 1e-6
-"""Information [1/m^2] of a feature's place beforehand, as good as none."""
+EVEN = LEVELS.upright / (1.0 - LEVELS.upright)
+"""Odds that a direction is as it is held to be."""
 
 
 def wanted(verdict: Verdict, length: float) -> Booleans:
     """Whether a verdict is clear enough to enter the map: likely, a fit, and known well enough to be linear in."""
     if verdict.kind < 0:
         return np.bool_(False)
-    information = np.linalg.inv(verdict.covariance) + verdict.information
+    holds = verdict.holds
+    information = np.linalg.inv(verdict.covariance) + (holds.axis.T / holds.std**2) @ holds.axis
     worst = np.sqrt(1.0 / np.linalg.eigvalsh(information)[0])
     return np.bool_(verdict.probability > LEVELS.born and verdict.misfit < LEVELS.fit and worst < 0.1 * length)

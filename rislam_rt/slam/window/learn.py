@@ -72,6 +72,16 @@ def recall(sights: Sights, expected: Expected, book: Book) -> tuple[Floats, Floa
     return np.asarray(first * (1.0 - LEVELS.blocked) + (1.0 - first) * LEVELS.cleared), scatter
 
 
+def seed(sights: Sights, forms: Integers, book: Book, scatter: float) -> Sights:
+    """A form that a new feature was found by: nothing hides it, and it scatters so much."""
+    code = np.append(sights.code, pack(forms, book))
+    order = np.argsort(code, kind="stable")
+    return Sights(
+        code[order], np.append(sights.clear, np.full(len(forms), 0.99))[order],
+        np.append(sights.scatter, np.full(len(forms), scatter))[order],
+    )  # fmt: skip
+
+
 def visible(expected: Expected, groups: Clusters, clear: Floats) -> Floats:
     """(C,) probability that each cluster shows."""
     return np.asarray(LEVELS.shown * (expected.detection * clear)[groups.leader]).clip(1e-4, LEVELS.shown)
