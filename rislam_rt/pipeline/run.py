@@ -25,7 +25,7 @@ from rislam_rt.pipeline.change import change_room
 from rislam_rt.pipeline.choose import build_designer
 from rislam_rt.pipeline.control import check_control, open_link
 from rislam_rt.pipeline.cycle import Agent, Cycle, Means, Rng, Room, run_cycle
-from rislam_rt.pipeline.estimators import ESTIMATORS
+from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.motion import draw_motion
 from rislam_rt.pipeline.record import gather
 from rislam_rt.pipeline.schemes import SCHEMES
@@ -143,8 +143,10 @@ def result_of(stage: Stage, spec: PipelineSpec, schemes: Mapping[str, SchemeResu
     )
 
 
-def run_scheme(name: str, stage: Stage, spec: PipelineSpec, tell: Progress) -> SchemeResult:
-    """One scheme over all cycles."""
+def run_scheme(
+    name: str, stage: Stage, spec: PipelineSpec, tell: Progress, estimator: Estimator | None = None
+) -> SchemeResult:
+    """One scheme over all cycles, with its own estimator unless another is given."""
     settings, scheme, seeds = build_settings(spec), SCHEMES[name], stage.seeds
     motion, ris = stage.scene.agent, stage.scene.ris
     panel = ris.spec if ris is not None and scheme.panel else None
@@ -154,7 +156,7 @@ def run_scheme(name: str, stage: Stage, spec: PipelineSpec, tell: Progress) -> S
         tolerance = spec.panel.tolerance
         room = Room(stage.paths, motion, draw_panel(panel, tolerance, rng=np.random.default_rng(seeds.panel)))
         designer = build_designer(scheme, panel, room, spec, settings)
-    estimator = ESTIMATORS[scheme.estimator]
+    estimator = estimator or ESTIMATORS[scheme.estimator]
     means = Means(panel, designer, estimator, spec, settings)
     filter_rng, design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
     start, config = _start(motion, spec, seeds, settings), estimator.config(settings)
