@@ -158,7 +158,7 @@ def run_scheme(name: str, stage: Stage, spec: PipelineSpec, tell: Progress) -> S
     means = Means(panel, designer, estimator, spec, settings)
     filter_rng, design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
     start, config = _start(motion, spec, seeds, settings), estimator.config(settings)
-    state = estimator.init(start, motion.body, panel, settings.radio, config, rng=filter_rng)
+    state = estimator.init(start, motion.body, panel, settings.sensor, config, rng=filter_rng)
     agent = Agent(state, open_link(panel) if panel is not None else None)
     noise, control = (_children(s, len(motion)) for s in (seeds.noise, seeds.control))
     cycles: list[Cycle] = []
