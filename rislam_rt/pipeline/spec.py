@@ -4,29 +4,18 @@ from dataclasses import fields
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
+from pydantic import Field, create_model, model_validator
 
 from rislam_rt.design import DESIGNERS, DesignConfig
-from rislam_rt.measurement import ReceiverConfig, with_reference_snr
-from rislam_rt.model import RadioConfig, RxArray
+from rislam_rt.measurement import ReceiverConfig, build_sensor, with_reference_snr
+from rislam_rt.model import RadioConfig, RxArray, SensorModel
+from rislam_rt.pipeline.mistold import ToldSection
 from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.pipeline.section import Count, Decibel, Name, NotNegative, Positive, Probability, Section
 from rislam_rt.ris import PanelTolerance
 from rislam_rt.slam import SlamConfig
 from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
 from rislam_rt.slam.schemes.channel_slam import ChannelSlamConfig
-
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=64)]
-Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, le=1e12, allow_inf_nan=False)]
-Decibel = Annotated[float, Field(ge=-300.0, le=300.0, allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=1, le=1_000_000)]
-Probability = Annotated[float, Field(ge=0.0, le=1.0)]
-
-
-class Section(BaseModel):
-    """A table of the file: no conversions, no unknown keys."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
 def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()) -> Any:
@@ -139,6 +128,8 @@ class StartSection(Section):
 
     position_std_m: NotNegative = 0.01
     velocity_std_m_s: NotNegative = 0.01
+    heading_std_deg: NotNegative = 0.0
+    """Where the heading is estimated."""
 
 
 class MotionSection(Section):
@@ -193,7 +184,7 @@ class PipelineSpec(Section):
     channel: Literal["traced", "image_source"] = "traced"
     depth: Annotated[int, Field(ge=0, le=4)] = 2
     """Largest number of wall bounces on a path, both legs together."""
-    schemes: Annotated[list[Literal[tuple(SCHEMES)]], Field(min_length=1)] = ["optimized", "random"]  # type: ignore[valid-type]
+    schemes: list[Literal[tuple(SCHEMES)]] = Field(default=["optimized", "random"], min_length=1)  # type: ignore[valid-type]
     radio: RadioSection = RadioSection()
     receiver: ReceiverSection = ReceiverSection()
     design: DesignSection = DesignSection()
@@ -203,6 +194,7 @@ class PipelineSpec(Section):
     panel: PanelSection = PanelSection()
     motion: MotionSection = MotionSection()
     start: StartSection = StartSection()
+    told: ToldSection = ToldSection()
     slam: SlamSection = SlamSection()
     bp_slam: BpSlamSection = BpSlamSection()
     channel_slam: ChannelSlamSection = ChannelSlamSection()
@@ -252,6 +244,8 @@ class Settings(NamedTuple):
     design: DesignConfig
     bp_slam: BpSlamConfig
     channel_slam: ChannelSlamConfig
+    sensor: SensorModel
+    """What the estimators are told of the receiver."""
 
 
 def build_settings(spec: PipelineSpec) -> Settings:
@@ -262,13 +256,15 @@ def build_settings(spec: PipelineSpec) -> Settings:
     ConfigError
         A value is out of the range that the record itself checks.
     """
+    radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump())
     return Settings(
-        build_radio(spec.radio),
-        ReceiverConfig(**spec.receiver.model_dump()),
+        radio,
+        receiver,
         SlamConfig(**spec.slam.model_dump()),
         build_design(spec.design),
         BpSlamConfig(**spec.bp_slam.model_dump()),
         ChannelSlamConfig(**spec.channel_slam.model_dump()),
+        build_sensor(radio, receiver),
     )
 
 

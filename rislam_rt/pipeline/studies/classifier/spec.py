@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rislam_rt.measurement import ReceiverConfig
-from rislam_rt.pipeline.spec import Count, Positive, RadioSection, ReceiverSection, Section
+from rislam_rt.pipeline.section import Count, Positive, Section
+from rislam_rt.pipeline.spec import RadioSection, ReceiverSection
 from rislam_rt.pipeline.studies.spec import RoomSection, StudySpec
 
 Share = Annotated[float, Field(ge=0.0, le=100.0)]

@@ -12,6 +12,7 @@ from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.sweeps.axes import put
+from rislam_rt.pipeline.told import tell_settings
 from rislam_rt.slam import StartPrior
 
 
@@ -120,11 +121,12 @@ def replay(
     content = dict(config)
     for key, value in (changes or {}).items():
         content = put(content, key, value)
-    settings = build_settings(PipelineSpec.model_validate(content))
+    spec = PipelineSpec.model_validate(content)
+    settings = tell_settings(build_settings(spec), spec.told)
     recorder = Recorder(estimator or ESTIMATORS[SCHEMES[scheme].estimator])
     run = recorder.estimator
     own = run.config(settings)
-    state = run.init(inputs.start, inputs.body, inputs.panel, settings.radio, own, rng=rng)
+    state = run.init(inputs.start, inputs.body, inputs.panel, settings.sensor, own, rng=rng)
     steps = zip(inputs.measurements, inputs.codes, np.diff(inputs.time, prepend=0.0), inputs.heading, strict=True)
     for measurement, code, dt, heading in steps:
         state, _ = run.step(state, measurement, code, float(dt), float(heading), own, rng=rng)

@@ -9,7 +9,6 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.information import posterior_bound
-from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.model import PathKind, Paths, Scene, SchemeResult
 from rislam_rt.pipeline.bound import bound_problem, position_rms, wall_surface
 from rislam_rt.pipeline.spec import PipelineSpec, Settings, build_settings
@@ -101,9 +100,9 @@ def audible_paths(paths: Paths, settings: Settings) -> Booleans:
 
     Wall returns count where the estimator uses them.
     """
-    threshold = detection_threshold(settings.radio, settings.receiver)
-    heard = paths.valid & (settings.radio.integrated_snr(paths.gain) >= threshold)
-    heard &= (paths.tau >= settings.receiver.min_delay) & (paths.tau <= settings.receiver.max_delay)
+    sensor = settings.sensor
+    heard = paths.valid & (settings.radio.integrated_snr(paths.gain) >= sensor.threshold)
+    heard &= (paths.tau >= sensor.window[0]) & (paths.tau <= sensor.window[1])
     if settings.radio.array.pattern == "upper":
         heard &= paths.arrival[..., 2] >= 0.0
     wanted = paths.landmark >= 0
