@@ -56,6 +56,10 @@ class Stage:
     """(M,) where each shape's triangles begin in `wall_of_primitive`."""
     wall_of_primitive: Integers
     """(T,) walls, shape by shape."""
+    materials: tuple[rt.RadioMaterialBase, ...]
+    """All radio materials of walls."""
+    material_of_wall: Integers
+    """(W,) index into `materials`."""
     sieve: Sieve
     views: dict[int, mi.Scene]
     """Everything (`NO_SHADE`), and for each scatterer with a shade everything but that shade."""
@@ -114,17 +118,12 @@ def build_stage(walls: Walls, carrier: float, origin: Floats, shades: Mapping[in
     scene = rt.load_scene()
     scene.frequency = carrier
     materials = list(dict.fromkeys(walls.material))
-    material_of_triangle = np.array([materials.index(m) for m in walls.material], dtype=np.int64)[
-        walls.wall_of_triangle
-    ]
-    members = [np.flatnonzero(material_of_triangle == m) for m in range(len(materials))]
+    radio_materials = tuple(_material(material, m) for m, material in enumerate(materials))
+    material_of_wall = np.array([materials.index(m) for m in walls.material], dtype=np.int64)
+    members = [np.flatnonzero(material_of_wall[walls.wall_of_triangle] == m) for m in range(len(materials))]
     objects = [
-        rt.SceneObject(
-            build_mesh(f"walls-{m}", walls.triangles[rows] - origin),
-            f"walls-{m}",
-            radio_material=_material(material, m),
-        )
-        for m, (material, rows) in enumerate(zip(materials, members, strict=True))
+        rt.SceneObject(build_mesh(f"walls-{m}", walls.triangles[rows] - origin), f"walls-{m}", radio_material=material)
+        for m, (material, rows) in enumerate(zip(radio_materials, members, strict=True))
     ]
     absorber = rt.AbsorberRadioMaterial("shade")
     dark = {
@@ -138,7 +137,8 @@ def build_stage(walls: Walls, carrier: float, origin: Floats, shades: Mapping[in
     ids = np.array([int(o.object_id) for o in objects], dtype=np.int64)
     views = {number: _part([*objects, *(o for n, o in dark.items() if n != number)]) for number in dark}
     alone = {number: _part([shade]) for number, shade in dark.items()}
-    return _numbered(scene, origin, walls, ids, members, {NO_SHADE: scene.mi_scene} | views, alone)
+    views = {NO_SHADE: scene.mi_scene} | views
+    return _numbered(scene, origin, walls, ids, members, (radio_materials, material_of_wall), views, alone)
 
 
 def _part(objects: list[rt.SceneObject]) -> mi.Scene:
@@ -152,6 +152,7 @@ def _numbered(
     walls: Walls,
     ids: Integers,
     members: list[Integers],
+    materials: tuple[tuple[rt.RadioMaterialBase, ...], Integers],
     views: dict[int, mi.Scene],
     shades: dict[int, mi.Scene],
 ) -> Stage:
@@ -177,6 +178,7 @@ def _numbered(
         ids[order],
         first,
         walls.wall_of_triangle[rows],
+        *materials,
         _sieve(walls, origin),
         views,
         shades,
