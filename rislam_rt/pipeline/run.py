@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.backend import prepare_backend
+from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.channel.protocol import Channel
 from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.model import (
@@ -158,7 +159,8 @@ def run_scheme(
     start = np.random.default_rng(seeds.start)
     told = tell_belief(motion, stage.body, panel, spec, settings, start=start, compass=compass)
     paths = stage.paths if panel is not None else without_panel(stage.paths)
-    room = Room(deceive(paths, motion, spec.told, rng=sway), motion)
+    shift = doppler_shift(stage.paths, motion, settings.radio.wavelength)
+    room = Room(deceive(paths, motion, spec.told, rng=sway), motion, shift)
     designer = None
     if panel is not None:
         tolerance = spec.panel.tolerance
