@@ -12,7 +12,7 @@ import numpy as np
 from rislam_rt.backend import prepare_backend
 from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.channel.protocol import Channel
-from rislam_rt.errors import ConfigError, RislamError
+from rislam_rt.errors import ConfigError, RislamError, expect
 from rislam_rt.model import (
     Body,
     PathKind,
@@ -120,6 +120,9 @@ def run_slam(
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
+    expect("scene", scene, Scene)
+    expect("spec", spec, PipelineSpec)
+    expect("rng", rng, np.random.Generator)
     done = {} if done is None else done
     tell = progress or (lambda stage, at, total: None)
     tell("trace", 0, 1)
