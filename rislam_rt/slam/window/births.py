@@ -1,22 +1,20 @@
 """Tracks that are understood: their components are explained, by a new feature or by those that there are."""
 
-from typing import NamedTuple
-
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.returns import linearise
 from rislam_rt.slam.window import gauss, tracks
-from rislam_rt.slam.window.book import Book, enter, idents
+from rislam_rt.slam.window.book import enter, idents
+from rislam_rt.slam.window.context import Context, resolve
 from rislam_rt.slam.window.digest import Digest, digest
-from rislam_rt.slam.window.expect import Clusters, Expected, Scene
+from rislam_rt.slam.window.expect import Clusters, Expected
 from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.gauss import HEAD, Window
+from rislam_rt.slam.window.gauss import HEAD
 from rislam_rt.slam.window.kinds import NEW, Verdict, judge, known_features, wanted
-from rislam_rt.slam.window.learn import Sights, seed
+from rislam_rt.slam.window.learn import seed
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.log import Log, Residuals, renew
-from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window.retract import behind, release
 
 NEAR = np.array([0.3, 0.15, 0.15])
 """Gap in length [m] and cosines up to which a return of the map is weighed as a track's explanation."""
@@ -24,19 +22,6 @@ MOST = 2
 """Explanations of one track by the map that are weighed, the nearest."""
 STRIDE = 3
 """Cycles between two examinations."""
-
-
-class Context(NamedTuple):
-    """What births read and change."""
-
-    window: Window
-    book: Book
-    log: Log
-    tracks: Tracks
-    heading: Floats
-    scene: Scene
-    cycle: int
-    sights: Sights
 
 
 def births(context: Context, expected: Expected, groups: Clusters) -> Context:
@@ -54,8 +39,9 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.book, mean[:3])
     histories = digest(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
     told = explanations(context, rows, histories, expected, groups, mean, covariance)
+    first = _may_be_first(context, histories, mean)
     verdicts, shares = judge(
-        histories, known, context.book, context.scene, [(row, value) for row, value, _ in told]
+        histories, known, context.book, context.scene, [(row, value) for row, value, _ in told], first
     )  # fmt: skip
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked = context.tracks.looked.copy()
@@ -76,6 +62,26 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
             continue  # its turn comes in the next cycle, with the new feature known
         looked[rows[row]] = context.tracks.hits[rows[row]]
     return context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
+
+
+def _may_be_first(context: Context, histories: Digest, mean: Floats) -> Booleans:
+    """(T,) tracks without anything shorter that leaves more of the signal: two walls throw two single returns as well.
+
+    Known walls count; the floor and what is hidden make exceptions.
+    """
+    every = context.tracks
+    length, shine = histories.mean[0][:, 0], histories.log_amplitude + np.log(histories.mean[0][:, 0])
+    old = every.hits >= 3
+    others, bright = every.mean[old, 0, 0], every.log_amplitude[old] + np.log(np.maximum(every.mean[old, 0, 0], 0.1))
+    shorter = ((others < 0.97 * length[:, None]) & (bright > shine[:, None] - 0.3)).any(axis=1)
+    walls = context.book.walls
+    if len(walls):
+        place = mean[HEAD:].reshape(-1, 3)[walls]
+        span = place - context.book.anchor[walls]
+        normal = span / np.linalg.norm(span, axis=1)[:, None]
+        reach = 2.0 * np.abs(np.vecdot(0.5 * (place + context.book.anchor[walls]) - mean[:3], normal))
+        shorter |= (reach < 0.97 * length[:, None]).any(axis=1)
+    return np.asarray(~shorter)
 
 
 def explanations(
@@ -170,13 +176,7 @@ def _enter(
     if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > 3.0 * LEVELS.fit:
         return context, False
     square = float(np.mean(histories.scatter[row] ** 2))
-    return grown._replace(window=window, sights=seed(context.sights, forms[:1], book, square)), True
-
-
-def resolve(context: Context, steps: int) -> tuple[Window, Residuals]:
-    """Gauss-Newton over the whole window."""
-    window, every = context.window, np.arange(context.window.num_poses)
-    for _ in range(steps):
-        window, left = renew(window, context.log, context.book, context.scene.body, context.heading, every)
-        window = gauss.weigh_holds(gauss.solve(window))
-    return window, left
+    grown = grown._replace(window=window, sights=seed(context.sights, forms[:1], book, square))
+    if verdict.is_wall:
+        grown = release(grown, ~behind(grown, new))
+    return grown, True

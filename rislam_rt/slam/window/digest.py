@@ -15,6 +15,8 @@ from rislam_rt.slam.window.gauss import Window, now, poses
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log
 
+TOGETHER = 10.0
+"""Measurements over which the pull of neighbours keeps its sign."""
 POINTS = 8
 """Most normal points of a history."""
 
@@ -76,8 +78,13 @@ def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: 
     scatter = np.ones((count, 3))
     level = np.zeros(count)
     for row, at in enumerate(rows):
+        scatter[row] = scatter_of(log.seen[at], log.std[at], time[log.cycle[at] - first])
+    # what the others show is what a short history has yet to show; it counts as much as four measurements
+    crowd = max(LEVELS.crowd, float(np.mean(np.minimum(scatter, 10.0) ** 2)))
+    number = np.array([len(at) for at in rows])[:, None]
+    scatter = np.sqrt((4.0 * crowd + number * scatter**2) / (4.0 + number))
+    for row, at in enumerate(rows):
         slot = log.cycle[at] - first
-        scatter[row] = scatter_of(log.seen[at], log.std[at], time[slot])
         std = log.std[at] * scatter[row]
         bins = np.arange(len(at)) * min(POINTS, len(at)) // len(at)
         start = np.searchsorted(bins, np.arange(bins[-1] + 1))
@@ -85,7 +92,7 @@ def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: 
         total = np.add.reduceat(inside, start)
         used = len(start)
         number = np.diff(start, append=len(at)).astype(np.float64)
-        alone = np.maximum(number / LEVELS.memory, 1.0)[:, None]  # how many of them err by themselves
+        alone = max(len(at) / TOGETHER, 1.0) / used  # how many of a point's errors are its own
         seen[row, :used] = np.add.reduceat(inside * log.seen[at], start) / total
         own = np.add.reduceat(log.std[at] ** 2, start) / number[:, None]
         weight[row, :used] = (own / number[:, None] + own * (scatter[row] ** 2 - 1.0) / alone) ** -0.5
@@ -119,5 +126,4 @@ def scatter_of(seen: Floats, std: Floats, time: Floats) -> Floats:
             squared[:, axis] = ((seen[:, axis] - rows @ best) / std[:, axis]) ** 2
         chi = (trust[:, None] * squared).sum(axis=0) / max(len(time) - order, 1)
         trust = (LEVELS.tail + 3.0) / (LEVELS.tail + (squared / np.maximum(chi, 1.0)).sum(axis=1))
-    # the prior counts as much as four measurements
-    return np.sqrt((4.0 * LEVELS.crowd + len(time) * np.maximum(chi, 1.0)) / (4.0 + len(time)))
+    return np.sqrt(np.maximum(chi, 1.0))

@@ -145,6 +145,8 @@ class Clusters(NamedTuple):
     """(C,) of the whole."""
     log_amplitude_std: Floats
     """(C,)."""
+    by_itself: Floats
+    """(C,) probability that it comes out by itself: 1 for leaders, less for what a leader should take in."""
 
 
 def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | None = None) -> Clusters:
@@ -158,7 +160,7 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
     if sides is not None:
         gap[sides[:, None] != sides] = np.inf
     inside, around = gap < 1.0, gap < 1.15
-    taken, partner = np.zeros(count, dtype=np.bool_), np.full(count, -1)
+    taken, partner, by_itself = np.zeros(count, dtype=np.bool_), np.full(count, -1), np.ones(count)
     crowded = around.any(axis=1).nonzero()[0]
     disturbance, power = np.zeros((count, 3)), np.exp(2.0 * strength)
     total = power.copy()
@@ -168,6 +170,7 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
         members = (inside[leader] & ~taken).nonzero()[0]
         members = members[strength[members] <= strength[leader]]
         taken[members] = True
+        by_itself[members] = np.maximum(1.0 - clear[leader], ALONE)
         if len(members):
             first = members[np.argmax(strength[members])]
             partner[leader] = first
@@ -175,8 +178,8 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
         others = np.setdiff1d((around[leader] & (strength <= strength[leader])).nonzero()[0], [partner[leader]])
         ratio = power[others] / power[leader] * clear[others]
         disturbance[leader] = (0.5 * ratio[:, None] * (expected.seen[others] - expected.seen[leader]) ** 2).sum(axis=0)
-    leader = (~taken).nonzero()[0]
-    mate = partner[leader]
+    leader = np.concatenate([(~taken).nonzero()[0], taken.nonzero()[0]])
+    mate = np.where(taken[leader], -1, partner[leader])
     both = mate >= 0
     ratio = np.where(both, np.exp(strength[mate] - strength[leader]), 0.0)
     doubt = np.where(both, np.hypot(expected.log_amplitude_std[mate], expected.log_amplitude_std[leader]), 0.0)
@@ -194,11 +197,14 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
         share,
         spread,
         disturbance[leader],
-        0.5 * np.log(total[leader]),
+        np.where(taken[leader], strength[leader], 0.5 * np.log(total[leader])),
         np.hypot(expected.log_amplitude_std[leader], fade),
+        by_itself[leader],
     )
 
 
+ALONE = 0.05
+"""Least probability that what lies in a stronger one's cell comes out by itself: cells have no sharp edge."""
 TWIN_STD = 0.03
 """Relative difference of a return and its reciprocal in amplitude: a baseline of 0.1 m at some metres."""
 

@@ -6,24 +6,24 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec
-from rislam_rt.model.sensor import SensorModel
+from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel
 from rislam_rt.slam.associate import Candidates, pair_costs
 from rislam_rt.slam.config import SlamConfig, StartPrior
-from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los
+from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los, stranger_density
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.returns import Poses
 from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance
 from rislam_rt.slam.window import gauss, motion, tracks
-from rislam_rt.slam.window.births import Context, births
+from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.book import Book, empty_book, idents
+from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, cluster, conditioned_share, expect
 from rislam_rt.slam.window.forms import UNKNOWN
 from rislam_rt.slam.window.gauss import HEAD, Window
 from rislam_rt.slam.window.learn import Sights, learn, no_sights, recall, visible
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
-from rislam_rt.slam.window.prune import prune
+from rislam_rt.slam.window.retract import condemned, release
 from rislam_rt.slam.window.tracks import Tracks
 
 REFRESH = 5
@@ -41,9 +41,9 @@ class WindowState(NamedTuple):
     tracks: Tracks
     sights: Sights
     gait: Floats
-    """(L,) probabilities of the liveliness of the step before the window's first."""
+    """(2, L) probabilities of the liveliness of the step before the window's first, across and upwards."""
     level: Floats
-    """(L,) of the last step's, filtered."""
+    """(2, L) of the last step's, filtered."""
     heading: Floats
     """(K,) [rad] that the compass told."""
     shift: Floats
@@ -54,18 +54,16 @@ class WindowState(NamedTuple):
 
 
 def init(
-    start: StartPrior, body: Body, ris: RisSpec | None, radio: RadioConfig, config: SlamConfig,
+    start: StartPrior, body: Body, ris: RisSpec | None, sensor: SensorModel, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> WindowState:  # fmt: skip
     """The start prior, and an empty map."""
-    axes = np.array([0, 1, 2] if config.height == "estimated" else [0, 1])
-    free = np.isin(np.arange(3), axes).astype(np.float64)
+    axes, free = np.arange(3), np.array([1.0, 1.0, float(config.height == "estimated")])
     compass = start.heading_std if config.heading == "estimated" else 0.0
     std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [compass]])
     window = gauss.begin(start.position, start.velocity, axes, std)
-    sensor = SensorModel(radio, threshold=config.detection_snr)
-    scene = Scene(body, radio, sensor, ris, config.max_bounces, config.use_vt)
-    gait = motion.first_gait(config.sigma_a)
+    scene = Scene(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
+    gait = np.stack([motion.first_gait(config.sigma_a), motion.first_gait(0.0)])
     return WindowState(
         0, config, window, empty_book(), empty_log(), tracks.no_tracks(), no_sights(), gait, gait,
         np.array([start.heading]), start.position_std * free, scene, 0.0,
@@ -94,8 +92,9 @@ def step(
     clear, scatter = recall(state.sights, expected, book)
     groups = cluster(expected, scene.sensor.cell_length, clear, sides)
     shows = visible(expected, groups, clear)
-    bend = np.sqrt(float(motion.expected_variance(state.level @ motion.transition(LEVELS.stay))))
-    row, pick = _associate(expected, groups, shows, scatter, covariance, glance, sides)
+    bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(LEVELS.stay))))
+    strangers = stranger_density(glance, scene.sensor, config.new_density)
+    row, pick = _associate(expected, groups, shows, scatter, covariance, glance, sides, strangers)
 
     log = append(state.log, glance, state.cycle, state.cycle - state.window.num_poses + 1)
     log = _explain(log, expected, groups, book, scatter, row, pick, len(glance.seen))
@@ -117,14 +116,16 @@ def step(
     context = Context(
         state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle, state.sights
     )  # fmt: skip
-    grown = births(context, expected, groups)
-    if grown is not context:
-        state = state._replace(
-            window=grown.window, book=grown.book, log=grown.log, tracks=grown.tracks, sights=grown.sights
-        )  # fmt: skip
-    if state.cycle % REFRESH == 0:
-        window, book, log = prune(state.window, state.book, state.log, state.heading, scene, state.cycle)
-        state = state._replace(window=window, book=book, log=log)
+    if state.cycle % REFRESH == 0 and len(book.ident):
+        gone = condemned(context.book, left, context.log, expected, gauss.now(context.window)[1])
+        context, fresh = release(context, ~gone), not gone.any()
+    else:
+        fresh = True
+    if fresh:
+        context = births(context, expected, groups)
+    state = state._replace(
+        window=context.window, book=context.book, log=context.log, tracks=context.tracks, sights=context.sights
+    )  # fmt: skip
     outcome = _outcome(len(measurement), len(state.book.ident), state.doubt)
     info = StepInfo(
         landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome
@@ -138,21 +139,28 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         return state._replace(heading=np.array([heading]))
     window, gait, headings = state.window, state.gait, state.heading
     while window.num_poses >= LEVELS.window:
-        spread = _accel_spread(window)
-        like = motion.log_likelihood(window.accel[:1], spread[:1], window.precision[:1])
-        gait = motion.smooth(gait, like, LEVELS.stay)[1][0]
+        gait = np.stack([smoothed[1][0] for smoothed in _liveliness(window, gait)])
         window, headings = gauss.slide(window), headings[1:]
     level = state.level @ motion.transition(LEVELS.stay)
-    window = gauss.extend(window, dt, float(motion.expected_precision(level)))
+    window = gauss.extend(window, dt, motion.expected_precision(level)[[0, 0, 1]])
     return state._replace(window=window, gait=gait, heading=np.append(headings, heading))
 
 
-def _accel_spread(window: Window) -> Floats:
-    """(K - 1, A, A) covariances of the accelerations."""
+GROUPS = (np.array([0, 1]), np.array([2]))
+"""Axes that are as lively as each other: an agent that turns does not climb."""
+
+
+def _liveliness(window: Window, gait: Floats) -> list[tuple[Floats, Floats]]:
+    """Posterior and filtered probabilities (K - 1, L) of each group's levels."""
     size, free = len(window.head), len(window.axes)
     count = len(window.accel)
-    block = window.covariance[size:, size:].reshape(count, free, count, free)
-    return block[np.arange(count), :, np.arange(count)]
+    block = window.covariance[size:, size:].reshape(count, free, count, free)[np.arange(count), :, np.arange(count)]
+    found = []
+    for group, before in zip(GROUPS, gait, strict=True):
+        inside = block[:, group[:, None], group]
+        like = motion.log_likelihood(window.accel[:, group], inside, window.precision[:, group[0]])
+        found.append(motion.smooth(before, like, LEVELS.stay))
+    return found
 
 
 def _sides(expected: Expected, book: Book) -> Integers:
@@ -163,7 +171,7 @@ def _sides(expected: Expected, book: Book) -> Integers:
 
 def _associate(
     expected: Expected, groups: Clusters, shows: Floats, scatter: Floats, covariance: Floats, glance: Glance,
-    sides: Integers | None,
+    sides: Integers | None, strangers: Floats,
 ) -> tuple[Integers, Integers]:  # fmt: skip
     """Rows of the clusters that were seen, and the components that they were seen as: the best assignment."""
     if not len(groups.leader) or not len(glance.seen):
@@ -181,7 +189,7 @@ def _associate(
     odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))
     side = np.full(len(lead), UNTOLD) if sides is None else sides[lead]
     candidates = Candidates(seen, spread, groups.log_amplitude, np.hypot(groups.log_amplitude_std, 0.15), odds, side)
-    cost = pair_costs(candidates, glance, LEVELS.gate, LEVELS.clutter)
+    cost = pair_costs(candidates, glance, LEVELS.gate, strangers)
     rows, columns = linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     return rows[good], columns[good]
@@ -224,11 +232,16 @@ def liven(state: WindowState) -> WindowState:
     window = state.window
     if not len(window.accel):
         return state
-    like = motion.log_likelihood(window.accel, _accel_spread(window), window.precision)
-    posterior, forward = motion.smooth(state.gait, like, LEVELS.stay)
-    return state._replace(
-        window=window._replace(precision=motion.expected_precision(posterior)), level=forward[-1]
-    )
+    across, upwards = _liveliness(window, state.gait)
+    fresh = np.stack([motion.expected_precision(found[0]) for found in (across, across, upwards)], axis=1)
+    # all steps at once, each as if the others were settled: damped, or they would take turns
+    precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
+    level = np.stack([across[1][-1], upwards[1][-1]])
+    return state._replace(window=window._replace(precision=precision), level=level)
+
+
+DAMPING = 0.3
+"""Share of the new in each step's log precision."""
 
 
 class _Followed(NamedTuple):

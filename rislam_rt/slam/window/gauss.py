@@ -72,7 +72,7 @@ class Window(NamedTuple):
     accel: Floats
     """(K - 1, A) [m/s^2] over the steps between the poses, along the axes that move freely."""
     precision: Floats
-    """(K - 1,) [s^4/m^2] of each acceleration's prior (see `motion`)."""
+    """(K - 1, A) [s^4/m^2] of each acceleration's prior (see `motion`)."""
     step: Floats
     """(K - 1,) [s]."""
     axes: Integers
@@ -103,7 +103,7 @@ def begin(position: Floats, velocity: Floats, axes: Integers, std: Floats) -> Wi
     prior = Quadratic(information, np.zeros(HEAD), head)
     slots = Quadratic(np.zeros((1, POSE, POSE)), np.zeros((1, POSE)), np.concatenate([position, [0.0]])[None])
     none = np.zeros(0)
-    return Window(head, none.reshape(0, len(axes)), none, none, axes, prior, slots, np.diag(np.maximum(std, 1e-6) ** 2), no_holds())
+    return Window(head, none.reshape(0, len(axes)), none.reshape(0, len(axes)), none, axes, prior, slots, np.diag(np.maximum(std, 1e-6) ** 2), no_holds())
 
 
 def pose_design(step: Floats, axes: Integers) -> Floats:
@@ -150,8 +150,8 @@ def now(window: Window) -> tuple[Floats, Floats]:
     return mean, design @ window.covariance @ design.T
 
 
-def extend(window: Window, dt: float, precision: float) -> Window:
-    """One more pose, a step of `dt` [s] on, with the prior precision of the step's acceleration."""
+def extend(window: Window, dt: float, precision: Floats) -> Window:
+    """One more pose, a step of `dt` [s] on, with the prior precisions (A,) of the step's acceleration."""
     free, features = len(window.axes), len(window.head) - HEAD
     step = np.append(window.step, dt)
     accel = np.concatenate([window.accel, np.zeros((1, free))])
@@ -160,10 +160,10 @@ def extend(window: Window, dt: float, precision: float) -> Window:
     slots = Quadratic(*(np.concatenate(pair) for pair in zip(window.slots, blank, strict=True)))
     covariance = np.zeros((len(window.covariance) + free,) * 2)
     covariance[:-free, :-free] = window.covariance
-    covariance[-free:, -free:] = np.eye(free) / precision
+    covariance[-free:, -free:] = np.diag(1.0 / precision)
     return window._replace(
         accel=accel,
-        precision=np.append(window.precision, precision),
+        precision=np.concatenate([window.precision, precision[None]]),
         step=step,
         slots=slots,
         covariance=covariance,
@@ -185,7 +185,7 @@ def slide(window: Window) -> Window:
     for place, axis in enumerate(window.axes):
         change[axis, size + place], change[3 + axis, size + place] = 0.5 * dt**2, -dt
     wide, steep = change.T @ hessian @ change, change.T @ gradient
-    wide[size:, size:] += window.precision[0] * np.eye(free)
+    wide[size:, size:] += np.diag(window.precision[0])
     steep[size:] += window.precision[0] * accel
     gain = np.linalg.solve(wide[size:, size:], wide[size:, :size]).T
     head = window.head.copy()
@@ -235,7 +235,7 @@ def solve(window: Window) -> Window:
         own = slice(HEAD + 3 * feature, HEAD + 3 * feature + 3)
         hessian[own, own] += information
         gradient[own] += pull
-    free = np.repeat(window.precision, len(window.axes))
+    free = window.precision.ravel()
     at = np.arange(size, total)
     hessian[at, at] += free
     gradient[at] += free * window.accel.ravel()

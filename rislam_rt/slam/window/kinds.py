@@ -15,11 +15,16 @@ from rislam_rt.slam.window.gauss import Holds, no_holds
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.trial import Fits, Trials, smooth_paths, try_all
 
-KINDS = ("wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same")
+KINDS = (
+    "wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same",
+    "two walls",
+)  # fmt: skip
 """Names of the kinds, by their number."""
-WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME = range(len(KINDS))
-LOG_KIND = np.log(np.array([0.3, 0.1, 0.1, 0.3, 0.05, 0.05, 0.02]))
+WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS = range(len(KINDS))
+LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05]))
 """Log prior of each kind; over known walls, of all walls together."""
+LOG_LONELY = np.log(0.1)
+"""Log probability that what two walls throw is heard, and neither of their single returns: the floor, or hidden."""
 LOG_NONE = np.log(0.05)
 """Of a path of no kind here: over walls that the map lacks."""
 LOG_VOLUME = float(np.log(4.0 / 3.0 * np.pi * LEVELS.size**3))
@@ -166,12 +171,25 @@ def hypotheses(digest: Digest, known: Known, book: Book) -> Hypotheses:
         add(OVER_RX, wall, mirrored, NONE, wall, (tx, mirrored))
         add(OVER_TX, wall, apparent, wall, NONE, (apparent, tx))
         add(OVER_SAME, wall, same, wall, wall, (same, same))
+    for pair in _pairs(ray):
+        turned = (pair @ tx[..., None])[..., 0]
+        add(TWO_WALLS, NONE, image - turned, NONE, NONE, (tx, tx))
+        turns[-1] = np.stack([pair, np.broadcast_to(AXES, (count, 3, 3))], axis=1)
     kind = np.concatenate(kinds)
     trials = Trials(
-        np.concatenate(tracks), kind <= WALL_KNOWN, np.concatenate(starts), np.concatenate(turns),
+        np.concatenate(tracks), kind <= WALL_KNOWN, kind == TWO_WALLS, np.concatenate(starts), np.concatenate(turns),
         np.concatenate(shifts), np.concatenate(doubts),
     )  # fmt: skip
     return Hypotheses(kind, np.concatenate(knowns), trials)
+
+
+def _pairs(ray: Floats) -> list[Floats]:
+    """What two walls do to the Tx: opposite ones, two upright ones, an upright and a level one: (T, 3, 3) each."""
+    count = len(ray)
+    corner = np.broadcast_to(np.diag([-1.0, -1.0, 1.0]), (count, 3, 3))
+    edge = np.stack([-ray[:, 1], ray[:, 0], np.zeros(count)], axis=1)
+    edge = edge / np.maximum(np.linalg.norm(edge, axis=1), 1e-6)[:, None]
+    return [np.broadcast_to(AXES, (count, 3, 3)), corner, 2.0 * edge[:, :, None] * edge[:, None, :] - AXES]
 
 
 def place_on_ray(ray: Floats, length: Floats, tx: Floats, rx: Floats) -> Floats:
@@ -182,15 +200,18 @@ def place_on_ray(ray: Floats, length: Floats, tx: Floats, rx: Floats) -> Floats:
 
 
 def judge(
-    digest: Digest, known: Known, book: Book, scene: Scene, explained: list[tuple[int, float]]
+    digest: Digest, known: Known, book: Book, scene: Scene, explained: list[tuple[int, float]], first: Booleans
 ) -> tuple[list[Verdict], Floats]:
-    """Verdicts of T tracks, and the posterior (E,) of each of the explanations (track, log evidence) by the map."""
+    """Verdicts of T tracks, and the posterior (E,) of each of the explanations (track, log evidence) by the map.
+
+    `first` (T,): nothing shorter and brighter is there.
+    """
     table = hypotheses(digest, known, book)
     fits = try_all(table.trials, digest)
     track = table.trials.track
     rivals = np.where(table.known >= 0, np.log(max(len(book.walls), 1)), 0.0)
-    evidence = fits.log_evidence - LOG_VOLUME - np.where(table.trials.is_wall, np.log(8.0), 0.0)
-    evidence += LOG_KIND[table.kind] - rivals
+    evidence = fits.log_evidence - LOG_VOLUME - np.where(table.trials.is_wall | table.trials.is_pair, np.log(8.0), 0.0)
+    evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair & first[track], LOG_LONELY, 0.0)
     evidence += _amplitudes(table, fits, digest, book, scene) + _opacity(table, fits, digest, known, book)
     gain = _upright(table, fits, digest, known, book)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
@@ -247,12 +268,15 @@ def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: Book, scene
     mean = unit + np.log(LEVELS.strength) + ratio * bounces
     spread = LEVELS.strength_std**2 + variance * bounces**2 + LEVELS.fading**2
     point = -0.5 * (level - mean) ** 2 / spread - 0.5 * np.log(spread)
-    return np.where(table.trials.is_wall, wall, point)
+    double, wide = free + 2.0 * LEVELS.wall_ratio, 2.0 * LEVELS.wall_ratio_std**2 + LEVELS.fading**2
+    pair = -0.5 * (level - double) ** 2 / wide - 0.5 * np.log(wide) - 20.0 * surplus**2
+    return np.where(table.trials.is_wall, wall, np.where(table.trials.is_pair, pair, point))
 
 
 def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: Book) -> Floats:
     """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known."""
     middle, walls, wall = digest.middle, book.walls, table.trials.is_wall
+    pair = table.trials.is_pair
     foot = np.where(wall[:, None], 0.5 * (fits.place + middle), fits.place)
     slack = DEPTH + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
     total = np.zeros(len(foot))
@@ -269,7 +293,7 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
     if len(book.points):
         depth = normal @ known.place[book.points].T - np.vecdot(foot, normal)[:, None]
         total += np.where(wall, BEHIND, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
-    return total
+    return np.where(pair, 0.0, total)
 
 
 def beliefs(place: Floats, digest: Digest, known: Known, book: Book) -> Holds:
@@ -322,7 +346,7 @@ EVEN = LEVELS.upright / (1.0 - LEVELS.upright)
 
 def wanted(verdict: Verdict, length: float) -> Booleans:
     """Whether a verdict is clear enough to enter the map: likely, a fit, and known well enough to be linear in."""
-    if verdict.kind < 0:
+    if verdict.kind < 0 or verdict.kind == TWO_WALLS:
         return np.bool_(False)
     holds = verdict.holds
     information = np.linalg.inv(verdict.covariance) + (holds.axis.T / holds.std**2) @ holds.axis

@@ -18,7 +18,8 @@ from rislam_rt.slam.identity import (
 )
 from rislam_rt.slam.moments import even_draws, square_root
 from rislam_rt.slam.returns import NONE, TX, Poses
-from rislam_rt.slam.tracks import OTHER, PANEL, Glance
+from rislam_rt.slam.filter import SIDED
+from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window.book import Book, learn_ratio
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene
 from rislam_rt.slam.window.gauss import HEAD, Window
@@ -84,7 +85,7 @@ def seed(sights: Sights, forms: Integers, book: Book, scatter: float) -> Sights:
 
 def visible(expected: Expected, groups: Clusters, clear: Floats) -> Floats:
     """(C,) probability that each cluster shows."""
-    return np.asarray(LEVELS.shown * (expected.detection * clear)[groups.leader]).clip(1e-4, LEVELS.shown)
+    return np.asarray(LEVELS.shown * (expected.detection * clear)[groups.leader] * groups.by_itself).clip(1e-4, LEVELS.shown)
 
 
 def learn(
@@ -100,10 +101,11 @@ def learn(
     detection = LEVELS.shown * expected.detection
     missed = before * (1.0 - detection) / (1.0 - before * detection)
     after = before.copy()
-    after[groups.leader] = np.where(hit, 0.995, missed[groups.leader])
+    told = hit | (groups.by_itself == 1.0)
+    after[groups.leader[told]] = np.where(hit, 0.995, missed[groups.leader])[told]
     lead = groups.leader[row]
     scatter[lead] += SCATTER_RATE * (np.minimum(raw, 30.0 * scatter[lead]) - scatter[lead])
-    alone = groups.partner < 0
+    alone = (groups.partner < 0) & (groups.by_itself == 1.0)
     book = _existence(book, expected, groups, hit & alone, ~hit & alone, shows)
     book = _strengths(book, window, expected, groups, row, pick, glance, poses, scene, code)
     fresh = pack(expected.forms, book)
@@ -146,16 +148,16 @@ def _strengths(
             surplus = glance.log_amplitude[pick[place]] - expected.log_amplitude[lead[place]]
             book = learn_ratio(book, int(walls[0]), float(np.clip(book.ratio[walls[0]] + surplus, -3.0, 0.1)))
     direct = alone & (expected.bounces[lead] == 0)
-    told: list[tuple[int, float, float, int]] = [
+    told: list[tuple[int, float, float, float]] = [
         (int(expected.forms[lead[i], 0]), float(np.exp(glance.log_amplitude[pick[i]])),
-         float(glance.amplitude_std[pick[i]]), int(glance.sides[pick[i]]))
+         float(glance.amplitude_std[pick[i]]), float(glance.odds[pick[i]]))
         for i in direct.nonzero()[0]
     ]  # fmt: skip
     if told:
         book = _weigh(book, window, told, poses, scene, code)
     if scene.ris is not None and code is not None:
         seen = np.isin(np.arange(len(groups.leader)), row)
-        silent = ~seen & (groups.partner < 0) & (expected.bounces[groups.leader] == 0)
+        silent = ~seen & (groups.partner < 0) & (groups.by_itself == 1.0) & (expected.bounces[groups.leader] == 0)
         points = expected.forms[groups.leader[silent], 0]
         if len(points):
             book = _weigh_silent(book, window, points, poses, scene, code)
@@ -163,7 +165,7 @@ def _strengths(
 
 
 def _weigh(
-    book: Book, window: Window, told: list[tuple[int, float, float, int]], poses: Poses, scene: Scene,
+    book: Book, window: Window, told: list[tuple[int, float, float, float]], poses: Poses, scene: Scene,
     code: RisCode | None,
 ) -> Book:  # fmt: skip
     points = np.array([entry[0] for entry in told])
@@ -174,9 +176,9 @@ def _weigh(
     scatterer = log_scatterer(amplitude, std, first, second, scene.radio)
     panel = np.full(len(points), -np.inf)
     if scene.ris is not None and code is not None:
-        panel = np.where(side == OTHER, -np.inf, log_panel(amplitude, std, _gains(window, points, poses, scene, code)))
+        panel = np.where(side < -SIDED, -np.inf, log_panel(amplitude, std, _gains(window, points, poses, scene, code)))
     grid, log_ris = add_evidence(book.log_grid[points], book.log_ris[points], scatterer, panel)
-    log_ris += np.where(side == PANEL, TOLD, 0.0)
+    log_ris += np.clip(side, 0.0, TOLD)
     grids, every = book.log_grid.copy(), book.log_ris.copy()
     grids[points] = grid
     every[points] = np.clip(log_ris, -CERTAIN, CERTAIN) if scene.ris is not None else -np.inf

@@ -52,6 +52,8 @@ class Levels(NamedTuple):
     """...and that it goes away again."""
     shown: float = 0.95
     """Probability that a path above the threshold with nothing in its way is reported by itself."""
+    against: float = 9.0
+    """Median squared residual (3 dof, half are below 2.4) from which on a feature's measurements contradict it."""
     dead: float = 0.01
     """Probability of existence below which a feature is taken back."""
 

@@ -15,16 +15,18 @@ LADDER = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0])
 
 
 def first_gait(sigma_a: float) -> Floats:
-    """Even odds of all levels, but the nearest to the acceleration told has as much as all others together."""
-    weight = np.ones(len(LADDER))
-    weight[int(np.argmin(np.abs(np.log(LADDER / sigma_a))))] = len(LADDER) - 1.0
+    """The level nearest to the acceleration told is the likeliest, one three times as far off a third as likely."""
+    nearest = int(np.argmin(np.abs(np.log(LADDER / max(sigma_a, LADDER[0])))))
+    weight = 3.0 ** -np.abs(np.arange(len(LADDER)) - nearest).astype(np.float64)
     return np.asarray(weight / weight.sum())
 
 
 def transition(stay: float) -> Floats:
-    """(L, L)."""
+    """(L, L): a step is as lively as the one before, or else more often a little different than much."""
     count = len(LADDER)
-    return stay * np.eye(count) + (1.0 - stay) / count
+    gap = np.abs(np.arange(count)[:, None] - np.arange(count))
+    jump = np.where(gap > 0, 3.0**-gap, 0.0)
+    return stay * np.eye(count) + (1.0 - stay) * jump / jump.sum(axis=1, keepdims=True)
 
 
 def log_likelihood(accel: Floats, spread: Floats, precision: Floats) -> Floats:

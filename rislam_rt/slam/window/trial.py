@@ -2,6 +2,8 @@
 
 Known walls are affine maps here. What is sought is a wall `w` (as image of the agent's place), with the Tx's image
 `m = S_out R_w(S_in x + t_in) + t_out`, or a point `p`, seen by the Rx at `S_r p + t_r` and by the Tx at `S_t p + t_t`.
+What two unknown walls throw together is `m = S_in x + d`, the shift `d` being sought: opposite walls turn nothing, at right
+angles they turn by half a turn about their edge.
 """
 
 from typing import NamedTuple
@@ -28,6 +30,8 @@ class Trials(NamedTuple):
     """(H,) row of the digest."""
     is_wall: Booleans
     """(H,)."""
+    is_pair: Booleans
+    """(H,) two unknown walls."""
     start: Floats
     """(H, 3) first guess of what is sought."""
     turn: Floats
@@ -110,7 +114,8 @@ def _equations(
     trials: Trials, digest: Digest, rows: Integers, place: Floats, error: Floats, trust: Floats
 ) -> _Equations:
     """Normal equations (H, 15, 15) of the rows, and their cost."""
-    track, wall = trials.track[rows], trials.is_wall[rows]
+    track, wall, pair = trials.track[rows], trials.is_wall[rows], trials.is_pair[rows]
+    moving = wall | pair
     tx, rx, heading = digest.tx[track], digest.rx[track], digest.heading[track]
     turn, shift, doubt = trials.turn[rows], trials.shift[rows], trials.doubt[rows]
     first, second = turn[:, 0], turn[:, 1]
@@ -120,14 +125,14 @@ def _equations(
     inner = tx @ np.swapaxes(first, 1, 2) + shift[:, None, 0]
     depth = np.vecdot(scaled[:, None], inner - 0.5 * (place + digest.middle)[:, None])
     mirrored = inner - 2.0 * depth[..., None] * span[:, None]
-    base = np.where(wall[:, None, None], mirrored, place[:, None])
+    base = np.where(wall[:, None, None], mirrored, place[:, None] + np.where(pair[:, None, None], inner, 0.0))
     image = base @ np.swapaxes(second, 1, 2) + shift[:, None, 1]
     by_wall = -2.0 * (
         depth[..., None, None] * AXES + scaled[:, None, :, None] * (mirrored - place[:, None])[..., None, :]
     )
     by_place = second[:, None] @ np.where(wall[:, None, None, None], by_wall, AXES)
     flip = AXES - 2.0 * span[:, :, None] * scaled[:, None, :]
-    by_tx = np.where(wall[:, None, None], second @ flip @ first, 0.0)
+    by_tx = np.where(wall[:, None, None], second @ flip @ first, np.where(pair[:, None, None], first, 0.0))
     to_rx = image - rx
     reach = np.maximum(np.sqrt(np.vecdot(to_rx, to_rx)), 1e-6)
     arrival = to_rx / reach[..., None]
@@ -140,7 +145,7 @@ def _equations(
     by_image[..., 1:, :] = (body - cosines[..., None] * arrival[..., None, :]) / reach[..., None, None]
     # the point's leg to the Tx
     far = (place[:, None, :] @ np.swapaxes(first, 1, 2) + shift[:, None, 0])
-    to_tx = np.where(wall[:, None, None], 0.0, far - tx)
+    to_tx = np.where(moving[:, None, None], 0.0, far - tx)
     leg = np.sqrt(np.vecdot(to_tx, to_tx))
     toward = to_tx / np.maximum(leg, 1e-6)[..., None]
     seen = np.concatenate([(reach + leg)[..., None], cosines], axis=-1)
@@ -172,30 +177,31 @@ def _equations(
 
 
 def smooth_paths(digest: Digest) -> tuple[Floats, Floats]:
-    """Log evidence (T,) and cost (T,) of paths of no kind: length and cosines that change at constant rates.
+    """Log evidence (T,) and cost (T,) of paths of no kind: length and cosines that change smoothly.
 
-    The rates are beforehand what the agent's own speed makes of things at rest or mirrored; the place counts with a
-    density 1 over length and cosines.
+    Their first two derivatives are beforehand what the agent's own speed makes of things at rest or mirrored; the place
+    counts with a density 1 over length and cosines.
     """
     count = len(digest.seen)
-    seen = digest.mean[0]
-    rate = np.sqrt(2.0) * digest.speed * np.stack(
-        [np.ones(count), 1.0 / np.maximum(seen[:, 0], 0.3), 1.0 / np.maximum(seen[:, 0], 0.3)], axis=1
-    )
+    reach = np.maximum(digest.mean[0][:, 0], 0.3)
+    speed = np.sqrt(2.0) * digest.speed
+    rate = speed * np.stack([np.ones(count), 1.0 / reach, 1.0 / reach], axis=1)
+    bend = speed**2 * np.stack([1.0 / reach, reach**-2.0, reach**-2.0], axis=1) + 0.1 * rate
     time = digest.time - digest.time.mean(axis=1, keepdims=True)
-    rows = np.stack([np.ones(time.shape), time], axis=-1)[:, None]
+    rows = np.stack([np.ones(time.shape), time, 0.5 * time**2], axis=-1)[:, None]
     tail = LEVELS.tail
     trust = np.ones(time.shape)
     value, weight = np.swapaxes(digest.seen, 1, 2), np.swapaxes(digest.weight, 1, 2)
+    spread = np.stack([rate, bend], axis=-1)
     for _ in range(3):
         heavy = rows * (weight**2 * trust[:, None])[..., None]
         normal = np.swapaxes(heavy, 2, 3) @ rows
         normal[..., 0, 0] += 1e-9
-        normal[..., 1, 1] += rate**-2.0
+        normal[..., [1, 2], [1, 2]] += spread**-2.0
         best = np.linalg.solve(normal, np.swapaxes(heavy, 2, 3) @ value[..., None])[..., 0]
         left = (value - (rows @ best[..., None])[..., 0]) * weight
         squared = np.sum(left**2, axis=1)
         trust = (tail + 3.0) / (tail + squared)
-    cost = (tail + 3.0) * np.log1p(squared / tail).sum(axis=1) + ((best[..., 1] / rate) ** 2).sum(axis=1)
-    log_det = np.linalg.slogdet(normal)[1].sum(axis=1) + 2.0 * np.log(rate).sum(axis=1)
+    cost = (tail + 3.0) * np.log1p(squared / tail).sum(axis=1) + ((best[..., 1:] / spread) ** 2).sum(axis=(1, 2))
+    log_det = np.linalg.slogdet(normal)[1].sum(axis=1) + 2.0 * np.log(spread).sum(axis=(1, 2))
     return -0.5 * cost - 0.5 * log_det + 1.5 * np.log(2.0 * np.pi), cost
