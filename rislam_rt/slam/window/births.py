@@ -61,6 +61,8 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
         elif born >= 0 and wanted(verdict, float(histories.mean[0][row, 0])):
             continue  # its turn comes in the next cycle, with the new feature known
         looked[rows[row]] = context.tracks.hits[rows[row]]
+    more = len(context.tracks.ident) - len(gone)  # what was taken back for the new feature
+    looked, gone = np.append(looked, np.zeros(more, dtype=np.int64)), np.append(gone, np.zeros(more, dtype=np.bool_))
     return context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
 
 
@@ -158,9 +160,7 @@ def _assign(context: Context, at: Integers, forms: Integers, scatter: Floats) ->
     return context._replace(log=log._replace(form=form, share=share, extra=extra))
 
 
-def _enter(
-    context: Context, at: Integers, verdict: Verdict, histories: Digest, row: int
-) -> tuple[Context, bool]:
+def _enter(context: Context, at: Integers, verdict: Verdict, histories: Digest, row: int) -> tuple[Context, bool]:
     """The map with a new feature and its history, solved anew; as it was, if they do not agree."""
     new = len(context.book.ident)
     holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))

@@ -53,7 +53,9 @@ class Expected(NamedTuple):
     """(R,) probability that it shows, were nothing in its way and it alone."""
 
 
-def expect(features: Floats, book: Book, poses: Poses, position: Floats, scene: Scene, code: RisCode | None) -> Expected:
+def expect(
+    features: Floats, book: Book, poses: Poses, position: Floats, scene: Scene, code: RisCode | None
+) -> Expected:
     """All forms that are possible at the mean belief, arrive from above, and may be detected."""
     legs = enumerate_forms(tuple(book.points.tolist()), tuple(book.walls.tolist()), scene.max_bounces, True)
     returns, bounces = legs.returns, legs.bounces
@@ -104,9 +106,7 @@ def amplitudes(
     return level, spread
 
 
-def panel_gains(
-    returns: Returns, features: Floats, book: Book, poses: Poses, scene: Scene, code: RisCode
-) -> Floats:
+def panel_gains(returns: Returns, features: Floats, book: Book, poses: Poses, scene: Scene, code: RisCode) -> Floats:
     """|gain| (R,) of the panel's returns with perfect walls."""
     assert scene.ris is not None
     radio, legs, center = scene.radio, returns.legs, features[returns.legs[:, 0]]
@@ -188,7 +188,11 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
     # a ratio r leaves a mean share of 0 below one and 1 above, of variance r^2/2: averaged over the doubt about r
     lean = _above(np.log(np.maximum(ratio, 1e-9)) / np.maximum(doubt, 1e-3))
     share = np.where(both, lean, 0.0)
-    spread = np.where(both, np.minimum(0.5 * ratio**2, 0.25) + lean * (1.0 - lean) * np.exp(-np.abs(np.log(np.maximum(ratio, 1e-9)))), 0.0)
+    spread = np.where(
+        both,
+        np.minimum(0.5 * ratio**2, 0.25) + lean * (1.0 - lean) * np.exp(-np.abs(np.log(np.maximum(ratio, 1e-9)))),
+        0.0,
+    )
     share[twins], spread[twins] = 0.5, TWIN_STD**2
     fade = np.where(both, 0.7 * np.minimum(ratio, 1.0), 0.0)
     return Clusters(

@@ -3,25 +3,22 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel
-from rislam_rt.slam.associate import Candidates, pair_costs
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los, stranger_density
-from rislam_rt.slam.moments import poses_of
-from rislam_rt.slam.returns import Poses
-from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance
+from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window import gauss, motion, tracks
 from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.book import Book, empty_book, idents
 from rislam_rt.slam.window.context import Context
-from rislam_rt.slam.window.expect import Clusters, Expected, Scene, cluster, conditioned_share, expect
+from rislam_rt.slam.window.expect import Clusters, Expected, Scene, conditioned_share
 from rislam_rt.slam.window.forms import UNKNOWN
 from rislam_rt.slam.window.gauss import HEAD, Window
-from rislam_rt.slam.window.learn import Sights, learn, no_sights, recall, visible
+from rislam_rt.slam.window.learn import Sights, learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.look import Look, look
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.retract import condemned, release
 from rislam_rt.slam.window.tracks import Tracks
@@ -84,17 +81,11 @@ def step(
     free = order[landmark[order] == UNUSED]
     glance = glance.take(free)
 
-    mean, covariance = gauss.now(state.window)
-    features = mean[HEAD:].reshape(-1, 3)
-    poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
-    expected = expect(features, book, poses, mean[:3], scene, code)
-    sides = _sides(expected, book) if glance.side is not None else None
-    clear, scatter = recall(state.sights, expected, book)
-    groups = cluster(expected, scene.sensor.cell_length, clear, sides)
-    shows = visible(expected, groups, clear)
-    bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(LEVELS.stay))))
     strangers = stranger_density(glance, scene.sensor, config.new_density)
-    row, pick = _associate(expected, groups, shows, scatter, covariance, glance, sides, strangers)
+    state, view = _notice(state, heading, code, glance, strangers)
+    mean, poses, expected, groups = view.mean, view.poses, view.expected, view.groups
+    shows, scatter, row, pick = view.shows, view.scatter, view.row, view.pick
+    bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(LEVELS.stay))))
 
     log = append(state.log, glance, state.cycle, state.cycle - state.window.num_poses + 1)
     log = _explain(log, expected, groups, book, scatter, row, pick, len(glance.seen))
@@ -109,7 +100,9 @@ def step(
     taken[pick] = True
     followed = _follow(state, mean, glance, (~taken).nonzero()[0], dt, turn, bend)
     state = state._replace(tracks=followed.tracks, log=followed.log)
-    sights, book = learn(state.sights, book, state.window, expected, groups, shows, row, pick, raw, glance, poses, scene, code)
+    sights, book = learn(
+        state.sights, book, state.window, expected, groups, shows, row, pick, raw, glance, poses, scene, code
+    )
     state = state._replace(sights=sights, book=book)
     landmark[free[pick]] = _names(state.book, expected, groups, row)
 
@@ -127,9 +120,7 @@ def step(
         window=context.window, book=context.book, log=context.log, tracks=context.tracks, sights=context.sights
     )  # fmt: skip
     outcome = _outcome(len(measurement), len(state.book.ident), state.doubt)
-    info = StepInfo(
-        landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome
-    )
+    info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome)
     return state._replace(cycle=state.cycle + 1), info
 
 
@@ -146,6 +137,42 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     return state._replace(window=window, gait=gait, heading=np.append(headings, heading))
 
 
+START = ((4, 0.5), (10, 1.0))
+"""Steps that may have been livelier than thought, and standard deviation [m/s^2] of their accelerations then."""
+LOG_START = np.log(0.01)
+"""Log probability of a manoeuvre that nothing announced."""
+MISSED = 2.0
+"""Standard deviations by which fewer returns show than should, from which on a manoeuvre is looked for."""
+
+
+def _notice(
+    state: WindowState, heading: float, code: RisCode | None, glance: Glance, strangers: Floats
+) -> tuple[WindowState, Look]:
+    """What is seen, and the belief that explains it best: as it was, or with a manoeuvre in the last steps.
+
+    The score of the better one tells whether the map explains anything at all (`doubt`).
+    """
+
+    def view_of(window: Window) -> Look:
+        return look(window, state.book, state.sights, heading, state.scene, code, glance, strangers)
+
+    best, window = view_of(state.window), state.window
+    if best.surprise > MISSED and len(state.window.step):
+        for steps, liveliness in START:
+            precision = state.window.precision.copy()
+            precision[-steps:, :2] = np.minimum(precision[-steps:, :2], liveliness**-2.0)
+            trial = gauss.solve(state.window._replace(precision=precision))
+            view = view_of(trial)
+            if view.score + LOG_START > best.score:
+                best, window = view, trial
+    if not len(best.expected.seen) or not len(glance.seen):
+        return state._replace(window=window), best
+    doubt = np.clip(state.doubt - np.clip(best.score, -2.0, 2.0), 0.0, 2.0 * LOST)
+    return state._replace(window=window, doubt=float(doubt)), best
+
+
+LOST = 10.0
+"""Log odds against the map from which on the agent is lost: some cycles that strangers explain better."""
 GROUPS = (np.array([0, 1]), np.array([2]))
 """Axes that are as lively as each other: an agent that turns does not climb."""
 
@@ -163,40 +190,15 @@ def _liveliness(window: Window, gait: Floats) -> list[tuple[Floats, Floats]]:
     return found
 
 
-def _sides(expected: Expected, book: Book) -> Integers:
-    """(R,) which returns run over the panel."""
-    panel = book.panel
-    return np.where(expected.forms[:, 0] == panel, PANEL, OTHER) if panel >= 0 else np.full(len(expected.seen), UNTOLD)
-
-
-def _associate(
-    expected: Expected, groups: Clusters, shows: Floats, scatter: Floats, covariance: Floats, glance: Glance,
-    sides: Integers | None, strangers: Floats,
-) -> tuple[Integers, Integers]:  # fmt: skip
-    """Rows of the clusters that were seen, and the components that they were seen as: the best assignment."""
-    if not len(groups.leader) or not len(glance.seen):
-        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    lead, mate = groups.leader, groups.partner
-    share = groups.share[:, None]
-    gap = np.where(mate[:, None] >= 0, expected.seen[mate] - expected.seen[lead], 0.0)
-    seen = expected.seen[lead] + share * gap
-    jacobian = expected.jacobian[lead] + share[..., None] * (expected.jacobian[mate] - expected.jacobian[lead])
-    spread = (jacobian.reshape(-1, jacobian.shape[-1]) @ covariance).reshape(jacobian.shape)
-    spread = spread @ np.swapaxes(jacobian, 1, 2)
-    extra = groups.disturbance + groups.share_variance[:, None] * gap**2
-    extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(glance.std, axis=0) ** 2
-    spread[:, [0, 1, 2], [0, 1, 2]] += extra
-    odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))
-    side = np.full(len(lead), UNTOLD) if sides is None else sides[lead]
-    candidates = Candidates(seen, spread, groups.log_amplitude, np.hypot(groups.log_amplitude_std, 0.15), odds, side)
-    cost = pair_costs(candidates, glance, LEVELS.gate, strangers)
-    rows, columns = linear_sum_assignment(cost)
-    good = cost[rows, columns] < 0.0
-    return rows[good], columns[good]
-
-
 def _explain(
-    log: Log, expected: Expected, groups: Clusters, book: Book, scatter: Floats, row: Integers, pick: Integers, count: int
+    log: Log,
+    expected: Expected,
+    groups: Clusters,
+    book: Book,
+    scatter: Floats,
+    row: Integers,
+    pick: Integers,
+    count: int,
 ) -> Log:
     """The log's last `count` components with what they were taken for."""
     if not len(row):
@@ -279,15 +281,6 @@ def _names(book: Book, expected: Expected, groups: Clusters, row: Integers) -> I
 def _outcome(heard: int, features: int, doubt: float) -> Outcome:
     if not heard:
         return Outcome.NO_MEASUREMENTS
-    if doubt > 5.0:
+    if doubt > LOST:
         return Outcome.DIVERGED
     return Outcome.OK if features else Outcome.NO_LANDMARKS
-
-
-def poses_now(state: WindowState) -> Poses:
-    """Ends of the agent at the mean belief."""
-    mean, _ = gauss.now(state.window)
-    return poses_of(mean[:3], np.asarray(state.heading[-1] + mean[6]), state.scene.body)
-
-
-__all__ = ["UNKNOWN", "WindowState", "init", "step"]

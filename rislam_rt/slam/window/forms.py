@@ -93,9 +93,7 @@ def _normals(walls: Integers, features: Floats, anchor: Floats) -> Floats:
     return np.asarray(span / np.sqrt(np.vecdot(span, span))[:, None])
 
 
-def _depths(
-    walls: Integers, first: Floats, second: Floats, features: Floats, anchor: Floats
-) -> tuple[Floats, Floats]:
+def _depths(walls: Integers, first: Floats, second: Floats, features: Floats, anchor: Floats) -> tuple[Floats, Floats]:
     """Signed distances (W,) of two sets of points (W, 3) from walls."""
     normal, middle = _normals(walls, features, anchor), 0.5 * (features[walls] + anchor[walls])
     return np.vecdot(first - middle, normal), np.vecdot(second - middle, normal)

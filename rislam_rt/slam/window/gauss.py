@@ -103,7 +103,17 @@ def begin(position: Floats, velocity: Floats, axes: Integers, std: Floats) -> Wi
     prior = Quadratic(information, np.zeros(HEAD), head)
     slots = Quadratic(np.zeros((1, POSE, POSE)), np.zeros((1, POSE)), np.concatenate([position, [0.0]])[None])
     none = np.zeros(0)
-    return Window(head, none.reshape(0, len(axes)), none.reshape(0, len(axes)), none, axes, prior, slots, np.diag(np.maximum(std, 1e-6) ** 2), no_holds())
+    return Window(
+        head,
+        none.reshape(0, len(axes)),
+        none.reshape(0, len(axes)),
+        none,
+        axes,
+        prior,
+        slots,
+        np.diag(np.maximum(std, 1e-6) ** 2),
+        no_holds(),
+    )
 
 
 def pose_design(step: Floats, axes: Integers) -> Floats:
@@ -334,5 +344,9 @@ def drop_features(window: Window, keep: Booleans) -> Window:
     holds = window.holds._replace(feature=(np.cumsum(keep) - 1)[window.holds.feature])
     holds = Holds(*(field[stay] for field in holds))
     return window._replace(
-        holds=holds, head=window.head[inside], prior=prior, slots=slots, covariance=window.covariance[np.ix_(kept, kept)]
+        holds=holds,
+        head=window.head[inside],
+        prior=prior,
+        slots=slots,
+        covariance=window.covariance[np.ix_(kept, kept)],
     )

@@ -85,7 +85,9 @@ def seed(sights: Sights, forms: Integers, book: Book, scatter: float) -> Sights:
 
 def visible(expected: Expected, groups: Clusters, clear: Floats) -> Floats:
     """(C,) probability that each cluster shows."""
-    return np.asarray(LEVELS.shown * (expected.detection * clear)[groups.leader] * groups.by_itself).clip(1e-4, LEVELS.shown)
+    return np.asarray(LEVELS.shown * (expected.detection * clear)[groups.leader] * groups.by_itself).clip(
+        1e-4, LEVELS.shown
+    )
 
 
 def learn(
@@ -210,6 +212,4 @@ def _gains(window: Window, points: Integers, poses: Poses, scene: Scene, code: R
         at = slice(HEAD + 3 * int(point), HEAD + 3 * int(point) + 3)
         root = square_root(window.covariance[at, at])
         centers.append(window.head[at] + even_draws(DRAWS, root.shape[1]) @ root.T)
-    return predicted_panel_gain(
-        scene.ris, code, np.array(centers), poses.tx, poses.rx, np.ones(1), scene.radio
-    )
+    return predicted_panel_gain(scene.ris, code, np.array(centers), poses.tx, poses.rx, np.ones(1), scene.radio)

@@ -141,7 +141,9 @@ def renew(
     size, place = POSE + window.features.size, poses(window)
     hessian, gradient, middle = (field.copy() for field in window.slots)
     hessian[slots], gradient[slots] = 0.0, 0.0
-    middle[slots] = np.concatenate([place[slots], np.broadcast_to(window.features.ravel(), (len(slots), size - POSE))], 1)
+    middle[slots] = np.concatenate(
+        [place[slots], np.broadcast_to(window.features.ravel(), (len(slots), size - POSE))], 1
+    )
     if not len(rows):
         nothing = Residuals(rows, rows, np.zeros((0, 3)), np.zeros((0, 3, size)))
         return window._replace(slots=Quadratic(hessian, gradient, middle)), nothing

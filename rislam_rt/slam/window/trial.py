@@ -144,7 +144,7 @@ def _equations(
     by_image[..., 0, :] = arrival
     by_image[..., 1:, :] = (body - cosines[..., None] * arrival[..., None, :]) / reach[..., None, None]
     # the point's leg to the Tx
-    far = (place[:, None, :] @ np.swapaxes(first, 1, 2) + shift[:, None, 0])
+    far = place[:, None, :] @ np.swapaxes(first, 1, 2) + shift[:, None, 0]
     to_tx = np.where(moving[:, None, None], 0.0, far - tx)
     leg = np.sqrt(np.vecdot(to_tx, to_tx))
     toward = to_tx / np.maximum(leg, 1e-6)[..., None]
