@@ -67,23 +67,37 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
 
 
 def _may_be_first(context: Context, histories: Digest, mean: Floats) -> Booleans:
-    """(T,) tracks without anything shorter that leaves more of the signal: two walls throw two single returns as well.
+    """(T,) tracks without anything shorter and brighter that could be one of two walls by itself.
 
-    Known walls count; the floor and what is hidden make exceptions.
+    Two walls shift the Tx by the sum of what each does: a single return of theirs comes from the same direction
+    (opposite walls), or is one leg of a right angle.
     """
-    every = context.tracks
+    every, ray = context.tracks, histories.direction
     length, shine = histories.mean[0][:, 0], histories.log_amplitude + np.log(histories.mean[0][:, 0])
     old = every.hits >= 3
-    others, bright = every.mean[old, 0, 0], every.log_amplitude[old] + np.log(np.maximum(every.mean[old, 0, 0], 0.1))
-    shorter = ((others < 0.97 * length[:, None]) & (bright > shine[:, None] - 0.3)).any(axis=1)
+    heading = float(context.heading[-1] + mean[6])
+    flat = every.mean[old, 1:, 0]
+    up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=1), 0.0))
+    cos, sin = np.cos(heading), np.sin(heading)
+    away = np.stack([cos * flat[:, 0] - sin * flat[:, 1], sin * flat[:, 0] + cos * flat[:, 1], up], axis=1)
+    reach = np.maximum(every.mean[old, 0, 0], 0.1)
+    bright = (every.log_amplitude[old] + np.log(reach))[None] > shine[:, None] - 0.3
     walls = context.book.walls
     if len(walls):
-        place = mean[HEAD:].reshape(-1, 3)[walls]
-        span = place - context.book.anchor[walls]
+        place, anchor = mean[HEAD:].reshape(-1, 3)[walls], context.book.anchor[walls]
+        span = place - anchor
         normal = span / np.linalg.norm(span, axis=1)[:, None]
-        reach = 2.0 * np.abs(np.vecdot(0.5 * (place + context.book.anchor[walls]) - mean[:3], normal))
-        shorter |= (reach < 0.97 * length[:, None]).any(axis=1)
-    return np.asarray(~shorter)
+        depth = np.vecdot(0.5 * (place + anchor) - mean[:3], normal)
+        away = np.concatenate([away, np.sign(depth)[:, None] * normal])
+        reach = np.concatenate([reach, 2.0 * np.abs(depth)])
+        bright = np.concatenate([bright, np.ones((len(ray), len(walls)), dtype=np.bool_)], axis=1)
+    along, share = ray @ away.T, reach / length[:, None]
+    leg = (np.abs(along - share) < LEG) | (along > 1.0 - 0.2 * LEG)
+    return np.asarray(~(leg & (share < 0.97) & bright).any(axis=1))
+
+
+LEG = 0.15
+"""Difference of cosines up to which one return may be a leg of another's right angle."""
 
 
 def explanations(
@@ -98,7 +112,9 @@ def explanations(
     features = mean[HEAD:].reshape(-1, 3)
     size = features.size
     inside = covariance[HEAD:, HEAD:]
-    root = np.linalg.cholesky(inside + 1e-9 * np.diag(np.diag(inside)) + 1e-14 * np.eye(size))
+    root = np.asarray(
+        np.linalg.cholesky(inside + 1e-9 * np.diag(np.diag(inside)) + 1e-14 * np.eye(size)), dtype=np.float64
+    )
     found: list[tuple[int, float, Integers]] = []
     for row, place in enumerate(rows):
         off = np.abs(expected.seen[lead] + share * gap - context.tracks.mean[place, :, 0]) / NEAR

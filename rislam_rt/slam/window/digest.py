@@ -73,7 +73,7 @@ def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: 
     place, time = poses(window), np.concatenate([[0.0], np.cumsum(window.step)])
     first = cycle - window.num_poses + 1
     count = len(rows)
-    seen, weight, doubt = np.zeros((count, POINTS, 3)), np.zeros((count, POINTS, 3)), np.zeros((count, POINTS, 3, 6))
+    seen, weight = np.zeros((count, POINTS, 3)), np.zeros((count, POINTS, 3))
     lag, spot, turned = np.zeros((count, POINTS)), np.zeros((count, POINTS, 3)) + mean[:3], np.zeros((count, POINTS))
     scatter = np.ones((count, 3))
     level = np.zeros(count)
@@ -102,14 +102,14 @@ def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: 
         level[row] = log.log_amplitude[at].mean()
     scale = np.maximum(np.diag(covariance)[:6], 1e-14)
     root = np.linalg.cholesky(covariance[:6, :6] + np.diag(1e-6 * scale + 1e-14))
-    doubt = root[:3] + lag[..., None, None] * root[3:6]
+    doubt = np.asarray(root[:3] + lag[..., None, None] * root[3:6], dtype=np.float64)
     ends = poses_of(spot, turned, body)
     speed = float(np.linalg.norm(mean[3:6])) + 0.05
     return Digest(seen, weight, lag, ends.tx, ends.rx, turned, doubt, level, scatter, mean[:3].copy(), speed)
 
 
 def scatter_of(seen: Floats, std: Floats, time: Floats) -> Floats:
-    """(3,) root mean square about a quadratic in time (a line, for short histories), in reported deviations; 1 at least.
+    """(3,) root mean square about a quadratic in time (a line, for short ones), in reported deviations; 1 at least.
 
     Weights of Student's t keep single outliers from speaking for all.
     """

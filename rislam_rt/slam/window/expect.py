@@ -94,7 +94,7 @@ def amplitudes(
     moving = point == TX
     strength, strength_std = book.log_strength
     free = np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * rx_length)) + ratio
-    unit = point_amplitude(1.0, np.maximum(tx_length, 1e-3), rx_length, radio)
+    unit = point_amplitude(np.ones(()), np.maximum(tx_length, 1e-3), rx_length, radio)
     level = np.where(moving, free, np.log(unit) + ratio + strength[point])
     spread = np.sqrt(np.where(moving, 0.0, strength_std[point] ** 2) + variance + (0.3 * LEVELS.fading) ** 2)
     panel = book.panel
@@ -161,7 +161,7 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
         gap[sides[:, None] != sides] = np.inf
     inside, around = gap < 1.0, gap < 1.15
     taken, partner, by_itself = np.zeros(count, dtype=np.bool_), np.full(count, -1), np.ones(count)
-    crowded = around.any(axis=1).nonzero()[0]
+    crowded = np.flatnonzero(around.any(axis=1))
     disturbance, power = np.zeros((count, 3)), np.exp(2.0 * strength)
     total = power.copy()
     for leader in crowded[np.argsort(-strength[crowded], kind="stable")]:

@@ -14,12 +14,11 @@ from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.book import Book, empty_book, idents
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, conditioned_share
-from rislam_rt.slam.window.forms import UNKNOWN
-from rislam_rt.slam.window.gauss import HEAD, Window
+from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.learn import Sights, learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.look import Look, look
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
+from rislam_rt.slam.window.look import Look, look
 from rislam_rt.slam.window.retract import condemned, release
 from rislam_rt.slam.window.tracks import Tracks
 

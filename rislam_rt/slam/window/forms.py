@@ -1,8 +1,8 @@
 """Forms: the ways by which a signal gets from Tx to Rx over the features of the map.
 
-A form is five feature rows: the base (a point, or `TX` where the Tx itself is mirrored), two walls on the Tx leg and two
-on the Rx leg, the one next to the base first, `NONE` where there is none. What a form looks like from a pose, and how
-that moves with pose and features, is `slam.returns`.
+A form is five feature rows: the base (a point, or `TX` where the Tx itself is mirrored), two walls on the Tx leg and
+two on the Rx leg, the one next to the base first, `NONE` where there is none. What a form looks like from a pose, and
+how that moves with pose and features, is `slam.returns`.
 """
 
 from functools import lru_cache

@@ -6,10 +6,10 @@ their prior singular):
 
     p_k = p_0 + t_k v_0 + sum_{i < k} (T_i^2 / 2 + T_i (t_k - t_{i+1})) a_i .
 
-Unknowns: the head (first position, its velocity, offset of the compass; then the features, three numbers each) and the
-accelerations. All of them live in vector spaces, so that no manifold is needed. What left the window stands as a
-quadratic on the head (`prior`); each cycle inside it as a quadratic on its own pose and the features (`slots`), which is
-made again at the present estimate whenever that is worth it. The first pose of a run is held: nothing that is measured
+Unknowns: the head (first position, its velocity, offset of the compass; then the features, three numbers each) and
+the accelerations. All of them live in vector spaces, so that no manifold is needed. What left the window stands as a
+quadratic on the head (`prior`); each cycle inside it as a quadratic on its own pose and the features (`slots`), which
+is made again at the present estimate whenever that is worth it. The first pose of a run is held: nothing measured
 tells where the start was, whose error stands beside the Gaussian.
 """
 
@@ -315,7 +315,7 @@ def add_feature(window: Window, place: Floats, holds: Holds, ridge: float = 1e-6
     middle = np.concatenate([old.middle, np.broadcast_to(place, (count, 3))], axis=1)
     covariance = np.insert(np.insert(window.covariance, size * np.ones(3, int), 0.0, axis=0), [size] * 3, 0.0, axis=1)
     covariance[size : size + 3, size : size + 3] = np.eye(3)
-    joined = Holds(*(np.concatenate(pair) for pair in zip(window.holds, holds, strict=True)))
+    joined = Holds._make(np.concatenate(pair) for pair in zip(window.holds, holds, strict=True))
     return window._replace(
         holds=joined,
         head=np.concatenate([window.head, place]),
@@ -342,7 +342,7 @@ def drop_features(window: Window, keep: Booleans) -> Window:
     kept = np.concatenate([inside, np.arange(size, len(window.covariance))])
     stay = keep[window.holds.feature]
     holds = window.holds._replace(feature=(np.cumsum(keep) - 1)[window.holds.feature])
-    holds = Holds(*(field[stay] for field in holds))
+    holds = Holds._make(field[stay] for field in holds)
     return window._replace(
         holds=holds,
         head=window.head[inside],

@@ -23,7 +23,7 @@ KINDS = (
 WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS = range(len(KINDS))
 LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05]))
 """Log prior of each kind; over known walls, of all walls together."""
-LOG_LONELY = np.log(0.1)
+LOG_LONELY = np.log(0.05)
 """Log probability that what two walls throw is heard, and neither of their single returns: the floor, or hidden."""
 LOG_NONE = np.log(0.05)
 """Of a path of no kind here: over walls that the map lacks."""
@@ -77,8 +77,9 @@ class Verdict(NamedTuple):
 
     @property
     def form(self) -> tuple[int, int, int, int, int]:
-        """Five rows, the new feature being -5."""
-        return _FORMS[self.kind](self.known)
+        """Five rows, the new feature being `NEW`."""
+        base, *walls = (self.known if part == KNOWN else part for part in _TEMPLATES[self.kind])
+        return base, walls[0], walls[1], walls[2], walls[3]
 
     @property
     def is_wall(self) -> bool:
@@ -87,15 +88,15 @@ class Verdict(NamedTuple):
 
 
 NEW = -5
-_FORMS = {
-    WALL: lambda k: (TX, NONE, NONE, NEW, NONE),
-    KNOWN_WALL: lambda k: (TX, NONE, NONE, k, NEW),
-    WALL_KNOWN: lambda k: (TX, NONE, NONE, NEW, k),
-    POINT: lambda k: (NEW, NONE, NONE, NONE, NONE),
-    OVER_RX: lambda k: (NEW, NONE, NONE, k, NONE),
-    OVER_TX: lambda k: (NEW, k, NONE, NONE, NONE),
-    OVER_SAME: lambda k: (NEW, k, NONE, k, NONE),
-}
+"""In a form: the feature that is sought."""
+KNOWN = -6
+"""In a template: the known wall."""
+_TEMPLATES = (
+    (TX, NONE, NONE, NEW, NONE), (TX, NONE, NONE, KNOWN, NEW), (TX, NONE, NONE, NEW, KNOWN),
+    (NEW, NONE, NONE, NONE, NONE), (NEW, NONE, NONE, KNOWN, NONE), (NEW, KNOWN, NONE, NONE, NONE),
+    (NEW, KNOWN, NONE, KNOWN, NONE), (TX, NONE, NONE, NONE, NONE),
+)  # fmt: skip
+"""Form of each kind."""
 
 
 def known_features(mean: Floats, covariance: Floats, book: Book, middle: Floats) -> Known:
@@ -132,7 +133,7 @@ def hypotheses(digest: Digest, known: Known, book: Book) -> Hypotheses:
     """Every kind for every track, with its first guess."""
     count, walls = len(digest.seen), book.walls
     seen, tx, rx, _ = digest.mean
-    ray, length = digest.direction, digest.mean[0][:, 0]
+    ray, length = digest.direction, seen[:, 0]
     middle, image = digest.middle, rx + length[:, None] * digest.direction
     kinds, knowns, tracks, starts, turns, shifts, doubts = [], [], [], [], [], [], []
     plain = (AXES, np.zeros(3), np.zeros((3, 3)))
@@ -330,13 +331,21 @@ def beliefs(place: Floats, digest: Digest, known: Known, book: Book) -> Holds:
 def _upright(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: Book) -> Floats:
     """Gain (H,) in log evidence by what walls are beforehand: each direction held, or anywhere in its width."""
     gain = np.zeros(len(fits.cost))
-    for row in (table.trials.is_wall & np.isfinite(fits.cost)).nonzero()[0]:
-        holds = beliefs(fits.place[row], digest, known, book)
-        span = fits.place[row] - digest.middle
+    trials, tx = table.trials, digest.mean[1]
+    for row in ((trials.is_wall | trials.is_pair) & np.isfinite(fits.cost)).nonzero()[0]:
+        place, turn = fits.place[row], trials.turn[row, 0]
+        if trials.is_pair[row]:  # what two walls do together goes across them both
+            if turn[2, 2] < 0.0:
+                continue  # an edge under the ceiling: any elevation
+            at = tx[trials.track[row]]
+            place = digest.middle + turn @ at + place - at
+        holds = beliefs(place, digest, known, book)
+        span = place - digest.middle
         variance = np.vecdot(holds.axis, holds.axis @ fits.covariance[row]) + holds.std**2
         log_right = -0.5 * (holds.axis @ span) ** 2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
         # odds hold the width: right against a density of one over it
-        gain[row] = (np.logaddexp(0.0, holds.log_odds + log_right) - np.log1p(EVEN)).sum()
+        each = np.logaddexp(0.0, holds.log_odds + log_right) - np.log1p(EVEN)
+        gain[row] = (each[:1] if trials.is_pair[row] and turn[0, 0] < 0.0 else each).sum()
     return gain
 
 
@@ -344,11 +353,11 @@ EVEN = LEVELS.upright / (1.0 - LEVELS.upright)
 """Odds that a direction is as it is held to be."""
 
 
-def wanted(verdict: Verdict, length: float) -> Booleans:
+def wanted(verdict: Verdict, length: float) -> bool:
     """Whether a verdict is clear enough to enter the map: likely, a fit, and known well enough to be linear in."""
     if verdict.kind < 0 or verdict.kind == TWO_WALLS:
-        return np.bool_(False)
+        return False
     holds = verdict.holds
     information = np.linalg.inv(verdict.covariance) + (holds.axis.T / holds.std**2) @ holds.axis
     worst = np.sqrt(1.0 / np.linalg.eigvalsh(information)[0])
-    return np.bool_(verdict.probability > LEVELS.born and verdict.misfit < LEVELS.fit and worst < 0.1 * length)
+    return bool(verdict.probability > LEVELS.born and verdict.misfit < LEVELS.fit and worst < 0.1 * length)

@@ -4,9 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.information import amplitude_std
 from rislam_rt.model import RisCode
+from rislam_rt.slam.filter import SIDED
 from rislam_rt.slam.identity import (
     TOLD,
     add_evidence,
@@ -18,7 +19,6 @@ from rislam_rt.slam.identity import (
 )
 from rislam_rt.slam.moments import even_draws, square_root
 from rislam_rt.slam.returns import NONE, TX, Poses
-from rislam_rt.slam.filter import SIDED
 from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window.book import Book, learn_ratio
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene
@@ -204,7 +204,7 @@ def _weigh_silent(book: Book, window: Window, points: Integers, poses: Poses, sc
     return book._replace(log_ris=every)
 
 
-def _gains(window: Window, points: Integers, poses: Poses, scene: Scene, code: RisCode) -> Floats:
+def _gains(window: Window, points: Integers, poses: Poses, scene: Scene, code: RisCode) -> Complexes:
     """The panel's gain (P, S) if it were at each of the points, over places of the belief."""
     assert scene.ris is not None
     centers = []

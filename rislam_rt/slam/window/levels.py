@@ -43,7 +43,7 @@ class Levels(NamedTuple):
     clutter: float = 0.016
     """New or false components per metre of length, unit of each cosine, and e-fold of amplitude."""
     crowd: float = 9.0
-    """Mean square of a residual in reported deviations beforehand: 1 + the SNR (9 dB) of what the map lacks in a cell."""
+    """Mean square of a residual in reported deviations beforehand: 1 + the SNR (9 dB) of what a cell holds besides."""
     memory: float = 4.0
     """Cycles over which the pull of such neighbours keeps its sign: phases turn once in half a wavelength of motion."""
     blocked: float = 0.02

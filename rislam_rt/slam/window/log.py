@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
-from rislam_rt.slam.returns import TX, Poses, linearise
+from rislam_rt.slam.returns import linearise
 from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.forms import UNKNOWN, compile_forms

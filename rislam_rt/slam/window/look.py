@@ -1,4 +1,4 @@
-"""What a belief makes of a cycle's components: expected returns, who was seen as which, and how well that explains it."""
+"""What a belief makes of a cycle's components: what is expected, who is which, how well that explains it."""
 
 from typing import NamedTuple
 

@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.mapping import MAX_LEAN, _images, _walls
+from rislam_rt.slam.mapping import MAX_LEAN, images_in, wall_planes
 from rislam_rt.slam.moments import even_draws, square_root
 from rislam_rt.slam.window import gauss
 from rislam_rt.slam.window.book import Book
@@ -43,9 +43,9 @@ def build_map(features: Floats, covariance: Floats, book: Book, shift: Floats) -
     covariance = covariance + np.tile(np.diag(shift**2), (len(features), len(features)))
     points, walls = book.points, book.walls
     parent, wall = np.repeat(points, len(walls)), np.tile(walls, len(points))
-    place, spread = _images(features, covariance, book, parent, wall)
+    place, spread = images_in(features, covariance, book.anchor, parent, wall)
     columns = 3 * points[:, None] + np.arange(3)
-    normal, offset, std = _walls(features, covariance, book)
+    normal, offset, std = wall_planes(features, covariance, book.anchor, walls)
     known = np.sqrt(2.0) * std[:, 0] < MAX_LEAN
     strength, ratio = np.exp(book.log_strength[0][points]), np.exp(book.ratio[wall])
     return MapEstimate(

@@ -24,7 +24,7 @@ def release(context: Context, keep: Booleans) -> Context:
     if keep.all():
         return context
     book, log = context.book, context.log
-    lost = np.isin(log.form, book.ident[~keep]).any(axis=(1, 2))
+    lost: Booleans = np.asarray(np.isin(log.form, book.ident[~keep]).any(axis=(1, 2)))
     tracks, log = _resume(context.tracks, log, lost, context.cycle)
     form = log.form.copy()
     form[lost] = UNKNOWN
@@ -60,7 +60,7 @@ def _resume(tracks: Tracks, log: Log, lost: Booleans, cycle: int) -> tuple[Track
         return tracks, log._replace(track=track)
     columns = [np.array([entry[place] for entry in fresh]) for place in range(len(fresh[0]))]
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], columns, strict=True))
-    return Tracks(*joined, ident), log._replace(track=track)
+    return Tracks._make([*joined, ident]), log._replace(track=track)
 
 
 def condemned(book: Book, left: Residuals, log: Log, expected: Expected, covariance: Floats) -> Booleans:

@@ -1,4 +1,4 @@
-"""Tracks: components that no form explains, followed from cycle to cycle by their own rates until they are understood."""
+"""Tracks: components that no form explains, followed from cycle to cycle until they are understood."""
 
 from typing import NamedTuple
 
@@ -39,7 +39,7 @@ class Tracks(NamedTuple):
 
     def keep(self, rows: Booleans) -> "Tracks":
         """Only some of the tracks."""
-        return Tracks(*(field[rows] for field in self[:-1]), self.next_ident)
+        return Tracks._make([*(field[rows] for field in self[:-1]), self.next_ident])
 
 
 def no_tracks() -> Tracks:
@@ -101,7 +101,7 @@ def start(tracks: Tracks, glance: Glance, picks: Integers, rate: Floats, cycle: 
         np.zeros(count, dtype=np.int64),
     )  # fmt: skip
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))
-    return Tracks(*joined, tracks.next_ident + count), ident
+    return Tracks._make([*joined, tracks.next_ident + count]), ident
 
 
 def alive(tracks: Tracks, cycle: int) -> Booleans:

@@ -2,8 +2,8 @@
 
 Known walls are affine maps here. What is sought is a wall `w` (as image of the agent's place), with the Tx's image
 `m = S_out R_w(S_in x + t_in) + t_out`, or a point `p`, seen by the Rx at `S_r p + t_r` and by the Tx at `S_t p + t_t`.
-What two unknown walls throw together is `m = S_in x + d`, the shift `d` being sought: opposite walls turn nothing, at right
-angles they turn by half a turn about their edge.
+What two unknown walls throw together is `m = S_in x + d`, the shift `d` being sought: opposite walls turn nothing, at
+right angles they turn by half a turn about their edge.
 """
 
 from typing import NamedTuple

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.returns import AXES, NONE, TX, linearise, reflect
 from rislam_rt.slam.window import trial
@@ -9,7 +10,6 @@ from rislam_rt.slam.window.digest import Digest, scatter_of
 from rislam_rt.slam.window.forms import compile_forms
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.trial import COMMON, Trials, smooth_paths, try_all
-from rislam_rt.model import Body
 
 
 def _digest(count, *, std=0.01, rng):
