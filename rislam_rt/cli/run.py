@@ -29,8 +29,8 @@ def command(
 
     An interrupted run goes on where it stopped when the same command is given again; a completed one is replaced.
     A file of another kind is a study: 'compare_channels' (exit code 1 if a path is unexplained), 'fig4a', 'claims',
-    'train_classifier', or 'fig4b', 'fig4c', 'rooms', 'ablations', which go through settings and seeds (exit code 1 if a
-    run failed).
+    'train_classifier', or 'fig4b', 'fig4c', 'rooms', 'ablations', 'robustness', which go through settings and seeds
+    (exit code 1 if a run failed).
     """
     from rislam_rt.cli.study import run_claims, run_compare_channels, run_gain_curves, run_swept
     from rislam_rt.pipeline.studies import ClaimsSpec, ClassifierSpec, CompareSpec, Fig4aSpec, SweptSpec, load_any
