@@ -8,9 +8,7 @@ says.
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.measurement.joint import joint_errors
 from rislam_rt.measurement.parts import (
     Errors,
@@ -24,20 +22,11 @@ from rislam_rt.measurement.parts import (
     single,
 )
 from rislam_rt.measurement.received import Received
-from rislam_rt.model import Measurement, PathTruth, RadioConfig
+from rislam_rt.measurement.sensor import build_sensor
+from rislam_rt.model import Measurement, PathTruth, RadioConfig, SensorModel
 
 NEGLIGIBLE = 1e-3
 """Paths this far below the detection threshold are left out: they move an amplitude at the threshold by 3 %."""
-
-
-def detection_probability(snr: Floats, threshold: float) -> Floats:
-    """Probability that the measured SNR of a path exceeds the threshold; both linear, over all antennas.
-
-    Marcum's `Q_1(sqrt(2 snr), sqrt(2 threshold))`; `exp(-threshold)` for noise alone.
-    """
-    from scipy.stats import ncx2  # takes a second to import, and no receiver needs it
-
-    return np.asarray(ncx2.sf(2.0 * threshold, 2, 2.0 * np.asarray(snr, dtype=np.float64)))
 
 
 def measure_bound(
@@ -49,22 +38,23 @@ def measure_bound(
     measured one suggests, all that a receiver knows. Each of the `num_paths` columns has its own draws whether heard
     or not, so that two codes see the same noise.
     """
-    threshold = detection_threshold(radio, config)
+    sensor = build_sensor(radio, config)
+    threshold, window = sensor.threshold, sensor.window
     draws = rng.standard_normal((num_paths, 5))
     received = audible(received, radio.integrated_snr(received.gain) > NEGLIGIBLE * threshold)
     if config.resolution == "joint":
         parts, errors = joint_errors(received, radio, config, draws)
     else:
-        parts = merge(received, radio, config.alternation) if config.merge else single(received)
+        parts = merge(received, sensor) if config.merge else single(received)
         errors = lone_errors(parts, radio, draws[parts.path])
     noise = draws[parts.path, :2] / np.sqrt(2.0)
     gain = parts.gain + errors.gain_std * (noise[:, 0] + 1j * noise[:, 1])
     points = np.column_stack([parts.tau, parts.cosines]) + errors.error
     seen = np.abs(gain) ** 2 > threshold * errors.gain_std**2
-    seen &= (points[:, 0] >= config.min_delay) & (points[:, 0] <= config.max_delay)
+    seen &= (points[:, 0] >= window[0]) & (points[:, 0] <= window[1])
     # Deviations go as one over the amplitude: this is the bound at the measured one.
     deviation = errors.deviation * (np.abs(parts.gain) / np.maximum(np.abs(gain), 1e-300))[:, None]
-    clutter, clutter_errors = _clutter(radio, config, threshold, rng)
+    clutter, clutter_errors = _clutter(sensor, rng)
     points = np.vstack([points[seen], np.column_stack([clutter.tau, clutter.cosines])])
     deviation = np.vstack([deviation[seen], clutter_errors.deviation])
     order = np.argsort(points[:, 0])
@@ -82,15 +72,13 @@ def measure_bound(
     return measurement, PathTruth(np.concatenate([parts.path[seen], clutter.path])[order])
 
 
-def _clutter(
-    radio: RadioConfig, config: ReceiverConfig, threshold: float, rng: np.random.Generator
-) -> tuple[Parts, Errors]:
-    """Poisson many, even over the delay window and the hemisphere; amplitudes as of noise above the threshold."""
-    count = rng.poisson(config.clutter_rate)
-    tau = rng.uniform(config.min_delay, config.max_delay, count)
-    radius, azimuth = np.sqrt(1.0 - rng.uniform(size=count) ** 2), rng.uniform(-np.pi, np.pi, count)
+def _clutter(sensor: SensorModel, rng: np.random.Generator) -> tuple[Parts, Errors]:
+    """Poisson many, even over the delay window and the disc of cosines; amplitudes as of noise above the threshold."""
+    radio, count = sensor.radio, rng.poisson(sensor.false_alarms)
+    tau = rng.uniform(*sensor.window, count)
+    radius, azimuth = np.sqrt(rng.uniform(size=count)), rng.uniform(-np.pi, np.pi, count)
     cosines = np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth)])
-    snr = threshold + rng.exponential(size=count)
+    snr = sensor.threshold + rng.exponential(size=count)
     gain = np.sqrt(snr * radio.noise_psd / (radio.array.num_antennas * radio.energy)).astype(np.complex128)
     parts = Parts(np.full(count, -1), tau, cosines, gain, rng.uniform(size=count) < 0.5)
     return parts, lone_errors(parts, radio, np.zeros((count, 5)))

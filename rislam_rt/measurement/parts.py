@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import amplitude_std, measurement_std
 from rislam_rt.measurement.received import Received
-from rislam_rt.model import RadioConfig
+from rislam_rt.model import RadioConfig, SensorModel
 
 DISC_STD = 0.5
 """Standard deviation of each coordinate of a point spread evenly over the unit disc: what is known of a direction
@@ -49,12 +49,12 @@ def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:
     return bound.tau, np.minimum(bound.cosines, DISC_STD)
 
 
-def merge(received: Received, radio: RadioConfig, alternation: bool) -> Parts:
-    """Join paths closer than 1/B in delay and within the array's beam, from the strongest down."""
+def merge(received: Received, sensor: SensorModel) -> Parts:
+    """Join paths closer than a resolution cell in delay and both cosines, from the strongest down."""
     cell = np.ones((len(received.tau), len(received.tau)), dtype=bool)
-    for value in in_cells(received, radio).T:  # axis by axis: half the time of one three-dimensional array
+    for value in in_cells(received, sensor.radio).T:  # axis by axis: half the time of one three-dimensional array
         cell &= np.abs(np.subtract.outer(value, value)) < 1.0
-    if alternation:
+    if sensor.alternation:
         cell &= received.from_panel[:, None] == received.from_panel
     return join(received, _leaders(np.abs(received.gain), cell))
 

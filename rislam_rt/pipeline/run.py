@@ -166,7 +166,7 @@ def run_scheme(name: str, stage: Stage, spec: PipelineSpec, tell: Progress) -> S
     means = Means(panel, designer, estimator, spec, settings, told)
     filter_rng, design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
     config = estimator.config(told.settings)
-    state = estimator.init(told.start, told.body, told.panel, told.settings.radio, config, rng=filter_rng)
+    state = estimator.init(told.start, told.body, told.panel, told.settings.sensor, config, rng=filter_rng)
     agent = Agent(state, open_link(panel) if panel is not None else None)
     noise, control = (
         [np.random.default_rng(seed) for seed in _children_of(s, len(motion))] for s in (seeds.noise, seeds.control)

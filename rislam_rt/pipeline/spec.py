@@ -7,8 +7,8 @@ import numpy as np
 from pydantic import Field, create_model, model_validator
 
 from rislam_rt.design import DESIGNERS, DesignConfig
-from rislam_rt.measurement import ReceiverConfig, with_reference_snr
-from rislam_rt.model import RadioConfig, RxArray
+from rislam_rt.measurement import ReceiverConfig, build_sensor, with_reference_snr
+from rislam_rt.model import RadioConfig, RxArray, SensorModel
 from rislam_rt.pipeline.mistold import ToldSection
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.section import Count, Decibel, Name, NotNegative, Positive, Probability, Section
@@ -244,6 +244,8 @@ class Settings(NamedTuple):
     design: DesignConfig
     bp_slam: BpSlamConfig
     channel_slam: ChannelSlamConfig
+    sensor: SensorModel
+    """What the estimators are told of the receiver."""
 
 
 def build_settings(spec: PipelineSpec) -> Settings:
@@ -254,13 +256,15 @@ def build_settings(spec: PipelineSpec) -> Settings:
     ConfigError
         A value is out of the range that the record itself checks.
     """
+    radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump())
     return Settings(
-        build_radio(spec.radio),
-        ReceiverConfig(**spec.receiver.model_dump()),
+        radio,
+        receiver,
         SlamConfig(**spec.slam.model_dump()),
         build_design(spec.design),
         BpSlamConfig(**spec.bp_slam.model_dump()),
         ChannelSlamConfig(**spec.channel_slam.model_dump()),
+        build_sensor(radio, receiver),
     )
 
 

@@ -99,13 +99,15 @@ def tell_panel(panel: RisSpec, told: ToldSection) -> RisSpec:
 
 def tell_settings(settings: Settings, told: ToldSection) -> Settings:
     """Radio, process noise, and what is known of detection and of false components."""
-    slam = replace(
-        settings.slam,
-        detection_snr=settings.slam.detection_snr * _amplitude(told.threshold_db) ** 2,
-        clutter_density=settings.slam.clutter_density * told.clutter_scale,
-        max_bounces=max(settings.slam.max_bounces - told.bounces_less, 0),
+    slam = replace(settings.slam, max_bounces=max(settings.slam.max_bounces - told.bounces_less, 0))
+    radio = tell_radio(settings.radio, told)
+    sensor = replace(
+        settings.sensor,
+        radio=radio,
+        threshold=settings.sensor.threshold * _amplitude(told.threshold_db) ** 2,
+        false_alarms=settings.sensor.false_alarms * told.clutter_scale,
     )
-    found = settings._replace(radio=tell_radio(settings.radio, told), slam=slam)
+    found = settings._replace(radio=radio, slam=slam, sensor=sensor)
     return found._replace(
         **{name: _livelier(getattr(found, name), told.process_noise_scale) for name in ("slam", *ESTIMATOR_SECTIONS)}
     )

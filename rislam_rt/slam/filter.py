@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import wrap
-from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec
+from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec, SensorModel
 from rislam_rt.slam.associate import associate
 from rislam_rt.slam.birth import Past, examine
 from rislam_rt.slam.book import Book, empty_book, named_panel, strike
@@ -60,7 +60,13 @@ class FilterState(NamedTuple):
     health: Health
     body: Body
     ris: RisSpec | None
-    radio: RadioConfig
+    sensor: SensorModel
+    """What the agent is told of its receiver."""
+
+    @property
+    def radio(self) -> RadioConfig:
+        """The radio that the receiver belongs to."""
+        return self.sensor.radio
 
 
 class StepInfo(NamedTuple):
@@ -83,7 +89,7 @@ def init(
     start: StartPrior,
     body: Body,
     ris: RisSpec | None,
-    radio: RadioConfig,
+    sensor: SensorModel,
     config: SlamConfig,
     *,
     rng: np.random.Generator,
@@ -99,7 +105,7 @@ def init(
         Health(),
         body,
         ris,
-        radio,
+        sensor,
     )
 
 
@@ -108,7 +114,7 @@ def revisit(state: FilterState, start: StartPrior, config: SlamConfig, *, rng: n
 
     The map keeps the covariance that it had; its frame is the earlier run's, and so must be the start's.
     """
-    fresh, moments = init(start, state.body, state.ris, state.radio, config, rng=rng), believed(state)
+    fresh, moments = init(start, state.body, state.ris, state.sensor, config, rng=rng), believed(state)
     particles = engine_of(config).furnish(fresh.particles, moments.features, moments.covariance[POSE:, POSE:])
     count = len(state.book.ident)
     book = state.book._replace(shown=np.ones((count, 2)), drift=np.zeros((count, 3)))
@@ -134,12 +140,13 @@ def step(
     free = order[landmark[order] == UNUSED]
     glance = glance.take(free)
     moments = believed(state)
-    belief = Belief(moments.features, state.book, _poses(state, moments), state.body, state.radio, state.ris)
-    expected = expected_returns(belief, code, config.max_bounces, config.detection_snr, config.use_vt)
+    belief = Belief(moments.features, state.book, _poses(state, moments), state.body, state.sensor, state.ris)
+    expected = expected_returns(belief, code, config.max_bounces, config.use_vt)
     tracks = advance(state.tracks, dt, state.cycle, _bend(moments))
     outlook = look_ahead(belief, expected, moments, tracks, glance.side is not None)
     hidden = hidden_tracks(outlook, tracks, config.gate)
-    picks = associate(candidates(outlook, tracks, hidden), glance, config.gate, config.clutter_density)
+    strangers = stranger_density(glance, state.sensor, config.new_density)
+    picks = associate(candidates(outlook, tracks, hidden), glance, config.gate, strangers)
 
     num_returns = len(expected.log_amplitude)
     hit = (picks[:num_returns] >= 0).nonzero()[0]
@@ -149,14 +156,12 @@ def step(
     state = state._replace(particles=updated.particles)
     white = np.zeros((len(hit), 3))
     white[used] = updated.white
-    book, names = learn(
-        belief, believed(state), outlook, Hits(hit, taken, white), glance, code, config.detection_snr, rng=rng
-    )  # fmt: skip
+    book, names = learn(belief, believed(state), outlook, Hits(hit, taken, white), glance, code, rng=rng)
     landmark[free[taken]] = names
     tracks, removed = _follow(state, _rates(moments), tracks, glance, picks, num_returns, config)
     landmark[free[removed]] = REMOVED
     if not named_panel(book):  # once it is known, no track needs to be it
-        tracks = weigh_tracks(tracks, belief, code, config.detection_snr)
+        tracks = weigh_tracks(tracks, belief, code)
     state = _tidy(state._replace(tracks=tracks, book=book), outlook, belief, config, rng=rng)
 
     engine = engine_of(config)
@@ -208,7 +213,9 @@ def _tidy(
     """Births and deaths: at most one track becomes a feature; features that should not be there go."""
     moments, book, particles, engine = believed(state), state.book, state.particles, engine_of(config)
     past = Past(*engine.trail(particles, np.arange(config.window)), state.time, state.body, state.cycle)
-    row, tracks, birth = examine(state.tracks, moments, book, outlook, past, free_space(state.radio), config)
+    row, tracks, birth = examine(
+        state.tracks, moments, book, outlook, past, free_space(state.radio), state.sensor.threshold, config
+    )
     if birth is not None:
         particles = engine.settle(particles, birth, state.body, rng=rng)
         book = birth.enter(book)
@@ -262,6 +269,16 @@ def glance_of(measurement: Measurement, radio: RadioConfig) -> Glance:
         amplitude / free,
         None if measurement.from_panel is None else np.where(measurement.from_panel, PANEL, OTHER),
     )
+
+
+def stranger_density(glance: Glance, sensor: SensorModel, new_density: float) -> Floats:
+    """(M,) expected new or false components per metre, unit of each cosine and e-fold of amplitude, where each lies.
+
+    False ones are as strong as noise that passes the threshold, hence rare where a component is strong.
+    """
+    snr = sensor.radio.integrated_snr(np.exp(glance.log_amplitude))
+    false = sensor.false_alarm_density(glance.seen[:, 0] / SPEED_OF_LIGHT, glance.seen[:, 1:]) / SPEED_OF_LIGHT
+    return new_density + false * 2.0 * snr * sensor.false_alarm_snr_density(snr)
 
 
 def free_space(radio: RadioConfig) -> float:

@@ -54,7 +54,6 @@ def learn(
     hits: Hits,
     glance: Glance,
     code: RisCode | None,
-    detection_snr: float,
     *,
     rng: np.random.Generator,
 ) -> tuple[Book, Integers]:
@@ -86,7 +85,7 @@ def learn(
     silent[hits.row] = False
     if silent.any() and belief.ris is not None and code is not None:
         direct = compact(expected.returns, np.flatnonzero(silent))
-        book = _weigh_silent(book, belief, moments, direct, code, detection_snr, rng=rng)
+        book = _weigh_silent(book, belief, moments, direct, code, rng=rng)
     return book, names
 
 
@@ -151,7 +150,6 @@ def _weigh_silent(
     moments: Moments,
     direct: Returns,
     code: RisCode,
-    detection_snr: float,
     *,
     rng: np.random.Generator,
 ) -> Book:
@@ -159,7 +157,7 @@ def _weigh_silent(
     points = direct.point
     sight = observe(direct, belief.features, book.anchor, belief.poses)
     std = np.full(len(points), amplitude_std(belief.radio))
-    threshold = float(np.sqrt(2.0 * detection_snr) * std[0])
+    threshold = belief.threshold
     scatterer = log_scatterer_missed(std, sight.tx_length, sight.rx_length, belief.radio, threshold)
     panel = log_panel_missed(std, _sampled_gains(belief, moments, points, code, rng=rng), threshold)
     weight = np.exp(book.log_grid[points])

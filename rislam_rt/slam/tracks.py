@@ -129,7 +129,7 @@ def has_ended(tracks: Tracks, cycle: int, max_misses: int) -> Booleans:
     return np.asarray((tracks.misses > max_misses) & ~patient)
 
 
-def overstatement(tracks: Tracks, cycle: int, detection_snr: float) -> Floats:
+def overstatement(tracks: Tracks, cycle: int, threshold: float) -> Floats:
     """(T,) factor by which the amplitudes of a track exceed its path's, and its reported deviations fall short.
 
     Of a path near the threshold only those amplitudes are measured that noise lifts above it. The share p of cycles in
@@ -139,7 +139,7 @@ def overstatement(tracks: Tracks, cycle: int, detection_snr: float) -> Floats:
     seen, missed = tracks.length, tracks.earlier_misses(cycle)
     share = np.clip((seen + 1.0) / (seen + missed + 2.0), FAINTEST, 1.0 - 1e-9)
     quantile = ndtri(share)
-    mean = np.sqrt(2.0 * detection_snr) + quantile
+    mean = np.sqrt(2.0 * threshold) + quantile
     return np.asarray(1.0 + np.exp(-0.5 * quantile**2) / np.sqrt(2.0 * np.pi) / share / mean)
 
 

@@ -164,7 +164,7 @@ def test_clutter_is_poisson_even_and_just_above_the_threshold(make_paths):
     tau = np.concatenate([m.tau for m, _ in runs])
     assert tau.mean() == pytest.approx(40e-9, rel=0.03)  # 2000 draws of an even law: five standard errors
     height = np.concatenate([m.arrival[:, 2] for m, _ in runs])
-    assert height.mean() == pytest.approx(0.5, rel=0.07)  # even over the hemisphere, likewise
+    assert height.mean() == pytest.approx(2.0 / 3.0, rel=0.04)  # even over the disc of cosines, likewise
     snr = RADIO.integrated_snr(np.concatenate([m.amplitude for m, _ in runs]))
     assert snr.min() >= 10.0 * (1.0 - 1e-12)
     assert snr.mean() == pytest.approx(11.0, abs=0.12)  # noise above a threshold exceeds it by one on average

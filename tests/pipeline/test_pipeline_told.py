@@ -34,11 +34,11 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     "baseline_m": ("0.01", ("body.tx_offset",)),
     "clock_offset_ns": ("1.0", ("measured",)),
     "clock_drift_ns_s": ("0.5", ("measured",)),
-    "noise_db": ("3.0", ("radio.noise_psd",)),
-    "gain_db": ("3.0", ("radio.tx_gain",)),
+    "noise_db": ("3.0", ("sensor.radio.noise_psd",)),
+    "gain_db": ("3.0", ("sensor.radio.tx_gain",)),
     "std_scale": ("2.0", ("measured",)),
-    "threshold_db": ("3.0", ("config.detection_snr",)),
-    "clutter_scale": ("4.0", ("config.clutter_density",)),
+    "threshold_db": ("3.0", ("sensor.threshold",)),
+    "clutter_scale": ("4.0", ("sensor.false_alarms",)),
     "array_scale": ("1.01", ("measured",)),
     "array_bias": ("0.01", ("measured",)),
     "bounces_less": ("1", ("config.max_bounces",)),
@@ -58,16 +58,16 @@ def overhear(run_short, monkeypatch):
     def _overhear(*overrides: str) -> dict[str, Any]:
         heard: dict[str, Any] = {}
 
-        def init(start, body, panel, radio, config, *, rng):
+        def init(start, body, panel, sensor, config, *, rng):
             for name, record in {
                 "start": start,
                 "body": body,
                 "panel": panel,
-                "radio": radio,
+                "sensor": sensor,
                 "config": config,
             }.items():
                 heard.update(_flat(record, name))
-            return slam.init(start, body, panel, radio, config, rng=rng)
+            return slam.init(start, body, panel, sensor, config, rng=rng)
 
         def step(state, measurement, code, dt, heading, config, *, rng):
             rows = heard.setdefault("steps", [])
@@ -117,7 +117,7 @@ def test_by_default_all_is_told_as_it_is(overhear, room, short_spec):
     heard, motion, settings = overhear(), room.agent, build_settings(short_spec)
     np.testing.assert_array_equal(heard["heading"], motion.heading[:4])
     np.testing.assert_allclose(heard["dt"], [0.0, 0.1, 0.1, 0.1], rtol=1e-9, atol=0.0)  # differences of float times
-    for name, record in {"body": motion.body, "panel": room.ris.spec, "radio": settings.radio}.items():
+    for name, record in {"body": motion.body, "panel": room.ris.spec, "sensor": settings.sensor}.items():
         for part, value in _flat(record, name).items():
             assert _same(heard[part], value), part
     assert heard["start.heading"] == motion.heading[0]

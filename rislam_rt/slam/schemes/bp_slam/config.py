@@ -23,9 +23,9 @@ class BpSlamConfig:
     detection_probability: float = 0.95
     survival_probability: float = 0.999
     clutter_mean: float = 1.0
-    """False ranges a scan, Poisson."""
+    """Published form: false ranges a scan, Poisson. The moving form takes what the agent is told of its receiver."""
     max_range: float = 30.0
-    """False ranges are uniform on (0, max_range]; features that would be farther are not born [m]."""
+    """Published form: false ranges are uniform on (0, max_range]; features that would be farther are not born [m]."""
     initial_features: float = 6.0
     """Features expected in the region before the first scan, Poisson."""
     birth_mean: float = 0.01
