@@ -27,9 +27,9 @@ WORST = 3
 LEVELS = ("#9ecae1", "#4292c6", "#08519c", "#08306b")
 """Colours of the levels, the first one first."""
 REFERENCE = "#8c8c8c"
-LAW = """One quantity at a time is not as filter and design are told ([list](told.md)), all else right. The change is that
-of the agent's RMSE against the reference, from pairs of runs with the same motion and noise; the bound is that of an agent
-that is told the truth."""
+LAW = """One quantity at a time is not as filter and design are told ([list](told.md)), all else right. The change is
+that of the agent's RMSE against the reference, from pairs of runs with the same motion and noise; a wrong height is
+part of the error. The bound is that of an agent that is told the truth."""
 
 
 def robustness_content(groups: Sequence[Group], spec: RobustnessSpec) -> dict[str, Any]:
@@ -83,7 +83,7 @@ def draw_robustness(content: Mapping[str, Any]) -> Figure:
         axis.set_ylim(len(rows) - 0.4, -0.6)
         axis.set_xscale("log")
         mark_metres(axis.xaxis)
-        axis.set_xlabel(f"RMSE of the agent's position [m], scheme {scheme}; dotted: nothing wrong, with its interval")
+        axis.set_xlabel(f"RMSE of the agent's position [m], {scheme}; dotted: nothing wrong")
         axis.set_title("Levels from light to dark; ring: ordinary equipment", fontsize=10)
     return figure
 
@@ -95,6 +95,7 @@ def robustness_page(
     lines = ["# Robustness: what happens when the belief is told wrong", "", *about, ""]
     lines += [*paragraph(LAW), "", "## The worst at the level of ordinary equipment", ""]
     lines += [*table_lines(["mismatch", "level", "change", "what would cure it"], _worst_rows(content)), ""]
+    lines += ["In this order after them: " + ", ".join(f"`{name}`" for name in content["worst"][WORST:]) + ".", ""]
     if figure is not None:
         lines += [f"![RMSE at every level of every mismatch]({figure})", ""]
     lines += ["## All levels", "", "An asterisk marks the level of ordinary equipment.", ""]
