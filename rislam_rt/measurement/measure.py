@@ -4,7 +4,8 @@ import numpy as np
 
 from rislam_rt.measurement.bound import measure_bound
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.received import receive
+from rislam_rt.measurement.hardware import FrontEnd
+from rislam_rt.measurement.received import direct_gain, receive
 from rislam_rt.measurement.waveform import measure_waveform
 from rislam_rt.model import Measurement, Paths, PathTruth, RadioConfig
 
@@ -16,6 +17,7 @@ def measure(
     radio: RadioConfig,
     config: ReceiverConfig,
     previous: Measurement | None = None,
+    front_end: FrontEnd | None = None,
     *,
     rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
@@ -33,8 +35,11 @@ def measure(
     previous
         What was measured in the cycle before: `waveform` begins its search there, which saves a third of its time and
         more; `bound` has no use for it.
+    front_end
+        A receiver as it was built (`waveform`); None for an ideal one.
     """
     received = receive(paths, cycle, heading, radio, config)
     if config.estimator == "waveform":
-        return measure_waveform(received, radio, config, previous, rng=rng)
+        leakage = direct_gain(paths, cycle) if front_end is not None else 0.0
+        return measure_waveform(received, radio, config, previous, front_end, leakage, rng=rng)
     return measure_bound(received, radio, config, paths.num_paths, rng=rng)

@@ -12,12 +12,13 @@ from rislam_rt.measurement.detect import build_grid
 from rislam_rt.measurement.doubt import crowding, luck, mirror_variance, unmirrored
 from rislam_rt.measurement.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.false_alarms import detection_threshold
+from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_swing, in_step
 from rislam_rt.measurement.identify import identify
 from rislam_rt.measurement.joint import LEAST_CERTAINTY
 from rislam_rt.measurement.parts import capped, into_disc
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.refine import amplitude_covariance
-from rislam_rt.measurement.signal import add_noise, converter_noise, quantise, tones
+from rislam_rt.measurement.signal import num_tones, tones
 from rislam_rt.model import Measurement, PathTruth, RadioConfig
 
 
@@ -52,29 +53,43 @@ class Components(NamedTuple):
 
 
 def capture(
-    received: Received, radio: RadioConfig, config: ReceiverConfig, *, rng: np.random.Generator
+    received: Received,
+    radio: RadioConfig,
+    config: ReceiverConfig,
+    front_end: FrontEnd | None = None,
+    leakage: complex = 0.0,
+    *,
+    rng: np.random.Generator,
 ) -> list[Capture]:
     """Sound the channel: one capture, or with alternation the sum and the difference of two at half the energy each.
 
     Sum and difference of the two halves, over sqrt 2, hold the walls' and the panel's paths at the full energy and the
     noise of one sounding: splitting the slot costs nothing but a second code.
+
+    Parameters
+    ----------
+    front_end
+        A real receiver; None for an ideal one.
+    leakage
+        Gain of the direct path before its cancellation: a real receiver's cancellation leaves something of it.
     """
+    elements = None if front_end is None else radio.array.positions(1.0) + front_end.offset
+    swing = 1.0 if front_end is None else draw_swing(front_end.config, rng=rng)
+    unit = np.sqrt(0.5) if config.alternation else 1.0
+    sent = Sent(unit, unit * leakage * np.sqrt(radio.energy / num_tones(radio, config)), swing)
+
+    def sound(gain: Complexes) -> tuple[Complexes, float]:
+        clean = unit * tones(received._replace(gain=gain), radio, config, elements)
+        return digitise(clean, sent, radio, config, front_end, rng=rng)
+
     if not config.alternation:
-        noisy = add_noise(tones(received, radio, config), radio.noise_psd, rng=rng)
-        extra = converter_noise(noisy, config.converter_bits, radio)
-        return [Capture(quantise(noisy, config.converter_bits, radio), radio.noise_psd + extra, False)]
+        return [Capture(*sound(received.gain), False)]
     sign = np.where(received.from_panel, -1.0, 1.0)
-    halves, extra = [], 0.0
-    for gain in (received.gain, sign * received.gain):
-        clean = np.sqrt(0.5) * tones(received._replace(gain=gain), radio, config)
-        noisy = add_noise(clean, radio.noise_psd, rng=rng)
-        extra += 0.5 * converter_noise(noisy, config.converter_bits, radio)
-        halves.append(quantise(noisy, config.converter_bits, radio))
-    level = radio.noise_psd + extra
-    return [
-        Capture(np.sqrt(0.5) * (halves[0] + halves[1]), level, False),
-        Capture(np.sqrt(0.5) * (halves[0] - halves[1]), level, True),
-    ]
+    (one, noise), (other, more) = sound(received.gain), sound(sign * received.gain)
+    if front_end is not None and front_end.correction is not None:
+        other = in_step(other, one)
+    level = 0.5 * (noise + more)
+    return [Capture(np.sqrt(0.5) * (one + other), level, False), Capture(np.sqrt(0.5) * (one - other), level, True)]
 
 
 def find_components(
@@ -93,11 +108,14 @@ def measure_waveform(
     radio: RadioConfig,
     config: ReceiverConfig,
     previous: Measurement | None = None,
+    front_end: FrontEnd | None = None,
+    leakage: complex = 0.0,
     *,
     rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
     """Components estimated from the cycle's signal, and the paths that they most likely are."""
-    found = find_components(capture(received, radio, config, rng=rng), radio, config, previous)
+    captures = capture(received, radio, config, front_end, leakage, rng=rng)
+    found = find_components(captures, radio, config, previous)
     return to_measurement(found, config), PathTruth(identify(found.tau, found.cosines, found.gain, received, radio))
 
 
