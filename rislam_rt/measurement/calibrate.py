@@ -76,8 +76,8 @@ def calibrate(
     image = np.zeros(len(residue), dtype=np.complex128)
     spread, stray = float(np.mean(np.abs(heard) ** 2)), STRAY
     for faintest in FAINTEST:
-        plain = heard - image[:, None] * mirrored(heard) - residue
-        drawn = np.array([_as_drawn(np.linalg.solve(matrix, one), known, faintest) for one in plain])
+        plain, inverse = heard - image[:, None] * mirrored(heard) - residue, _inverse(matrix)
+        drawn = np.array([_as_drawn(inverse @ one, known, faintest) for one in plain])
         matrix = _array_matrix(plain, drawn, matrix, spread, stray)
         stray = max(float(np.sqrt(np.mean(np.abs(matrix - np.diag(np.diag(matrix))) ** 2))), LEAST_STRAY)
         model = matrix @ drawn

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from rislam_rt.arrays import Floats
 from rislam_rt.measurement.bound import measure_bound
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.hardware import FrontEnd
@@ -17,6 +18,7 @@ def measure(
     radio: RadioConfig,
     config: ReceiverConfig,
     previous: Measurement | None = None,
+    doppler: Floats | None = None,
     front_end: FrontEnd | None = None,
     *,
     rng: np.random.Generator,
@@ -35,10 +37,14 @@ def measure(
     previous
         What was measured in the cycle before: `waveform` begins its search there, which saves a third of its time and
         more; `bound` has no use for it.
+    doppler
+        (P,) Doppler shifts [Hz] of the paths, which turn within the slot; None if nothing moves.
     front_end
         A receiver as it was built (`waveform`); None for an ideal one.
     """
-    received = receive(paths, cycle, heading, radio, config)
+    if front_end is not None and front_end.config.carrier_offset_hz:
+        doppler = (np.zeros(paths.num_paths) if doppler is None else doppler) + front_end.config.carrier_offset_hz
+    received = receive(paths, cycle, heading, radio, config, doppler)
     if config.estimator == "waveform":
         leakage = direct_gain(paths, cycle) if front_end is not None else 0.0
         return measure_waveform(received, radio, config, previous, front_end, leakage, rng=rng)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.measurement import measure
+from rislam_rt.measurement import FrontEnd, measure
 from rislam_rt.model import Measurement, Paths, PathTruth, RisCode, RisSpec, SlamEstimate, Trajectory
 from rislam_rt.pipeline.control import Link, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
@@ -36,8 +36,12 @@ class Room(NamedTuple):
     paths: Paths
     """As the array hears them (`told.deceive`)."""
     trajectory: Trajectory
+    doppler: Floats
+    """(K, P) shifts [Hz]: what paths turn by within the measurement slot."""
     faults: PanelErrors | None = None
     """What the panel does wrong; None without a panel."""
+    front_end: FrontEnd | None = None
+    """What the receiver does wrong; None for an ideal one."""
 
     def at(self, cycle: int) -> Paths:
         """The paths of one cycle alone."""
@@ -114,7 +118,7 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
         paths = rephase(paths, applied, 1.0 if room.faults is None else room.faults.weight)
     measurement, truth = measure(
         paths, 0, float(room.trajectory.heading[cycle]), means.settings.radio, means.settings.receiver, agent.heard,
-        rng=rng.noise,
+        room.doppler[cycle], room.front_end, rng=rng.noise,
     )  # fmt: skip
     clock.append(perf_counter())
 
