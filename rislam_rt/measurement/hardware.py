@@ -174,11 +174,12 @@ def mirrored(spectrum: Complexes) -> Complexes:
 
 def _shaken(spectrum: Complexes, config: HardwareConfig, radio: RadioConfig, rng: np.random.Generator) -> Complexes:
     """Tones after an oscillator whose phase trembles from sample to sample and steps from code to code."""
-    turn = np.radians(config.phase_step_deg) * rng.standard_normal()
-    tremble = np.radians(config.phase_noise_deg) * rng.standard_normal(spectrum.shape[-1])
+    if config.phase_step_deg:
+        spectrum = spectrum * np.exp(1j * np.radians(config.phase_step_deg) * rng.standard_normal())
     if not config.phase_noise_deg:
-        return spectrum * np.exp(1j * turn) if config.phase_step_deg else spectrum
-    return to_tones(to_samples(spectrum, radio) * np.exp(1j * (turn + tremble)), radio)
+        return spectrum
+    tremble = np.radians(config.phase_noise_deg) * rng.standard_normal(spectrum.shape[-1])
+    return to_tones(to_samples(spectrum, radio) * np.exp(1j * tremble), radio)
 
 
 def _neighbours(positions: Floats, spacing: float) -> Complexes:
