@@ -15,7 +15,8 @@ from rislam_rt.slam import SlamConfig
 from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
 from rislam_rt.slam.schemes.channel_slam import ChannelSlamConfig
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=64)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$", max_length=64)]
+"""Of a pipeline: part of folders' names, so that it holds no separator and begins with no dot."""
 Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, le=1e12, allow_inf_nan=False)]
 Decibel = Annotated[float, Field(ge=-300.0, le=300.0, allow_inf_nan=False)]

@@ -64,7 +64,12 @@ def _start(work: Work, name: str, common: tuple[Any, ...]) -> Worker:
     context = mp.get_context("spawn")
     ear, mouth = context.Pipe(duplex=False)
     process = context.Process(target=_run, args=(mouth, work, name, common), daemon=True)
-    process.start()
+    # the keyboard's interrupt reaches the whole group, and one that comes while Python starts would be a traceback
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        process.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
     mouth.close()
     return Worker(name, process, ear)
 
