@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.options import JsonFile, PipelineFile, SceneOption, Settings, write_json
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, write_json
 from rislam_rt.cli.study import Given
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def command(
-    pipeline: PipelineFile,
+    pipeline: PipelineFile = MAIN_JOB,
     scene: SceneOption = None,
     set_: Settings = None,
     out: Annotated[

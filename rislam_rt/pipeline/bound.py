@@ -18,12 +18,11 @@ from rislam_rt.information import (
     plane_tangents,
     posterior_bound,
 )
-from rislam_rt.measurement.bound import detection_probability
-from rislam_rt.measurement.false_alarms import detection_threshold
-from rislam_rt.model import PathKind, Paths, Scene
+from rislam_rt.measurement import build_sensor
+from rislam_rt.model import PathKind, Paths, Scene, SensorModel, detection_probability
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.spec import PipelineSpec, Settings, build_settings
+from rislam_rt.pipeline.spec import PipelineSpec, build_settings
 
 SILENT = 1e-4
 """Information over that at the detection threshold below which a path counts as not heard."""
@@ -69,10 +68,10 @@ def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Map
     spec = PipelineSpec.model_validate(dict(config))
     settings = build_settings(spec)
     estimator, walls = ESTIMATORS[SCHEMES[scheme].estimator], build_walls(scene)
-    threshold = detection_threshold(settings.radio, settings.receiver)
+    sensor = build_sensor(settings.radio, settings.receiver)
     axes = 3 if settings.slam.height == "estimated" else 2
     use_vt = settings.slam.use_vt and estimator.walls == "planes"
-    audible = heard_paths(paths.with_gain(gain), settings, threshold, use_vt=use_vt)
+    audible = heard_paths(paths.with_gain(gain), sensor, use_vt=use_vt)
     motion = MotionPrior(settings.slam.sigma_a, spec.start.position_std_m, spec.start.velocity_std_m_s, axes)
     if not audible.num_paths:
         silence: Iterable[Rows] = repeat(NO_ROWS, len(scene.agent))
@@ -82,7 +81,7 @@ def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Map
         audible, scene.agent, scene.landmark_positions, walls.normal, walls.offset, settings.radio,
         walls=estimator.walls,
     )  # fmt: skip
-    rows = map(fewer_rows, model.rows(SILENT * threshold, angles=estimator.angles, use_vt=use_vt))
+    rows = map(fewer_rows, model.rows(SILENT * sensor.threshold, angles=estimator.angles, use_vt=use_vt))
     bound = posterior_bound(rows, scene.agent.time, motion, prior_std(model, scene, upright=use_vt))
     heard = {scene.landmarks[number] for number in audible.landmark if number >= 0}
     landmarks = {name: error for name, error in model.landmark_error(bound.last).items() if name in heard}
@@ -127,16 +126,16 @@ def fewer_rows(rows: Rows) -> Rows:
     return Rows(factor[:, :3], factor[:, 3:], np.ones(len(factor)))
 
 
-def heard_paths(paths: Paths, settings: Settings, threshold: float, *, use_vt: bool) -> Paths:
+def heard_paths(paths: Paths, sensor: SensorModel, *, use_vt: bool) -> Paths:
     """The columns that are reported in some cycle, with their gains times the root of the detection probability.
 
     Information is proportional to the SNR, so that it comes out times that probability.
     """
-    snr = settings.radio.integrated_snr(paths.gain)
-    detected = _detected(snr, threshold)
-    heard = paths.valid & (snr * detected >= SILENT * threshold)
-    heard &= (paths.tau >= settings.receiver.min_delay) & (paths.tau <= settings.receiver.max_delay)
-    if settings.radio.array.pattern == "upper":
+    snr = sensor.radio.integrated_snr(paths.gain)
+    detected = _detected(snr, sensor.threshold)
+    heard = paths.valid & (snr * detected >= SILENT * sensor.threshold)
+    heard &= (paths.tau >= sensor.window[0]) & (paths.tau <= sensor.window[1])
+    if sensor.radio.array.pattern == "upper":
         heard &= paths.arrival[..., 2] >= 0.0
     wanted = paths.landmark >= 0
     if use_vt:

@@ -10,16 +10,17 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.backend import prepare_backend
+from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.channel.protocol import Channel
 from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.model import (
+    Body,
     PathKind,
     Paths,
     RadioConfig,
     Scene,
     SchemeResult,
     SlamResult,
-    Trajectory,
 )
 from rislam_rt.pipeline.change import change_room
 from rislam_rt.pipeline.choose import build_designer
@@ -29,10 +30,10 @@ from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.motion import draw_motion
 from rislam_rt.pipeline.record import gather
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.spec import PipelineSpec, Settings, build_radio, build_settings
+from rislam_rt.pipeline.spec import PipelineSpec, build_radio, build_settings
+from rislam_rt.pipeline.told import deceive, lean, tell_belief
 from rislam_rt.pipeline.workers import run_side_by_side
 from rislam_rt.ris import delay_spread_warnings, draw_panel
-from rislam_rt.slam import StartPrior
 
 Progress = Callable[[str, int, int], None]
 """Told the stage (`trace` or a scheme), how much of it is done, and how much there is."""
@@ -52,6 +53,8 @@ class Seeds(NamedTuple):
     motion: np.random.SeedSequence
     panel: np.random.SeedSequence
     room: np.random.SeedSequence
+    told: np.random.SeedSequence
+    """Of the compass, and of how the body sways."""
 
 
 class Stage(NamedTuple):
@@ -61,6 +64,8 @@ class Stage(NamedTuple):
     """With the true motion of this run."""
     paths: Paths
     """Panel at level 0."""
+    body: Body
+    """Of a level agent: what is told of it."""
     seeds: Seeds
     seconds: float
     """Time [s] that the channel took."""
@@ -80,10 +85,10 @@ def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
     seeds = Seeds(*rng.bit_generator.seed_seq.spawn(len(Seeds._fields)))  # type: ignore[attr-defined]
     scene = change_room(cut_scene(scene, spec.cycles), spec.room, rng=np.random.default_rng(seeds.room))
     motion = draw_motion(scene, spec.motion.sigma_a_m_s2, rng=np.random.default_rng(seeds.motion))
-    scene = replace(scene, agent=motion)
+    scene, body = replace(scene, agent=lean(motion, spec.told)), motion.body
     begin = perf_counter()
-    paths = build_channel(spec.channel, scene, build_radio(spec.radio), spec.depth).paths(motion)
-    return Stage(scene, paths, seeds, perf_counter() - begin)
+    paths = build_channel(spec.channel, scene, build_radio(spec.radio), spec.depth).paths(scene.agent)
+    return Stage(scene, paths, body, seeds, perf_counter() - begin)
 
 
 def run_slam(
@@ -148,19 +153,26 @@ def run_scheme(name: str, stage: Stage, spec: PipelineSpec, tell: Progress) -> S
     settings, scheme, seeds = build_settings(spec), SCHEMES[name], stage.seeds
     motion, ris = stage.scene.agent, stage.scene.ris
     panel = ris.spec if ris is not None and scheme.panel else None
-    room = Room(without_panel(stage.paths), motion)
+    compass, sway = (np.random.default_rng(seed) for seed in _children_of(seeds.told, 2))
+    start = np.random.default_rng(seeds.start)
+    told = tell_belief(motion, stage.body, panel, spec, settings, start=start, compass=compass)
+    paths = stage.paths if panel is not None else without_panel(stage.paths)
+    shift = doppler_shift(stage.paths, motion, settings.radio.wavelength)
+    room = Room(deceive(paths, motion, spec.told, rng=sway), motion, shift)
     designer = None
     if panel is not None:
         tolerance = spec.panel.tolerance
-        room = Room(stage.paths, motion, draw_panel(panel, tolerance, rng=np.random.default_rng(seeds.panel)))
-        designer = build_designer(scheme, panel, room, spec, settings)
+        room = room._replace(faults=draw_panel(panel, tolerance, rng=np.random.default_rng(seeds.panel)))
+        designer = build_designer(scheme, panel, room, spec, settings, told)
     estimator = ESTIMATORS[scheme.estimator]
-    means = Means(panel, designer, estimator, spec, settings)
+    means = Means(panel, designer, estimator, spec, settings, told)
     filter_rng, design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
-    start, config = _start(motion, spec, seeds, settings), estimator.config(settings)
-    state = estimator.init(start, motion.body, panel, settings.radio, config, rng=filter_rng)
+    config = estimator.config(told.settings)
+    state = estimator.init(told.start, told.body, told.panel, told.settings.sensor, config, rng=filter_rng)
     agent = Agent(state, open_link(panel) if panel is not None else None)
-    noise, control = (_children(s, len(motion)) for s in (seeds.noise, seeds.control))
+    noise, control = (
+        [np.random.default_rng(seed) for seed in _children_of(s, len(motion))] for s in (seeds.noise, seeds.control)
+    )
     cycles: list[Cycle] = []
     tell(name, 0, len(motion))
     for cycle in range(len(motion)):
@@ -255,27 +267,12 @@ def library_versions() -> dict[str, str]:
     return found
 
 
-def _start(motion: Trajectory, spec: PipelineSpec, seeds: Seeds, settings: Settings) -> StartPrior:
-    """What the agent is told: the truth plus one draw of the prior's errors; a known height is told exactly."""
-    rng = np.random.default_rng(seeds.start)
-    axes = np.array([1.0, 1.0, 1.0 if settings.slam.height == "estimated" else 0.0])
-    position_std, velocity_std = spec.start.position_std_m, spec.start.velocity_std_m_s
-    return StartPrior(
-        motion.position[0] + rng.standard_normal(3) * position_std * axes,
-        motion.velocity[0] + rng.standard_normal(3) * velocity_std * axes,
-        float(motion.heading[0]),
-        position_std,
-        velocity_std,
-    )
-
-
 def _seed_of(rng: np.random.Generator) -> int | None:
     """The integer that the generator was made from, if it was."""
     entropy = getattr(rng.bit_generator.seed_seq, "entropy", None)
     return entropy if isinstance(entropy, int) else None
 
 
-def _children(seed: np.random.SeedSequence, count: int) -> list[np.random.Generator]:
-    """One generator a cycle, the same ones every time, however many numbers a cycle draws."""
-    keys = (np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, cycle)) for cycle in range(count))
-    return [np.random.default_rng(key) for key in keys]
+def _children_of(seed: np.random.SeedSequence, count: int) -> list[np.random.SeedSequence]:
+    """Seeds by number, the same ones every time, however many numbers are drawn from each."""
+    return [np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, number)) for number in range(count)]

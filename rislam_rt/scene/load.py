@@ -42,7 +42,7 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> list[Finding]:
-    """Everything wrong (errors) or suspicious (warnings) about a scene, or a scene folder; empty if all is well.
+    """Everything wrong (errors), suspicious (warnings) or worth knowing (notes) about a scene, or a scene folder.
 
     A bad scene is an answer, not an exception. Warnings about the panel depend on the radio, the default one if none
     is given; where there are errors, warnings are not looked for.

@@ -79,13 +79,13 @@ def test_delays_alone_and_images_apart_know_less(stage):
 
 def test_what_the_receiver_does_not_report_does_not_count(stage):
     settings = build_settings(load_spec(PIPELINE, [*SHORT, "receiver.max_delay=25e-9"]))
-    heard = heard_paths(stage.paths, settings, 10.0, use_vt=True)
+    heard = heard_paths(stage.paths, settings.sensor, use_vt=True)
     shown = heard.gain != 0.0
     assert 0 < shown.sum() < stage.paths.valid.sum()
     assert (heard.tau[shown] <= 25e-9).all()
     assert (heard.arrival[shown][:, 2] >= 0.0).all()
     assert (heard.kind != PathKind.LOS).all()
-    assert (heard_paths(stage.paths, settings, 10.0, use_vt=False).kind != PathKind.VT).all()
+    assert (heard_paths(stage.paths, settings.sensor, use_vt=False).kind != PathKind.VT).all()
 
 
 def test_what_the_filter_takes_for_granted_is_in_the_bound(stage):

@@ -105,6 +105,6 @@ class TracedChannel:
         rows, vertices = visible_rows(self.stage, batch.all_sequences, batch.far, batch.device, candidates, spared)
         sequences, ends = batch.all_sequences[rows.sequence], batch.ends(rows)
         exact = refined_course(self.walls, sequences, ends.device, ends.far)
-        coefficient = leg_coefficients(self.stage, sequences, ends, exact, self.antennas)
+        coefficient = leg_coefficients(self.stage, self.walls, sequences, ends, exact, self.antennas)
         course = exact if self.refine else traced_course(sequences, ends.device, ends.far, vertices)
         return Found(rows, course, coefficient)
