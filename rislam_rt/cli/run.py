@@ -80,16 +80,21 @@ def run_main_job(spec: "PipelineSpec", given: Given) -> None:
 
 def show_run(folder: Path, about: "Mapping[str, Any]", given: Given) -> None:
     """A completed run of these very settings, as it was written."""
-    from rislam_rt.pipeline.store import read_run, read_summary
+    from rislam_rt.pipeline.store import hold_run, is_left_locked, read_run, read_summary
     from rislam_rt.report.page import PAGE, write_report
     from rislam_rt.report.tables import print_summary
 
     summary = read_summary(folder, about)
     typer.echo("this run is complete already; nothing was computed")
     print_summary(summary)
+    page = folder / PAGE
+    draw = given.page and not page.is_file()
+    if draw or is_left_locked(folder):  # a process died at the report, or is at it
+        with hold_run(folder):
+            if draw:
+                write_report(read_run(folder), summary, folder)
     if given.page:
-        page = folder / PAGE
-        typer.echo(f"report: {page if page.is_file() else write_report(read_run(folder), summary, folder)}")
+        typer.echo(f"report: {page}")
     typer.echo(f"run folder: {folder}")
     write_json(given.json, summary)
 

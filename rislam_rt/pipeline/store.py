@@ -177,10 +177,9 @@ def open_run(folder: Path, identity: Identity) -> Iterator[RunFolder]:
     find_run(folder, identity)
     made = make_folders(folder)
     try:
-        with hold(folder, "run"):
+        with hold_run(folder):
             about = find_run(folder, identity)
             store = RunFolder(folder, identity, about["files"] if about else None)
-            remove_temporaries(folder / part for part in OWN_FOLDERS)
             try:
                 store.mark(RUNNING)
                 yield store
@@ -189,6 +188,27 @@ def open_run(folder: Path, identity: Identity) -> Iterator[RunFolder]:
                 raise
     finally:
         remove_empty(made)
+
+
+@contextmanager
+def hold_run(folder: Path) -> Iterator[None]:
+    """Keep others out of the folder of a run, and remove what a killed process was writing there.
+
+    Raises
+    ------
+    ConfigError
+        Another process is at work there.
+    StoreError
+        The disk refused.
+    """
+    with hold(folder, "run"):
+        remove_temporaries(folder / part for part in OWN_FOLDERS)
+        yield
+
+
+def is_left_locked(folder: Path) -> bool:
+    """Whether somebody is at work in a folder, or died there."""
+    return (folder / LOCK_FILE).exists()
 
 
 def check_files(folder: Path, about: Mapping[str, Any]) -> None:

@@ -287,6 +287,8 @@ def start(folder, jobs):
     return subprocess.Popen(
         [sys.executable, HERE / "sweep_cells.py", str(folder), str(jobs)],
         stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True, cwd=HERE,
+        # whoever runs the tests in the background may ignore it, and a child inherits that
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL) and None,
     )  # fmt: skip
 
 
