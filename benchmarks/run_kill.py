@@ -26,7 +26,7 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +70,7 @@ def main() -> int:
     rng, bad = np.random.default_rng(given.seed), 0
     with tempfile.TemporaryDirectory() as folder:
         base = Path(folder)
-        finish(start(RUN, prepare(base / "first")))  # imports what the first run imports
+        here(RUN, prepare(base / "first"))
         took = timed(RUN, prepare(base / "whole"))
         whole = values(base / "whole")
         print(f"undisturbed: {len(whole)} files, {took:.1f} s", flush=True)
@@ -199,7 +199,7 @@ class Forked:
     """The command in a fork of this process and a group of its own, with what of `Popen` is asked for here."""
 
     def __init__(self, words: tuple[str, ...], folder: Path) -> None:
-        self.said = tempfile.TemporaryFile()
+        self.said = tempfile.TemporaryFile()  # noqa: SIM115 (lives as long as the process)
         self.returncode: int | None = None
         self.pid = os.fork()
         if self.pid == 0:
@@ -234,6 +234,18 @@ class Forked:
             time.sleep(0.005)
         self.said.seek(0)
         return None, self.said.read()
+
+
+def here(words: tuple[str, ...], folder: Path) -> None:
+    """The command in this very process, so that it has imported what forks of it need."""
+    place, output = os.getcwd(), os.dup(1)
+    os.chdir(folder)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    sys.argv = ["rislam-rt", words[0], PIPELINE, *words[1:]]
+    with suppress(SystemExit):
+        cli_main()
+    os.chdir(place)
+    os.dup2(output, 1)
 
 
 def start(words: tuple[str, ...], folder: Path, *, fresh: bool = False) -> Any:
