@@ -22,8 +22,8 @@ def on_files(files: Files, config: Any) -> Files:
 def cli_page() -> Iterator[str]:
     """Every command with its arguments and options."""
     yield "# Command line\n"
-    yield "`rislam-rt COMMAND --help` says the same. Exit codes: 0 done, 1 a failure in the work, 2 bad input, 3 the machine"
-    yield "lacks something, 4 the disk.\n"
+    yield "`rislam-rt COMMAND --help` says the same. Exit codes: 0 done, 1 a failure in the work, 2 bad"
+    yield "input, 3 the machine lacks something, 4 the disk.\n"
     group: Any = typer.main.get_command(app)
     for name, command in group.commands.items():
         context = command.context_class(command, info_name=f"rislam-rt {name}")

@@ -1,4 +1,4 @@
-"""The documentation builds as a site, without a warning: every page is reached, every link and every name leads somewhere."""
+"""The documentation builds as a site without a warning: every page is reached, every link leads somewhere."""
 
 import os
 import subprocess
