@@ -42,7 +42,7 @@ def run_compare_channels(spec: "CompareSpec", given: Given) -> None:
     opened = [open_scene(_beside(given.pipeline, room.scene)) for room in spec.rooms]
     scenes = [one.scene for one in opened]
     record = study_record(spec, scenes)
-    folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record)
+    folder = output_folder(given.out, f"{spec.name}-{spec.seed}", record)
     prepare_channel("traced")
     for one in opened:
         one.warn()
@@ -72,7 +72,7 @@ def run_gain_curves(spec: "Fig4aSpec", given: Given) -> None:
     scene = opened.scene
     check_fig4a(scene, spec)
     record = study_record(spec, [scene])
-    folder = study_folder(given.out, f"{spec.name}-{scene.name}-{spec.seed}", record)
+    folder = output_folder(given.out, f"{spec.name}-{scene.name}-{spec.seed}", record)
     prepare_channel(spec.channel)
     opened.warn()
     with show_progress() as progress:
@@ -98,7 +98,7 @@ def run_swept(spec: "SweptSpec", given: Given) -> None:
     sweep = build_sweep(spec, given.pipeline, given.scene)
     found = build_cells(sweep)
     record, cells = swept_record(spec, sweep, given.pipeline), Path("sweeps") / spec.name
-    folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record)
+    folder = output_folder(given.out, f"{spec.name}-{spec.seed}", record)
     check_folder(cells)
     for kind in {cell.depends["config"]["channel"] for cell in found}:
         prepare_channel(kind)
@@ -131,7 +131,7 @@ def run_claims(spec: "ClaimsSpec", given: Given) -> None:
     found = judge(results)
     names = ("seed", "scenes", "versions")
     sources = {study: {name: content[name] for name in names} for study, content in results.items()}
-    folder = study_folder(given.out, spec.name, results)
+    folder = output_folder(given.out, spec.name, results)
     for claim in found:
         typer.echo(f"{claim.verdict}: {claim.claim}")
     typer.echo(f"page: {write_claims(found, spec.name, sources, folder)}")
@@ -143,7 +143,7 @@ def _beside(pipeline: Path, scene: str) -> Path:
     return Path(os.path.normpath(pipeline.parent / scene))
 
 
-def study_folder(out: Path | None, name: str, record: "Mapping[str, Any]") -> Path:
+def output_folder(out: Path | None, name: str, record: "Mapping[str, Any]") -> Path:
     """Where the files go: `--out`, whose folder they may share with others, or `runs/<name>-<hash of the record>`.
 
     Raises
