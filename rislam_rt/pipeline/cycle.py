@@ -36,6 +36,8 @@ class Room(NamedTuple):
     paths: Paths
     """As the array hears them (`told.deceive`)."""
     trajectory: Trajectory
+    doppler: Floats
+    """(K, P) shifts [Hz]: what paths turn by within the measurement slot."""
     faults: PanelErrors | None = None
     """What the panel does wrong; None without a panel."""
 
@@ -114,7 +116,7 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
         paths = rephase(paths, applied, 1.0 if room.faults is None else room.faults.weight)
     measurement, truth = measure(
         paths, 0, float(room.trajectory.heading[cycle]), means.settings.radio, means.settings.receiver, agent.heard,
-        rng=rng.noise,
+        room.doppler[cycle], rng=rng.noise,
     )  # fmt: skip
     clock.append(perf_counter())
 

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.backend import prepare_backend
+from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.channel.protocol import Channel
-from rislam_rt.errors import ConfigError, RislamError
+from rislam_rt.errors import ConfigError, RislamError, expect
 from rislam_rt.model import (
     Body,
     PathKind,
@@ -25,7 +26,7 @@ from rislam_rt.pipeline.change import change_room
 from rislam_rt.pipeline.choose import build_designer
 from rislam_rt.pipeline.control import check_control, open_link
 from rislam_rt.pipeline.cycle import Agent, Cycle, Means, Rng, Room, run_cycle
-from rislam_rt.pipeline.estimators import ESTIMATORS
+from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.motion import draw_motion
 from rislam_rt.pipeline.record import gather
 from rislam_rt.pipeline.schemes import SCHEMES
@@ -119,6 +120,9 @@ def run_slam(
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
+    expect("scene", scene, Scene)
+    expect("spec", spec, PipelineSpec)
+    expect("rng", rng, np.random.Generator)
     done = {} if done is None else done
     tell = progress or (lambda stage, at, total: None)
     tell("trace", 0, 1)
@@ -147,8 +151,10 @@ def result_of(stage: Stage, spec: PipelineSpec, schemes: Mapping[str, SchemeResu
     )
 
 
-def run_scheme(name: str, stage: Stage, spec: PipelineSpec, tell: Progress) -> SchemeResult:
-    """One scheme over all cycles."""
+def run_scheme(
+    name: str, stage: Stage, spec: PipelineSpec, tell: Progress, estimator: Estimator | None = None
+) -> SchemeResult:
+    """One scheme over all cycles, with its own estimator unless another is given."""
     settings, scheme, seeds = build_settings(spec), SCHEMES[name], stage.seeds
     motion, ris = stage.scene.agent, stage.scene.ris
     panel = ris.spec if ris is not None and scheme.panel else None
@@ -156,13 +162,14 @@ def run_scheme(name: str, stage: Stage, spec: PipelineSpec, tell: Progress) -> S
     start = np.random.default_rng(seeds.start)
     told = tell_belief(motion, stage.body, panel, spec, settings, start=start, compass=compass)
     paths = stage.paths if panel is not None else without_panel(stage.paths)
-    room = Room(deceive(paths, motion, spec.told, rng=sway), motion)
+    shift = doppler_shift(stage.paths, motion, settings.radio.wavelength)
+    room = Room(deceive(paths, motion, spec.told, rng=sway), motion, shift)
     designer = None
     if panel is not None:
         tolerance = spec.panel.tolerance
         room = room._replace(faults=draw_panel(panel, tolerance, rng=np.random.default_rng(seeds.panel)))
         designer = build_designer(scheme, panel, room, spec, settings, told)
-    estimator = ESTIMATORS[scheme.estimator]
+    estimator = estimator or ESTIMATORS[scheme.estimator]
     means = Means(panel, designer, estimator, spec, settings, told)
     filter_rng, design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
     config = estimator.config(told.settings)

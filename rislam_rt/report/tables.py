@@ -118,7 +118,7 @@ def _nearest(limits: "Mapping[str, Any]") -> str:
 
 def print_validation(rows: Sequence["Validation"]) -> None:
     """One line a room and kind of numbers: counts, and the largest error in length; then what fails."""
-    table = Table("room", "numbers", "matched", "explained", "unexplained", "beyond", "length \\[m]")
+    table = Table("room", "numbers", "matched", "explained", "open", "beyond", "length \\[m]")
     for scene, _, numbers, report in rows:
         counts = (report.matched, sum(report.explained.values()), report.unexplained, report.num_breaches)
         length = report.as_dict()["max_length_error_m"]
@@ -129,6 +129,8 @@ def print_validation(rows: Sequence["Validation"]) -> None:
             print(f"unexplained: {scene}, {numbers}, pose {path.cycle}, {path.label}, only {path.side}")
         for breach in report.breaches[:10]:
             print(f"beyond its limit: {scene}, {numbers}, {breach}")
+    unexplained, beyond = sum(r.report.unexplained for r in rows), sum(r.report.num_breaches for r in rows)
+    print(f"{unexplained} unexplained paths, {beyond} errors beyond their limits")
 
 
 def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"]) -> None:

@@ -19,6 +19,7 @@ class SlamConfig:
     """Everything that the filter is free to choose. SI units."""
 
     filter: str = "rao_blackwellised"
+    """Who localises and maps; all filters have the same inputs and outputs."""
     num_particles: int = 1
     """Gaussian particles that the start prior is split into: more where it is too wide to be linear in."""
     particle_share: float = 0.5

@@ -8,11 +8,13 @@ import mitsuba as mi
 import numpy as np
 import sionna.rt as rt
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.traced.material import ConstantReflection
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
+from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.errors import SceneError
+from rislam_rt.geometry.triangles import inside_any
 from rislam_rt.model import Material
 
 NO_SHADE = -1
@@ -39,6 +41,7 @@ class Stage:
     """A Sionna RT scene and the correspondence of its (shape, primitive) pairs with walls."""
 
     scene: rt.Scene
+    walls: Walls
     origin: Floats
     """(3,) [m] point of the room that is the tracer's zero."""
     shape: Integers
@@ -74,6 +77,29 @@ class Stage:
         known = (place < len(self.shapes)) & np.isin(shape, self.shapes)
         index = np.where(known, self.first[np.where(known, place, 0)] + primitive, 0)
         return np.where(known, self.wall_of_primitive[index], NO_WALL)
+
+    def is_stacked(self, wall: Integers) -> Booleans:
+        """Whether walls (...,) lie on others or others on them."""
+        sharing = np.bincount(self.walls.plane, minlength=len(self.walls)) > 1
+        return (wall != NO_WALL) & sharing[self.walls.plane[wall]] if len(self.walls) else wall != NO_WALL
+
+    def share_plane(self, a: Integers, b: Integers) -> Booleans:
+        """Whether walls (...,) are in one plane by lying on each other."""
+        return (a != NO_WALL) & (b != NO_WALL) & (self.walls.plane[a] == self.walls.plane[b])
+
+    def on_top(self, wall: Integers, points: Floats) -> Booleans:
+        """Whether walls (N, D) are there at points (N, D, 3) [m] and nothing lies on them; true for `NO_WALL`."""
+        top = np.ones(wall.shape, dtype=np.bool_)
+        for number in np.unique(wall[self.is_stacked(wall)]):
+            here = wall == number
+            top[here] = self._has(number, points[here])
+            for upper in self.walls.over[number]:
+                top[here] &= ~self._has(upper, points[here])
+        return top
+
+    def _has(self, wall: int, points: Floats) -> Booleans:
+        """Which points (N, 3) of its plane are on a wall, within the uncertainty of float32 vertices."""
+        return inside_any(points, self.walls.triangles[self.walls.wall_of_triangle == wall], SURFACE_TOLERANCE)
 
 
 def build_stage(walls: Walls, carrier: float, origin: Floats, shades: Mapping[int, Floats]) -> Stage:
@@ -144,6 +170,7 @@ def _numbered(
     largest = by_size[np.unique(walls.wall_of_triangle[by_size], return_index=True)[1]]
     return Stage(
         scene,
+        walls,
         origin,
         shape_of[largest],
         primitive_of[largest],

@@ -21,7 +21,9 @@ class BpSlamConfig:
     range_std: float = 0.1
     """Standard deviation of a range [m], where the measurement brings none of its own."""
     detection_probability: float = 0.95
+    """Published form: that a feature in reach is measured."""
     survival_probability: float = 0.999
+    """That a feature is still there after one step."""
     clutter_mean: float = 1.0
     """Published form: false ranges a scan, Poisson. The moving form takes what the agent is told of its receiver."""
     max_range: float = 30.0
