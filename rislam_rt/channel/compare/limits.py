@@ -22,8 +22,8 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.cross_section import cross_section
 from rislam_rt.channel.image_source.fresnel import relative_permittivity, slab_coefficients
-from rislam_rt.channel.traced.limits import RAY_OFFSET
 from rislam_rt.channel.walls import Walls, build_walls
+from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, PathKind, Paths, RadioConfig, Scene, Trajectory
 
