@@ -33,7 +33,7 @@ def command(
 
     An interrupted run goes on where it stopped when the same command is given again, and a completed one is shown;
     other settings make another folder.
-    A file of another kind is a study: 'compare_channels' (exit code 1 if a path is unexplained), 'fig4a', 'claims',
+    A file of another kind is a study: 'compare_channels' (exit code 1 if the channels differ), 'fig4a', 'claims',
     'train_classifier', or 'fig4b', 'fig4c', 'rooms', 'ablations', 'unseen', which go through settings, rooms and seeds
     (exit code 1 if a run failed).
     """
