@@ -12,46 +12,22 @@ import numpy as np
 from rislam_rt.backend import prepare_backend
 from rislam_rt.channel.protocol import Channel
 from rislam_rt.errors import ConfigError, RislamError
-from rislam_rt.model import (
-    PathKind,
-    Paths,
-    RadioConfig,
-    Scene,
-    SchemeResult,
-    SlamResult,
-    Trajectory,
-)
+from rislam_rt.model import Paths, RadioConfig, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.change import change_room
-from rislam_rt.pipeline.choose import build_designer
-from rislam_rt.pipeline.control import check_control, open_link
-from rislam_rt.pipeline.cycle import Agent, Cycle, Means, Rng, Room, run_cycle
-from rislam_rt.pipeline.estimators import ESTIMATORS
+from rislam_rt.pipeline.control import check_control
 from rislam_rt.pipeline.motion import draw_motion
-from rislam_rt.pipeline.record import gather
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.spec import PipelineSpec, Settings, build_radio, build_settings
+from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
+from rislam_rt.pipeline.spec import PipelineSpec, build_radio
+from rislam_rt.pipeline.walk import Walk
 from rislam_rt.pipeline.workers import run_side_by_side
-from rislam_rt.ris import delay_spread_warnings, draw_panel
-from rislam_rt.slam import StartPrior
+from rislam_rt.ris import delay_spread_warnings
 
 Progress = Callable[[str, int, int], None]
 """Told the stage (`trace` or a scheme), how much of it is done, and how much there is."""
 
 LIBRARIES = ("numpy", "scipy", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-core")
 """Libraries that numbers depend on; their versions go into every result."""
-
-
-class Seeds(NamedTuple):
-    """Every scheme draws the same motion, start, noise, losses and filter numbers: only its codes differ."""
-
-    start: np.random.SeedSequence
-    noise: np.random.SeedSequence
-    control: np.random.SeedSequence
-    filter: np.random.SeedSequence
-    design: np.random.SeedSequence
-    motion: np.random.SeedSequence
-    panel: np.random.SeedSequence
-    room: np.random.SeedSequence
 
 
 class Stage(NamedTuple):
@@ -66,6 +42,21 @@ class Stage(NamedTuple):
     """Time [s] that the channel took."""
 
 
+def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> tuple[Scene, Seeds]:
+    """The room of a run with its true motion, and the run's seeds.
+
+    Raises
+    ------
+    ConfigError
+        Scene and specification do not fit (see `check_run`).
+    """
+    check_run(scene, spec)
+    seeds = spawn_seeds(rng)
+    scene = change_room(cut_scene(scene, spec.cycles), spec.room, rng=np.random.default_rng(seeds.room))
+    motion = draw_motion(scene, spec.motion.sigma_a_m_s2, rng=np.random.default_rng(seeds.motion))
+    return replace(scene, agent=motion), seeds
+
+
 def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> Stage:
     """Draw the true motion and find all paths along it. None of it depends on the noise, so that one stage serves many.
 
@@ -76,13 +67,9 @@ def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
-    check_run(scene, spec)
-    seeds = Seeds(*rng.bit_generator.seed_seq.spawn(len(Seeds._fields)))  # type: ignore[attr-defined]
-    scene = change_room(cut_scene(scene, spec.cycles), spec.room, rng=np.random.default_rng(seeds.room))
-    motion = draw_motion(scene, spec.motion.sigma_a_m_s2, rng=np.random.default_rng(seeds.motion))
-    scene = replace(scene, agent=motion)
+    scene, seeds = set_scene(scene, spec, rng=rng)
     begin = perf_counter()
-    paths = build_channel(spec.channel, scene, build_radio(spec.radio), spec.depth).paths(motion)
+    paths = build_channel(spec.channel, scene, build_radio(spec.radio), spec.depth).paths(scene.agent)
     return Stage(scene, paths, seeds, perf_counter() - begin)
 
 
@@ -145,30 +132,8 @@ def result_of(stage: Stage, spec: PipelineSpec, schemes: Mapping[str, SchemeResu
 
 def run_scheme(name: str, stage: Stage, spec: PipelineSpec, tell: Progress) -> SchemeResult:
     """One scheme over all cycles."""
-    settings, scheme, seeds = build_settings(spec), SCHEMES[name], stage.seeds
-    motion, ris = stage.scene.agent, stage.scene.ris
-    panel = ris.spec if ris is not None and scheme.panel else None
-    room = Room(without_panel(stage.paths), motion)
-    designer = None
-    if panel is not None:
-        tolerance = spec.panel.tolerance
-        room = Room(stage.paths, motion, draw_panel(panel, tolerance, rng=np.random.default_rng(seeds.panel)))
-        designer = build_designer(scheme, panel, room, spec, settings)
-    estimator = ESTIMATORS[scheme.estimator]
-    means = Means(panel, designer, estimator, spec, settings)
-    filter_rng, design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
-    start, config = _start(motion, spec, seeds, settings), estimator.config(settings)
-    state = estimator.init(start, motion.body, panel, settings.radio, config, rng=filter_rng)
-    agent = Agent(state, open_link(panel) if panel is not None else None)
-    noise, control = (_children(s, len(motion)) for s in (seeds.noise, seeds.control))
-    cycles: list[Cycle] = []
-    tell(name, 0, len(motion))
-    for cycle in range(len(motion)):
-        rng = Rng(design_rng, control[cycle], noise[cycle], filter_rng)
-        agent, outcome = run_cycle(agent, room, cycle, means, rng=rng)
-        cycles.append(outcome)
-        tell(name, cycle + 1, len(motion))
-    return gather(name, cycles, panel.levels if panel is not None else 0)
+    walk = Walk(name, stage.scene, spec, stage.seeds)
+    return walk.lead(stage.paths, 0, len(stage.scene.agent), tell)
 
 
 def check_run(scene: Scene, spec: PipelineSpec) -> None:
@@ -224,12 +189,6 @@ def cut_scene(scene: Scene, cycles: int | None) -> Scene:
     return scene if cycles is None else replace(scene, agent=scene.agent[:cycles])
 
 
-def without_panel(paths: Paths) -> Paths:
-    """The paths of a plain wall where the panel hangs: identities stay, panel paths are never there."""
-    panel = np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS))
-    return replace(paths, valid=paths.valid & ~panel, gain=np.where(panel, 0.0, paths.gain), ris=None)
-
-
 def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
     """Where the panel's formulas leave their range along the true motion; one line each, empty if nowhere.
 
@@ -255,27 +214,7 @@ def library_versions() -> dict[str, str]:
     return found
 
 
-def _start(motion: Trajectory, spec: PipelineSpec, seeds: Seeds, settings: Settings) -> StartPrior:
-    """What the agent is told: the truth plus one draw of the prior's errors; a known height is told exactly."""
-    rng = np.random.default_rng(seeds.start)
-    axes = np.array([1.0, 1.0, 1.0 if settings.slam.height == "estimated" else 0.0])
-    position_std, velocity_std = spec.start.position_std_m, spec.start.velocity_std_m_s
-    return StartPrior(
-        motion.position[0] + rng.standard_normal(3) * position_std * axes,
-        motion.velocity[0] + rng.standard_normal(3) * velocity_std * axes,
-        float(motion.heading[0]),
-        position_std,
-        velocity_std,
-    )
-
-
 def _seed_of(rng: np.random.Generator) -> int | None:
     """The integer that the generator was made from, if it was."""
     entropy = getattr(rng.bit_generator.seed_seq, "entropy", None)
     return entropy if isinstance(entropy, int) else None
-
-
-def _children(seed: np.random.SeedSequence, count: int) -> list[np.random.Generator]:
-    """One generator a cycle, the same ones every time, however many numbers a cycle draws."""
-    keys = (np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, cycle)) for cycle in range(count))
-    return [np.random.default_rng(key) for key in keys]
