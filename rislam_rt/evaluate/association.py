@@ -44,7 +44,11 @@ def association_fractions(labels: Integers, identities: Integers, counts: Intege
     own = counts[np.ix_(labels != NONE, identities != NONE)]
     right = int(own[linear_sum_assignment(own, maximize=True)].sum()) if own.size else 0
     left_alone = int(counts[np.ix_(labels == NONE, identities == NONE)].sum())
-    total, answered, known = int(counts.sum()), int(counts[labels != NONE].sum()), int(counts[:, identities != NONE].sum())
+    total, answered, known = (
+        int(counts.sum()),
+        int(counts[labels != NONE].sum()),
+        int(counts[:, identities != NONE].sum()),
+    )
     return (
         (right + left_alone) / total if total else 1.0,
         right / answered if answered else 1.0,

@@ -47,7 +47,13 @@ def _on_truth(method: str, panel: RisSpec, spec: PipelineSpec, settings: Setting
         there = room.trajectory[due : due + 1]
         try:
             problem = problem_from_paths(
-                room.at(due), there.tx[0], there.rx[0], settings.radio, panel.levels, prior=prior, least_snr=spec.design.least_snr
+                room.at(due),
+                there.tx[0],
+                there.rx[0],
+                settings.radio,
+                panel.levels,
+                prior=prior,
+                least_snr=spec.design.least_snr,
             )
         except ConfigError:  # the panel is out of sight: any code will do
             return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)

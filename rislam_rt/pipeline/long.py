@@ -88,7 +88,7 @@ def gather_long(folder: Path, scene: Scene, about: Mapping[str, Any]) -> LongRun
     stride = -(-len(scene.agent) // SHOWN)
     lines = (*about["warnings"], f"a run in slices: figures show every {stride}th cycle, and there is no bound")
     shown = SlamResult(scene=replace(scene, agent=motion), paths=paths, schemes=schemes,
-                       **{**about, "warnings": lines if stride > 1 else lines})  # fmt: skip
+                       **{**about, "warnings": lines})  # fmt: skip
     summary = {
         "seed": about["seed"],
         "cycles": len(scene.agent),
