@@ -15,7 +15,7 @@ demo: $(READY)
 	@$(BIN)/rislam-rt run pipelines/trace_then_slam.toml --scene scenes/paper_room
 
 test: $(READY)
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest -n 2
 
 check: $(READY)
 	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy

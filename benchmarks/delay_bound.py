@@ -21,7 +21,7 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.information import MotionPrior, Rows, build_landmark_model, posterior_bound
 from rislam_rt.information.landmarks import LandmarkModel, mirror_chain
 from rislam_rt.information.position import range_information
-from rislam_rt.measurement.false_alarms import detection_threshold
+from rislam_rt.measurement import build_sensor
 from rislam_rt.model import PathKind, SlamResult
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.bound import SILENT, fewer_rows, heard_paths
@@ -80,8 +80,8 @@ def bound(result: SlamResult, least_std: float) -> tuple[float, float]:
     """Root mean squares along and across the walk as it was told [m]."""
     spec = PipelineSpec.model_validate(dict(result.config))
     settings, found = build_settings(spec), result.schemes["bp_slam"]
-    threshold = detection_threshold(settings.radio, settings.receiver)
-    paths = heard_paths(result.paths.with_gain(found.gain), settings, threshold, use_vt=True)
+    sensor = build_sensor(settings.radio, settings.receiver)
+    paths = heard_paths(result.paths.with_gain(found.gain), sensor, use_vt=True)
     walls = build_walls(result.scene)
     model = build_landmark_model(
         paths, result.scene.agent, result.scene.landmark_positions, walls.normal, walls.offset, settings.radio,
@@ -89,7 +89,7 @@ def bound(result: SlamResult, least_std: float) -> tuple[float, float]:
     )  # fmt: skip
     columns = Columns(model)
     motion = MotionPrior(settings.bp_slam.sigma_a, spec.start.position_std_m, spec.start.velocity_std_m_s, 2)
-    rows = rows_of(model, columns, SILENT * threshold, least_std)
+    rows = rows_of(model, columns, SILENT * sensor.threshold, least_std)
     covariance = posterior_bound(rows, result.scene.agent.time, motion, np.array(columns.std)).agent[:, :2, :2]
     ahead = unit(found.velocity[0][:2])
     axes = np.array([ahead, [-ahead[1], ahead[0]]])

@@ -37,6 +37,7 @@ from rislam_rt.model import (
     RisSpec,
     RxArray,
     Scene,
+    SensorModel,
     SlamEstimate,
     Trajectory,
 )
@@ -368,7 +369,7 @@ def run_case(case: Case) -> Verdict:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            state = init(case.start, case.body, case.panel, case.radio, case.config, rng=rng)
+            state = init(case.start, case.body, case.panel, SensorModel(case.radio), case.config, rng=rng)
             for row, cycle in enumerate(case.cycles):
                 state, info = step(
                     state, cycle.measurement, cycle.code, cycle.dt, cycle.heading, case.config, rng=rng

@@ -11,3 +11,6 @@ COPLANAR_ANGLE = 1e-4
 
 COPLANAR_OFFSET = 1e-4
 """Distance [m] between two triangles' planes below which they are the same wall; PLY files hold float32."""
+
+RAY_OFFSET = 6e-6
+"""Sionna RT starts a ray off its surface by this much of (1 m + the largest coordinate): 100 float32 roundings."""

@@ -4,10 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.shades import Shades, build_shades
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
-from rislam_rt.geometry.triangles import planar_groups, triangle_planes
+from rislam_rt.geometry.flat import flat_parts
+from rislam_rt.geometry.planes import signed_distance
+from rislam_rt.geometry.stack import stack_walls, tracer_gap
 from rislam_rt.model import Material, Scene
 
 
@@ -27,6 +29,10 @@ class Walls:
     """(T, 3, 3) [m], reflector by reflector in the order of their faces."""
     wall_of_triangle: Integers
     """(T,)."""
+    plane: Integers
+    """(W,) the wall whose plane each shares: its own number, unless it lies on another or another on it."""
+    over: tuple[Integers, ...]
+    """(W,) for each wall those that lie on it: where they are, they reflect and it does not."""
     host: int
     """The wall behind the panel, -1 without one."""
     shades: Shades
@@ -35,39 +41,54 @@ class Walls:
     def __len__(self) -> int:
         return len(self.names)
 
+    def beside(self, wall: int) -> Booleans:
+        """(W,) which walls share a wall's plane by lying on each other; none for -1."""
+        return (self.plane == self.plane[wall]) if wall >= 0 else np.zeros(len(self), dtype=np.bool_)
+
 
 def build_walls(scene: Scene) -> Walls:
-    """Number the walls of a scene.
+    """Number the walls of a scene, each the plane that fits all its corners.
 
-    The panel's host wall is the plane of the reflector named `host` that lies nearest to the panel's centre.
+    Walls that lie on each other share one plane, that of the largest, into which the others are moved. The panel's host
+    wall is the plane of the reflector named `host` that lies nearest to the panel's centre.
     """
-    names: list[str] = []
-    materials: list[Material] = []
-    normals, offsets, triangles, owner = [], [], [], []
-    host = -1
-    host_distance = np.inf
-    for reflector in scene.reflectors:
-        group = planar_groups(reflector.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET)
-        normal, offset = triangle_planes(reflector.triangles)
-        for facet in range(group.max() + 1):
-            first = int(np.argmax(group == facet))
-            if scene.ris is not None and scene.ris.host == reflector.name:
-                distance = abs(float(normal[first] @ scene.ris.center - offset[first]))
-                if distance < host_distance:
-                    host, host_distance = len(names), distance
-            names.append(reflector.name if group.max() == 0 else f"{reflector.name}#{facet}")
-            materials.append(reflector.material)
-            normals.append(normal[first])
-            offsets.append(offset[first])
-        triangles.append(reflector.triangles)
-        owner.append(group + len(names) - (group.max() + 1))
+    parts = [flat_parts(reflector.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for reflector in scene.reflectors]
+    counts = [len(part.offset) for part in parts]
+    first = np.cumsum([0, *counts])
+    triangles = np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in scene.reflectors)])
+    nothing = np.zeros(0, dtype=np.int64)
+    owner = np.concatenate([nothing, *(part.group + start for part, start in zip(parts, first, strict=False))])
+    normal = np.concatenate([np.zeros((0, 3)), *(part.normal for part in parts)])
+    offset = np.concatenate([np.zeros(0), *(part.offset for part in parts)])
+    stack = stack_walls(triangles, owner, normal, offset, tracer_gap(scene.bounds))
+    normal, offset = normal[stack.plane], offset[stack.plane]
+    moved = np.flatnonzero((stack.plane != np.arange(len(normal)))[owner])
+    height = signed_distance(triangles[moved], normal[owner[moved], None], offset[owner[moved], None])
+    triangles[moved] -= height[..., None] * normal[owner[moved], None]
     return Walls(
-        tuple(names),
-        np.array(normals, dtype=np.float64).reshape(-1, 3),
-        np.array(offsets, dtype=np.float64),
-        tuple(materials),
-        np.concatenate(triangles) if triangles else np.zeros((0, 3, 3)),
-        np.concatenate(owner) if owner else np.zeros(0, dtype=np.int64),
-        host,
+        tuple(name for r, count in zip(scene.reflectors, counts, strict=True) for name in _names(r.name, count)),
+        normal,
+        offset,
+        tuple(r.material for r, count in zip(scene.reflectors, counts, strict=True) for _ in range(count)),
+        triangles,
+        owner,
+        stack.plane,
+        stack.over,
+        _host(scene, np.repeat(np.arange(len(counts)), counts), normal, offset),
         build_shades(scene),
     )
+
+
+def _names(reflector: str, count: int) -> list[str]:
+    """Names of the walls of one reflector."""
+    return [reflector] if count == 1 else [f"{reflector}#{facet}" for facet in range(count)]
+
+
+def _host(scene: Scene, reflector: Integers, normal: Floats, offset: Floats) -> int:
+    """The wall behind the panel, of walls whose `reflector` (W,) is given."""
+    panel, names = scene.ris, [r.name for r in scene.reflectors]
+    if panel is None or panel.host not in names:
+        return -1
+    of_host = np.flatnonzero(reflector == names.index(panel.host))
+    distance = np.abs(signed_distance(panel.center, normal[of_host], offset[of_host]))
+    return int(of_host[np.argmin(distance)]) if len(of_host) else -1

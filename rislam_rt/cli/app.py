@@ -2,16 +2,16 @@
 
 import typer
 
-from rislam_rt.cli import check, compare, design, doctor, new, report, run, show, sweep, trace
+from rislam_rt.cli import check, compare, config, design, doctor, new, pipelines, report, run, show, sweep, trace
 
 app = typer.Typer(
     name="rislam-rt",
     epilog="Exit codes: 0 done, 1 a failure in the work, 2 bad input, 3 the machine lacks something, 4 the disk.",
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _command in (run, trace, compare, design, check, new, show, sweep, report, doctor):
+for _command in (run, sweep, pipelines, config, new, check, show, trace, compare, design, report, doctor):
     app.command(_command.__name__.rpartition(".")[2])(_command.command)
 
 

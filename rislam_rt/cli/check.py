@@ -14,7 +14,7 @@ def command(scene: SceneFolder, json: JsonFile = None) -> None:
     findings = check_scene(Path(scene))
     for finding in findings:
         typer.echo(f"{finding.severity}: {finding.line}")
-    errors = sum(finding.severity == "error" for finding in findings)
+    errors, warnings = (sum(f.severity == severity for f in findings) for severity in ("error", "warning"))
     fields = ("severity", "file", "field", "message", "mend")
     write_json(
         json,
@@ -24,6 +24,6 @@ def command(scene: SceneFolder, json: JsonFile = None) -> None:
             "findings": [{name: getattr(finding, name) for name in fields} for finding in findings],
         },
     )
-    typer.echo(f"{scene}: {errors} errors, {len(findings) - errors} warnings")
+    typer.echo(f"{scene}: {errors} errors, {warnings} warnings")
     if errors:
         raise typer.Exit(2)

@@ -5,11 +5,30 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from rislam_rt.shipped import find_pipeline, find_room
+
 SceneFolder = Annotated[
-    Path, typer.Argument(metavar="SCENE", help="Scene folder, or its scene.toml.", show_default=False)
+    Path,
+    typer.Argument(
+        metavar="SCENE", help="Scene folder, or the name of a built-in room.", parser=find_room, show_default=False
+    ),
 ]
-PipelineFile = Annotated[Path, typer.Argument(metavar="PIPELINE", help="Pipeline file (TOML).", show_default=False)]
-SceneOption = Annotated[Path | None, typer.Option(metavar="DIR", help="Scene folder; the pipeline's own by default.")]
+PipelineFile = Annotated[
+    Path,
+    typer.Argument(
+        metavar="PIPELINE", help="Pipeline file (TOML), or the name of a built-in one.", parser=find_pipeline
+    ),
+]
+MAIN_JOB = Path("trace_then_slam")
+"""The pipeline of a command that names none."""
+SceneOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR",
+        help="Scene folder, or the name of a built-in room; the pipeline's own by default.",
+        parser=find_room,
+    ),
+]
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a setting, e.g. radio.bandwidth_ghz=0.5; repeatable."),

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import JsonFile, PipelineFile, SceneOption, Settings, write_json
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, write_json
 from rislam_rt.cli.study import Given
 
 if TYPE_CHECKING:
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def command(
-    pipeline: PipelineFile,
+    pipeline: PipelineFile = MAIN_JOB,
     scene: SceneOption = None,
     set_: Settings = None,
     out: Annotated[
@@ -29,11 +29,19 @@ def command(
 
     An interrupted run goes on where it stopped when the same command is given again; a completed one is replaced.
     A file of another kind is a study: 'compare_channels' (exit code 1 if a path is unexplained), 'fig4a', 'claims',
-    'train_classifier', or 'fig4b', 'fig4c', 'rooms', 'ablations', which go through settings and seeds (exit code 1 if a
-    run failed).
+    'train_classifier', or 'fig4b', 'fig4c', 'rooms', 'ablations', 'unseen', which go through settings, rooms and seeds
+    (exit code 1 if a run failed).
     """
     from rislam_rt.cli.study import run_claims, run_compare_channels, run_gain_curves, run_swept
-    from rislam_rt.pipeline.studies import ClaimsSpec, ClassifierSpec, CompareSpec, Fig4aSpec, SweptSpec, load_any
+    from rislam_rt.pipeline.studies import (
+        ClaimsSpec,
+        ClassifierSpec,
+        CompareSpec,
+        Fig4aSpec,
+        SweptSpec,
+        UnseenSpec,
+        load_any,
+    )
 
     spec = load_any(pipeline, set_ or ())
     given = Given(pipeline, scene, out, jobs, json, page)
@@ -41,6 +49,10 @@ def command(
         run_compare_channels(spec, given)
     elif isinstance(spec, Fig4aSpec):
         run_gain_curves(spec, given)
+    elif isinstance(spec, UnseenSpec):
+        from rislam_rt.cli.unseen import run_unseen
+
+        run_unseen(spec, given)
     elif isinstance(spec, SweptSpec):
         run_swept(spec, given)
     elif isinstance(spec, ClaimsSpec):

@@ -36,7 +36,7 @@ def open_scene(path: Path) -> Opened:
 
     findings = check_scene(path)
     raise_errors(findings)
-    return Opened(load_scene(path), tuple(finding.line for finding in findings))
+    return Opened(load_scene(path), tuple(f.line for f in findings if f.severity == "warning"))
 
 
 def scene_of(option: Path | None, spec: "PipelineSpec | Fig4aSpec", pipeline: Path) -> Path:

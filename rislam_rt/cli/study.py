@@ -40,7 +40,7 @@ def run_compare_channels(spec: "CompareSpec", given: Given) -> None:
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'compare_channels' names its rooms; set 'rooms'")
     opened = [open_scene(_beside(given.pipeline, room.scene)) for room in spec.rooms]
-    folder = _folder(given.out, Path("runs") / f"{spec.name}-{spec.seed}")
+    folder = output_folder(given.out, Path("runs") / f"{spec.name}-{spec.seed}")
     prepare_channel("traced")
     for one in opened:
         one.warn()
@@ -70,7 +70,7 @@ def run_gain_curves(spec: "Fig4aSpec", given: Given) -> None:
     opened = open_scene(scene_of(given.scene, spec, given.pipeline))
     scene = opened.scene
     check_fig4a(scene, spec)
-    folder = _folder(given.out, Path("runs") / f"{spec.name}-{scene.name}-{spec.seed}")
+    folder = output_folder(given.out, Path("runs") / f"{spec.name}-{scene.name}-{spec.seed}")
     prepare_channel(spec.channel)
     opened.warn()
     with show_progress() as progress:
@@ -92,7 +92,7 @@ def run_swept(spec: "SweptSpec", given: Given) -> None:
     from rislam_rt.report.swept import write_swept
 
     sweep = build_sweep(spec, given.pipeline, given.scene)
-    folder, cells = _folder(given.out, Path("runs") / f"{spec.name}-{spec.seed}"), Path("sweeps") / spec.name
+    folder, cells = output_folder(given.out, Path("runs") / f"{spec.name}-{spec.seed}"), Path("sweeps") / spec.name
     for kind in {cell.depends["config"]["channel"] for cell in build_cells(sweep)}:
         prepare_channel(kind)
     record = swept_record(spec, sweep, given.pipeline)
@@ -124,7 +124,7 @@ def run_claims(spec: "ClaimsSpec", given: Given) -> None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'claims' runs in no room; leave it out")
     results = read_results(_beside(given.pipeline, spec.results))
     found = judge(results)
-    folder = _folder(given.out, Path("runs") / spec.name)
+    folder = output_folder(given.out, Path("runs") / spec.name)
     names = ("seed", "scenes", "versions")
     sources = {study: {name: content[name] for name in names} for study, content in results.items()}
     for claim in found:
@@ -138,7 +138,7 @@ def _beside(pipeline: Path, scene: str) -> Path:
     return Path(os.path.normpath(pipeline.parent / scene))
 
 
-def _folder(out: Path | None, default: Path) -> Path:
+def output_folder(out: Path | None, default: Path) -> Path:
     """Where the files go; a study's files may join others in a folder.
 
     Raises

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import JsonFile, PipelineFile, SceneOption, Settings, write_json
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, write_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def command(
-    pipeline: PipelineFile,
+    pipeline: PipelineFile = MAIN_JOB,
     scene: SceneOption = None,
     set_: Settings = None,
     axis: Annotated[

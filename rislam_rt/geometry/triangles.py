@@ -1,8 +1,8 @@
-"""Triangles in float64: planes, planar groups, point-in-triangle and segment tests, distance to edges."""
+"""Triangles in float64: planes, point-in-triangle and segment tests, distance to edges."""
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.angles import unit
 
 
@@ -10,26 +10,6 @@ def triangle_planes(triangles: Floats) -> tuple[Floats, Floats]:
     """Unit normals (T, 3) and offsets (T,) [m] of triangles (T, 3, 3); the normal of a degenerate one is zero."""
     normal = unit(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]))
     return normal, np.einsum("ti,ti->t", normal, triangles.mean(axis=1))
-
-
-def planar_groups(triangles: Floats, angle: float, offset: float) -> Integers:
-    """Number (T,) of the plane each triangle (T, 3, 3) lies in, counted in the order of first appearance.
-
-    Two triangles share a plane when their normals agree up to sign within `angle` [rad] and every corner of the
-    one lies within `offset` [m] of the other's plane.
-    """
-    normal, distance = triangle_planes(triangles)
-    group = np.full(len(triangles), -1, dtype=np.int64)
-    count = 0
-    for seed in range(len(triangles)):
-        if group[seed] >= 0:
-            continue
-        parallel = np.linalg.norm(np.cross(normal, normal[seed]), axis=-1) <= angle
-        near = np.abs(triangles @ normal[seed] - distance[seed]).max(axis=1) <= offset
-        group[(group < 0) & parallel & near] = count
-        group[seed] = count
-        count += 1
-    return group
 
 
 def edge_planes(triangles: Floats) -> tuple[Floats, Floats]:
@@ -78,6 +58,16 @@ def distance_to_triangles(points: Floats, triangles: Floats) -> Floats:
         plane = np.where(above, height, np.inf).min(axis=1, initial=np.inf)
         nearest[rows] = np.minimum(plane, distance_to_edges(points[rows], edges))
     return nearest
+
+
+def inside_any(points: Floats, triangles: Floats, slack: float) -> Booleans:
+    """Which points (N, 3), all in the plane of triangles (T, 3, 3), lie on one, up to `slack` [m] over its edges."""
+    inward, offset = edge_planes(triangles)
+    inside = np.zeros(len(points), dtype=np.bool_)
+    for rows in np.array_split(np.arange(len(points)), max(1, len(points) * len(triangles) // 200_000)):
+        depth = (np.einsum("ni,tei->nte", points[rows], inward) - offset).min(axis=-1)
+        inside[rows] = (depth >= -slack).any(axis=-1)
+    return inside
 
 
 def edge_distance_pairs(points: Floats, triangles: Floats) -> Floats:

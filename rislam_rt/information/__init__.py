@@ -33,6 +33,7 @@ from rislam_rt.information.outcome import Outcome
 from rislam_rt.information.position import Bound, position_bound, position_information, range_information
 from rislam_rt.information.prior import prior_from_covariance, prior_from_particles
 from rislam_rt.information.recursion import MotionPrior, PosteriorBound, posterior_bound
+from rislam_rt.information.resolution import certainty_share, resolved_probability
 
 __all__ = [
     "Bound",
@@ -50,6 +51,7 @@ __all__ = [
     "WallSpread",
     "amplitude_std",
     "build_landmark_model",
+    "certainty_share",
     "cosine_gradient",
     "cosine_information",
     "delay_gain_information",
@@ -72,6 +74,7 @@ __all__ = [
     "prior_from_covariance",
     "prior_from_particles",
     "range_information",
+    "resolved_probability",
     "steering",
     "uncertain_range_information",
     "vertex_gradient",

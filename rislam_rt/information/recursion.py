@@ -106,4 +106,4 @@ def _update(spread: Floats, slope: Floats) -> Floats:
     stacked[:count, :count] = np.eye(count)
     stacked[:count, count:] = slope @ spread
     stacked[count:, count:] = spread
-    return np.asarray(np.linalg.qr(stacked.T, mode="r").T[count:, count:])
+    return np.asarray(np.linalg.qr(stacked.T, mode="r")).T[count:, count:]

@@ -1,6 +1,5 @@
 """Floor 5: the receiver. What arrives, the noise, and multipath components with their standard deviations."""
 
-from rislam_rt.measurement.bound import detection_probability
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.dataset import NO_COMPONENT, load_signals, signals_dataset
 from rislam_rt.measurement.false_alarms import detection_threshold, expected_false_alarms
@@ -14,9 +13,11 @@ from rislam_rt.measurement.noise import (
 )
 from rislam_rt.measurement.parts import path_std
 from rislam_rt.measurement.received import Received, receive, twin
+from rislam_rt.measurement.sensor import build_sensor
 from rislam_rt.measurement.signal import num_tones, pulse_samples, to_samples, to_tones, tones
 from rislam_rt.measurement.tracking import TrackInfo, TrackingConfig, TrackState, init_tracks, step_tracks
 from rislam_rt.measurement.waveform import Capture, Components, capture, find_components
+from rislam_rt.model import detection_probability
 
 __all__ = [
     "NO_COMPONENT",
@@ -27,6 +28,7 @@ __all__ = [
     "TrackInfo",
     "TrackState",
     "TrackingConfig",
+    "build_sensor",
     "capture",
     "detection_probability",
     "detection_threshold",

@@ -7,6 +7,7 @@ from rislam_rt.model.radio import RadioConfig, RxArray
 from rislam_rt.model.result import NOTHING, STEPS, SchemeResult, SlamResult
 from rislam_rt.model.ris import RisCode, RisPanel, RisSpec
 from rislam_rt.model.scene import Material, Reflector, Scatterer, Scene, Shade
+from rislam_rt.model.sensor import SensorModel, detection_probability, merged_pull
 from rislam_rt.model.trajectory import Body, Trajectory
 
 __all__ = [
@@ -29,10 +30,13 @@ __all__ = [
     "Scatterer",
     "Scene",
     "SchemeResult",
+    "SensorModel",
     "Shade",
     "SlamEstimate",
     "SlamResult",
     "Suspect",
     "Trajectory",
+    "detection_probability",
     "empty_map",
+    "merged_pull",
 ]

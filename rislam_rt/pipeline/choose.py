@@ -11,16 +11,18 @@ from rislam_rt.model import RisCode, RisSpec, SlamEstimate
 from rislam_rt.pipeline.cycle import Designer, Room
 from rislam_rt.pipeline.schemes import Scheme
 from rislam_rt.pipeline.spec import PipelineSpec, Settings
+from rislam_rt.pipeline.told import Told
 
 
-def build_designer(scheme: Scheme, panel: RisSpec, spec: PipelineSpec, settings: Settings) -> Designer:
-    """The designer of a scheme that has a panel."""
+def build_designer(scheme: Scheme, panel: RisSpec, spec: PipelineSpec, settings: Settings, told: Told) -> Designer:
+    """The designer of a scheme that has a panel: true panel and settings serve the one that knows the truth."""
     method = spec.design.method if scheme.method == "spec" else str(scheme.method)
-    return (_on_truth if scheme.on_truth else _on_belief)(method, panel, spec, settings)
+    return _on_truth(method, panel, spec, settings) if scheme.on_truth else _on_belief(method, spec, told)
 
 
-def _on_belief(method: str, panel: RisSpec, spec: PipelineSpec, settings: Settings) -> Designer:
-    section = spec.design
+def _on_belief(method: str, spec: PipelineSpec, told: Told) -> Designer:
+    section, panel, settings = spec.design, told.panel, told.settings
+    assert panel is not None
     last: RisCode | None = None
 
     def choose(belief: Callable[[], SlamEstimate], cycle: int, room: Room, *, rng: np.random.Generator) -> RisCode:

@@ -11,11 +11,13 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from rislam_rt.arrays import Floats
 from rislam_rt.measurement import measure
 from rislam_rt.model import Measurement, Paths, PathTruth, RisCode, RisSpec, SlamEstimate, Trajectory
 from rislam_rt.pipeline.control import Link, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.spec import PipelineSpec, Settings
+from rislam_rt.pipeline.told import Told, tell_measurement
 from rislam_rt.ris import PanelErrors, rephase
 
 
@@ -32,7 +34,10 @@ class Room(NamedTuple):
     """The true side of a run."""
 
     paths: Paths
+    """As the array hears them (`told.deceive`)."""
     trajectory: Trajectory
+    doppler: Floats
+    """(K, P) shifts [Hz]: what paths turn by within the measurement slot."""
     faults: PanelErrors | None = None
     """What the panel does wrong; None without a panel."""
     first: int = 0
@@ -50,7 +55,7 @@ class Agent(NamedTuple):
     link: Link | None
     """None without a panel."""
     heard: Measurement | None = None
-    """What was measured in the cycle before."""
+    """What the receiver found in the cycle before."""
 
 
 class Means(NamedTuple):
@@ -61,6 +66,9 @@ class Means(NamedTuple):
     estimator: Estimator
     spec: PipelineSpec
     settings: Settings
+    """True ones: what the room and the receiver go by."""
+    told: Told
+    """What filter and design go by."""
 
 
 class Cycle(NamedTuple):
@@ -89,15 +97,14 @@ class Designer(Protocol):
 
 def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -> tuple[Agent, Cycle]:
     """One cycle of one scheme."""
-    motion, control, estimator = room.trajectory, means.spec.control, means.estimator
-    config = estimator.config(means.settings)
-    dt = float(motion.time[cycle] - motion.time[cycle - 1]) if cycle else 0.0
-    heading = float(motion.heading[cycle])
+    control, estimator, told = means.spec.control, means.estimator, means.told
+    config = estimator.config(told.settings)
+    dt = float(told.time[cycle] - told.time[cycle - 1]) if cycle else 0.0
     clock = [perf_counter()]
 
     link, sent = agent.link, None
     if link is not None and means.designer is not None:
-        ahead = dt + control.delay_cycles * _nominal_step(motion)
+        ahead = dt + control.delay_cycles * _nominal_step(told.time)
         sent = means.designer(partial(estimator.predict, agent.state, ahead, config), cycle, room, rng=rng.design)
     clock.append(perf_counter())
 
@@ -112,23 +119,26 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
         applied = link.applied if room.faults is None else room.faults.settle(link.applied)
         paths = rephase(paths, applied, 1.0 if room.faults is None else room.faults.weight)
     measurement, truth = measure(
-        paths, 0, heading, means.settings.radio, means.settings.receiver, agent.heard, rng=rng.noise
+        paths, 0, float(room.trajectory.heading[cycle]), means.settings.radio, means.settings.receiver, agent.heard,
+        room.doppler[cycle - room.first], rng=rng.noise,
     )  # fmt: skip
     clock.append(perf_counter())
 
     believed = link.believed if link is not None else None
-    state, info = estimator.step(agent.state, measurement, believed, dt, heading, config, rng=rng.filter)
+    reported = tell_measurement(measurement, means.spec.told)
+    heading = float(told.heading[cycle])
+    state, info = estimator.step(agent.state, reported, believed, dt, heading, config, rng=rng.filter)
     belief = estimator.estimate(state, config)
     clock.append(perf_counter())
 
     optimise, communicate, acquire, localise = np.diff(clock)
     outcome = Cycle(
-        belief, info, measurement, truth, paths.gain[0], sent, applied,
+        belief, info, reported, truth, paths.gain[0], sent, applied,
         (optimise, communicate + air, acquire, localise),
     )  # fmt: skip
     return Agent(state, link, measurement), outcome
 
 
-def _nominal_step(motion: Trajectory) -> float:
-    """Cycle time [s] of a trajectory."""
-    return float(motion.time[1] - motion.time[0]) if len(motion) > 1 else 0.0
+def _nominal_step(time: Floats) -> float:
+    """Cycle time [s] of times (K,)."""
+    return float(time[1] - time[0]) if len(time) > 1 else 0.0

@@ -24,7 +24,7 @@ def join_paths(parts: Sequence[Paths]) -> Paths:
     for part, column in zip(parts, columns, strict=True):
         for name, value in first.items():
             own = getattr(part, name)
-            value[(column, *(slice(0, n) for n in own.shape[1:]))] = own
+            value[(column, *(slice(0, int(n)) for n in own.shape[1:]))] = own
     names = ("valid", "tau", "departure", "arrival", "gain", "vertices")
     course = {name: _spread([getattr(p, name) for p in parts], columns, count) for name in names}
     return replace(parts[0], **first, **course, ris=None)
@@ -41,10 +41,11 @@ def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> Schem
         parent[place] = np.where(part.parent >= 0, part.parent, parent[place])
     plain = ("position", "velocity", "heading", "covariance", "sent", "applied", "seconds")
     held = ("held", "landmark_position", "ris_probability")
+    course: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in plain}
+    course |= {name: _spread([getattr(part, name) for part in parts], places, len(ident)) for name in held}
     return replace(
         parts[-1],
-        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in plain},
-        **{name: _spread([getattr(part, name) for part in parts], places, len(ident)) for name in held},
+        **course,
         gain=_spread([part.gain for part in parts], columns, count),
         component_path=_stacked([_renamed(p.component_path, c) for p, c in zip(parts, columns, strict=True)]),
         component_landmark=_stacked([part.component_landmark for part in parts]),
@@ -84,12 +85,13 @@ def path_columns(parts: Sequence[Paths]) -> list[Integers]:
 
 def _spread(parts: Sequence[Any], columns: Sequence[Integers], count: int) -> Any:
     """Arrays (K_i, P_i, ...) under each other, each at its columns of (K, count, ...); zero elsewhere."""
-    tail = tuple(np.max([part.shape[2:] for part in parts], axis=0).astype(int)) if parts[0].ndim > 2 else ()
+    tail = tuple(max(sizes) for sizes in zip(*(part.shape[2:] for part in parts), strict=True))
     table = np.zeros((sum(map(len, parts)), count, *tail), dtype=parts[0].dtype)
     row = 0
     for part, column in zip(parts, columns, strict=True):
         block = np.zeros((len(part), count, *tail), dtype=part.dtype)
-        block[(slice(None), column, *(slice(0, n) for n in part.shape[2:]))] = part
+        where: Any = (slice(None), column, *(slice(0, n) for n in part.shape[2:]))
+        block[where] = part
         table[row : row + len(part)] = block
         row += len(part)
     return table

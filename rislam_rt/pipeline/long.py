@@ -46,11 +46,11 @@ def run_long(
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
-    scene, seeds = set_scene(scene, spec, rng=rng)
+    scene, body, seeds = set_scene(scene, spec, rng=rng)
     write_pieces(folder / "truth.tum", _truth_lines(scene))
     todo = [name for name in spec.schemes if not is_complete(folder, name, len(scene.agent))]
     seconds = 0.0
-    for _, outcome in run_side_by_side(run_slices, todo, (scene, spec, seeds, folder), jobs, progress):
+    for _, outcome in run_side_by_side(run_slices, todo, (scene, body, spec, seeds, folder), jobs, progress):
         if isinstance(outcome, RislamError):
             raise outcome
         seconds = max(seconds, float(outcome))

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.spec import PipelineSpec, build_settings
+from rislam_rt.shipped import shipped_pipelines
 from rislam_rt.toml import MAX_LEVELS, parse_toml
 
 MAX_BYTES = 1_000_000
@@ -94,7 +95,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except FileNotFoundError:
-        raise ConfigError(f"{path}: no such pipeline file; give one, e.g. pipelines/trace_then_slam.toml") from None
+        raise ConfigError(f"{path}: no such pipeline file; {_near_pipeline(path)}") from None
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}); give a pipeline file in TOML") from None
     if len(content) > MAX_BYTES:
@@ -104,6 +105,12 @@ def _read_toml(path: Path) -> dict[str, Any]:
     except ValueError as error:
         cause = " ".join(str(error).split())[:120]
         raise ConfigError(f"{path}: not valid TOML ({cause}); mend that place") from None
+
+
+def _near_pipeline(path: Path) -> str:
+    known = shipped_pipelines()
+    near = get_close_matches(path.stem, known, n=1)
+    return f"did you mean '{near[0]}'?" if near else f"give one, or a built-in one: {', '.join(known)}"
 
 
 def _override(table: dict[str, Any], setting: str) -> str:

@@ -11,14 +11,16 @@ import numpy as np
 
 from rislam_rt.backend import prepare_backend
 from rislam_rt.channel.protocol import Channel
-from rislam_rt.errors import ConfigError, RislamError
-from rislam_rt.model import Paths, RadioConfig, Scene, SchemeResult, SlamResult
+from rislam_rt.errors import ConfigError, RislamError, expect
+from rislam_rt.model import Body, Paths, RadioConfig, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.change import change_room
 from rislam_rt.pipeline.control import check_control
+from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.motion import draw_motion
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
 from rislam_rt.pipeline.spec import PipelineSpec, build_radio
+from rislam_rt.pipeline.told import lean
 from rislam_rt.pipeline.walk import Walk
 from rislam_rt.pipeline.workers import run_side_by_side
 from rislam_rt.ris import delay_spread_warnings
@@ -37,13 +39,15 @@ class Stage(NamedTuple):
     """With the true motion of this run."""
     paths: Paths
     """Panel at level 0."""
+    body: Body
+    """Of a level agent: what is told of it."""
     seeds: Seeds
     seconds: float
     """Time [s] that the channel took."""
 
 
-def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> tuple[Scene, Seeds]:
-    """The room of a run with its true motion, and the run's seeds.
+def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> tuple[Scene, Body, Seeds]:
+    """The room of a run with its true motion, the body of a level agent, and the run's seeds.
 
     Raises
     ------
@@ -51,10 +55,10 @@ def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
         Scene and specification do not fit (see `check_run`).
     """
     check_run(scene, spec)
-    seeds = spawn_seeds(rng)
+    seeds = spawn_seeds(rng=rng)
     scene = change_room(cut_scene(scene, spec.cycles), spec.room, rng=np.random.default_rng(seeds.room))
     motion = draw_motion(scene, spec.motion.sigma_a_m_s2, rng=np.random.default_rng(seeds.motion))
-    return replace(scene, agent=motion), seeds
+    return replace(scene, agent=lean(motion, spec.told)), motion.body, seeds
 
 
 def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> Stage:
@@ -67,10 +71,10 @@ def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
-    scene, seeds = set_scene(scene, spec, rng=rng)
+    scene, body, seeds = set_scene(scene, spec, rng=rng)
     begin = perf_counter()
     paths = build_channel(spec.channel, scene, build_radio(spec.radio), spec.depth).paths(scene.agent)
-    return Stage(scene, paths, seeds, perf_counter() - begin)
+    return Stage(scene, paths, body, seeds, perf_counter() - begin)
 
 
 def run_slam(
@@ -102,6 +106,9 @@ def run_slam(
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
+    expect("scene", scene, Scene)
+    expect("spec", spec, PipelineSpec)
+    expect("rng", rng, np.random.Generator)
     done = {} if done is None else done
     tell = progress or (lambda stage, at, total: None)
     tell("trace", 0, 1)
@@ -130,9 +137,11 @@ def result_of(stage: Stage, spec: PipelineSpec, schemes: Mapping[str, SchemeResu
     )
 
 
-def run_scheme(name: str, stage: Stage, spec: PipelineSpec, tell: Progress) -> SchemeResult:
-    """One scheme over all cycles."""
-    walk = Walk(name, stage.scene, spec, stage.seeds)
+def run_scheme(
+    name: str, stage: Stage, spec: PipelineSpec, tell: Progress, estimator: Estimator | None = None
+) -> SchemeResult:
+    """One scheme over all cycles, with its own estimator unless another is given."""
+    walk = Walk(name, stage.scene, stage.body, spec, stage.seeds, estimator)
     return walk.lead(stage.paths, 0, len(stage.scene.agent), tell)
 
 

@@ -16,13 +16,15 @@ class Seeds(NamedTuple):
     motion: np.random.SeedSequence
     panel: np.random.SeedSequence
     room: np.random.SeedSequence
+    told: np.random.SeedSequence
+    """Of the compass, and of how the body sways."""
 
 
-def spawn_seeds(rng: np.random.Generator) -> Seeds:
+def spawn_seeds(*, rng: np.random.Generator) -> Seeds:
     """The children of a run's generator."""
     return Seeds(*rng.bit_generator.seed_seq.spawn(len(Seeds._fields)))  # type: ignore[attr-defined]
 
 
-def child(seed: np.random.SeedSequence, cycle: int) -> np.random.Generator:
-    """The generator of one cycle, the same one every time, however many numbers a cycle draws."""
-    return np.random.default_rng(np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, cycle)))
+def child(seed: np.random.SeedSequence, number: int) -> np.random.Generator:
+    """A generator by number, as of a cycle: the same one every time, however many numbers others draw."""
+    return np.random.default_rng(np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, number)))

@@ -15,7 +15,8 @@ from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene
 from rislam_rt.pipeline.dataset import paths_to_dataset
 from rislam_rt.pipeline.read import build_spec, settings_table
 from rislam_rt.pipeline.run import build_channel
-from rislam_rt.pipeline.spec import RadioSection, ReceiverSection, Section, build_radio
+from rislam_rt.pipeline.section import Section
+from rislam_rt.pipeline.spec import RadioSection, ReceiverSection, build_radio
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,7 +1,8 @@
 """Long runs: traced, led and written slice by slice, so that memory does not grow with the number of cycles.
 
 A scheme goes through the slices one after the other and leaves a file in each slice's folder; the agent, its generators
-and the panel go along, the paths and the cycles' records do not. The numbers are those of a run in one piece.
+and the panel go along, the paths and the cycles' records do not. Noise is drawn for each path of a slice, so that the
+law is that of a run in one piece, and its draws are not.
 """
 
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.errors import RislamError
-from rislam_rt.model import Paths, Scene, SchemeResult, Trajectory
+from rislam_rt.model import Body, Paths, Scene, SchemeResult, Trajectory
 from rislam_rt.pipeline.dataset import (
     dataset_to_paths,
     dataset_to_scheme,
@@ -53,7 +54,9 @@ def slice_file(folder: Path, number: int, name: str) -> Path:
     return folder / FOLDER / f"{number:05d}" / name
 
 
-def run_slices(name: str, scene: Scene, spec: PipelineSpec, seeds: Seeds, folder: Path, tell: Progress) -> float:
+def run_slices(
+    name: str, scene: Scene, body: Body, spec: PipelineSpec, seeds: Seeds, folder: Path, tell: Progress
+) -> float:
     """Lead one scheme through all slices, each written to `folder` when it is done. Returns the seconds of tracing.
 
     Raises
@@ -64,7 +67,7 @@ def run_slices(name: str, scene: Scene, spec: PipelineSpec, seeds: Seeds, folder
         The traced channel failed, or the machine lacks what it needs.
     """
     channel = build_channel(spec.channel, scene, build_radio(spec.radio), spec.depth)
-    walk, seconds, cycles = Walk(name, scene, spec, seeds), 0.0, len(scene.agent)
+    walk, seconds, cycles = Walk(name, scene, body, spec, seeds), 0.0, len(scene.agent)
     for number, (first, last) in enumerate(slice_bounds(cycles)):
         begin = perf_counter()
         paths = channel.paths(scene.agent[first : min(last + walk.foresight, cycles)])

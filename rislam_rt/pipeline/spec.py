@@ -4,39 +4,33 @@ from dataclasses import fields
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
+from pydantic import Field, create_model, model_validator
 
 from rislam_rt.design import DESIGNERS, DesignConfig
-from rislam_rt.measurement import ReceiverConfig, with_reference_snr
-from rislam_rt.model import RadioConfig, RxArray
+from rislam_rt.measurement import ReceiverConfig, build_sensor, with_reference_snr
+from rislam_rt.model import RadioConfig, RxArray, SensorModel
+from rislam_rt.pipeline.mistold import ToldSection
 from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.pipeline.section import Count, Decibel, Name, NotNegative, Positive, Probability, Section
 from rislam_rt.ris import PanelTolerance
 from rislam_rt.slam import SlamConfig
 from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
 from rislam_rt.slam.schemes.channel_slam import ChannelSlamConfig
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=64)]
-Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, le=1e12, allow_inf_nan=False)]
-Decibel = Annotated[float, Field(ge=-300.0, le=300.0, allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=1, le=1_000_000)]
-Probability = Annotated[float, Field(ge=0.0, le=1.0)]
-
-
-class Section(BaseModel):
-    """A table of the file: no conversions, no unknown keys."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+RECORDS: dict[type, type] = {}
+"""The records behind the sections that are made of one."""
 
 
 def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()) -> Any:
     """A section with the fields, types and defaults of a frozen record of scalars, which checks its own ranges."""
     kinds: dict[str, Any] = {f.name: (f.type, f.default) for f in fields(record) if f.name not in without}
-    return create_model(name, __base__=Section, __doc__=doc, **kinds)
+    section = create_model(name, __base__=Section, __doc__=doc, **kinds)
+    RECORDS[section] = record
+    return section
 
 
 _Filter = _section("_Filter", SlamConfig, "Fields of `SlamConfig`.")
-_Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.")
+_Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.", without=("slot",))
 _BpSlam = _section("_BpSlam", BpSlamConfig, "Fields of `BpSlamConfig`.")
 _ChannelSlam = _section("_ChannelSlam", ChannelSlamConfig, "Fields of `ChannelSlamConfig`.")
 _Designers = _section("_Designers", DesignConfig, "Fields of `DesignConfig`.", without=("certify",))
@@ -55,26 +49,35 @@ class ChannelSlamSection(_ChannelSlam):  # type: ignore[misc, valid-type]
 
 
 class ReceiverSection(_Receiver):  # type: ignore[misc, valid-type]
-    """The receiver's settings, SI units."""
+    """The receiver's settings, SI units; its slot is `budget.measure_s`."""
 
 
 class ArraySection(Section):
     """The Rx array."""
 
     rows: Count = 4
+    """Antennas along the body's x axis, forward."""
     cols: Count = 4
+    """Antennas along the body's y axis."""
     spacing_wavelengths: Positive = 0.5
+    """Between neighbours, in wavelengths of the carrier."""
     pattern: Literal["upper", "isotropic"] = "upper"
+    """`upper` hears nothing from below the array's plane."""
 
 
 class RadioSection(Section):
     """The radio. The noise is given by what it does to the paper's sphere at 3 m, or by its density."""
 
     carrier_ghz: Positive = 10.0
+    """Carrier frequency."""
     bandwidth_ghz: Positive = 1.0
+    """Of a flat band; delays are resolved to its inverse."""
     tx_gain_db: Decibel = 0.0
+    """Of the transmit antenna, the same in all directions."""
     rx_gain_db: Decibel = 0.0
+    """Of each receive antenna, where its pattern hears."""
     energy_j: Positive = 1.0
+    """Of one sounding; SNR follows from its ratio to the noise."""
     reference_snr_db: Decibel | None = None
     """SNR of the paper's sphere 3 m away, integrated over the signal and over all antennas; 13 if nothing is given."""
     noise_psd: Positive | None = None
@@ -92,6 +95,7 @@ class DesignerSection(_Designers):  # type: ignore[misc, valid-type]
     """A designer and its settings."""
 
     method: Literal[tuple(DESIGNERS)] = "genetic"  # type: ignore[valid-type]
+    """Designer of the codes: the paper's genetic algorithm, the exact single-target optimum, coordinate descent, ..."""
 
 
 class DesignSection(DesignerSection):
@@ -117,9 +121,13 @@ class BudgetSection(Section):
     """Time [s] of the cycle's four steps; together they are the scene's cycle."""
 
     optimise_s: NotNegative = 0.04
+    """To design the code."""
     communicate_s: NotNegative = 0.01
+    """To send it to the panel's controller."""
     measure_s: NotNegative = 0.01
+    """To sound the channel."""
     localise_s: NotNegative = 0.04
+    """To localise and map."""
 
 
 class ControlSection(Section):
@@ -128,6 +136,7 @@ class ControlSection(Section):
     levels: Annotated[int, Field(ge=2, le=65536)] | None = None
     """Phase levels that the message can name, a divisor of the panel's; all of them by default."""
     rate_bits_s: Positive = 1e6
+    """Of the link to the controller."""
     loss_probability: Probability = 0.0
     """Probability that a message is lost; the panel then keeps its code and the agent does not know."""
     delay_cycles: Annotated[int, Field(ge=0, le=1000)] = 0
@@ -138,7 +147,11 @@ class StartSection(Section):
     """What the agent is told of its start: the truth plus one draw of these errors."""
 
     position_std_m: NotNegative = 0.01
+    """Of each coordinate of the start."""
     velocity_std_m_s: NotNegative = 0.01
+    """Of each component of the first velocity."""
+    heading_std_deg: NotNegative = 0.0
+    """Where the heading is estimated."""
 
 
 class MotionSection(Section):
@@ -155,6 +168,7 @@ class PanelSection(Section):
     amplitude_std: NotNegative = 0.0
     """Of an element's amplitude, relative."""
     phase_std_deg: NotNegative = 0.0
+    """Of an element's phase."""
     dead: Probability = 0.0
     """Probability that an element reflects nothing."""
     stuck: Probability = 0.0
@@ -172,9 +186,11 @@ class RoomSection(Section):
     """What of the scene is replaced; nothing by default."""
 
     panel_rows: Annotated[int, Field(ge=1, le=256)] | None = None
+    """Rows of elements."""
     panel_cols: Annotated[int, Field(ge=1, le=256)] | None = None
-    """The spacing of the elements and the panel's centre stay as they are."""
+    """Columns of elements. The spacing of the elements and the panel's centre stay as they are."""
     panel_levels: Annotated[int, Field(ge=2, le=65536)] | None = None
+    """Phase levels of an element."""
     scatterers: Annotated[int, Field(ge=0, le=100)] | None = None
     """Their number: the scene's first ones, and then spheres at places drawn for every seed (see `pipeline.change`)."""
 
@@ -183,17 +199,23 @@ class PipelineSpec(Section):
     """A whole pipeline file of the main job."""
 
     kind: Literal["slam"] = "slam"
+    """What the file is: the main job."""
     name: Name
+    """Of run folders and pages."""
     description: str = ""
+    """For readers alone."""
     scene: str | None = None
     """Scene folder, relative to the pipeline file; `--scene` comes first."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 7
+    """Of every random draw; the same seed gives the same result."""
     cycles: Count | None = None
     """Only the first so many cycles of the scene's trajectory; all of them by default."""
     channel: Literal["traced", "image_source"] = "traced"
+    """Ray tracer, or exact image sources."""
     depth: Annotated[int, Field(ge=0, le=4)] = 2
     """Largest number of wall bounces on a path, both legs together."""
-    schemes: Annotated[list[Literal[tuple(SCHEMES)]], Field(min_length=1)] = ["optimized", "random"]  # type: ignore[valid-type]
+    schemes: list[Literal[tuple(SCHEMES)]] = Field(default=["optimized", "random"], min_length=1)  # type: ignore[valid-type]
+    """What is compared: who chooses the panel's codes, and who estimates; under the same motion, channel and noise."""
     radio: RadioSection = RadioSection()
     receiver: ReceiverSection = ReceiverSection()
     design: DesignSection = DesignSection()
@@ -203,6 +225,7 @@ class PipelineSpec(Section):
     panel: PanelSection = PanelSection()
     motion: MotionSection = MotionSection()
     start: StartSection = StartSection()
+    told: ToldSection = ToldSection()
     slam: SlamSection = SlamSection()
     bp_slam: BpSlamSection = BpSlamSection()
     channel_slam: ChannelSlamSection = ChannelSlamSection()
@@ -252,6 +275,8 @@ class Settings(NamedTuple):
     design: DesignConfig
     bp_slam: BpSlamConfig
     channel_slam: ChannelSlamConfig
+    sensor: SensorModel
+    """What the estimators are told of the receiver."""
 
 
 def build_settings(spec: PipelineSpec) -> Settings:
@@ -262,13 +287,15 @@ def build_settings(spec: PipelineSpec) -> Settings:
     ConfigError
         A value is out of the range that the record itself checks.
     """
+    radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump(), slot=spec.budget.measure_s)
     return Settings(
-        build_radio(spec.radio),
-        ReceiverConfig(**spec.receiver.model_dump()),
+        radio,
+        receiver,
         SlamConfig(**spec.slam.model_dump()),
         build_design(spec.design),
         BpSlamConfig(**spec.bp_slam.model_dump()),
         ChannelSlamConfig(**spec.channel_slam.model_dump()),
+        build_sensor(radio, receiver),
     )
 
 

@@ -5,17 +5,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from rislam_rt.model import PathKind, Paths, Scene, SchemeResult, Trajectory
+from rislam_rt.channel.doppler import doppler_shift
+from rislam_rt.model import Body, PathKind, Paths, Scene, SchemeResult
 from rislam_rt.pipeline.choose import build_designer
 from rislam_rt.pipeline.control import open_link
 from rislam_rt.pipeline.cycle import Agent, Cycle, Means, Rng, Room, run_cycle
-from rislam_rt.pipeline.estimators import ESTIMATORS
+from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.record import gather
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, child
-from rislam_rt.pipeline.spec import PipelineSpec, Settings, build_settings
+from rislam_rt.pipeline.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.told import deceive, tell_belief
 from rislam_rt.ris import draw_panel
-from rislam_rt.slam import StartPrior
 
 Tell = Callable[[str, int, int], None]
 
@@ -26,19 +27,26 @@ class Walk:
     Cycle k draws from generators of its own, so that the numbers are the same however the run is cut.
     """
 
-    def __init__(self, name: str, scene: Scene, spec: PipelineSpec, seeds: Seeds) -> None:
+    def __init__(
+        self, name: str, scene: Scene, body: Body, spec: PipelineSpec, seeds: Seeds, estimator: Estimator | None = None
+    ) -> None:
         settings, self.scheme, self.name, self.seeds = build_settings(spec), SCHEMES[name], name, seeds
         self.motion = scene.agent
         panel = scene.ris.spec if scene.ris is not None and self.scheme.panel else None
-        self.faults = None
+        compass, self.sway = (child(seeds.told, number) for number in range(2))
+        start = np.random.default_rng(seeds.start)
+        told = tell_belief(self.motion, body, panel, spec, settings, start=start, compass=compass)
+        self.faults, designer = None, None
         if panel is not None:
             self.faults = draw_panel(panel, spec.panel.tolerance, rng=np.random.default_rng(seeds.panel))
-        designer = None if panel is None else build_designer(self.scheme, panel, spec, settings)
-        estimator = ESTIMATORS[self.scheme.estimator]
-        self.means = Means(panel, designer, estimator, spec, settings)
+            designer = build_designer(self.scheme, panel, spec, settings, told)
+        estimator = estimator or ESTIMATORS[self.scheme.estimator]
+        self.means = Means(panel, designer, estimator, spec, settings, told)
         self.filter_rng, self.design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
-        start, config = start_prior(self.motion, spec, seeds, settings), estimator.config(settings)
-        state = estimator.init(start, self.motion.body, panel, settings.radio, config, rng=self.filter_rng)
+        config = estimator.config(told.settings)
+        state = estimator.init(
+            told.start, told.body, told.panel, told.settings.sensor, config, rng=self.filter_rng
+        )  # fmt: skip
         self.agent = Agent(state, open_link(panel) if panel is not None else None)
 
     @property
@@ -48,9 +56,12 @@ class Walk:
 
     def lead(self, paths: Paths, first: int, last: int, tell: Tell) -> SchemeResult:
         """Cycles `first` to `last` (not included); `paths` begin at `first` and may go on beyond `last`."""
-        if not self.scheme.panel:
+        if self.means.panel is None:
             paths = without_panel(paths)
-        room = Room(paths, self.motion, self.faults, first)
+        spec, motion = self.means.spec, self.motion[first : first + paths.num_cycles]
+        shift = doppler_shift(paths, motion, self.means.settings.radio.wavelength)
+        heard = deceive(paths, motion, spec.told, rng=self.sway, since=float(self.motion.time[0]))
+        room = Room(heard, self.motion, shift, self.faults, first)
         cycles: list[Cycle] = []
         tell(self.name, first, len(self.motion))
         for cycle in range(first, last):
@@ -66,17 +77,3 @@ def without_panel(paths: Paths) -> Paths:
     """The paths of a plain wall where the panel hangs: identities stay, panel paths are never there."""
     panel = np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS))
     return replace(paths, valid=paths.valid & ~panel, gain=np.where(panel, 0.0, paths.gain), ris=None)
-
-
-def start_prior(motion: Trajectory, spec: PipelineSpec, seeds: Seeds, settings: Settings) -> StartPrior:
-    """What the agent is told: the truth plus one draw of the prior's errors; a known height is told exactly."""
-    rng = np.random.default_rng(seeds.start)
-    axes = np.array([1.0, 1.0, 1.0 if settings.slam.height == "estimated" else 0.0])
-    position_std, velocity_std = spec.start.position_std_m, spec.start.velocity_std_m_s
-    return StartPrior(
-        motion.position[0] + rng.standard_normal(3) * position_std * axes,
-        motion.velocity[0] + rng.standard_normal(3) * velocity_std * axes,
-        float(motion.heading[0]),
-        position_std,
-        velocity_std,
-    )

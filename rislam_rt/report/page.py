@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rislam_rt.measurement import build_sensor
 from rislam_rt.model import SlamResult
 from rislam_rt.pipeline.files import write_atomic
 from rislam_rt.pipeline.spec import PipelineSpec, build_settings
@@ -63,6 +64,7 @@ def draw_figures(result: SlamResult) -> dict[str, bytes]:
     spec = PipelineSpec.model_validate(dict(result.config))
     settings = build_settings(spec)
     snr = 10.0 * float(np.log10(settings.radio.integrated_snr(np.ones(()))))
+    threshold = 10.0 * float(np.log10(build_sensor(settings.radio, settings.receiver).threshold))
     budget = spec.budget
     cycle = len(result.scene.agent) // 2
     first = next(iter(result.schemes.values()))
@@ -71,7 +73,7 @@ def draw_figures(result: SlamResult) -> dict[str, bytes]:
         "room": draw_above(result),
         "error": draw_agent_error(result),
         "landmarks": draw_landmark_errors(result),
-        "levels": draw_levels(result, settings.receiver.detection_threshold_db, snr),
+        "levels": draw_levels(result, threshold, snr),
         "paths": draw_paths(
             result.scene, result.paths, np.abs(first.gain[cycle]), cycle,
             f"{result.scene.name} at t = {time:.1f} s ({result.paths.source})",

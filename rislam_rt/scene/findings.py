@@ -7,10 +7,10 @@ from rislam_rt.errors import SceneError
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One remark on a scene. An `error` makes the scene unusable, a `warning` may be meant."""
+    """One remark on a scene. An `error` makes the scene unusable, a `warning` may be meant, a `note` is no fault."""
 
     severity: str
-    """`error` or `warning`."""
+    """`error`, `warning` or `note`."""
     file: str
     """Path of the file to edit."""
     field: str

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade
 from rislam_rt.scene.check import find_errors, find_warnings
@@ -23,6 +24,7 @@ from rislam_rt.scene.schema import (
     read_spec,
 )
 from rislam_rt.scene.solids import solid_mesh
+from rislam_rt.shipped import find_room
 
 SCENE_FILE = "scene.toml"
 
@@ -36,13 +38,14 @@ class Draft(NamedTuple):
 
 
 def load_scene(path: str | Path) -> Scene:
-    """The scene of a folder, or of its `scene.toml`.
+    """The scene of a folder, of its `scene.toml`, or the built-in room of that name.
 
     Raises
     ------
     SceneError
         The scene file, a mesh or the trajectory is unusable; one line that says where, what and how to mend it.
     """
+    expect("path", path, (str, Path))
     draft = read_draft(path)
     raise_errors(draft.findings)
     assert draft.scene is not None
@@ -51,7 +54,7 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> list[Finding]:
-    """Everything wrong (errors) or suspicious (warnings) about a scene, or a scene folder; empty if all is well.
+    """Everything wrong (errors), suspicious (warnings) or worth knowing (notes) about a scene, or a scene folder.
 
     A bad scene is an answer, not an exception. Warnings about the panel depend on the radio, the default one if none
     is given; where there are errors, warnings are not looked for.
@@ -75,7 +78,7 @@ def read_draft(path: str | Path) -> Draft:
 
 def scene_file(path: str | Path) -> Path:
     """The scene file of a scene folder; a file is taken as it is."""
-    path = Path(path)
+    path = find_room(path)
     return path if path.suffix == ".toml" and not path.is_dir() else path / SCENE_FILE
 
 

@@ -79,7 +79,8 @@ class MeshReader:
     """Reads meshes, and keeps the last file unfolded: a scene picks many nodes of one GLB file, one after the other."""
 
     def __init__(self) -> None:
-        self._key, self._loaded = ("", b""), None
+        self._key: tuple[str, bytes] = ("", b"")
+        self._loaded: Any = None
 
     def parse(
         self, content: bytes, name: str, node: str | None = None, max_faces: int = MAX_FACES, max_nodes: int = MAX_NODES

@@ -1,6 +1,8 @@
 """From a `Scene` to a scene folder, whole or not at all."""
 
+import json
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -72,12 +74,12 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
 
 def toml_bytes(table: Mapping[str, Any]) -> bytes:
     """A scene table as TOML: plain keys first, then (lists of) tables; numbers so that they read back equal."""
-    lines = [f"{key} = {_toml_value(value)}" for key, value in table.items() if not _is_table(value)]
+    lines = [f"{key} = {toml_value(value)}" for key, value in table.items() if not _is_table(value)]
     for key, value in table.items():
         for section in value if isinstance(value, list) and _is_table(value) else [value]:
             if isinstance(section, Mapping):
                 lines += ["", f"[[{key}]]" if isinstance(value, list) else f"[{key}]"]
-                lines += [f"{name} = {_toml_value(item)}" for name, item in section.items()]
+                lines += [f"{name} = {toml_value(item)}" for name, item in section.items()]
     return ("\n".join(lines) + "\n").encode()
 
 
@@ -114,16 +116,22 @@ def _is_table(value: Any) -> bool:
     return isinstance(value, Mapping) or (isinstance(value, list) and bool(value) and isinstance(value[0], Mapping))
 
 
-def _toml_value(value: Any) -> str:
+def toml_value(value: Any) -> str:
+    """A value as TOML; tables inline, numbers so that they read back equal."""
     if isinstance(value, str):
-        return f'"{value}"'
+        # TOML's strings are JSON's, but for DEL.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, bool | int | np.integer):
         return str(value).lower()
     if isinstance(value, float):
         return repr(float(value))
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_toml_value(item)}" for key, item in value.items()) + " }"
-    return "[" + ", ".join(_toml_value(item) for item in value) + "]"
+        return "{ " + ", ".join(f"{_toml_key(key)} = {toml_value(item)}" for key, item in value.items()) + " }"
+    return "[" + ", ".join(toml_value(item) for item in value) + "]"
+
+
+def _toml_key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else str(toml_value(key))
 
 
 def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:

@@ -28,24 +28,25 @@ class Candidates(NamedTuple):
     """(C,) (see `tracks.Glance`)."""
 
 
-def associate(candidates: Candidates, glance: Glance, gate: float, clutter_density: float) -> Integers:
+def associate(candidates: Candidates, glance: Glance, gate: float, strangers: Floats | float) -> Integers:
     """Measurement (C,) of each candidate, -1 for none: the assignment of the highest likelihood.
 
-    A pair competes against "the candidate is missed and the measurement is new or clutter"; pairs beyond the gate (on
+    A pair competes against "the candidate is missed and the measurement is new or false", of which `strangers` (M,) are
+    to be expected per metre, unit of each cosine and e-fold of amplitude; pairs beyond the gate (on
     delay and cosines) do not compete at all.
     """
     chosen = np.full(len(candidates.seen), -1)
     if not len(candidates.seen) or not len(glance.seen):
         return chosen
-    cost = pair_costs(candidates, glance, gate, clutter_density)
+    cost = pair_costs(candidates, glance, gate, strangers)
     rows, columns = linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     chosen[rows[good]] = columns[good]
     return chosen
 
 
-def pair_costs(candidates: Candidates, glance: Glance, gate: float, clutter_density: float) -> Floats:
-    """(C, M): -2 log of the likelihood ratio of each pair against clutter, 0 where it cannot be."""
+def pair_costs(candidates: Candidates, glance: Glance, gate: float, strangers: Floats | float) -> Floats:
+    """(C, M): -2 log of the likelihood ratio of each pair against a stranger, 0 where it cannot be."""
     noise = np.zeros((len(glance.seen), 3, 3))
     noise[:, DIAGONAL, DIAGONAL] = glance.std**2
     variance = candidates.log_amplitude_std[:, None] ** 2 + glance.log_amplitude_std**2
@@ -54,7 +55,9 @@ def pair_costs(candidates: Candidates, glance: Glance, gate: float, clutter_dens
     pairs = near_pairs(candidates.seen, candidates.covariance, glance.seen, noise, allowed, gate)
     at = pairs.row, pairs.column
     cost = pairs.distance + fade[at] + pairs.log_det + np.log(variance[at]) + 4.0 * np.log(2.0 * np.pi)
-    cost += 2.0 * np.log(clutter_density) - 2.0 * candidates.log_odds[pairs.row]
+    cost += (
+        2.0 * np.log(np.broadcast_to(strangers, fade.shape[1:])[pairs.column]) - 2.0 * candidates.log_odds[pairs.row]
+    )
     costs = np.zeros(fade.shape)
     costs[at] = np.minimum(cost, 0.0)
     return costs

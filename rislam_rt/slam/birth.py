@@ -137,11 +137,12 @@ def examine(
     outlook: Outlook,
     past: Past,
     free_space: float,
+    threshold: float,
     config: SlamConfig,
 ) -> tuple[int, Tracks, Birth | None]:
     """Look at the tracks whose turn it is; at most one becomes a feature, as it may explain the others.
 
-    Returns the row of that track (-1 without one), the tracks (some now known for moving images), and the birth.
+    Returns its row (-1 without one), the tracks (some now known for moving images), and the birth. `threshold`: SNR.
     """
     due = due_tracks(tracks, outlook, past.cycle, config)
     if not len(due):
@@ -152,7 +153,7 @@ def examine(
     moving = tracks.moving.copy()
     doubt = square_root(moments.covariance[:6, :6])
     for row in due:
-        history, slots = track_history(tracks, row, past, doubt, free_space, config.detection_snr)
+        history, slots = track_history(tracks, row, past, doubt, free_space, threshold)
         if is_explained(tracks, row, history, scene):
             continue
         if not named_panel(book):
@@ -172,7 +173,7 @@ def examine(
 
 
 def track_history(
-    tracks: Tracks, row: int, past: Past, doubt: Floats, free_space: float, detection_snr: float
+    tracks: Tracks, row: int, past: Past, doubt: Floats, free_space: float, threshold: float
 ) -> tuple[History, Integers]:
     """A track's measurements with the mean believed poses, and the rows of the past that they belong to.
 
@@ -182,7 +183,7 @@ def track_history(
     poses = poses_of(past.position[rows], past.heading[rows], past.body)
     lag = past.time[past.cycle % len(past.time)] - past.time[rows]
     ratio = float(tracks.log_amplitude[row] - free_space + np.log(tracks.mean[row, 0, 0]))
-    faint = overstatement(tracks, past.cycle, detection_snr)[row]
+    faint = overstatement(tracks, past.cycle, threshold)[row]
     seen, std = tracks.seen[row, rows], tracks.std[row, rows] * faint
     return History(seen, std, poses, lag, ratio, doubt, side=int(tracks.side[row])), rows
 

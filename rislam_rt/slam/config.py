@@ -26,6 +26,7 @@ class SlamConfig:
     """Everything that the filter is free to choose. SI units."""
 
     filter: str = "rao_blackwellised"
+    """Who localises and maps; all filters have the same inputs and outputs."""
     num_particles: int = 1
     """Gaussian particles that the start prior is split into: more where it is too wide to be linear in."""
     particle_share: float = 0.5
@@ -44,10 +45,9 @@ class SlamConfig:
     """Largest number of wall bounces, both legs together, of a landmark path that the agent looks for."""
     gate: float = 16.3
     """Largest squared Mahalanobis distance of delay and two cosines that still associates (chi^2, 3 dof: 0.999)."""
-    clutter_density: float = 0.016
-    """Expected new or false components per metre of length, unit of each cosine, and e-fold of amplitude."""
-    detection_snr: float = 10.0
-    """Integrated SNR (linear, all antennas) above which the agent expects to see a path."""
+    new_density: float = 0.016
+    """Expected components of paths that the map lacks, per metre of length, unit of each cosine, and e-fold of
+    amplitude; false ones come on top, as many as the agent is told of its receiver."""
     specular_ratio: float = 0.35
     """Amplitude over that of free space of the same length, above which a component is a wall return."""
     classifier: str = "amplitude"
@@ -103,7 +103,7 @@ class SlamConfig:
             )
         if self.window < self.birth_cycles:
             raise ConfigError(f"slam.window: {self.window} received; give at least birth_cycles, {self.birth_cycles}")
-        for name in ("sigma_a", "gate", "clutter_density", "detection_snr", "specular_ratio"):
+        for name in ("sigma_a", "gate", "new_density", "specular_ratio"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise ConfigError(f"slam.{name}: {value} received; give a positive number")

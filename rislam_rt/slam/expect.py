@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec
+from rislam_rt.information import amplitude_std
+from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec, SensorModel
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.slam.book import Book
 from rislam_rt.slam.identity import point_amplitude
@@ -53,15 +54,23 @@ class Belief(NamedTuple):
     book: Book
     poses: Poses
     body: Body
-    radio: RadioConfig
+    sensor: SensorModel
     ris: RisSpec | None
 
+    @property
+    def radio(self) -> RadioConfig:
+        """The radio that the receiver belongs to."""
+        return self.sensor.radio
 
-def expected_returns(
-    belief: Belief, code: RisCode | None, max_bounces: int, detection_snr: float, use_vt: bool
-) -> Expected:
+    @property
+    def threshold(self) -> float:
+        """Amplitude at the detection threshold."""
+        return float(amplitude_std(self.radio) * np.sqrt(2.0 * self.sensor.threshold))
+
+
+def expected_returns(belief: Belief, code: RisCode | None, max_bounces: int, use_vt: bool) -> Expected:
     """All returns of up to `max_bounces` bounces that arrive from above and are not hopelessly faint."""
-    book, radio = belief.book, belief.radio
+    book = belief.book
     returns = enumerate_returns(tuple(book.points.tolist()), tuple(book.walls.tolist()), max_bounces, use_vt)
     real = possible_legs(belief, returns)
     rows = (real[returns.tx] & real[returns.rx]).nonzero()[0]
@@ -71,12 +80,11 @@ def expected_returns(
     returns = Returns(returns.legs, returns.tx[heard], returns.rx[heard])
     sight = Sight._make(field[heard] for field in sight)
     amplitude, spread = predicted_amplitudes(belief, returns, sight, code)
-    threshold = np.sqrt(detection_snr * radio.noise_psd / (radio.array.num_antennas * radio.energy))
-    visible = ((amplitude >= FAINT * threshold) | (bounces(returns) == 0)).nonzero()[0]
+    visible = ((amplitude >= FAINT * belief.threshold) | (bounces(returns) == 0)).nonzero()[0]
     kept, amplitude = compact(returns, visible), amplitude[visible]
     log_amplitude = np.log(np.maximum(amplitude, 1e-30))
     number, owner, founding = _roles(book, kept)
-    likely = amplitude > 2.0 * threshold
+    likely = amplitude > 2.0 * belief.threshold
     return Expected(kept, log_amplitude, spread[visible], number, owner, founding, twins(kept), likely)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import wrap
-from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec
+from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec, SensorModel
 from rislam_rt.slam.associate import associate
 from rislam_rt.slam.birth import Past, examine
 from rislam_rt.slam.book import Book, empty_book, named_panel, strike
@@ -24,12 +24,14 @@ from rislam_rt.slam.prune import keepers
 from rislam_rt.slam.returns import Poses, compact
 from rislam_rt.slam.sift import sift
 from rislam_rt.slam.suspect import weigh_tracks
-from rislam_rt.slam.tracks import OTHER, PANEL, Glance, Tracks, advance, begin, extend, has_ended, no_tracks
+from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance, Tracks, advance, begin, extend, has_ended, no_tracks
 
 LOS_MARGIN = 0.1
 """Length [m] beyond the baseline below which a component is the direct path: no landmark can be that near."""
 FAR = 1e5
 """Length [m], and standard deviation of anything, that stands for an infinite one."""
+SIDED = 3.0
+"""Log odds beyond which a component is held for the panel's, or for another's: 19 in 20."""
 STRANGERS = np.array([1.3, 2.0, 3.0])
 """Factor on the standard deviations of returns over 0, 1 and 2 walls, for paths in their cell that the map lacks."""
 PRUNE_STRIDE = 5
@@ -61,7 +63,13 @@ class FilterState(NamedTuple):
     health: Health
     body: Body
     ris: RisSpec | None
-    radio: RadioConfig
+    sensor: SensorModel
+    """What the agent is told of its receiver."""
+
+    @property
+    def radio(self) -> RadioConfig:
+        """The radio that the receiver belongs to."""
+        return self.sensor.radio
 
 
 class StepInfo(NamedTuple):
@@ -84,7 +92,7 @@ def init(
     start: StartPrior,
     body: Body,
     ris: RisSpec | None,
-    radio: RadioConfig,
+    sensor: SensorModel,
     config: SlamConfig,
     *,
     rng: np.random.Generator,
@@ -100,7 +108,7 @@ def init(
         Health(),
         body,
         ris,
-        radio,
+        sensor,
     )
 
 
@@ -109,7 +117,7 @@ def revisit(state: FilterState, start: StartPrior, config: SlamConfig, *, rng: n
 
     The map keeps the covariance that it had; its frame is the earlier run's, and so must be the start's.
     """
-    fresh, moments = init(start, state.body, state.ris, state.radio, config, rng=rng), believed(state)
+    fresh, moments = init(start, state.body, state.ris, state.sensor, config, rng=rng), believed(state)
     particles = engine_of(config).furnish(fresh.particles, moments.features, moments.covariance[POSE:, POSE:])
     count = len(state.book.ident)
     book = state.book._replace(shown=np.ones((count, 2)), drift=np.zeros((count, 3)))
@@ -142,12 +150,13 @@ def step(
     free = order[landmark[order] == UNUSED]
     glance = glance.take(free)
     moments = believed(state)
-    belief = Belief(moments.features, state.book, _poses(state, moments), state.body, state.radio, state.ris)
-    expected = expected_returns(belief, code, config.max_bounces, config.detection_snr, config.use_vt)
+    belief = Belief(moments.features, state.book, _poses(state, moments), state.body, state.sensor, state.ris)
+    expected = expected_returns(belief, code, config.max_bounces, config.use_vt)
     tracks = advance(state.tracks, dt, state.cycle, _bend(moments))
     outlook = look_ahead(belief, expected, moments, tracks, glance.side is not None)
     hidden = hidden_tracks(outlook, tracks, config.gate)
-    picks = associate(candidates(outlook, tracks, hidden), glance, config.gate, config.clutter_density)
+    strangers = stranger_density(glance, state.sensor, config.new_density)
+    picks = associate(candidates(outlook, tracks, hidden), glance, config.gate, strangers)
 
     num_returns = len(expected.log_amplitude)
     hit = (picks[:num_returns] >= 0).nonzero()[0]
@@ -157,14 +166,12 @@ def step(
     state = state._replace(particles=updated.particles)
     white = np.zeros((len(hit), 3))
     white[used] = updated.white
-    book, names = learn(
-        belief, believed(state), outlook, Hits(hit, taken, white), glance, code, config.detection_snr, rng=rng
-    )  # fmt: skip
+    book, names = learn(belief, believed(state), outlook, Hits(hit, taken, white), glance, code, rng=rng)
     landmark[free[taken]] = names
     tracks, removed = _follow(state, _rates(moments), tracks, glance, picks, num_returns, config)
     landmark[free[removed]] = REMOVED
     if not named_panel(book):  # once it is known, no track needs to be it
-        tracks = weigh_tracks(tracks, belief, code, config.detection_snr)
+        tracks = weigh_tracks(tracks, belief, code)
     state = _tidy(state._replace(tracks=tracks, book=book), outlook, belief, config, rng=rng)
 
     engine = engine_of(config)
@@ -216,7 +223,9 @@ def _tidy(
     """Births and deaths: at most one track becomes a feature; features that should not be there go."""
     moments, book, particles, engine = believed(state), state.book, state.particles, engine_of(config)
     past = Past(*engine.trail(particles, np.arange(config.window)), state.time, state.body, state.cycle)
-    row, tracks, birth = examine(state.tracks, moments, book, outlook, past, free_space(state.radio), config)
+    row, tracks, birth = examine(
+        state.tracks, moments, book, outlook, past, free_space(state.radio), state.sensor.threshold, config
+    )
     if birth is not None:
         particles = engine.settle(particles, birth, state.body, rng=rng)
         book = birth.enter(book)
@@ -268,8 +277,29 @@ def glance_of(measurement: Measurement, radio: RadioConfig) -> Glance:
         np.minimum(measurement.amplitude_std / amplitude, 1.0),
         np.clip(measurement.amplitude_std, 1e-30, 1e30),
         amplitude / free,
-        None if measurement.from_panel is None else np.where(measurement.from_panel, PANEL, OTHER),
+        *side_of(measurement.from_panel),
     )
+
+
+def stranger_density(glance: Glance, sensor: SensorModel, new_density: float) -> Floats:
+    """(M,) expected new or false components per metre, unit of each cosine and e-fold of amplitude, where each lies.
+
+    False ones are as strong as noise that passes the threshold, hence rare where a component is strong.
+    """
+    snr = sensor.radio.integrated_snr(np.exp(glance.log_amplitude))
+    false = sensor.false_alarm_density(glance.seen[:, 0] / SPEED_OF_LIGHT, glance.seen[:, 1:]) / SPEED_OF_LIGHT
+    return new_density + false * 2.0 * snr * sensor.false_alarm_snr_density(snr)
+
+
+def side_of(probability: Floats | None) -> tuple[Integers | None, Floats | None]:
+    """Side (M,) of components that ran over the panel with a probability (M,), and its log odds; None without them.
+
+    What may be either is left open.
+    """
+    if probability is None:
+        return None, None
+    odds = np.log(probability / (1.0 - probability))
+    return np.where(odds > SIDED, PANEL, np.where(odds < -SIDED, OTHER, UNTOLD)), odds
 
 
 def free_space(radio: RadioConfig) -> float:

@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.model import RadioConfig
+from rislam_rt.model import merged_pull
 from rislam_rt.slam.associate import DIAGONAL, Candidates, near_pairs, squared_distance
 from rislam_rt.slam.book import Book, named_panel
 from rislam_rt.slam.expect import Belief, Expected
@@ -68,7 +67,7 @@ def look_ahead(belief: Belief, expected: Expected, moments: Moments, tracks: Tra
     flat = np.zeros((len(seen), 3, len(moments.mean)))
     flat[..., :3], flat[..., 6] = linear.by_pose, linear.by_heading(belief.poses, moments.position)
     flat[..., POSE:] = by_feature.reshape(len(seen), 3, 3 * len(book.ident))
-    cell = resolution_cell(belief.radio)
+    cell = belief.sensor.cell_length
     side, likely = (
         return_sides(returns, book, odds) if apart else np.full(len(seen), UNTOLD) for odds in (SURE, -np.inf)
     )
@@ -93,19 +92,12 @@ def return_sides(returns: Returns, book: Book, odds: float) -> Integers:
     return np.where(point == int(np.argmax(book.log_ris)), PANEL, OTHER)
 
 
-def resolution_cell(radio: RadioConfig) -> Floats:
-    """(3,) length c/B [m] and the array's beam in either cosine, within which paths come out as one."""
-    array = radio.array
-    beams = [1.0 / (count * array.spacing) if count > 1 else 2.0 for count in (array.rows, array.cols)]
-    return np.array([SPEED_OF_LIGHT / radio.bandwidth, *beams])
-
-
 def merge_returns(seen: Floats, expected: Expected, tracks: Tracks, cell: Floats, side: Integers) -> Merger:
     """Foresee what the receiver cannot resolve: from the strongest down, each takes in all that is in its cell.
 
-    What comes out lies at `Re sum alpha_i conj(alpha) z_i / |alpha|^2`. With phases that change by a turn every half
-    wavelength of motion a weaker path shifts the stronger by its amplitude ratio times the gap, in root mean square
-    over sqrt(2). A reciprocal is as strong as its twin, so that the two come out halfway between, whatever the phases.
+    Phases change by a turn every half wavelength of motion: a weaker path shifts the stronger by the root mean square
+    of what `merged_pull` says of the gap. A reciprocal is as strong as its twin, so that the two come out halfway
+    between, whatever the phases.
     """
     count, shiny = len(seen), tracks.specular.nonzero()[0]
     place = np.concatenate([seen, tracks.mean[shiny, :, 0]])
@@ -131,9 +123,9 @@ def merge_returns(seen: Floats, expected: Expected, tracks: Tracks, cell: Floats
     strong, weak = (around & leads[:, None]).nonzero()
     ratio = np.exp(surplus[strong, weak])
     twins = np.append(partner, np.full(len(shiny), -1))[strong] == weak
-    shift = np.where(twins, 0.0, ratio)[:, None] * (place[weak] - place[strong])
+    pull, spread = merged_pull(np.where(twins, 0.0, ratio))
     variance = np.zeros(place.shape)
-    np.add.at(variance, strong, 0.5 * shift**2)
+    np.add.at(variance, strong, (pull**2 + spread)[:, None] * (place[weak] - place[strong]) ** 2)
     outshone = taken.copy()
     outshone[weak] = True
     outshone[strong[(ratio > 0.5) & ~twins]] = True

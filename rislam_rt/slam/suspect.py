@@ -47,7 +47,7 @@ def places(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:
     return poses.rx + reach[..., None] * ray, reach
 
 
-def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None, detection_snr: float) -> Tracks:
+def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None) -> Tracks:
     """The tracks after what this cycle tells of each: is it the panel?"""
     rows = np.flatnonzero(~tracks.specular)
     if belief.ris is None or code is None or not len(rows):
@@ -60,7 +60,7 @@ def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None, detection
     _, rx_length = places(tracks.mean[rows, :, 0], belief.poses)
     tx_length = np.maximum(tracks.mean[rows, 0, 0] - rx_length, 1e-3)
     std = np.full(len(rows), amplitude_std(radio))
-    threshold = float(std[0] * np.sqrt(2.0 * detection_snr))
+    threshold = belief.threshold
     here = tracks.misses[rows] == 0
     amplitude = np.exp(tracks.log_amplitude[rows])
     panel = np.where(here, log_panel(amplitude, std, gain), log_panel_missed(std, gain, threshold))

@@ -37,12 +37,19 @@ class Glance(NamedTuple):
     ratio: Floats
     """(M,) amplitude over that of free space of the same length."""
     side: Integers | None = None
-    """(M,) `PANEL` or `OTHER`; None where the receiver does not tell."""
+    """(M,) `PANEL`, `OTHER` or, where either may be, `UNTOLD`; None where the receiver does not tell."""
+    panel_odds: Floats | None = None
+    """(M,) log odds of having run over the panel, likewise."""
 
     @property
     def sides(self) -> Integers:
         """(M,) with `UNTOLD` where the receiver does not tell."""
         return np.full(len(self.ratio), UNTOLD) if self.side is None else self.side
+
+    @property
+    def odds(self) -> Floats:
+        """(M,) log odds of having run over the panel, 0 where the receiver does not tell."""
+        return np.zeros(len(self.ratio)) if self.panel_odds is None else self.panel_odds
 
     def take(self, rows: Integers) -> "Glance":
         """Only some of the measurements."""
@@ -129,7 +136,7 @@ def has_ended(tracks: Tracks, cycle: int, max_misses: int) -> Booleans:
     return np.asarray((tracks.misses > max_misses) & ~patient)
 
 
-def overstatement(tracks: Tracks, cycle: int, detection_snr: float) -> Floats:
+def overstatement(tracks: Tracks, cycle: int, threshold: float) -> Floats:
     """(T,) factor by which the amplitudes of a track exceed its path's, and its reported deviations fall short.
 
     Of a path near the threshold only those amplitudes are measured that noise lifts above it. The share p of cycles in
@@ -139,7 +146,7 @@ def overstatement(tracks: Tracks, cycle: int, detection_snr: float) -> Floats:
     seen, missed = tracks.length, tracks.earlier_misses(cycle)
     share = np.clip((seen + 1.0) / (seen + missed + 2.0), FAINTEST, 1.0 - 1e-9)
     quantile = ndtri(share)
-    mean = np.sqrt(2.0 * detection_snr) + quantile
+    mean = np.sqrt(2.0 * threshold) + quantile
     return np.asarray(1.0 + np.exp(-0.5 * quantile**2) / np.sqrt(2.0 * np.pi) / share / mean)
 
 

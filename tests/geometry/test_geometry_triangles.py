@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rislam_rt.geometry.flat import planar_groups
 from rislam_rt.geometry.triangles import (
     distance_to_edges,
     distance_to_triangles,
     edge_distance_pairs,
     edge_planes,
     outline_edges,
-    planar_groups,
     triangle_planes,
 )
 

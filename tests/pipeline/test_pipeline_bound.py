@@ -13,9 +13,9 @@ from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.bound import FLOOR_TILT, UPRIGHT_TILT, fewer_rows, heard_paths, prior_std, scheme_bound
 from rislam_rt.pipeline.run import set_stage
-from rislam_rt.pipeline.walk import without_panel
 from rislam_rt.pipeline.spec import build_settings
 from rislam_rt.pipeline.summary import map_score, summarise
+from rislam_rt.pipeline.walk import without_panel
 
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
 SHORT = ["channel=image_source", "cycles=40", "depth=1"]
@@ -80,13 +80,13 @@ def test_delays_alone_and_images_apart_know_less(stage):
 
 def test_what_the_receiver_does_not_report_does_not_count(stage):
     settings = build_settings(load_spec(PIPELINE, [*SHORT, "receiver.max_delay=25e-9"]))
-    heard = heard_paths(stage.paths, settings, 10.0, use_vt=True)
+    heard = heard_paths(stage.paths, settings.sensor, use_vt=True)
     shown = heard.gain != 0.0
     assert 0 < shown.sum() < stage.paths.valid.sum()
     assert (heard.tau[shown] <= 25e-9).all()
     assert (heard.arrival[shown][:, 2] >= 0.0).all()
     assert (heard.kind != PathKind.LOS).all()
-    assert (heard_paths(stage.paths, settings, 10.0, use_vt=False).kind != PathKind.VT).all()
+    assert (heard_paths(stage.paths, settings.sensor, use_vt=False).kind != PathKind.VT).all()
 
 
 def test_what_the_filter_takes_for_granted_is_in_the_bound(stage):

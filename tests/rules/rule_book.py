@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = "rislam_rt"
 
 FLOORS = {
-    0: ("errors", "constants", "arrays", "backend", "toml"),
+    0: ("errors", "constants", "arrays", "backend", "shipped", "toml"),
     1: ("geometry",),
     2: ("model",),
     3: ("scene", "ris", "waveform"),
@@ -20,6 +20,7 @@ FLOORS = {
     6: ("pipeline",),
     7: ("report",),
     8: ("cli",),
+    9: ("__main__",),
 }
 FLOOR_OF = {folder: floor for floor, folders in FLOORS.items() for folder in folders}
 

@@ -24,9 +24,17 @@ def paper() -> Scene:
 
 
 def remarks(scene: Scene, radio: RadioConfig | None = None) -> dict[str, str]:
-    """Field and message of every finding but the one on the paper's element."""
-    findings = [f for f in check_scene(scene, radio) if f.field != "ris.element"]
-    return {f"{f.severity} {f.field}": f"{f.message}; {f.mend}" for f in findings}
+    """Field and messages of every finding but the one on the paper's element."""
+    found: dict[str, str] = {}
+    for f in check_scene(scene, radio):
+        if f.field != "ris.element":
+            found[key] = f"{found.get(key := f'{f.severity} {f.field}', '')}{f.message}; {f.mend}"
+    return found
+
+
+def complaints(scene: Scene, radio: RadioConfig | None = None) -> dict[str, str]:
+    """Those remarks that are no notes."""
+    return {field: text for field, text in remarks(scene, radio).items() if not field.startswith("note")}
 
 
 def moved(scene: Scene, start: list[float], velocity: list[float], body: Body | None = None) -> Scene:
@@ -62,6 +70,8 @@ def scaled(scene: Scene, factor: float) -> Scene:
 
 TINY = Body(np.array([-1e-4, 0.0, 0.0]), np.array([1e-4, 0.0, 0.0]))
 SLIVER = Mesh(np.array([[1.0, 1, 1], [2, 1, 1], [3, 1, 1 + 1e-7]]), np.array([[0, 1, 2]]))
+UP = np.array([0, 0, 1e-5])
+BOARD, NEXT = (grid([x, 1, 2], [1, 0, 0], [0, 1, 0], 2, 2) for x in (1, 2))
 TABLE = block([2.5, 2.5, 0.4], [3.5, 3.5, 0.6])
 CRATE = block([0.2, 0.2, 0.0], [1.2, 1.2, 1.0], without=("floor",))
 SCREEN = grid([1.0, 0.2, 0.1], [0.0, 5.0, 0.0], [0.0, 0.0, 2.0], 1, 1)
@@ -94,9 +104,34 @@ CASES: dict[str, tuple[Change, str, str]] = {
     "doubled name": (lambda s: furnished(s, "sphere", TABLE), "error name", "called 'sphere'"),
     "sliver": (lambda s: furnished(s, "sliver", SLIVER), "error reflector[6].mesh (sliver)", "first is face 0"),
     "doubled faces": (
-        lambda s: furnished(s, "again", Mesh(s.reflectors[0].vertices, s.reflectors[0].faces[:, ::-1])),
+        lambda s: furnished(s, "shelf", joined([BOARD, Mesh(BOARD.vertices, BOARD.faces[:, ::-1])])),
         "warning reflector",
-        "2 faces lie exactly on others",
+        "8 faces lie exactly on others of their mesh, the first in 'shelf'",
+    ),
+    "doubled wall": (
+        lambda s: furnished(s, "again", Mesh(s.reflectors[0].vertices + UP, s.reflectors[0].faces[:, ::-1])),
+        "warning reflector[0].mesh (floor)",
+        "'floor' lies in the plane of 'again', 1.0e-05 m apart; where they overlap 'floor' reflects",
+    ),
+    "poster": (
+        lambda s: furnished(s, "poster", grid([0, 1, 1], [0, 1, 0], [0, 0, 1], 1, 1)),
+        "warning reflector[6].mesh (poster)",
+        "'poster' lies in the plane of 'wall_x0', 0.0e+00 m apart; where they overlap 'poster' reflects",
+    ),
+    "foot on the floor": (
+        lambda s: furnished(s, "crate", block([2, 4, 0], [3, 5, 1])),
+        "note reflector[6].mesh (crate)",
+        "'crate' lies in the plane of 'floor'",
+    ),
+    "bent plate": (
+        lambda s: furnished(s, "plate", joined([BOARD, grid([2, 1, 2], [1, 0, 1e-3], [0, 1, 0], 2, 2)])),
+        "warning reflector[6].mesh (plate)",
+        "splits into 2 walls, of which neighbours meet at only 1.0e-03 rad",
+    ),
+    "planes": (
+        lambda s: furnished(s, "shelf", block([1, 4, 1], [2, 5, 2])),
+        "note reflector[6].mesh (shelf)",
+        "the mesh has 6 planes; its walls are shelf#0 to shelf#5",
     ),
     "scatterer outside": (lambda s: scatterer(s, [2, 1, 4]), "error scatterer[0].position (sphere)", "outside"),
     "scatterer on a wall": (
@@ -162,10 +197,13 @@ def test_remark(paper: Scene, case: str) -> None:
         lambda s: panel(s, center=[3, 3, 2.5], host=None),
         lambda s: panel(s, rows=9, cols=9),
         lambda s: scatterer(s, [2, 1, 0.6]),
+        lambda s: furnished(s, "poster", grid([3e-5, 1, 1], [0, 1, 0], [0, 0, 1], 1, 1)),
+        lambda s: furnished(s, "tiles", joined([grid([1, 1, 2], [1, 0, 0], [0, 1, 0], 1, 1), NEXT])),
+        lambda s: furnished(furnished(s, "tile", BOARD), "next", NEXT),
     ],
 )
 def test_no_remark_on_what_is_sound(paper: Scene, change: Change) -> None:
-    assert remarks(change(paper)) == {}
+    assert complaints(change(paper)) == {}
 
 
 def test_room_of_a_larger_building_is_no_object(paper: Scene) -> None:
@@ -174,7 +212,7 @@ def test_room_of_a_larger_building_is_no_object(paper: Scene) -> None:
     walls = joined(list(box_walls(6.0, 6.0, 3.0).values()))
     building = replace(furnished(furnished(paper, "house", walls), "far", far), ris=None)
     building = without(building, "floor", "ceiling", "wall_x0", "wall_x6", "wall_y0", "wall_y6")
-    assert remarks(building) == {}
+    assert complaints(building) == {}
     empty = replace(building, scatterers=())
     assert "inside the object 'house'" in remarks(empty)["error agent.start"]
 
@@ -189,7 +227,7 @@ def test_element_remark_depends_on_carrier_and_pattern(paper: Scene) -> None:
 
 def test_isotropic_array_hears_from_below(paper: Scene) -> None:
     radio = RadioConfig(array=RxArray(pattern="isotropic"))
-    assert remarks(scatterer(paper, [2, 1, 0.4]), radio) == {}
+    assert complaints(scatterer(paper, [2, 1, 0.4]), radio) == {}
 
 
 def test_loader_refuses_what_the_check_calls_an_error(room: Path, damaged: Callable[[str, str], Path]) -> None:

@@ -1,18 +1,14 @@
-"""Association: the assignment against brute force, its gates, tracks that give way, and what merges at the receiver."""
+"""Association: the assignment against brute force, its gates, tracks that give way, and what comes out as one."""
 
 from itertools import product
 
 import numpy as np
 import pytest
 
-from rislam_rt.arrays import Floats, Integers
-from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.measurement.parts import merge
-from rislam_rt.measurement.received import Received
-from rislam_rt.model import RadioConfig
+from rislam_rt.arrays import Floats
 from rislam_rt.slam.associate import Candidates, associate, inverse_3x3, pair_costs
 from rislam_rt.slam.expect import Expected
-from rislam_rt.slam.match import Merger, Outlook, candidates, hidden_tracks, merge_returns, resolution_cell
+from rislam_rt.slam.match import Merger, Outlook, candidates, hidden_tracks, merge_returns
 from rislam_rt.slam.returns import NONE, Returns
 from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance, Tracks, begin, no_tracks
 
@@ -157,45 +153,8 @@ def test_tracks_behind_an_expected_return_give_way() -> None:
     assert chosen[1] == -1
 
 
-def test_what_the_filter_expects_to_merge_the_receiver_merges() -> None:
-    """Random groups of paths of which no gap is near the limit: the same ones come out, the same ones do not.
-
-    The receiver's own rule, on delay and both cosines, from the strongest down.
-    """
-    rng, radio, agreed = np.random.default_rng(17), RadioConfig(), 0
-    cell = resolution_cell(radio)
-    for _ in range(200):
-        count = int(rng.integers(2, 7))
-        place = np.array([5.0, 0.0, 0.0]) + cell * np.array([1.0, 0.5, 0.5]) * rng.uniform(-1.0, 1.0, (count, 3))
-        reach = np.max(np.abs(place[None] - place[:, None]) / cell, axis=2)
-        if ((reach > 0.88) & (reach < 1.12)).any():
-            continue
-        strength = np.exp(rng.normal(size=count))
-        foreseen = merge_returns(place, _expected(strength), no_tracks(4), cell, np.full(count, UNTOLD))
-        taken = _taken_by_receiver(place, strength, radio)
-        np.testing.assert_array_equal(foreseen.absorbed, taken)
-        agreed += int(taken.any())
-    assert agreed > 30
-
-
 def _expected(strength: Floats) -> Expected:
     return outlook(np.zeros((len(strength), 3)), np.log(strength)).expected
-
-
-def _taken_by_receiver(place: Floats, strength: Floats, radio: RadioConfig) -> Integers:
-    """(N,) whether a path comes out as part of a stronger one."""
-    direction = np.column_stack([place[:, 1:], np.sqrt(1.0 - np.sum(place[:, 1:] ** 2, axis=1))])
-    count = len(place)
-    received = Received(
-        np.arange(count),
-        place[:, 0] / SPEED_OF_LIGHT,
-        direction,
-        strength.astype(np.complex128),
-        np.zeros(count, dtype=np.bool_),
-        place[:, 0],
-    )
-    kept = merge(received, radio, False).path
-    return ~np.isin(np.arange(count), kept)
 
 
 def test_reciprocals_come_out_halfway_and_shift_nothing() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.arrays import Booleans, Floats
-from rislam_rt.model import Body, RadioConfig
+from rislam_rt.model import Body, RadioConfig, SensorModel
 from rislam_rt.slam.book import Book, empty_book, enter, image_idents, learn_ratio, strike
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.expect import Belief, expected_returns, shown_share
@@ -56,9 +56,14 @@ def room(*features: Floats) -> tuple[Moments, Book]:
 def outlook_of(moments: Moments, book: Book) -> tuple[Outlook, Belief]:
     """What is expected of it, without a panel."""
     belief = Belief(
-        moments.features, book, poses_of(moments.position, np.asarray(moments.heading), BODY), BODY, RADIO, None
+        moments.features,
+        book,
+        poses_of(moments.position, np.asarray(moments.heading), BODY),
+        BODY,
+        SensorModel(RADIO),
+        None,
     )
-    expected = expected_returns(belief, None, 2, CONFIG.detection_snr, False)
+    expected = expected_returns(belief, None, 2, False)
     return look_ahead(belief, expected, moments, no_tracks(4)), belief
 
 
@@ -76,7 +81,7 @@ def live(moments: Moments, book: Book, cycles: int, shows: Booleans, *, rng: np.
         std = np.full(len(rows), 1e-8)
         glance = Glance(seen, np.full(seen.shape, 0.01), np.log(amplitude), std / amplitude, std, 0.0 * std)
         hits = Hits(rows, np.arange(len(rows)), np.zeros((len(rows), 3)))
-        book, _ = learn(belief, moments, outlook, hits, glance, None, CONFIG.detection_snr, rng=rng)
+        book, _ = learn(belief, moments, outlook, hits, glance, None, rng=rng)
     return book
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec
+from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec, SensorModel
 from rislam_rt.slam.book import empty_book
 from rislam_rt.slam.expect import Belief
 from rislam_rt.slam.identity import predicted_panel_gain
@@ -34,7 +34,7 @@ def looks() -> np.ndarray:
 
 
 def belief() -> Belief:
-    return Belief(np.zeros((0, 3)), empty_book(), POSES, BODY, RADIO, PANEL)
+    return Belief(np.zeros((0, 3)), empty_book(), POSES, BODY, SensorModel(RADIO, threshold=THRESHOLD), PANEL)
 
 
 def glance(picks: list[int], amplitude: np.ndarray) -> Glance:
@@ -59,7 +59,7 @@ def follow(cycles: int, rng: np.random.Generator) -> Tracks:
         else:
             heard = np.flatnonzero(amplitude > least)
             tracks = extend(advance(tracks, 0.1, cycle, np.full(3, 1e-3)), heard, seen, heard, dull, cycle)
-        tracks = weigh_tracks(tracks, belief(), code, THRESHOLD)
+        tracks = weigh_tracks(tracks, belief(), code)
     return tracks
 
 
@@ -86,7 +86,7 @@ def test_silence_when_the_panel_would_shout_speaks_against_it(rng: np.random.Gen
         key=lambda c: abs(predicted_panel_gain(PANEL, c, SPOTS[:1], POSES.tx, POSES.rx, np.ones(1), RADIO)[0]),
     )
     before = tracks.log_ris[0]
-    assert weigh_tracks(tracks, belief(), loudest, THRESHOLD).log_ris[0] < before - 0.5
+    assert weigh_tracks(tracks, belief(), loudest).log_ris[0] < before - 0.5
 
 
 def test_the_likelier_track_is_suspected_and_none_without_evidence(rng: np.random.Generator) -> None:

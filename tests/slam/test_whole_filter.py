@@ -8,8 +8,8 @@ import pytest
 
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.measurement import ReceiverConfig, measure
-from rislam_rt.model import Measurement, Paths, RadioConfig, RisCode, RisLegs, Scene, SlamEstimate
+from rislam_rt.measurement import ReceiverConfig, build_sensor, measure
+from rislam_rt.model import Measurement, Paths, RadioConfig, RisCode, RisLegs, Scene, SensorModel, SlamEstimate
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import Outcome, SlamConfig, StartPrior, StepInfo, estimate, init, step
@@ -24,7 +24,7 @@ class Heard(NamedTuple):
     """What the agent gets in a run."""
 
     scene: Scene
-    radio: RadioConfig
+    sensor: SensorModel
     measurements: list[Measurement]
     codes: RisCode
     start: StartPrior
@@ -51,7 +51,7 @@ def hear(receiver: ReceiverConfig, noise_psd: float, depth: int, seed: int) -> H
     ]
     wrong = 0.01 * rng.standard_normal((2, 3)) * [1.0, 1.0, 0.0]
     start = StartPrior(motion.position[0] + wrong[0], motion.velocity[0] + wrong[1], float(motion.heading[0]))
-    return Heard(scene, radio, measurements, codes, start)
+    return Heard(scene, build_sensor(radio, receiver), measurements, codes, start)
 
 
 def _one(paths: Paths, cycle: int) -> Paths:
@@ -69,7 +69,7 @@ def go(heard: Heard, measurements: list[Measurement] | None = None, cycles: int 
     """The filter over the first cycles."""
     motion, rng = heard.scene.agent[CYCLES], np.random.default_rng(seed)
     assert heard.scene.ris is not None
-    state = init(heard.start, motion.body, heard.scene.ris.spec, heard.radio, CONFIG, rng=rng)
+    state = init(heard.start, motion.body, heard.scene.ris.spec, heard.sensor, CONFIG, rng=rng)
     estimates, infos = [], []
     for cycle, measurement in enumerate((measurements or heard.measurements)[:cycles]):
         code, heading = RisCode(heard.codes.index[cycle], heard.codes.levels), float(motion.heading[cycle])
@@ -184,7 +184,7 @@ def test_prediction_is_the_belief_without_a_measurement(clear: tuple[Heard, Cour
     heard = clear[0]
     motion = heard.scene.agent[CYCLES]
     rng = np.random.default_rng(1)
-    state = init(heard.start, motion.body, None, heard.radio, CONFIG, rng=rng)
+    state = init(heard.start, motion.body, None, heard.sensor, CONFIG, rng=rng)
     none = Measurement(*(np.zeros(shape) for shape in (0, (0, 2), 0, 0, (0, 2), 0)))
     after, info = step(state, none, None, 0.5, 0.0, CONFIG, rng=rng)
     belief = estimate(after, CONFIG)

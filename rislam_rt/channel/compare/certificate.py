@@ -8,6 +8,9 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.facets import Facets, build_facets
 from rislam_rt.channel.walls import build_walls
+from rislam_rt.constants import RAY_OFFSET
+from rislam_rt.geometry.angles import unit
+from rislam_rt.geometry.flat import FLOAT32_ROUNDING
 from rislam_rt.geometry.planes import mirror
 from rislam_rt.geometry.triangles import distance_to_edges, outline_edges
 from rislam_rt.model import PathKind, Scene, Trajectory
@@ -18,9 +21,11 @@ Identity = tuple[int, str, tuple[str, ...], tuple[str, ...]]
 SHORTEST_SEGMENT = 10.07e-3
 """[m] Sionna RT drops a path with a segment below 1 cm; in float32 the limit bites up to this length."""
 
-EDGE_TOLERANCE = 1e-4
-"""[m] How far from an outline a bounce or a passing ray may be decided either way: vertices, images and directions in
-float32 carry about 1e-6 of the coordinates, and a slanting bounce multiplies that."""
+HIDDEN = ("occluded", "close surfaces")
+"""Reasons of what stands in the way, rather than of a reflection that is none."""
+
+ROUNDINGS = 8.0
+"""Float32 operations, each rounding to the last place, between the coordinates and a mirror image or a hit."""
 
 
 class Proof(NamedTuple):
@@ -32,23 +37,29 @@ class Proof(NamedTuple):
 
 
 class Condition(NamedTuple):
-    """One thing that a path needs: it holds where `margin` [m] is positive. `reason` names its failure."""
+    """One thing that a path needs: it holds where `margin` [m] is positive. `reason` names its failure.
+
+    Where the margin is smaller than `reach` [m], float32 cannot tell.
+    """
 
     reason: str
     text: str
     margin: float
+    reach: float
 
 
 class Leg(NamedTuple):
-    """One leg drawn on unbounded planes: device, bounces, far end (d + 2, 3), its walls (d,), and the least clearance.
-
-    `clearance` [m] is the smallest distance of a segment's ends from the plane it bounces on, negative where the two
-    neighbours of a bounce do not lie on the same side: then there is no such reflection.
-    """
+    """One leg drawn on unbounded planes."""
 
     points: Floats
+    """(d + 2, 3) [m] device, bounces, far end."""
     walls: Integers
+    """(d,)."""
     clearance: float
+    """[m] Smallest distance of a segment's ends from the plane it bounces on, negative where the two neighbours of a
+    bounce do not lie on the same side: then there is no such reflection."""
+    shift: Floats
+    """(d + 1,) [m] how far beside each segment its ray may run in float32."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +78,10 @@ class Certifier:
     """(E, 2, 3) [m] outline edges of all walls."""
     wall_of_edge: Integers
     """(E,)."""
+    tilt: Floats
+    """(W,) [rad] what float32 corners do to the normal of each wall's largest triangle, which the tracer mirrors in."""
+    center: Floats
+    """(3,) [m] middle of the room, from which the tracer's coordinates count."""
     host: int
 
     @classmethod
@@ -77,7 +92,9 @@ class Certifier:
         outlines = [outline_edges(facets.corners[a:b]) for a, b in zip(facets.first, facets.first[1:], strict=False)]
         owner = np.repeat(np.arange(len(walls)), [len(o) for o in outlines])
         edges = np.concatenate([np.zeros((0, 2, 3)), *outlines])
-        return cls(scene, trajectory, depth, shortest, walls.names, facets, edges, owner, walls.host)
+        center = scene.bounds.mean(axis=0)
+        tilt = _tilts(facets, center)
+        return cls(scene, trajectory, depth, shortest, walls.names, facets, edges, owner, tilt, center, walls.host)
 
     def label(self, identity: Identity) -> str:
         """An identity for people; Rx walls after the bar."""
@@ -89,26 +106,27 @@ class Certifier:
         """The proof for a path that only `side` has.
 
         A path exists where all its conditions hold. It is proved absent by an object that stands clearly in the way
-        of reflections in order, undecidable where some margin is within `EDGE_TOLERANCE` of zero and no other
-        condition clearly fails, and cut by the tracer where it exists with too short a segment. All else is no proof.
+        of reflections in order, undecidable where a margin is below what float32 leaves open there (`Leg.shift`) and no
+        other condition clearly fails, and cut by the tracer where it exists with too short a segment. All else is no
+        proof.
         """
         bounces = len(identity[2]) + len(identity[3])
         if bounces > self.depth:
             return Proof("beyond depth", f"{bounces} bounces, depth {self.depth}")
         legs = self._legs(identity, cycle)
         conditions = [condition for leg in legs for condition in self._conditions(leg)]
-        broken = [c for c in conditions if c.margin <= -EDGE_TOLERANCE]
-        close = [c for c in conditions if abs(c.margin) < EDGE_TOLERANCE]
+        broken = [c for c in conditions if c.margin <= -c.reach]
+        close = [c for c in conditions if abs(c.margin) < c.reach]
         shortest = min(float(np.linalg.norm(np.diff(leg.points, axis=0), axis=1).min()) for leg in legs)
         if broken:
-            only_hidden = all(c.reason == "occluded" for c in broken)
+            only_hidden = all(c.reason in HIDDEN for c in broken)
             return Proof("occluded" if only_hidden else "", broken[0].text, -broken[0].margin)
         if side == "analytic" and shortest < self.shortest:
             return Proof("short segment", f"segment of {1e3 * shortest:.4f} mm", shortest)
         if close:
-            closest = min(close, key=lambda c: abs(c.margin))
-            reason = "in a face" if closest.reason == "in a face" else "edge"
-            return Proof(reason, closest.text, abs(closest.margin))
+            closest = min(close, key=lambda c: abs(c.margin) / c.reach)
+            text = f"{closest.text}; float32 leaves {closest.reach:.2e} m"
+            return Proof("edge" if closest.reason == "occluded" else closest.reason, text, abs(closest.margin))
         return Proof("", f"all its conditions hold, shortest segment {1e3 * shortest:.4f} mm")
 
     def _legs(self, identity: Identity, cycle: int) -> list[Leg]:
@@ -117,48 +135,98 @@ class Certifier:
         tx_walls, rx_walls = ([self.names.index(n) for n in names] for names in (tx_names, rx_names))
         tx, rx = self.trajectory.tx[cycle], self.trajectory.rx[cycle]
         if not landmark:
-            return [unfolded(self.facets, tx_walls, tx, rx)]
+            return [self._unfolded(tx_walls, tx, rx)]
         point = self.scene.landmark_positions[self.scene.landmarks.index(landmark)]
-        return [unfolded(self.facets, tx_walls, tx, point), unfolded(self.facets, rx_walls[::-1], rx, point)]
+        return [self._unfolded(tx_walls, tx, point), self._unfolded(rx_walls[::-1], rx, point)]
+
+    def _unfolded(self, walls: list[int], device: Floats, far: Floats) -> Leg:
+        """Draw a leg on unbounded planes by mirroring the far end."""
+        facets, images = self.facets, [far]
+        for wall in walls[::-1]:
+            images.append(mirror(images[-1], facets.normal[wall], facets.offset[wall]))
+        points, clearance = [device], np.inf
+        for wall, image in zip(walls, images[:0:-1], strict=True):
+            a = float(facets.normal[wall] @ points[-1] - facets.offset[wall])
+            b = float(facets.normal[wall] @ image - facets.offset[wall])
+            clearance = min(clearance, np.copysign(min(abs(a), abs(b)), -a * b))
+            fraction = a / (a - b) if a != b else 0.5
+            points.append(points[-1] + fraction * (image - points[-1]))
+        drawn = np.array([*points, far])
+        shift = self._shifts(drawn, np.array(images[::-1]), walls)
+        return Leg(drawn, np.array(walls, dtype=np.int64), float(clearance), shift)
+
+    def _shifts(self, points: Floats, images: Floats, walls: list[int]) -> Floats:
+        """How far beside each segment the tracer's ray may run: (d + 1,) [m].
+
+        The image method sends a ray from the last point found, moved off its surface by `RAY_OFFSET` of (1 m + its
+        largest coordinate), to the image, moved alike. In between, the ray is off by at most the weighted mean of what
+        its ends are off. An image adds the rounding of its own coordinates and the tilt of the planes it came about by.
+        """
+        size = [1.0 + np.abs(p - self.center).max(axis=-1) for p in (points, images)]
+        rounding = ROUNDINGS * FLOAT32_ROUNDING
+        shift, off = np.zeros(len(images)), rounding * float(size[0][0])
+        for segment, image in enumerate(images):
+            run = np.linalg.norm(points[segment : segment + 2] - image, axis=-1)
+            tilted = sum(self.tilt[wall] for wall in walls[segment:]) * 2.0 * float(run[0])
+            start = off + RAY_OFFSET * float(size[0][segment]) * (segment > 0)
+            moved = RAY_OFFSET * (segment < len(walls))  # the far end itself is not moved
+            end = (moved + rounding) * float(size[1][segment]) + tilted
+            share = float(run[1] / run[0]) if run[0] > 0.0 else 0.0
+            off = share * start + (1.0 - share) * end
+            shift[segment] = max(start, off)
+        return shift
 
     def _conditions(self, leg: Leg) -> list[Condition]:
         """All that a leg needs, with margins from the geometry."""
-        found = [Condition("in a face", f"{abs(leg.clearance):.2e} m off the plane of a bounce", leg.clearance)]
-        found += [self._on_wall(bounce, int(wall)) for bounce, wall in zip(leg.points[1:-1], leg.walls, strict=True)]
+        reach = float(leg.shift.max())
+        found = [Condition("in a face", f"{abs(leg.clearance):.2e} m off the plane of a bounce", leg.clearance, reach)]
+        for number in range(len(leg.walls)):
+            found += self._on_wall(leg, number)
         for number in range(len(leg.points) - 1):
             found += self._free(leg, number)
         panel = self.scene.ris
         if panel is not None and np.array_equal(leg.points[-1], panel.center):
             height = float((leg.points[-2] - leg.points[-1]) @ panel.spec.normal)
-            found.append(Condition("in a face", f"{height:.2e} m in front of the panel's plane", height))
+            found.append(Condition("in a face", f"{height:.2e} m in front of the panel's plane", height, reach))
         return found
 
-    def _on_wall(self, bounce: Floats, wall: int) -> Condition:
-        """The bounce point lies on the wall's triangles, not only in its plane."""
-        inside = bool(self.facets.contains(bounce[None], np.array([wall]))[0])
-        distance = self._outline_distance(bounce, wall)
-        text = f"bounce {distance:.2e} m {'inside' if inside else 'outside'} the outline of {self.names[wall]}"
-        return Condition("edge", text, distance if inside else -distance)
+    def _on_wall(self, leg: Leg, number: int) -> list[Condition]:
+        """Bounce `number` lies on its wall's triangles, not only in its plane, and not on what lies on them."""
+        wall, bounce = int(leg.walls[number]), leg.points[number + 1]
+        found = []
+        for surface, sign in ((wall, 1.0), *((int(upper), -1.0) for upper in self.facets.over[wall])):
+            inside = self._inside(bounce, bounce - leg.points[number], surface)
+            where = "inside" if inside > 0.0 else "outside"
+            text = f"ray to the bounce {abs(inside):.2e} m {where} the outline of {self.names[surface]}"
+            found.append(Condition("edge", text, sign * inside, float(leg.shift[number])))
+        return found
 
     def _free(self, leg: Leg, number: int) -> list[Condition]:
         """No other wall stands across segment `number`: it would have to be crossed, and where it is solid.
 
-        Walls that the segment bounces on do not stand in its way, nor does the host wall before its own panel.
+        Walls that the segment bounces on, and those in one plane with them, do not stand in its way, nor does the host
+        wall before its own panel. A wall that is solid where a segment ends within float32 of it is too close to tell.
         """
-        start, end = leg.points[number], leg.points[number + 1]
+        start, end, reach = leg.points[number], leg.points[number + 1], float(leg.shift[number])
         a, b = self.facets.distance(np.stack([start, end]))
         least = np.minimum(np.abs(a), np.abs(b))
-        own = {int(w) for w in leg.walls[max(number - 1, 0) : number + 1]}
-        own |= {self.host} if number == len(leg.walls) else set()
+        own = {int(self.facets.plane[w]) for w in leg.walls[max(number - 1, 0) : number + 1]}
+        own |= {int(self.facets.plane[self.host])} if number == len(leg.walls) and self.host >= 0 else set()
         found = []
-        for wall in set(np.flatnonzero((a * b < 0.0) | (least < EDGE_TOLERANCE))) - own:
+        for wall in np.flatnonzero((a * b < 0.0) | (least < reach)):
+            if int(self.facets.plane[wall]) in own:
+                continue
             slope = a[wall] - b[wall]
             point = start + (np.clip(a[wall] / slope, 0.0, 1.0) if slope else 0.0) * (end - start)
-            solid = self._on_wall(point, int(wall)).margin
-            crossed = np.copysign(least[wall], -a[wall] * b[wall])
+            solid = self._inside(point, end - start, int(wall))
+            crossed = float(np.copysign(least[wall], -a[wall] * b[wall]))
             where = "inside" if solid > 0.0 else "outside"
             text = f"{self.names[wall]} across a segment, {abs(solid):.2e} m {where} its outline"
-            found.append(Condition("occluded", text, -min(solid, float(crossed))))
+            if solid >= reach and abs(crossed) < reach:
+                text = f"{self.names[wall]} {abs(crossed):.2e} m off a segment's end"
+                found.append(Condition("close surfaces", text, -crossed, reach))
+            else:
+                found.append(Condition("occluded", text, -min(solid, crossed), reach))
         return found + self._unshaded(leg, number)
 
     def _unshaded(self, leg: Leg, number: int) -> list[Condition]:
@@ -169,24 +237,28 @@ class Certifier:
                 continue
             margin = shades.margin(leg.points[number], leg.points[number + 1], shade)
             text = f"shade of {self.scene.landmarks[landmark]}, {abs(margin):.2e} m {'in' if margin < 0 else 'out'}side"
-            found.append(Condition("occluded", text, margin))
+            found.append(Condition("occluded", text, margin, float(leg.shift[number])))
         return found
 
-    def _outline_distance(self, point: Floats, wall: int) -> float:
-        """Distance [m] of a point (3,) from a wall's outline."""
-        return float(distance_to_edges(point[None], self.edges[self.wall_of_edge == wall])[0])
+    def _inside(self, point: Floats, ray: Floats, wall: int) -> float:
+        """Distance [m] of a `ray` (3,) through a point (3,) of a wall's plane from the wall's outline.
+
+        Across the ray, since that is how a ray is off; negative outside.
+        """
+        inside = bool(self.facets.contains(point[None], np.array([wall]))[0])
+        along = unit(ray)
+        edges = self.edges[self.wall_of_edge == wall] - point
+        seen = edges - (edges @ along)[..., None] * along
+        distance = float(distance_to_edges(np.zeros((1, 3)), seen)[0])
+        return distance if inside else -distance
 
 
-def unfolded(facets: Facets, walls: list[int], device: Floats, far: Floats) -> Leg:
-    """Draw a leg on unbounded planes by mirroring the far end."""
-    images = [far]
-    for wall in walls[::-1]:
-        images.append(mirror(images[-1], facets.normal[wall], facets.offset[wall]))
-    points, clearance = [device], np.inf
-    for wall, image in zip(walls, images[:0:-1], strict=True):
-        a = float(facets.normal[wall] @ points[-1] - facets.offset[wall])
-        b = float(facets.normal[wall] @ image - facets.offset[wall])
-        clearance = min(clearance, np.copysign(min(abs(a), abs(b)), -a * b))
-        fraction = a / (a - b) if a != b else 0.5
-        points.append(points[-1] + fraction * (image - points[-1]))
-    return Leg(np.array([*points, far]), np.array(walls, dtype=np.int64), float(clearance))
+def _tilts(facets: Facets, center: Floats) -> Floats:
+    """(W,) [rad] how far rounded corners can turn the normal of each wall's largest triangle."""
+    corners = facets.corners - center
+    sides = np.roll(corners, -1, axis=1) - corners
+    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=-1)
+    altitude = area / np.linalg.norm(sides, axis=-1).max(axis=1)
+    largest = [int(a + np.argmax(area[a:b])) for a, b in zip(facets.first, facets.first[1:], strict=False)]
+    rounding = 2.0 * FLOAT32_ROUNDING * np.abs(corners[largest]).max(axis=(1, 2), initial=0.0)
+    return rounding / np.maximum(altitude[largest], np.finfo(np.float64).tiny)

@@ -8,6 +8,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, Certifier, Identity
 from rislam_rt.channel.compare.report import OneSided, PathReport
 from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import angle_between
 from rislam_rt.model import Paths, Scene, Trajectory
 
@@ -34,6 +35,13 @@ def compare_paths(
     geometry (`certificate.py`); what has no proof there counts as unexplained. `shortest_segment` [m] is the tracer's
     limit: below it, and only for paths that the tracer lacks, a segment's length is a proof.
     """
+    for name, value, kind in (
+        ("traced", traced, Paths),
+        ("analytic", analytic, Paths),
+        ("scene", scene, Scene),
+        ("trajectory", trajectory, Trajectory),
+    ):
+        expect(name, value, kind)
     columns = _align(traced, analytic)
     in_traced, in_analytic = _valid(traced, columns.traced), _valid(analytic, columns.analytic)
     depth = min(traced.tx_walls.shape[1], analytic.tx_walls.shape[1])

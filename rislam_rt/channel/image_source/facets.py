@@ -40,6 +40,10 @@ class Facets:
     """(2, W, 3) [m] lowest and highest corner of each wall."""
     extent: Floats
     """(2, W) [m] lowest and highest signed distance of all walls' corners from wall w's plane."""
+    plane: Integers
+    """(W,) of `Walls.plane`."""
+    over: tuple[Integers, ...]
+    """(W,) of `Walls.over`."""
     shades: Shades
     """What hides but is no wall."""
 
@@ -63,6 +67,19 @@ class Facets:
             inside[rows] = self._on_wall(points[rows], int(number))
         return inside
 
+    def reflects(self, points: Floats, wall: Integers) -> Booleans:
+        """Whether points (N, 3) of the plane of a wall (N,) lie on that wall and on none that lies on it."""
+        own = self.contains(points, wall)
+        for lower in np.unique(wall[own]) if any(map(len, self.over)) else []:
+            for upper in self.over[lower]:
+                rows = np.flatnonzero(own & (wall == lower))
+                own[rows] = ~self.contains(points[rows], np.full(len(rows), upper))
+        return own
+
+    def _planes(self, wall: Integers) -> Integers:
+        """The planes (N,) of walls (N,), -1 for -1."""
+        return np.where(wall >= 0, self.plane[wall], -1) if len(self) else wall
+
     def _on_wall(self, points: Floats, wall: int) -> Booleans:
         """Whether points (N, 3) of the plane of one wall lie on its triangles."""
         span = slice(self.first[wall], self.first[wall + 1])
@@ -83,7 +100,7 @@ class Facets:
         """One of `walls` that stands between the ends (N, 3) of each segment: (N,), -1 where none does.
 
         A wall whose plane passes within `SURFACE_TOLERANCE` of an end is not in the way (ends are bounce points,
-        devices and landmarks), nor is a segment's `spared` wall (N,).
+        devices and landmarks), nor is a segment's `spared` wall (N,) or what lies on it.
         """
         blocker = np.full(len(start), -1, dtype=np.int64)
         normal, offset = self.normal[walls].T, self.offset[walls]
@@ -94,7 +111,7 @@ class Facets:
             fraction = a[segment, column] / (a[segment, column] - b[segment, column])
             segment, wall = segment + rows.start, walls[column]
             point = start[segment] + fraction[:, None] * (end[segment] - start[segment])
-            hit = self.contains(point, wall) & (spared[segment] != wall)
+            hit = self.contains(point, wall) & (self._planes(spared)[segment] != self.plane[wall])
             blocker[segment[hit]] = wall[hit]
         return blocker
 
@@ -140,6 +157,8 @@ def build_facets(walls: Walls) -> Facets:
         edge_offset=edge_offset,
         box=np.stack(box),
         extent=extent,
+        plane=walls.plane,
+        over=walls.over,
         shades=walls.shades,
     )
 

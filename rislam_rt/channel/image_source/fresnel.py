@@ -100,7 +100,8 @@ class Coatings:
         """Reflection coefficients (N,) of rays that leave along `direction` (N, 3) and meet `walls` (N, d).
 
         With slabs on the way, both ends are vertically polarised and the coefficient is the vertical part of what
-        arrives of a vertical unit field. `normals` (N, d, 3) are those of the walls.
+        arrives of a vertical unit field. `normals` (N, d, 3) are those of the walls. Seen from the far end theta_hat is
+        the same; taken from the arriving ray it also has the same azimuth where that ray is exactly vertical.
         """
         constant: Complexes = np.prod(self.reflection[walls], axis=1).astype(np.complex128)
         rows = np.flatnonzero((self.reflection[walls] == 0.0).any(axis=1))
@@ -110,7 +111,7 @@ class Coatings:
             reflected = mirror_direction(incident, normal)
             field = self._reflect(field, incident, reflected, normal, wall)
             incident = reflected
-        constant[rows] = np.sum(field * polarisation_basis(-incident)[0], axis=-1)
+        constant[rows] = np.sum(field * polarisation_basis(incident)[0], axis=-1)
         return constant
 
     def _reflect(

@@ -85,7 +85,7 @@ def _reflected_rays(facets: Facets, walls: Integers, device: Floats, far: Floats
         target = image[cycle * static, sequence]
         tolerance = (SURFACE_TOLERANCE if bounce == 0 else SEAM, SURFACE_TOLERANCE if image is images[-1] else SEAM)
         crosses, hit = _plane_crossing(point, target, facets.normal[wall], facets.offset[wall], tolerance)
-        on_wall = facets.contains(hit, wall[crosses])
+        on_wall = facets.reflects(hit, wall[crosses])
         keep = np.flatnonzero(crosses)[on_wall]
         cycle, sequence, bounces, point = cycle[keep], sequence[keep], bounces[keep], hit[on_wall]
         bounces[:, bounce] = point

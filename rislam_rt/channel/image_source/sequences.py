@@ -19,14 +19,14 @@ def wall_sequences(facets: Facets, device: Floats, far: Floats, depth: int, host
     device, far
         (K, 3) all positions of either end [m].
     host
-        A wall that may not come last (the one that a panel hangs on), -1 for none.
+        A wall that may not come last, nor what lies on it (the one that a panel hangs on), -1 for none.
     """
     if depth < 1 or len(facets) == 0:
         return
     device_side, far_side = facets.point_sides(device), facets.point_sides(far)
     sides = facets.sides() if depth > 1 else np.zeros((len(facets), len(facets)), dtype=np.int64)
     last = np.flatnonzero(far_side > 0)
-    level = last[last != host][:, None]
+    level = (last if host < 0 else last[facets.plane[last] != facets.plane[host]])[:, None]
     before = far_side[level[:, 0]]
     for bounces in range(1, depth + 1):
         ends_here = (device_side[level[:, 0]] & before) > 0

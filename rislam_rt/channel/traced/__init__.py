@@ -8,8 +8,8 @@ How a trajectory of K cycles becomes few solves:
 - *candidates* (`sequences.py`) are all wall sequences that the room's planes leave possible, at every position, instead
   of what randomly shot rays happen to meet. So the set is complete by construction, and the same from run to run.
 - *tracing* is Sionna's: its image method (`visibility.py`) mirrors in the meshes' planes and sends rays back through
-  the scene, which decides visibility and the primitives met; its field computation (`fields.py`) evaluates the radio
-  materials.
+  the scene, which decides visibility and the primitives met; its radio materials and antenna patterns say what becomes
+  of the field (`fields.py`), which is carried along the path's own directions: Sionna's basis fails near the vertical.
 - *refinement* (`course.py`) recomputes in float64, on the walls' planes, where the legs found run.
 """
 

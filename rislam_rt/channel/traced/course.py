@@ -53,6 +53,16 @@ def refined_course(walls: Walls, sequences: Integers, device: Floats, far: Float
     return Course(vertices, np.linalg.norm(images[0] - device, axis=-1), at_device, -direction)
 
 
+def segment_directions(walls: Walls, sequences: Integers, at_device: Floats) -> Floats:
+    """Unit vectors (N, D + 1, 3) along which legs that leave along `at_device` (N, 3) travel, the last one repeated."""
+    travel = [at_device]
+    for wall in sequences.T:
+        travel.append(
+            np.where((wall != NO_WALL)[:, None], mirror_direction(travel[-1], walls.normal[wall]), travel[-1])
+        )
+    return np.stack(travel, axis=1)
+
+
 def traced_course(sequences: Integers, device: Floats, far: Floats, vertices: Floats) -> Course:
     """Legs over the bounce points (N, D, 3) that the tracer left."""
     points = polyline(sequences, device, far, vertices)

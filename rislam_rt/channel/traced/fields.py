@@ -1,76 +1,128 @@
-"""Sionna's field computation along given courses: what the radio materials do to the signal."""
+"""What walls and antennas do to the signal along given courses: Sionna's materials and patterns, fields in float64.
+
+Sionna carries a field in the (theta, phi) basis of the ray's direction, in float32. That basis turns over at the pole:
+within 1e-3 rad of the vertical Sionna takes another one, in which a bounce off floor or ceiling is a mirror image, and
+a vertical ray has no azimuth that both its ends agree on. So the materials are asked in the plane of incidence, where
+no basis has a pole, and the field is carried from bounce to bounce by the path's own directions.
+"""
 
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import sionna.rt as rt
 from sionna.rt import antenna_pattern
-from sionna.rt.path_solvers.field_calculator import FieldCalculator
+from sionna.rt.utils import spectrum_to_matrix_4f
 
-from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.traced.antennas import Antennas
-from rislam_rt.channel.traced.buffer import fill_buffer
-from rislam_rt.channel.traced.course import Course, polyline
+from rislam_rt.channel.traced.course import Course, segment_directions
+from rislam_rt.channel.traced.material import ConstantReflection
 from rislam_rt.channel.traced.problem import Ends
-from rislam_rt.channel.traced.rows import Rows
-from rislam_rt.channel.traced.stage import Stage, as_points
+from rislam_rt.channel.traced.sequences import NO_WALL
+from rislam_rt.channel.traced.stage import Stage
+from rislam_rt.channel.walls import Walls
+
+POLE = 1e-12
+"""Sine of the zenith angle below which a direction is vertical: rounding of float64 a thousand times over. Its azimuth
+is then 0, for all segments of a leg alike."""
 
 
-def leg_coefficients(stage: Stage, sequences: Integers, ends: Ends, course: Course, antennas: Antennas) -> Complexes:
+def leg_coefficients(
+    stage: Stage, walls: Walls, sequences: Integers, ends: Ends, course: Course, antennas: Antennas
+) -> Complexes:
     """Field (N,) of legs over `sequences` (N, D), without spreading loss and carrier phase.
 
     Both ends have the same linear polarisation. Between isotropic antennas what is left is the reflection: exactly the
     product of R for walls of constant R, and the part of the Fresnel-reflected field in that polarisation for slabs.
-
-    Every leg is computed about the middle of its own shortest segment: float32 coordinates of the whole room would
-    leave a segment of a millimetre no direction, and Fresnel's coefficients with it.
+    The field is a Jones vector (N, 2) along theta_hat and phi_hat of each segment's direction of travel.
     """
     if len(sequences) == 0:
         return np.zeros(0, dtype=np.complex128)
-    points = polyline(sequences, ends.device, ends.far, course.vertices)
-    origin = _middle_of_shortest(points)
-    index = np.arange(len(sequences))
-    buffer = fill_buffer(stage, sequences, Rows(index, index, index), course.vertices - origin[:, None])
-    buffer.valid = dr.full(mi.Bool, True, len(sequences))
-    turned = mi.Point3f(mi.Float(ends.heading.astype(np.float32)), 0.0, 0.0)
-    devices, far_ends = _patterns(antennas)
-    solved = FieldCalculator()(
-        wavelength=stage.scene.wavelength,
-        paths=buffer,
-        samples_per_src=1,
-        diffraction=False,
-        src_positions=as_points(ends.far - origin),
-        tgt_positions=as_points(ends.device - origin),
-        src_orientations=turned,
-        tgt_orientations=turned,
-        src_antenna_patterns=far_ends,
-        tgt_antenna_patterns=devices,
-    )
-    gains = np.empty((len(devices), len(far_ends), len(sequences)), dtype=np.complex128)
-    for device, row in enumerate(solved.a):
-        for far, gain in enumerate(row):
-            gains.real[device, far], gains.imag[device, far] = np.array(gain.real), np.array(gain.imag)
-    chosen = gains[ends.from_rx * (len(devices) - 1), ends.to_rx * (len(far_ends) - 1), index]
-    return chosen * (4.0 * np.pi / stage.wavelength * course.length)
+    travel = segment_directions(walls, sequences, course.at_device)
+    field = _radiated(antennas, travel[:, 0], ends.heading, ends.from_rx, antennas.tx)
+    for bounce, wall in enumerate(sequences.T):
+        for number, material in enumerate(stage.materials):
+            rows = np.flatnonzero((wall != NO_WALL) & (stage.material_of_wall[wall] == number))
+            if len(rows):
+                normal = walls.normal[wall[rows]]
+                jones = _jones(material, travel[rows, bounce], travel[rows, bounce + 1], normal)
+                field[rows] = (jones @ field[rows][..., None])[..., 0]
+    received = _radiated(antennas, -travel[:, -1], ends.heading, ends.to_rx, "iso")
+    received[:, 1] *= -1.0  # theta_hat is the same seen from either end, phi_hat the opposite
+    return np.vecdot(received, field)
 
 
-def _patterns(antennas: Antennas) -> tuple[list[Any], list[Any]]:
-    """Sionna's patterns of the devices (Tx, Rx) and of the far ends (landmark, Rx), one of each where all are alike."""
+def _jones(material: Any, incident: Floats, reflected: Floats, normal: Floats) -> Complexes:
+    """Jones matrices (N, 2, 2), or (1, 2, 2) for all, between the (theta, phi) bases of rays (N, 3) before and after.
 
-    def pattern(name: str) -> Any:
+    A wall of constant R is given in those bases; a slab across the plane of incidence and in it, and turned here.
+    """
+    if isinstance(material, ConstantReflection):
+        return incidence_jones(material, np.ones(1))
+    along = np.vecdot(incident, normal)
+    across = np.cross(incident, normal)
+    sine = np.linalg.norm(across, axis=-1, keepdims=True)
+    # at normal incidence any direction in the wall will do: across and along the plane are alike there
+    across = np.where(sine > POLE, across / np.where(sine > POLE, sine, 1.0), spherical_basis(incident)[0])
+    before, after = (_turn(spherical_basis(ray), across) for ray in (incident, reflected))
+    turned: Complexes = after.swapaxes(1, 2) @ incidence_jones(material, np.abs(along)) @ before
+    return turned
+
+
+def incidence_jones(material: Any, cosine: Floats) -> Complexes:
+    """Jones matrices (N, 2, 2) of a radio material at cosines (N,) of incidence, across and in the plane of incidence.
+
+    The first component of a field is along a unit vector s across the plane, the second along `k x s`, k being the
+    ray's direction. Sionna's material is evaluated with the wall's normal along x and the rays level, where its own
+    basis is s = -z.
+    """
+    count = len(cosine)
+    along, up = (mi.Float(part.astype(np.float32)) for part in (cosine, np.sqrt(1.0 - np.minimum(cosine, 1.0) ** 2)))
+    incident, reflected = mi.Vector3f(-along, up, 0.0), mi.Vector3f(along, up, 0.0)
+    bounce = dr.zeros(mi.SurfaceInteraction3f, count)
+    bounce.n = bounce.sh_frame.n = mi.Normal3f(1.0, 0.0, 0.0)
+    bounce.initialize_sh_frame()
+    bounce.wi = bounce.to_local(incident)
+    event = dr.full(mi.UInt, rt.InteractionType.SPECULAR, count)
+    bounce.dp_du = mi.Vector3f(0.0, 0.0, dr.reinterpret_array(mi.Float, event))
+    context = mi.BSDFContext(mode=mi.TransportMode.Importance, type_mask=0, component=0)
+    real = np.array(spectrum_to_matrix_4f(material.eval(context, bounce, reflected, True)), dtype=np.float64)
+    matrix = np.moveaxis(np.broadcast_to(real.reshape(4, 4, -1), (4, 4, count)), -1, 0)
+    return matrix[:, :2, :2] + 1j * matrix[:, 2:, :2]
+
+
+def spherical_basis(direction: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors theta_hat and phi_hat (N, 3) of directions (N, 3)."""
+    cosine, azimuth = direction[:, 2], _azimuth(direction)
+    c, s = np.cos(azimuth), np.sin(azimuth)
+    sine = np.hypot(direction[:, 0], direction[:, 1])
+    return np.stack([cosine * c, cosine * s, -sine], axis=-1), np.stack([-s, c, np.zeros_like(c)], axis=-1)
+
+
+def _azimuth(direction: Floats) -> Floats:
+    """(N,) [rad] of directions (N, 3), 0 along the vertical."""
+    x, y = direction[:, 0], direction[:, 1]
+    return np.where(np.hypot(x, y) > POLE, np.arctan2(y, x), 0.0)
+
+
+def _turn(basis: tuple[Floats, Floats], across: Floats) -> Floats:
+    """Matrices (N, 2, 2): components along theta_hat and phi_hat to those along s = `across` (N, 3) and k x s."""
+    c, s = (np.vecdot(vector, across) for vector in basis)
+    return np.stack([np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)], axis=1)
+
+
+def _radiated(antennas: Antennas, direction: Floats, heading: Floats, is_rx: Booleans, otherwise: str) -> Complexes:
+    """Field (N, 2) along theta_hat and phi_hat that antennas radiate in `direction` (N, 3): the Rx's or another."""
+    field = np.empty((len(direction), 2), dtype=np.complex128)
+    for name in {antennas.rx, otherwise}:
+        rows = np.flatnonzero(np.where(is_rx, antennas.rx, otherwise) == name)
         shape = getattr(antenna_pattern, f"v_{name}_pattern")
         kind = antenna_pattern.PolarizedAntennaPattern(v_pattern=shape, polarization=antennas.polarization)
-        return kind.patterns[0]
-
-    if antennas.isotropic:
-        return [pattern("iso")], [pattern("iso")]
-    return [pattern(antennas.tx), pattern(antennas.rx)], [pattern("iso"), pattern(antennas.rx)]
-
-
-def _middle_of_shortest(points: Floats) -> Floats:
-    """Middle (N, 3) of each polyline's (N, V, 3) shortest segment; repeated points at the end are no segment."""
-    segment = np.linalg.norm(np.diff(points, axis=1), axis=-1)
-    shortest = np.argmin(np.where(segment > 0.0, segment, np.inf), axis=1)
-    row = np.arange(len(points))
-    return 0.5 * (points[row, shortest] + points[row, shortest + 1])
+        theta = np.arctan2(np.hypot(direction[rows, 0], direction[rows, 1]), direction[rows, 2])
+        angles = theta, _azimuth(direction[rows]) - heading[rows]
+        gains = kind.patterns[0](*(mi.Float(angle.astype(np.float32)) for angle in angles))
+        for part, gain in enumerate(gains):
+            field[rows, part] = np.array(gain.real) + 1j * np.array(gain.imag)
+    return field

@@ -3,10 +3,8 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.model import Scene
-
-RAY_OFFSET = 6e-6
-"""Sionna RT starts a ray off its surface by this much of (1 m + the largest coordinate)."""
 
 SEGMENT_LIMIT = 1e-5
 """[m] What Sionna RT's limit of 1 cm on segments is lowered to: that limit loses double bounces near a corner, and

@@ -4,13 +4,29 @@ import drjit as dr
 import mitsuba as mi
 from sionna.rt import InteractionType
 from sionna.rt.radio_materials import RadioMaterialBase
+from sionna.rt.utils import jones_matrix_from_real_imag, theta_hat, theta_phi_from_unit_vec
+from sionna.rt.utils.jones import implicit_basis_vector, jones_matrix_rotator
+
+
+def kept_components(reflection: mi.Float, incident: mi.Vector3f, reflected: mi.Vector3f) -> mi.Matrix4f:
+    """Jones matrix between Sionna's bases for rays along `incident` and `reflected`: theta and phi parts times R.
+
+    Sionna's basis is theta_hat, except within 1e-3 rad of the vertical, where it is a fixed direction in both rays: R
+    times the identity there would mirror the field and multiply a matched signal by `-cos(2 phi)`.
+    """
+
+    def to_spherical(ray: mi.Vector3f) -> mi.Matrix2f:
+        return jones_matrix_rotator(ray, implicit_basis_vector(ray), theta_hat(*theta_phi_from_unit_vec(ray)))
+
+    turned = to_spherical(reflected).T @ to_spherical(incident)
+    return jones_matrix_from_real_imag(turned * reflection, mi.Matrix2f(0.0))
 
 
 class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
     """Mirror with coefficient R in (0, 1] whatever the angle and the polarisation; nothing passes, nothing scatters.
 
-    The Jones matrix is R times the identity between the (theta, phi) bases of the incident and the reflected ray, in
-    which Sionna carries its fields: a bounce keeps the vertical and the horizontal part of the field and scales both.
+    The Jones matrix is R times the identity between the (theta, phi) bases of the incident and the reflected ray: a
+    bounce keeps the vertical and the horizontal part of the field and scales both.
     Any other choice would turn part of a matched signal into the other polarisation, and |R| would depend on the angle.
     """
 
@@ -36,14 +52,14 @@ class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
         result.pdf = dr.full(mi.Float, 1.0, count)  # type: ignore[assignment]
         result.sampled_type = mi.UInt32(+mi.BSDFFlags.DeltaReflection)  # type: ignore[assignment]
         result.eta = 1.0  # type: ignore[assignment]
-        return result, mi.Spectrum(self._jones())
+        return result, mi.Spectrum(self._jones(si, result.wo))
 
     def eval(
         self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: bool | mi.Bool = True
     ) -> mi.Spectrum:
         """Jones matrix as a real 4 x 4 matrix; zero for anything but a specular reflection."""
         event = dr.reinterpret_array(mi.UInt, si.dp_du.z)
-        return mi.Spectrum(dr.select(event == InteractionType.SPECULAR, self._jones(), mi.Matrix4f(0.0)))
+        return mi.Spectrum(dr.select(event == InteractionType.SPECULAR, self._jones(si, wo), mi.Matrix4f(0.0)))
 
     def pdf(
         self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: bool | mi.Bool = True
@@ -59,8 +75,8 @@ class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
         """Text for people."""
         return f"ConstantReflection R={self._reflection[0]:.3f}"
 
-    def _jones(self) -> mi.Matrix4f:
-        return mi.Matrix4f(1.0) * self._reflection  # type: ignore[operator]
+    def _jones(self, si: mi.SurfaceInteraction3f, wo: mi.Vector3f) -> mi.Matrix4f:
+        return kept_components(self._reflection, si.to_world(si.wi), wo)
 
 
 mi.register_bsdf("rislam-constant-reflection", lambda props: ConstantReflection(props.id(), 1.0))

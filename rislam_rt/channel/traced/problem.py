@@ -133,7 +133,7 @@ def build_batch(problems: Sequence[Problem], walls: Walls, sides: Integers, dept
     sequences = []
     for problem in problems:
         device_side, far_side = (np.bitwise_or.reduce(point_sides(walls, p)) for p in (problem.device, problem.far))
-        sequences.append(possible_sequences(sides, device_side, far_side, depth, problem.host))
+        sequences.append(possible_sequences(sides, device_side, far_side, depth, walls.beside(problem.host)))
     device = np.concatenate([problem.device for problem in problems])
     return Batch(problems, sequences, device, np.concatenate([_lifted(problem, walls) for problem in problems]))
 

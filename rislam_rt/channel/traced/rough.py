@@ -4,8 +4,8 @@ from typing import Any
 
 import mitsuba as mi
 import sionna.rt as rt
-from sionna.rt.utils import jones_matrix_from_real_imag
 
+from rislam_rt.channel.traced.material import kept_components
 from rislam_rt.errors import SceneError
 from rislam_rt.model import Material
 
@@ -36,9 +36,9 @@ class RoughConstantReflection(rt.RadioMaterial):  # type: ignore[misc]
         r, t = mi.Complex2f(self._reflection), mi.Complex2f(0.0)  # type: ignore[operator]
         return super()._event_probabilities(r, r, t, t, enabled_interactions)
 
-    def _specular_reflection_transmission_matrix(self, *_: Any) -> Any:
+    def _specular_reflection_transmission_matrix(self, to_world: Any, ki_local: Any, ko_local: Any, *_: Any) -> Any:
         """R between the bases of the incident and the reflected ray, as `ConstantReflection` has it."""
-        return jones_matrix_from_real_imag(mi.Matrix2f(self._reflection), mi.Matrix2f(0.0))
+        return kept_components(mi.Float(self._reflection), to_world @ ki_local, to_world @ ko_local)
 
 
 def rough_material(material: Material, number: int, scattering: float) -> rt.RadioMaterialBase:

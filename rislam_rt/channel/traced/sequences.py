@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.errors import ConfigError
@@ -45,7 +45,9 @@ def point_sides(walls: Walls, points: Floats) -> Integers:
     return np.where(height > SURFACE_TOLERANCE, FRONT, np.where(height < -SURFACE_TOLERANCE, BACK, 0))
 
 
-def possible_sequences(sides: Integers, device: Integers, far: Integers, depth: int, host: int = NO_WALL) -> Integers:
+def possible_sequences(
+    sides: Integers, device: Integers, far: Integers, depth: int, barred: Booleans | None = None
+) -> Integers:
     """Wall sequences (S, depth) of up to `depth` bounces, from device to far end, padded with `NO_WALL`.
 
     Parameters
@@ -54,15 +56,15 @@ def possible_sequences(sides: Integers, device: Integers, far: Integers, depth: 
         (W, W) of `wall_sides`.
     device, far
         (W,) sides of every wall on which the ends ever are.
-    host
-        A wall that may not come last.
+    barred
+        (W,) walls that may not come last.
 
     Raises
     ------
     ConfigError
         There are more than `MOST_SEQUENCES`.
     """
-    last = np.flatnonzero((far > 0) & (np.arange(len(sides)) != host))
+    last = np.flatnonzero((far > 0) if barred is None else (far > 0) & ~barred)
     level, onward = last[:, None], far[last]
     found = [np.full((1, depth), NO_WALL)]
     for bounces in range(1, depth + 1):

@@ -8,11 +8,13 @@ import mitsuba as mi
 import numpy as np
 import sionna.rt as rt
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.traced.material import ConstantReflection
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
+from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.errors import SceneError
+from rislam_rt.geometry.triangles import inside_any
 from rislam_rt.model import Material
 
 NO_SHADE = -1
@@ -39,6 +41,7 @@ class Stage:
     """A Sionna RT scene and the correspondence of its (shape, primitive) pairs with walls."""
 
     scene: rt.Scene
+    walls: Walls
     origin: Floats
     """(3,) [m] point of the room that is the tracer's zero."""
     shape: Integers
@@ -53,6 +56,10 @@ class Stage:
     """(M,) where each shape's triangles begin in `wall_of_primitive`."""
     wall_of_primitive: Integers
     """(T,) walls, shape by shape."""
+    materials: tuple[rt.RadioMaterialBase, ...]
+    """All radio materials of walls."""
+    material_of_wall: Integers
+    """(W,) index into `materials`."""
     sieve: Sieve
     views: dict[int, mi.Scene]
     """Everything (`NO_SHADE`), and for each scatterer with a shade everything but that shade."""
@@ -71,6 +78,29 @@ class Stage:
         index = np.where(known, self.first[np.where(known, place, 0)] + primitive, 0)
         return np.where(known, self.wall_of_primitive[index], NO_WALL)
 
+    def is_stacked(self, wall: Integers) -> Booleans:
+        """Whether walls (...,) lie on others or others on them."""
+        sharing = np.bincount(self.walls.plane, minlength=len(self.walls)) > 1
+        return (wall != NO_WALL) & sharing[self.walls.plane[wall]] if len(self.walls) else wall != NO_WALL
+
+    def share_plane(self, a: Integers, b: Integers) -> Booleans:
+        """Whether walls (...,) are in one plane by lying on each other."""
+        return (a != NO_WALL) & (b != NO_WALL) & (self.walls.plane[a] == self.walls.plane[b])
+
+    def on_top(self, wall: Integers, points: Floats) -> Booleans:
+        """Whether walls (N, D) are there at points (N, D, 3) [m] and nothing lies on them; true for `NO_WALL`."""
+        top = np.ones(wall.shape, dtype=np.bool_)
+        for number in np.unique(wall[self.is_stacked(wall)]):
+            here = wall == number
+            top[here] = self._has(number, points[here])
+            for upper in self.walls.over[number]:
+                top[here] &= ~self._has(upper, points[here])
+        return top
+
+    def _has(self, wall: int, points: Floats) -> Booleans:
+        """Which points (N, 3) of its plane are on a wall, within the uncertainty of float32 vertices."""
+        return inside_any(points, self.walls.triangles[self.walls.wall_of_triangle == wall], SURFACE_TOLERANCE)
+
 
 def build_stage(walls: Walls, carrier: float, origin: Floats, shades: Mapping[int, Floats]) -> Stage:
     """Put walls and shades on stage at the carrier [Hz]: meshes built in memory about `origin`, faces in their order.
@@ -88,17 +118,12 @@ def build_stage(walls: Walls, carrier: float, origin: Floats, shades: Mapping[in
     scene = rt.load_scene()
     scene.frequency = carrier
     materials = list(dict.fromkeys(walls.material))
-    material_of_triangle = np.array([materials.index(m) for m in walls.material], dtype=np.int64)[
-        walls.wall_of_triangle
-    ]
-    members = [np.flatnonzero(material_of_triangle == m) for m in range(len(materials))]
+    radio_materials = tuple(_material(material, m) for m, material in enumerate(materials))
+    material_of_wall = np.array([materials.index(m) for m in walls.material], dtype=np.int64)
+    members = [np.flatnonzero(material_of_wall[walls.wall_of_triangle] == m) for m in range(len(materials))]
     objects = [
-        rt.SceneObject(
-            build_mesh(f"walls-{m}", walls.triangles[rows] - origin),
-            f"walls-{m}",
-            radio_material=_material(material, m),
-        )
-        for m, (material, rows) in enumerate(zip(materials, members, strict=True))
+        rt.SceneObject(build_mesh(f"walls-{m}", walls.triangles[rows] - origin), f"walls-{m}", radio_material=material)
+        for m, (material, rows) in enumerate(zip(radio_materials, members, strict=True))
     ]
     absorber = rt.AbsorberRadioMaterial("shade")
     dark = {
@@ -112,7 +137,8 @@ def build_stage(walls: Walls, carrier: float, origin: Floats, shades: Mapping[in
     ids = np.array([int(o.object_id) for o in objects], dtype=np.int64)
     views = {number: _part([*objects, *(o for n, o in dark.items() if n != number)]) for number in dark}
     alone = {number: _part([shade]) for number, shade in dark.items()}
-    return _numbered(scene, origin, walls, ids, members, {NO_SHADE: scene.mi_scene} | views, alone)
+    views = {NO_SHADE: scene.mi_scene} | views
+    return _numbered(scene, origin, walls, ids, members, (radio_materials, material_of_wall), views, alone)
 
 
 def _part(objects: list[rt.SceneObject]) -> mi.Scene:
@@ -126,6 +152,7 @@ def _numbered(
     walls: Walls,
     ids: Integers,
     members: list[Integers],
+    materials: tuple[tuple[rt.RadioMaterialBase, ...], Integers],
     views: dict[int, mi.Scene],
     shades: dict[int, mi.Scene],
 ) -> Stage:
@@ -143,6 +170,7 @@ def _numbered(
     largest = by_size[np.unique(walls.wall_of_triangle[by_size], return_index=True)[1]]
     return Stage(
         scene,
+        walls,
         origin,
         shape_of[largest],
         primitive_of[largest],
@@ -150,6 +178,7 @@ def _numbered(
         ids[order],
         first,
         walls.wall_of_triangle[rows],
+        *materials,
         _sieve(walls, origin),
         views,
         shades,

@@ -19,7 +19,7 @@ from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 from sionna.rt.utils import spawn_ray_to
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.buffer import fill_buffer, read_vertices
+from rislam_rt.channel.traced.buffer import fill_buffer, read_vertices, turned_vertices
 from rislam_rt.channel.traced.limits import SEGMENT_LIMIT
 from rislam_rt.channel.traced.rows import Rows
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
@@ -133,14 +133,21 @@ def _trace(
 def _confirmed(stage: Stage, sequences: Integers, traced: PathsBuffer) -> Integers:
     """Rows that the tracer found visible with every bounce on the wall asked for.
 
-    The image method also accepts a hit on another wall in the same plane; that is another path's business.
+    The image method also accepts a hit on another wall in the same plane; that is another path's business. Where walls
+    lie on each other the ray meets any of them, and the one on top reflects.
     """
     valid = np.array(traced.valid, dtype=np.bool_)
     wanted = turned_round(sequences)
     depth = wanted.shape[1]
     shape, primitive = (np.array(t, dtype=np.int64)[:, :depth] for t in (traced.shapes, traced.primitives))
     hit = stage.wall_hit(shape, primitive)
-    return np.flatnonzero(valid & ((hit == wanted) | (wanted == NO_WALL)).all(axis=1))
+    met = (hit == wanted) | (wanted == NO_WALL)
+    rows = np.flatnonzero(valid & stage.is_stacked(wanted).any(axis=1))
+    if len(rows):
+        points = turned_vertices(read_vertices(stage, traced, rows, sequences[rows]), sequences[rows])
+        met[rows] |= stage.share_plane(hit[rows], wanted[rows])
+        met[rows] &= stage.on_top(wanted[rows], points)
+    return np.flatnonzero(valid & met.all(axis=1))
 
 
 @contextmanager

@@ -9,7 +9,6 @@ from rislam_rt.channel.compare import PathReport, Validation, compare_paths, val
 from rislam_rt.channel.compare.channels import room_rng, trace_both
 from rislam_rt.errors import RislamError
 from rislam_rt.model import Paths, RadioConfig, Scene
-from rislam_rt.pipeline.cycle import Room
 from rislam_rt.pipeline.run import Progress
 from rislam_rt.pipeline.spec import build_radio
 from rislam_rt.pipeline.studies.spec import CompareSpec
@@ -90,7 +89,7 @@ def certify_pose(scene: Scene, depth: int, radio: RadioConfig, *, poses: int, se
     count = Counter(path.cycle for path in whole.one_sided)
     pose = min(count, key=lambda cycle: (-count[cycle], cycle), default=0)
     here = motion[pose : pose + 1]
-    one_traced, one_analytic = (Room(paths, motion).at(pose) for paths in (traced, analytic))
+    one_traced, one_analytic = (paths.of_cycle(pose) for paths in (traced, analytic))
     report = compare_paths(one_traced, one_analytic, scene, here)
     return Certificate(replace(scene, agent=here), pose, one_traced, one_analytic, report)
 

@@ -6,7 +6,8 @@ from pydantic import Field, model_validator
 
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.run import library_versions
-from rislam_rt.pipeline.spec import Count, DesignerSection, Name, Positive, RadioSection, Section
+from rislam_rt.pipeline.section import Count, Name, Positive, Section
+from rislam_rt.pipeline.spec import DesignerSection, RadioSection
 
 Depth = Annotated[int, Field(ge=0, le=4)]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
@@ -27,9 +28,13 @@ class StudySpec(Section):
     """What all studies share."""
 
     kind: str
+    """Which study the file is."""
     name: Name
+    """Of folders and pages."""
     description: str = ""
+    """For readers alone."""
     seed: Seed = 7
+    """Of every random draw."""
     radio: RadioSection = RadioSection()
 
 
@@ -37,8 +42,11 @@ class CompareSpec(StudySpec):
     """Traced against analytic paths at random poses of many rooms."""
 
     kind: Literal["compare_channels"]
+    """Which study the file is."""
     poses: Annotated[int, Field(ge=1, le=100_000)] = 200
+    """Random poses in each room."""
     rooms: Annotated[list[RoomSection], Field(min_length=1)]
+    """The rooms: `scene`, `depth`, `picture`."""
 
     @model_validator(mode="after")
     def _each_room_once(self) -> "CompareSpec":
@@ -53,9 +61,11 @@ class Fig4aSpec(StudySpec):
     """Gain of the direct path over the panel against distance, as in Fig. 4(a)."""
 
     kind: Literal["fig4a"]
+    """Which study the file is."""
     scene: str | None = None
     """Scene folder, relative to the pipeline file; `--scene` comes first."""
     channel: Literal["traced", "image_source"] = "traced"
+    """Ray tracer, or exact image sources."""
     elements: list[Literal["tang", "energy"]] = Field(default=["tang", "energy"], min_length=1)
     """Element patterns, one after the other, whatever the scene's panel has."""
     places: Annotated[int, Field(ge=2, le=10_000)] = 25
@@ -83,8 +93,11 @@ class ClaimsSpec(Section):
     """The paper's claims against the figures that other studies left behind."""
 
     kind: Literal["claims"]
+    """Which study the file is."""
     name: Name
+    """Of folders and pages."""
     description: str = ""
+    """For readers alone."""
     results: str = "../docs"
     """Folder of `fig4a.json`, `fig4b.json` and `fig4c.json`, relative to the pipeline file."""
 

@@ -15,7 +15,8 @@ from rislam_rt.model import Scene
 from rislam_rt.pipeline.files import write_atomic
 from rislam_rt.pipeline.read import Table, build_spec, read_table
 from rislam_rt.pipeline.run import check_run, library_versions, prepare_channel, run_slam
-from rislam_rt.pipeline.spec import PipelineSpec, Positive, Section, build_settings
+from rislam_rt.pipeline.section import Positive, Section
+from rislam_rt.pipeline.spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.summary import summarise
 from rislam_rt.pipeline.sweeps.axes import Axis, Scalar, Sweep, Value, parse_axis
 from rislam_rt.pipeline.sweeps.record import json_bytes

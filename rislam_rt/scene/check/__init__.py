@@ -6,6 +6,7 @@ from rislam_rt.scene.check.meshes import face_errors, mesh_warnings, name_errors
 from rislam_rt.scene.check.panel import panel_errors, panel_warnings
 from rislam_rt.scene.check.shades import cylinder_warnings, shade_errors, shade_face_errors
 from rislam_rt.scene.check.soup import build_soup
+from rislam_rt.scene.check.walls import wall_findings
 from rislam_rt.scene.findings import Finding
 
 __all__ = ["find_errors", "find_warnings"]
@@ -23,10 +24,11 @@ def find_errors(scene: Scene, file: str) -> list[Finding]:
 
 
 def find_warnings(scene: Scene, file: str, radio: RadioConfig) -> list[Finding]:
-    """What may be meant but seldom is, of a scene whose meshes are not damaged."""
+    """What may be meant but seldom is, and what is worth knowing, of a scene whose meshes are not damaged."""
     soup = build_soup(scene, file)
     return [
         *mesh_warnings(soup),
+        *wall_findings(soup),
         *panel_warnings(soup, radio),
         *cylinder_warnings(soup, radio),
         *agent_warnings(soup, radio),

@@ -61,14 +61,15 @@ def _size(soup: Soup) -> Iterator[Finding]:
 
 
 def _coincident(soup: Soup) -> Iterator[Finding]:
+    """Doubled faces of one mesh; those of two meshes are for the check of walls."""
     corners = np.round(soup.triangles, 6) + 0.0
     order = np.lexsort(np.moveaxis(corners, -1, 0)[::-1], axis=-1)
     keys = np.take_along_axis(corners, order[..., None], axis=1).reshape(len(corners), 9)
-    _, first, count = np.unique(keys, axis=0, return_index=True, return_counts=True)
+    _, first, count = np.unique(np.column_stack([keys, soup.owner]), axis=0, return_index=True, return_counts=True)
     if (count > 1).any():
         name = soup.name(int(first[np.argmax(count > 1)]))
-        message = f"{int((count - 1).sum())} faces lie exactly on others, the first on '{name}'"
-        yield soup.warning("reflector", message, "leave the doubles out, or they reflect twice")
+        message = f"{int((count - 1).sum())} faces lie exactly on others of their mesh, the first in '{name}'"
+        yield soup.warning("reflector", message, "leave the doubles out")
 
 
 def _box(soup: Soup) -> str:

@@ -45,6 +45,10 @@ class Soup(NamedTuple):
         """A warning at a key of the scene file."""
         return Finding("warning", self.file, field, message, mend)
 
+    def note(self, field: str, message: str, mend: str) -> Finding:
+        """Something worth knowing at a key of the scene file."""
+        return Finding("note", self.file, field, message, mend)
+
 
 def build_soup(scene: Scene, file: str) -> Soup:
     """The triangles of a scene that was read from `file`."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.compare import Validation, compare_paths, random_poses, validation_page, validation_table
-from rislam_rt.channel.compare.certificate import EDGE_TOLERANCE, SHORTEST_SEGMENT
+from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, Certifier
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import distance_to_triangles
@@ -110,16 +110,30 @@ def test_a_short_segment_explains_what_the_tracer_lacks_but_not_what_it_has(room
     assert compare_paths(full, less, scene, trajectory).unexplained == 1
 
 
-def test_an_edge_is_a_proof_only_within_the_tolerance(rooms):
-    """A screen whose upper edge lies just above or below the line of sight."""
+@pytest.mark.parametrize("depth", [0, 1])
+def test_an_edge_is_a_proof_only_where_float32_leaves_it_open(rooms, depth):
+    """A screen whose upper edge lies just below a ray: the line of sight, or that to a bounce on a board."""
     trajectory = rooms.at([3.0, 3.0, 1.0], tx=(-0.5, 0.1, 0.0), rx=(0.5, -0.1, 0.0))
-    for gap, explained in ((0.2 * EDGE_TOLERANCE, {"edge": 1}), (20 * EDGE_TOLERANCE, {})):
-        screen = rooms.polygon("screen", [(3, 2, 0), (3, 4, 0), (3, 4, 1 - gap), (3, 2, 1 - gap)])
-        scene = rooms.scene([screen])
-        full = paths_of(scene, trajectory, 0)
-        report = compare_paths(without(full, only(full, 0, "LOS")), full, scene, trajectory)
+    board = rooms.polygon("board", [(2, 5, 0), (4, 5, 0), (4, 5, 2), (2, 5, 2)])
+    place = 3.0 if depth == 0 else 2.7  # the ray from (2.5, 3.1, 1) to (3, 5, 1) has y = 3.86 at x = 2.7
+
+    def room(gap):
+        corners = [(place, 2, 0), (place, 4, 0), (place, 4, 1 - gap), (place, 2, 1 - gap)]
+        return rooms.scene([board, rooms.polygon("screen", corners)])
+
+    certifier = Certifier.of(room(0.0), trajectory, depth, 0.0)
+    limit = certifier._unfolded([0] * depth, trajectory.tx[0], trajectory.rx[0]).shift[0]
+    # float32: 6e-8 of some metres, eight times over; a moved image 6e-6 of some metres
+    assert (1e-7, 1e-6)[depth] < limit < (1e-5, 1e-4)[depth]
+    for gap, explained in ((0.2 * limit, {"edge": 1}), (1.5 * limit, {})):
+        scene = room(gap)
+        full = paths_of(scene, trajectory, depth)
+        lost = without(full, only(full, 0, "VT board" if depth else "LOS"))
+        report = compare_paths(lost, full, scene, trajectory)
         assert report.explained == explained
         assert report.unexplained == 1 - len(explained)
+        if explained:
+            assert f"float32 leaves {limit:.2e} m" in report.one_sided[0].proof
 
 
 def test_occlusion_names_the_object(rooms):

@@ -38,7 +38,7 @@ def test_all_sequences_of_a_box(rooms, depth, count):
     assert table.shape == (count, depth)
     assert len(np.unique(table, axis=0)) == count
     if depth > 1:
-        hosted = possible_sequences(wall_sides(walls), inner, inner, depth, host=walls.host)
+        hosted = possible_sequences(wall_sides(walls), inner, inner, depth, walls.beside(walls.host))
         assert walls.host not in turned_round(hosted)[:, 0]
         assert walls.host in hosted
 

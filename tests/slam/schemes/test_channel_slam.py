@@ -7,6 +7,7 @@ import pytest
 from rooms import BODY, CYCLE, HEADING, RADIO, build_room, measurement_of
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes import channel_slam
 from rislam_rt.slam.schemes.channel_slam import ChannelSlamConfig
 from rislam_rt.slam.schemes.channel_slam.tracker import advance, assign, follow, no_tracks
@@ -16,7 +17,7 @@ CONFIG = ChannelSlamConfig()
 
 def walk(lengths: list[np.ndarray], config: ChannelSlamConfig, ratio: float = 0.05) -> channel_slam.ChannelSlamState:
     rng = np.random.default_rng(1)
-    state = channel_slam.init(build_room(1, 1).start, BODY, None, RADIO, config, rng=rng)
+    state = channel_slam.init(build_room(1, 1).start, BODY, None, SensorModel(RADIO), config, rng=rng)
     for cycle, length in enumerate(lengths):
         dt = CYCLE if cycle else 0.0
         state, _ = channel_slam.step(state, measurement_of(length, ratio), None, dt, HEADING, config, rng=rng)

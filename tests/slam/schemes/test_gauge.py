@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from rooms import BODY, CYCLE, HEADING, RADIO, build_room, measurement_of
 
+from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes import bp_slam
 from rislam_rt.slam.schemes.bp_slam.course import Course, advance, begin
 from rislam_rt.slam.schemes.bp_slam.gauge import over_all_turns
@@ -79,7 +80,7 @@ def test_an_estimated_height_is_a_proper_belief() -> None:
     """Three axes: positive definite, finite, and level moments as with two."""
     config = bp_slam.BpSlamConfig(sigma_a=0.01, height="estimated")
     room, rng = build_room(5, 1), np.random.default_rng(1)
-    state = bp_slam.init(room.start, BODY, None, RADIO, config, rng=rng)
+    state = bp_slam.init(room.start, BODY, None, SensorModel(RADIO), config, rng=rng)
     for cycle in range(30):
         nothing = measurement_of(np.zeros(0))
         state, _ = bp_slam.step(state, nothing, None, CYCLE if cycle else 0.0, HEADING, config, rng=rng)

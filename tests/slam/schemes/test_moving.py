@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rooms import BODY, CYCLE, HEADING, RADIO, build_room, measurement_of
 
+from rislam_rt.model import SensorModel
 from rislam_rt.slam import Outcome
 from rislam_rt.slam.filter import REMOVED
 from rislam_rt.slam.schemes import bp_slam, channel_slam
@@ -23,7 +24,7 @@ def test_a_short_walk_stays_within_bounds(scheme: Any, config: Any) -> None:
     That is 0.01 m of start and 0.01 m/s over the walk, on two axes.
     """
     room, rng = build_room(40, 1), np.random.default_rng(2)
-    state = scheme.init(room.start, BODY, None, RADIO, config, rng=rng)
+    state = scheme.init(room.start, BODY, None, SensorModel(RADIO), config, rng=rng)
     for cycle, measurement in enumerate(room.measurements):
         dt = CYCLE if cycle else 0.0
         state, info = scheme.step(state, measurement, None, dt, HEADING, config, rng=rng)
@@ -48,7 +49,7 @@ def test_a_short_walk_stays_within_bounds(scheme: Any, config: Any) -> None:
 def test_direct_path_and_wall_returns_are_set_aside(scheme: Any, config: Any) -> None:
     """By length and by strength; nothing is left, and the filter survives it."""
     room, rng = build_room(1, 1), np.random.default_rng(3)
-    state = scheme.init(room.start, BODY, None, RADIO, config, rng=rng)
+    state = scheme.init(room.start, BODY, None, SensorModel(RADIO), config, rng=rng)
     bright = measurement_of(np.array([0.1, 3.0, 7.0]), ratio=0.85)
     _, info = scheme.step(state, bright, None, CYCLE, HEADING, config, rng=rng)
     assert np.array_equal(info.landmark, [REMOVED, REMOVED, REMOVED])
@@ -61,7 +62,7 @@ def test_direct_path_and_wall_returns_are_set_aside(scheme: Any, config: Any) ->
 def test_a_known_height_stays(scheme: Any, config: Any) -> None:
     """The filter keeps the height that it was told, exactly."""
     room, rng = build_room(5, 1), np.random.default_rng(4)
-    state = scheme.init(room.start, BODY, None, RADIO, config, rng=rng)
+    state = scheme.init(room.start, BODY, None, SensorModel(RADIO), config, rng=rng)
     for measurement in room.measurements:
         state, _ = scheme.step(state, measurement, None, CYCLE, HEADING, config, rng=rng)
     assert np.all(scheme.estimate(state, config).samples[:, 2] == room.start.position[2])

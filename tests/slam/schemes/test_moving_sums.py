@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from rooms import BODY, CYCLE, HEADING, RADIO, build_room
 
+from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes import bp_slam
 from rislam_rt.slam.schemes.bp_slam.correct import absorb, claims
 from rislam_rt.slam.schemes.bp_slam.course import Course, advance, begin
@@ -118,7 +119,7 @@ def test_a_turn_about_the_start_stays_as_unknown_as_it_was() -> None:
     config, squares = bp_slam.BpSlamConfig(sigma_a=0.001), []
     for seed in range(4):
         room, rng = build_room(80, seed), np.random.default_rng(2)
-        state = bp_slam.init(room.start, BODY, None, RADIO, config, rng=rng)
+        state = bp_slam.init(room.start, BODY, None, SensorModel(RADIO), config, rng=rng)
         for cycle, measurement in enumerate(room.measurements):
             state, _ = bp_slam.step(state, measurement, None, CYCLE if cycle else 0.0, HEADING, config, rng=rng)
         belief = bp_slam.estimate(state, config)

@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rislam_rt.measurement import ReceiverConfig
-from rislam_rt.pipeline.spec import Count, Positive, RadioSection, ReceiverSection, Section
+from rislam_rt.pipeline.section import Count, Positive, Section
+from rislam_rt.pipeline.spec import RadioSection, ReceiverSection
 from rislam_rt.pipeline.studies.spec import RoomSection, StudySpec
 
 Share = Annotated[float, Field(ge=0.0, le=100.0)]
@@ -36,6 +37,7 @@ class NetworkSection(Section):
     penalty: Positive = 1e-3
     """Times half the squared weights."""
     iterations: Count = 400
+    """Most steps of a fit."""
     restarts: Annotated[int, Field(ge=1, le=50)] = 5
     """Random starts; the best on the random rooms for validation is kept."""
 
@@ -44,7 +46,9 @@ class ClassifierSpec(StudySpec):
     """Training of the classifier of multipath components on random rooms, and its score on named ones."""
 
     kind: Literal["train_classifier"]
+    """Which study the file is."""
     channel: Literal["traced", "image_source"] = "image_source"
+    """Ray tracer, or exact image sources."""
     train: Annotated[int, Field(ge=2, le=10_000)] = 160
     """Random rooms to learn from, one random walk through each."""
     validation: Annotated[int, Field(ge=2, le=10_000)] = 40
@@ -54,11 +58,13 @@ class ClassifierSpec(StudySpec):
     walks: Annotated[int, Field(ge=2, le=1000)] = 8
     """Random walks through each of them."""
     cycles: Annotated[int, Field(ge=20, le=10_000)] = 120
+    """Length of a walk."""
     stride: Annotated[int, Field(ge=1, le=100)] = 4
     """Every so many cycles the tracks are examples."""
     snr_low_db: Share = 0.0
     """Range of the reference SNR of random rooms; the rooms of the test have the radio's own."""
     snr_high_db: Share = 30.0
+    """Its upper end."""
     coverage: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
     """Of the intervals, by resampling whole walks."""
     radio: RadioSection = RadioSection()

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from rislam_rt.pipeline.spec import Decibel, Name, Positive, Section
+from rislam_rt.pipeline.section import Decibel, Name, Positive, Section
 from rislam_rt.pipeline.studies.spec import Seed
 
 
@@ -24,9 +24,13 @@ class SweptSpec(Section):
     """What all swept studies share."""
 
     kind: str
+    """Which study the file is."""
     name: Name
+    """Of folders and pages."""
     description: str = ""
+    """For readers alone."""
     seed: Seed = 7
+    """Of every random draw."""
     repetitions: Annotated[int, Field(ge=1, le=100_000)] = 20
     """Runs with different seeds at every point; a repetition has the same motion and noise at all of them."""
     time_limit_s: Positive | None = None
@@ -49,6 +53,7 @@ class Fig4bSpec(_OneRoom):
     """Error against SNR, as in Fig. 4(b)."""
 
     kind: Literal["fig4b"]
+    """Which study the file is."""
     snr_db: list[Decibel] = Field(default=[-10.0, 0.0, 10.0, 20.0, 30.0], min_length=1)
     """SNR of the paper's sphere at 3 m, integrated over the signal and all antennas."""
     cases: Annotated[list[VariantSection], Field(min_length=1)]
@@ -61,7 +66,7 @@ class Fig4bSpec(_OneRoom):
 
     @model_validator(mode="after")
     def _each_once(self) -> "Fig4bSpec":
-        _check_names(self.cases)
+        check_names(self.cases)
         return self
 
 
@@ -69,6 +74,7 @@ class Fig4cSpec(_OneRoom):
     """Error of agent and panel against the panel's size, as in Fig. 4(c)."""
 
     kind: Literal["fig4c"]
+    """Which study the file is."""
     sizes: list[Annotated[int, Field(ge=1, le=256)]] = Field(default=[4, 6, 8, 10, 12, 16], min_length=1)
     """Elements along one side of a square panel."""
 
@@ -77,6 +83,7 @@ class RoomsSpec(SweptSpec):
     """All schemes in many rooms."""
 
     kind: Literal["rooms"]
+    """Which study the file is."""
     scenes: Annotated[list[str], Field(min_length=1)]
     """Scene folders, relative to the pipeline file."""
     variants: list[VariantSection] = Field(default=[])
@@ -89,7 +96,7 @@ class RoomsSpec(SweptSpec):
 
     @model_validator(mode="after")
     def _each_once(self) -> "RoomsSpec":
-        _check_names(self.variants)
+        check_names(self.variants)
         return self
 
 
@@ -97,6 +104,7 @@ class AblationsSpec(_OneRoom):
     """One setting changed at a time."""
 
     kind: Literal["ablations"]
+    """Which study the file is."""
     variants: Annotated[list[VariantSection], Field(min_length=1)]
     """The first one is the reference that the others are compared with."""
 
@@ -107,7 +115,7 @@ class AblationsSpec(_OneRoom):
 
     @model_validator(mode="after")
     def _each_once(self) -> "AblationsSpec":
-        _check_names(self.variants)
+        check_names(self.variants)
         return self
 
 
@@ -120,7 +128,8 @@ SWEPT: dict[str, type[SweptSpec]] = {
 """Swept studies by the `kind` of their file."""
 
 
-def _check_names(variants: list[VariantSection]) -> None:
+def check_names(variants: list[VariantSection]) -> None:
+    """Refuse variants of one name."""
     names = [variant.name for variant in variants]
     if len(set(names)) < len(names):
         raise ValueError("a name comes twice; give each once")

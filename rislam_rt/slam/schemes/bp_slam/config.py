@@ -21,11 +21,13 @@ class BpSlamConfig:
     range_std: float = 0.1
     """Standard deviation of a range [m], where the measurement brings none of its own."""
     detection_probability: float = 0.95
+    """Published form: that a feature in reach is measured."""
     survival_probability: float = 0.999
+    """That a feature is still there after one step."""
     clutter_mean: float = 1.0
-    """False ranges a scan, Poisson."""
+    """Published form: false ranges a scan, Poisson. The moving form takes what the agent is told of its receiver."""
     max_range: float = 30.0
-    """False ranges are uniform on (0, max_range]; features that would be farther are not born [m]."""
+    """Published form: false ranges are uniform on (0, max_range]; features that would be farther are not born [m]."""
     initial_features: float = 6.0
     """Features expected in the region before the first scan, Poisson."""
     birth_mean: float = 0.01

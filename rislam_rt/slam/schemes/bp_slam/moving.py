@@ -4,13 +4,15 @@ Same functions, inputs and outputs as the package's own filter, so that a run ca
 mean nothing to it, and angles of arrival are not used.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec, SlamEstimate
+from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel, SlamEstimate
 from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los
 from rislam_rt.slam.inputs import check_step
@@ -23,6 +25,8 @@ from rislam_rt.slam.schemes.bp_slam.ranges import Bistatic
 from rislam_rt.slam.schemes.bp_slam.report import ahead_of, known_points, lift, reported
 from rislam_rt.slam.schemes.bp_slam.sums import Sight, Sums, born, carry, join, look, no_sums, prune, spread_of
 
+FEWEST_FALSE = 1e-3
+"""Mean number of false ranges a scan that is reckoned with at least, so that no range is ever held for certain."""
 NIS_LIMIT = 3.0
 """Running mean of the NIS per degree of freedom above which the filter says that it has diverged."""
 STRAIN_RATE = 0.05
@@ -45,7 +49,8 @@ class BpSlamState(NamedTuple):
     strain: float
     """Running mean of the NIS per degree of freedom: 1 when all is well."""
     body: Body
-    radio: RadioConfig
+    sensor: SensorModel
+    """What the agent is told of its receiver."""
 
     @property
     def pose(self) -> Floats:
@@ -54,7 +59,7 @@ class BpSlamState(NamedTuple):
 
 
 def init(
-    start: StartPrior, body: Body, ris: RisSpec | None, radio: RadioConfig, config: BpSlamConfig, *,
+    start: StartPrior, body: Body, ris: RisSpec | None, sensor: SensorModel, config: BpSlamConfig, *,
     rng: np.random.Generator,
 ) -> BpSlamState:  # fmt: skip
     """The start prior, and no features. `ris` is taken for the interface and not used; nothing is drawn."""
@@ -62,7 +67,13 @@ def init(
     course = begin(start.position[:axes], start.velocity[:axes], start.position_std, start.velocity_std)
     height = np.array([start.position[2], start.velocity[2]])
     sums = no_sums(len(course.mean))
-    return BpSlamState(course, sums, config.initial_features, 0, 0, height, float(start.heading), 1.0, body, radio)
+    return BpSlamState(course, sums, config.initial_features, 0, 0, height, float(start.heading), 1.0, body, sensor)
+
+
+def told(config: BpSlamConfig, sensor: SensorModel) -> BpSlamConfig:
+    """The settings with the false ranges that the agent is told of its receiver."""
+    rate = max(sensor.false_alarms, FEWEST_FALSE)
+    return replace(config, clutter_mean=rate, max_range=SPEED_OF_LIGHT * sensor.window[1])
 
 
 def predict(state: BpSlamState, dt: float, config: BpSlamConfig) -> SlamEstimate:
@@ -98,15 +109,18 @@ def step(
         Time step or heading is no number.
     """
     check_step(dt, heading)
+    config = told(config, state.sensor)
     state = _move(state, dt, np.full(state.course.axes, config.sigma_a), config)._replace(heading=float(heading))
-    glance = glance_of(measurement, state.radio)
+    glance = glance_of(measurement, state.sensor.radio)
     free = ~is_los(glance, state.body)
     if not config.planes:
         free &= ~is_strong(glance.ratio, config.specular_ratio)
     rows = np.flatnonzero(free)
     scan = Scan(glance.seen[rows, 0], np.maximum(glance.std[rows, 0], config.smallest_std))
     turn = rotation_z(np.asarray(heading))
-    model = Bistatic(turn @ state.body.tx_offset, turn @ state.body.rx_offset, state.radio.array.pattern == "upper")
+    model = Bistatic(
+        turn @ state.body.tx_offset, turn @ state.body.rx_offset, state.sensor.radio.array.pattern == "upper"
+    )
     fresh = 1.0 + birth_ratio(scan, state.undetected, model, 3, config)
     sight = look(state.sums, state.course, state.pose[0], model)
     found = claims(state.sums, sight, state.course, scan, fresh, config)

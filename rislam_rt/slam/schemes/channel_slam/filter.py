@@ -14,7 +14,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec, SlamEstimate
+from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel, SlamEstimate
 from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los
 from rislam_rt.slam.inputs import check_step
@@ -53,7 +53,8 @@ class ChannelSlamState(NamedTuple):
     strain: float
     """Running mean of the NIS per degree of freedom: 1 when all is well."""
     body: Body
-    radio: RadioConfig
+    sensor: SensorModel
+    """What the agent is told of its receiver."""
 
     @property
     def pose(self) -> Floats:
@@ -62,7 +63,7 @@ class ChannelSlamState(NamedTuple):
 
 
 def init(
-    start: StartPrior, body: Body, ris: RisSpec | None, radio: RadioConfig, config: ChannelSlamConfig, *,
+    start: StartPrior, body: Body, ris: RisSpec | None, sensor: SensorModel, config: ChannelSlamConfig, *,
     rng: np.random.Generator,
 ) -> ChannelSlamState:  # fmt: skip
     """The start prior, and no paths. `ris` is taken for the interface and not used; nothing is drawn."""
@@ -71,7 +72,7 @@ def init(
     height = np.array([start.position[2], start.velocity[2]])
     sums = no_sums(len(course.mean))
     return ChannelSlamState(
-        course, sums, no_tracks(), {}, 0, 0, height, float(start.heading), 1.0, body, radio
+        course, sums, no_tracks(), {}, 0, 0, height, float(start.heading), 1.0, body, sensor
     )  # fmt: skip
 
 
@@ -93,12 +94,12 @@ def step(
     """
     check_step(dt, heading)
     state = _move(state, dt, config)._replace(heading=float(heading))
-    glance = glance_of(measurement, state.radio)
+    glance = glance_of(measurement, state.sensor.radio)
     strong, free = is_strong(glance.ratio, config.specular_ratio), ~is_los(glance, state.body)
     rows = np.flatnonzero(free if config.planes else free & ~strong)
     scan = Scan(glance.seen[rows, 0], np.maximum(glance.std[rows, 0], config.smallest_std))
     turn = rotation_z(np.asarray(heading))
-    upper = state.radio.array.pattern == "upper"
+    upper = state.sensor.radio.array.pattern == "upper"
     model = Bistatic(turn @ state.body.tx_offset, turn @ state.body.rx_offset, upper)
     state, label = _label(state, scan, dt, config)
     state, squares = _correct(state, label, scan, model, config)

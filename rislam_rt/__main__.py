@@ -1,0 +1,5 @@
+"""`python -m rislam_rt`."""
+
+from rislam_rt.cli import main
+
+main()

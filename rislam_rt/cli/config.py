@@ -1,0 +1,80 @@
+"""`rislam-rt config [PIPELINE]`."""
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, Settings, write_json
+
+if TYPE_CHECKING:
+    from rislam_rt.pipeline.settings import Setting
+
+Value = dict[str, Any]
+
+
+def command(
+    pipeline: PipelineFile = MAIN_JOB,
+    set_: Settings = None,
+    explain: Annotated[str | None, typer.Option(metavar="KEY", help="Say all about one setting.")] = None,
+    json: JsonFile = None,
+) -> None:
+    """Print every setting of a pipeline: value, unit, range, and what it means.
+
+    What is printed is a pipeline file itself: `rislam-rt config > mine.toml`, edit, `rislam-rt run mine.toml`.
+    """
+    from rislam_rt.pipeline.settings import explain as find
+    from rislam_rt.pipeline.settings import list_settings
+    from rislam_rt.pipeline.studies import load_any
+
+    spec = load_any(pipeline, set_ or ())
+    settings = list_settings(type(spec))
+    if explain is not None:
+        settings = [find(settings, explain)]
+        _print_one(settings[0], _value(spec, settings[0].key))
+    else:
+        _print_file(settings, spec)
+    write_json(json, {one.key: one._asdict() | {"value": _plain(_value(spec, one.key))} for one in settings})
+
+
+def _print_file(settings: "list[Setting]", spec: Any) -> None:
+    """All settings as TOML, each under one line on its meaning; those without a value are commented out."""
+    from rislam_rt.scene.write import toml_value
+
+    table = ""
+    for one in settings:
+        head, _, name = one.key.rpartition(".")
+        if head != table:
+            typer.echo(f"\n[{head}]")
+            table = head
+        value = _plain(_value(spec, one.key))
+        typer.echo(f"# {_facts(one)}")
+        typer.echo(f"# {name} =" if value is None else f"{name} = {toml_value(value)}")
+
+
+def _print_one(one: "Setting", value: Any) -> None:
+    from rislam_rt.scene.write import toml_value
+
+    typer.echo(f"{one.key} = {'(not set)' if value is None else toml_value(_plain(value))}")
+    typer.echo(_facts(one))
+    if not one.required:
+        typer.echo(f"Default: {'not set' if one.default is None else toml_value(_plain(one.default))}.")
+
+
+def _facts(one: "Setting") -> str:
+    facts = [one.kind, f"in {one.unit}" if one.unit else "", one.allowed]
+    return f"{one.meaning} ({'; '.join(fact for fact in facts if fact)})".strip()
+
+
+def _value(spec: Any, key: str) -> Any:
+    for part in key.split("."):
+        spec = getattr(spec, part)
+    return spec
+
+
+def _plain(value: Any) -> Any:
+    """A value of a specification as TOML and JSON know it."""
+    from pydantic import BaseModel
+
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json", exclude_none=True)
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value

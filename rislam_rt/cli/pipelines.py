@@ -1,0 +1,25 @@
+"""`rislam-rt pipelines`."""
+
+import typer
+
+from rislam_rt.cli.options import JsonFile, write_json
+
+
+def command(json: JsonFile = None) -> None:
+    """List the pipelines and the rooms that come with the package.
+
+    Each can be given by its name wherever a pipeline file or a scene folder is asked for, in any folder.
+    """
+    from rich.console import Console
+    from rich.table import Table
+
+    from rislam_rt.shipped import first_sentence, shipped_pipelines, shipped_rooms
+
+    pipelines = {name: first_sentence(file) for name, file in shipped_pipelines().items()}
+    rooms = shipped_rooms()
+    table = Table("pipeline", "what it does")
+    for name, sentence in pipelines.items():
+        table.add_row(name, sentence)
+    Console().print(table)
+    typer.echo(f"rooms: {', '.join(rooms)}")
+    write_json(json, {"pipelines": pipelines, "rooms": list(rooms)})

@@ -1,0 +1,27 @@
+"""The sensor model that a receiver's settings make: what the simulation draws from."""
+
+from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.false_alarms import detection_threshold, expected_false_alarms
+from rislam_rt.model import RadioConfig, SensorModel
+
+
+def build_sensor(radio: RadioConfig, config: ReceiverConfig) -> SensorModel:
+    """What these settings make of detection, false alarms and resolution.
+
+    The bound-driven receiver invents its false components, as many as it is set to; the waveform's are the peaks of its
+    noise.
+    """
+    threshold = detection_threshold(radio, config)
+    rate = config.clutter_rate
+    if config.estimator == "waveform":
+        captures = 2 if config.alternation else 1
+        rate = captures * expected_false_alarms(threshold, radio, config.max_delay - config.min_delay)
+    resolution = "cell" if config.estimator == "bound" and config.resolution == "cell" else "joint"
+    return SensorModel(
+        radio,
+        threshold=threshold,
+        false_alarms=rate,
+        window=(config.min_delay, config.max_delay),
+        resolution=resolution if config.merge else "all",
+        alternation=config.alternation,
+    )

@@ -1,0 +1,116 @@
+"""What is known of the receiver: which paths it reports, what else it reports, what it cannot tell apart.
+
+One object says it all. The simulation draws from the one that its settings make; filter, bound and rivals reckon with
+the one that they are told, which may be wrong.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import chndtr
+
+from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.errors import ConfigError
+from rislam_rt.model.radio import RadioConfig
+
+RESOLUTIONS = ("cell", "joint", "all")
+"""What two paths must be to come out apart: outside each other's cell; certain of their amplitudes when all else is
+unknown (`information.resolved_probability`); anything at all."""
+CERTAIN_SNR = 30.0
+"""Standard deviations above the threshold from which on the detection probability is 1 to double precision."""
+
+
+@dataclass(frozen=True, slots=True)
+class SensorModel:
+    """Detection, false alarms, resolution and error tails of a receiver. SI units; SNRs linear, over all antennas."""
+
+    radio: RadioConfig
+    """Noise, band, gains and array that the rest refers to."""
+    threshold: float = 10.0
+    """A component is reported when its measured SNR exceeds this."""
+    false_alarms: float = 0.5
+    """Mean number of false components a cycle."""
+    window: tuple[float, float] = (0.0, 80e-9)
+    """First and last delay [s] that are reported."""
+    resolution: str = "cell"
+    """What two paths must be to come out apart (`RESOLUTIONS`)."""
+    tail_share: float = 0.0
+    """Share of the components of true paths whose errors are larger than reported,"""
+    tail_scale: float = 1.0
+    """...and by how much their standard deviations are."""
+    alternation: bool = False
+    """Whether components come with the probability that they ran over the panel."""
+
+    def __post_init__(self) -> None:
+        for name, least in (("threshold", 1e-300), ("false_alarms", 0.0), ("tail_scale", 1.0)):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= least):
+                raise ConfigError(f"sensor.{name}: {value} received; give a finite number of at least {least:g}")
+        if not self.window[1] > self.window[0]:
+            raise ConfigError(f"sensor.window: {self.window} received; give a last delay after the first")
+        if not 0.0 <= self.tail_share <= 1.0:
+            raise ConfigError(f"sensor.tail_share: {self.tail_share} received; give a share from 0 to 1")
+        if self.resolution not in RESOLUTIONS:
+            raise ConfigError(f"sensor.resolution: '{self.resolution}' received; give one of {', '.join(RESOLUTIONS)}")
+
+    @property
+    def cell(self) -> Floats:
+        """(3,) width of a resolution cell: 1/B [s], and the array's beam in either cosine (the sky without one)."""
+        array = self.radio.array
+        beams = [1.0 / (count * array.spacing) if count > 1 else 2.0 for count in (array.rows, array.cols)]
+        return np.array([1.0 / self.radio.bandwidth, *beams])
+
+    @property
+    def cell_length(self) -> Floats:
+        """(3,) the same with the delay as a length [m]."""
+        return self.cell * np.array([SPEED_OF_LIGHT, 1.0, 1.0])
+
+    def detection_probability(self, snr: ArrayLike) -> Floats:
+        """Probability (...,) that a lone path of this expected SNR is reported (see `detection_probability`)."""
+        return detection_probability(snr, self.threshold)
+
+    def false_alarm_density(self, tau: ArrayLike, cosines: Floats) -> Floats:
+        """Expected false components (...,) a cycle per second of delay and unit of either cosine.
+
+        Noise is stationary in delay and cosines, so that its peaks lie evenly over the window and the unit disc.
+        """
+        delay = np.asarray(tau, dtype=np.float64)
+        inside = (delay >= self.window[0]) & (delay <= self.window[1]) & (np.sum(cosines**2, axis=-1) <= 1.0)
+        return np.where(inside, self.false_alarms / (np.pi * (self.window[1] - self.window[0])), 0.0)
+
+    def false_alarm_snr_density(self, snr: ArrayLike) -> Floats:
+        """Probability density (...,) of the measured SNR of a false component: noise above the threshold."""
+        excess = np.asarray(snr, dtype=np.float64) - self.threshold
+        return np.where(excess >= 0.0, np.exp(-np.maximum(excess, 0.0)), 0.0)
+
+    def may_merge(self, gap: Floats) -> Booleans:
+        """(...,) whether two paths a `gap` (..., 3) of delay [s] and cosines apart share a resolution cell."""
+        if self.resolution == "all":
+            return np.zeros(gap.shape[:-1], dtype=np.bool_)
+        return np.asarray((np.abs(gap) < self.cell).all(axis=-1))
+
+
+def detection_probability(snr: ArrayLike, threshold: float) -> Floats:
+    """Probability (...,) that the measured SNR of a path exceeds the threshold; both linear, over all antennas.
+
+    Marcum's `Q_1(sqrt(2 snr), sqrt(2 threshold))`: twice the measured SNR is noncentral chi-square with two degrees of
+    freedom. `exp(-threshold)` for noise alone.
+    """
+    level = np.sqrt(2.0 * threshold)
+    mean = np.minimum(np.sqrt(2.0 * np.maximum(np.asarray(snr, dtype=np.float64), 0.0)), level + CERTAIN_SNR)
+    return np.asarray(1.0 - chndtr(level**2, 2.0, mean**2))
+
+
+def merged_pull(ratio: ArrayLike) -> tuple[Floats, Floats]:
+    """Where two paths come out that cannot be resolved: mean and variance (...,), as a share of the gap between them.
+
+    Counted from the one that is `1 / ratio` times as strong as the other. One path fits both best, to first order, at
+    `Re sum alpha_i conj(alpha) z_i / |alpha|^2` with alpha the sum. Over an even relative phase, each weighed by the
+    energy |alpha|^2 with which it is measured, the share has the mean `r^2 / (1 + r^2)`, the centre of energy, and the
+    mean square `r^2 / 2 / (1 + r^2)`.
+    """
+    square = np.asarray(ratio, dtype=np.float64) ** 2
+    mean = square / (1.0 + square)
+    return mean, np.maximum(0.5 * mean - mean**2, 0.0)
