@@ -28,7 +28,7 @@ def command(
     """Run a pipeline in a room: trace, then design, measure, localise and map, cycle by cycle.
 
     An interrupted run goes on where it stopped when the same command is given again; a completed one is replaced.
-    A file of another kind is a study: 'compare_channels' (exit code 1 if a path is unexplained), 'fig4a', 'claims',
+    A file of another kind is a study: 'compare_channels' (exit code 1 if the channels differ), 'fig4a', 'claims',
     'train_classifier', or 'fig4b', 'fig4c', 'rooms', 'ablations', 'unseen', which go through settings, rooms and seeds
     (exit code 1 if a run failed).
     """

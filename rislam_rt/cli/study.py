@@ -27,7 +27,7 @@ class Given(NamedTuple):
 
 
 def run_compare_channels(spec: "CompareSpec", given: Given) -> None:
-    """Compare both channels in all rooms; exit code 1 if a difference is unexplained."""
+    """Compare both channels in all rooms; exit code 1 if a difference is unexplained or beyond its limit."""
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.errors import ConfigError
@@ -47,11 +47,12 @@ def run_compare_channels(spec: "CompareSpec", given: Given) -> None:
     scenes = [one.scene for one in opened]
     with show_progress() as progress:
         found = run_comparison(scenes, spec, jobs=given.jobs or os.cpu_count() or 1, progress=progress)
-    content = {**study_record(spec, scenes), "unexplained": found.unexplained, "rooms": comparison_table(found)}
+    counts = {"passed": found.passed, "unexplained": found.unexplained, "breaches": found.breaches}
+    content = {**study_record(spec, scenes), **counts, "rooms": comparison_table(found)}
     print_validation(found.rows)
     typer.echo(f"page: {write_comparison(found, spec, content, folder, figures=given.page)}")
     write_json(given.json, content)
-    if found.unexplained:
+    if not found.passed:
         raise typer.Exit(1)
 
 

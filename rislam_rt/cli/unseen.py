@@ -32,7 +32,7 @@ def run_unseen(spec: "UnseenSpec", given: Given) -> None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'unseen' draws its rooms; leave it out")
     cells = Path("sweeps") / spec.name
     folder = output_folder(given.out, Path("runs") / f"{spec.name}-{spec.first}")
-    sweep = build_unseen(spec, given.pipeline, folder / "data")
+    sweep = build_unseen(spec, given.pipeline, Path("sweeps") / f"{spec.name}_data")
     for kind in {cell.depends["config"]["channel"] for cell in build_cells(sweep)}:
         prepare_channel(kind)
     record, tests = unseen_record(spec), count_tests(spec, given.pipeline)
