@@ -1,8 +1,11 @@
 """Meshes on disk: only from inside the scene's folder, checked before anything else sees them."""
 
 import io
+import logging
 import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
@@ -108,7 +111,7 @@ class MeshReader:
 
         # A damaged file makes trimesh raise nearly anything and numpy warn; here every cause has the same answer.
         try:
-            with warnings.catch_warnings(), np.errstate(all="ignore"):
+            with warnings.catch_warnings(), np.errstate(all="ignore"), _silence("trimesh"):
                 warnings.simplefilter("ignore")
                 if self._key != (file_type, content):
                     self._loaded = trimesh.load_scene(io.BytesIO(content), file_type=file_type, process=False)
@@ -149,6 +152,17 @@ def _own_ply(content: bytes) -> Mesh | None:
     if (rows["count"] != 3).any():
         return None
     return Mesh(vertices.astype(np.float64), rows["corner"].astype(np.int64))
+
+
+@contextmanager
+def _silence(name: str) -> Iterator[None]:
+    """A logger that says nothing, tracebacks of failures that have an answer here least of all."""
+    logger = logging.getLogger(name)
+    before, logger.disabled = logger.disabled, True
+    try:
+        yield
+    finally:
+        logger.disabled = before
 
 
 def _flatten(loaded: Any, node: str | None) -> Mesh:

@@ -88,7 +88,7 @@ def parse_tum(content: bytes) -> tuple[Floats, Floats, Floats]:
         )
     if np.abs(position).max() > 1e5:
         raise Fault(f"a coordinate of {np.abs(position).max():.3g} m in the trajectory", "give metres")
-    length = np.linalg.norm(q, axis=1)
+    length = np.linalg.norm(np.clip(q, -2.0, 2.0), axis=1)  # a wrong length stays one, and no square overflows
     if (np.abs(length - 1.0) > 1e-3).any():
         raise Fault(
             f"quaternion of pose {int(np.argmax(np.abs(length - 1.0) > 1e-3))} has not length 1", "normalise it"
