@@ -2,8 +2,9 @@
 
 import multiprocessing as mp
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, NamedTuple
@@ -64,9 +65,23 @@ def _start(work: Work, name: str, common: tuple[Any, ...]) -> Worker:
     context = mp.get_context("spawn")
     ear, mouth = context.Pipe(duplex=False)
     process = context.Process(target=_run, args=(mouth, work, name, common), daemon=True)
-    process.start()
+    with _deaf():
+        process.start()
     mouth.close()
     return Worker(name, process, ear)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """A process started in here ignores the keyboard from its first instruction on; this one does again afterwards."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread may, and an interrupt goes to nobody else
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _run(mouth: Connection, work: Work, name: str, common: tuple[Any, ...]) -> None:
