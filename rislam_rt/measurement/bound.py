@@ -6,12 +6,15 @@ probability the Marcum Q function of a noncentral chi-square detector. Delay and
 says.
 """
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 
+from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.joint import joint_errors
 from rislam_rt.measurement.parts import (
-    Errors,
     Parts,
     audible,
     blind_axes,
@@ -23,10 +26,27 @@ from rislam_rt.measurement.parts import (
 )
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sensor import build_sensor
+from rislam_rt.measurement.sides import Found, panel_probability
+from rislam_rt.measurement.slot import split
 from rislam_rt.model import Measurement, PathTruth, RadioConfig, SensorModel
 
 NEGLIGIBLE = 1e-3
 """Paths this far below the detection threshold are left out: they move an amplitude at the threshold by 3 %."""
+
+
+class Components(NamedTuple):
+    """N components of one capture as the receiver reports them."""
+
+    path: Integers
+    """(N,) column of the strongest path, -1 for a false one."""
+    points: Floats
+    """(N, 3) delay [s] and cosines."""
+    deviation: Floats
+    """(N, 3)."""
+    gain: Complexes
+    """(N,)."""
+    gain_std: Floats
+    """(N,) of the complex gain."""
 
 
 def measure_bound(
@@ -35,13 +55,39 @@ def measure_bound(
     """Components with bound-driven errors, missed detections, merging and clutter, in the order of their delays.
 
     The errors have the variance that belongs to the true SNR; the standard deviations reported are those that the
-    measured one suggests, all that a receiver knows. Each of the `num_paths` columns has its own draws whether heard
-    or not, so that two codes see the same noise.
+    measured one suggests, all that a receiver knows. Each of the `num_paths` columns has its own draws in every capture
+    whether heard or not, so that two codes see the same noise.
     """
-    sensor = build_sensor(radio, config)
-    threshold, window = sensor.threshold, sensor.window
-    draws = rng.standard_normal((num_paths, 5))
-    received = audible(received, radio.integrated_snr(received.gain) > NEGLIGIBLE * threshold)
+    sensor, captures = build_sensor(radio, config), split(received, config)
+    draws = rng.standard_normal((len(captures), num_paths, 5))
+    # false components are as many in all, whichever capture they are in
+    rate = replace(sensor, false_alarms=sensor.false_alarms / len(captures))
+    parts = [_capture(*one, rate, config, rng=rng) for one in zip(captures, draws, strict=True)]
+    side = np.repeat(np.arange(len(parts)) > 0, [len(part.path) for part in parts])
+    found = Components._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
+    order = np.argsort(found.points[:, 0])
+    found, side = Components._make(field[order] for field in found), side[order]
+    over_panel = None
+    if config.alternation:
+        over_panel = panel_probability(Found(*found[1:], side), radio, config)
+    measurement = Measurement(
+        found.points[:, 0],
+        into_disc(blind_axes(found.points[:, 1:], radio)),
+        np.abs(found.gain),
+        found.deviation[:, 0],
+        capped(found.deviation[:, 1:], radio),
+        found.gain_std / np.sqrt(2.0),
+        over_panel,
+    )
+    return measurement, PathTruth(found.path)
+
+
+def _capture(
+    received: Received, draws: Floats, sensor: SensorModel, config: ReceiverConfig, *, rng: np.random.Generator
+) -> Components:
+    """What is reported of the paths in one capture, and what is false."""
+    radio, window = sensor.radio, sensor.window
+    received = audible(received, radio.integrated_snr(received.gain) > NEGLIGIBLE * sensor.threshold)
     if config.resolution == "joint":
         parts, errors = joint_errors(received, radio, config, draws)
     else:
@@ -50,35 +96,23 @@ def measure_bound(
     noise = draws[parts.path, :2] / np.sqrt(2.0)
     gain = parts.gain + errors.gain_std * (noise[:, 0] + 1j * noise[:, 1])
     points = np.column_stack([parts.tau, parts.cosines]) + errors.error
-    seen = np.abs(gain) ** 2 > threshold * errors.gain_std**2
+    seen = np.abs(gain) ** 2 > sensor.threshold * errors.gain_std**2
     seen &= (points[:, 0] >= window[0]) & (points[:, 0] <= window[1])
     # Deviations go as one over the amplitude: this is the bound at the measured one.
     deviation = errors.deviation * (np.abs(parts.gain) / np.maximum(np.abs(gain), 1e-300))[:, None]
-    clutter, clutter_errors = _clutter(sensor, rng)
-    points = np.vstack([points[seen], np.column_stack([clutter.tau, clutter.cosines])])
-    deviation = np.vstack([deviation[seen], clutter_errors.deviation])
-    order = np.argsort(points[:, 0])
-    points, deviation = points[order], deviation[order]
-    from_panel = np.concatenate([parts.from_panel[seen], clutter.from_panel])[order]
-    measurement = Measurement(
-        points[:, 0],
-        into_disc(blind_axes(points[:, 1:], radio)),
-        np.abs(np.concatenate([gain[seen], clutter.gain]))[order],
-        deviation[:, 0],
-        capped(deviation[:, 1:], radio),
-        np.concatenate([errors.gain_std[seen], clutter_errors.gain_std])[order] / np.sqrt(2.0),
-        from_panel if config.alternation else None,
-    )
-    return measurement, PathTruth(np.concatenate([parts.path[seen], clutter.path])[order])
+    true = Components(parts.path[seen], points[seen], deviation[seen], gain[seen], errors.gain_std[seen])
+    return Components._make(np.concatenate(fields) for fields in zip(true, _clutter(sensor, rng), strict=True))
 
 
-def _clutter(sensor: SensorModel, rng: np.random.Generator) -> tuple[Parts, Errors]:
+def _clutter(sensor: SensorModel, rng: np.random.Generator) -> Components:
     """Poisson many, even over the delay window and the disc of cosines; amplitudes as of noise above the threshold."""
     radio, count = sensor.radio, rng.poisson(sensor.false_alarms)
     tau = rng.uniform(*sensor.window, count)
     radius, azimuth = np.sqrt(rng.uniform(size=count)), rng.uniform(-np.pi, np.pi, count)
     cosines = np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth)])
     snr = sensor.threshold + rng.exponential(size=count)
-    gain = np.sqrt(snr * radio.noise_psd / (radio.array.num_antennas * radio.energy)).astype(np.complex128)
-    parts = Parts(np.full(count, -1), tau, cosines, gain, rng.uniform(size=count) < 0.5)
-    return parts, lone_errors(parts, radio, np.zeros((count, 5)))
+    phase = np.exp(2j * np.pi * rng.uniform(size=count))
+    gain = phase * np.sqrt(snr * radio.noise_psd / (radio.array.num_antennas * radio.energy))
+    parts = Parts(np.full(count, -1), tau, cosines, gain)
+    errors = lone_errors(parts, radio, np.zeros((count, 5)))
+    return Components(parts.path, np.column_stack([tau, cosines]), errors.deviation, gain, errors.gain_std)

@@ -10,6 +10,7 @@ ESTIMATORS = ("bound", "waveform")
 """Ways from the channel to multipath components: errors drawn from the Cramér-Rao bound, or a real estimator."""
 
 RESOLUTIONS = ("cell", "joint")
+ORDERS = ("ABBA", "AB")
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +32,15 @@ class ReceiverConfig:
     the joint bound cannot share the amplitude out. `joint` draws the errors from that bound too, and costs more."""
     alternation: bool = False
     """Whether the slot is split between the code and its phase-reversed twin, which sets the panel's paths apart."""
+    order: str = "ABBA"
+    """Order of code and twin within the slot: `ABBA` cancels what moves evenly, `AB` lets it leak."""
+    code_dwell: float = 0.0
+    """Time [s] for which a code is held, the order repeated until the slot is full; 0 goes through it once. The panel
+    has to switch as fast."""
+    slot: float = 0.01
+    """Length [s] of the measurement slot, in which the agent moves on."""
+    top_speed: float = 0.5
+    """Speed of the agent [m/s] that is reckoned with at most in asking what motion may have left in the difference."""
     min_delay: float = 0.0
     """Components before this delay [s] are not reported."""
     max_delay: float = 80e-9
@@ -47,11 +57,18 @@ class ReceiverConfig:
     """Most components that are looked for in one cycle (`waveform`)."""
 
     def __post_init__(self) -> None:
-        for name, allowed in (("estimator", ESTIMATORS), ("resolution", RESOLUTIONS)):
+        for name, allowed in (("estimator", ESTIMATORS), ("resolution", RESOLUTIONS), ("order", ORDERS)):
             if getattr(self, name) not in allowed:
                 choice = " or ".join(map(repr, allowed))
                 raise ConfigError(f"receiver.{name}: '{getattr(self, name)}' received; give {choice}")
-        not_negative = ("clutter_rate", "leakage_cancellation_db", "min_delay", "false_alarm_rate")
+        not_negative: tuple[str, ...] = (
+            "clutter_rate",
+            "leakage_cancellation_db",
+            "min_delay",
+            "false_alarm_rate",
+            "code_dwell",
+        )
+        not_negative += ("slot", "top_speed")
         for name in ("detection_threshold_db", "max_delay", *not_negative):
             if not np.isfinite(getattr(self, name)):
                 raise ConfigError(f"receiver.{name}: {getattr(self, name)} received; give a finite number")

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.errors import StoreError
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.identify import identify
 from rislam_rt.measurement.received import receive
 from rislam_rt.measurement.tracking import TrackingConfig, init_tracks, step_tracks
-from rislam_rt.measurement.waveform import Components, capture, find_components, to_measurement
+from rislam_rt.measurement.waveform import Components, capture, find_components, to_measurement, true_paths
 from rislam_rt.model import Paths, RadioConfig, Trajectory
 from rislam_rt.waveform import subcarrier_frequencies
 
@@ -36,7 +36,7 @@ SCHEMA: dict[str, tuple[tuple[str, ...], str, str]] = {
     "found_tau_std": (("cycle", "component"), "s", "standard deviation of found_tau"),
     "found_cosines_std": (("cycle", "component", "cosine"), "1", "standard deviation of found_cosines"),
     "found_amplitude_std": (("cycle", "component"), "1", "standard deviation of |found_gain|"),
-    "found_from_panel": (("cycle", "component"), "1", "1 if found in the difference, 0 if not, -9 no component"),
+    "found_from_panel": (("cycle", "component"), "1", "probability that it ran over the panel, -9 no component"),
     "found_label": (("cycle", "component"), "1", "the tracker's label, -9 no component"),
     "found_path": (("cycle", "component"), "1", "truth, for scoring only: column of the path, -1 clutter, -9 none"),
 }
@@ -56,14 +56,15 @@ def signals_dataset(
 
     Variables as in `SCHEMA`; the radio and the receiver are in the attributes. `on_cycle` is called after each cycle.
     """
-    samples, noise, found, labels, truth = [], [], [], [], []
+    samples, noise, found, labels, truth, over_panel = [], [], [], [], [], []
     heard = np.zeros((paths.num_cycles, paths.num_paths), dtype=np.int8)
+    shift = doppler_shift(paths, trajectory, radio.wavelength)
     tracks, last, previous = init_tracks(), trajectory.time[0], None
     for cycle in range(paths.num_cycles):
-        received = receive(paths, cycle, float(trajectory.heading[cycle]), radio, config)
+        received = receive(paths, cycle, float(trajectory.heading[cycle]), radio, config, shift[cycle])
         captures = capture(received, radio, config, rng=rng)
         components = find_components(captures, radio, config, previous)
-        previous = to_measurement(components, config)
+        previous = to_measurement(components, radio, config)
         step = float(trajectory.time[cycle] - last)
         tracks, info = step_tracks(tracks, previous, step, TrackingConfig())
         last = trajectory.time[cycle]
@@ -72,7 +73,8 @@ def signals_dataset(
         heard[cycle, received.path] = 1
         found.append(components)
         labels.append(info.label)
-        truth.append(identify(components.tau, components.cosines, components.gain, received, radio))
+        truth.append(true_paths(components, received, radio, config))
+        over_panel.append(np.zeros(len(components.tau)) if previous.from_panel is None else previous.from_panel)
         if on_cycle is not None:
             on_cycle()
     values: dict[str, Any] = {
@@ -85,7 +87,7 @@ def signals_dataset(
         "receiver_heading": trajectory.heading,
         "found_label": _padded(labels, NO_COMPONENT),
         "found_path": _padded(truth, NO_COMPONENT),
-        "found_from_panel": _padded([one.from_panel.astype(np.int64) for one in found], NO_COMPONENT),
+        "found_from_panel": _padded(over_panel, float(NO_COMPONENT)),
     }
     for name in Components._fields[:-1]:
         values[f"found_{name}"] = _padded([getattr(one, name) for one in found], 0.0)

@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.measurement.atoms import Sounding, build_sounding, factors, inner_products
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.parts import Errors, Parts, audible, in_cells, join
+from rislam_rt.measurement.parts import Errors, Parts, in_cells, join
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.refine import joint_bound
 from rislam_rt.measurement.signal import num_tones
@@ -18,27 +18,17 @@ LEAST_CERTAINTY = 2.0
 def joint_errors(received: Received, radio: RadioConfig, config: ReceiverConfig, draws: Floats) -> tuple[Parts, Errors]:
     """Components that can be resolved, and errors drawn from their joint bound.
 
-    Under alternation the panel's paths and the others are separate problems.
+    Paths merge until every component is certain enough, or has no neighbour to merge with.
 
     Parameters
     ----------
+    received
+        The paths of one capture.
     draws
         (P, 5) normal draws of all columns of the paths; the last three are used.
     """
     sounding = build_sounding(num_tones(radio, config), radio)
-    halves = [received]
-    if config.alternation:
-        halves = [audible(received, received.from_panel), audible(received, ~received.from_panel)]
-    parts, errors = zip(*(_one_problem(half, sounding, radio, config.merge, draws) for half in halves), strict=True)
-    return Parts(*map(np.concatenate, zip(*parts, strict=True))), Errors(
-        *map(np.concatenate, zip(*errors, strict=True))
-    )
-
-
-def _one_problem(
-    received: Received, sounding: Sounding, radio: RadioConfig, merging: bool, draws: Floats
-) -> tuple[Parts, Errors]:
-    """Merge until every component is certain enough, or has no neighbour to merge with."""
+    merging = config.merge
     place = in_cells(received, radio)
     near = np.linalg.norm(place[:, None] - place, axis=-1)
     unit = np.sqrt(radio.energy * radio.array.num_antennas / (sounding.num_samples * radio.noise_psd))

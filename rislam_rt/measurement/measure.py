@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from rislam_rt.arrays import Floats
 from rislam_rt.measurement.bound import measure_bound
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.received import receive
@@ -16,6 +17,7 @@ def measure(
     radio: RadioConfig,
     config: ReceiverConfig,
     previous: Measurement | None = None,
+    doppler: Floats | None = None,
     *,
     rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
@@ -33,8 +35,10 @@ def measure(
     previous
         What was measured in the cycle before: `waveform` begins its search there, which saves a third of its time and
         more; `bound` has no use for it.
+    doppler
+        (P,) Doppler shifts [Hz] of the paths, which turn within the slot; None if nothing moves.
     """
-    received = receive(paths, cycle, heading, radio, config)
+    received = receive(paths, cycle, heading, radio, config, doppler)
     if config.estimator == "waveform":
         return measure_waveform(received, radio, config, previous, rng=rng)
     return measure_bound(received, radio, config, paths.num_paths, rng=rng)

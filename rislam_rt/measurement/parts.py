@@ -25,8 +25,6 @@ class Parts(NamedTuple):
     """(N, 2) body frame."""
     gain: Complexes
     """(N,)."""
-    from_panel: Booleans
-    """(N,)."""
 
 
 class Errors(NamedTuple):
@@ -50,12 +48,10 @@ def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:
 
 
 def merge(received: Received, sensor: SensorModel) -> Parts:
-    """Join paths closer than a resolution cell in delay and both cosines, from the strongest down."""
+    """Join paths of one capture closer than a resolution cell in delay and both cosines, from the strongest down."""
     cell = np.ones((len(received.tau), len(received.tau)), dtype=bool)
     for value in in_cells(received, sensor.radio).T:  # axis by axis: half the time of one three-dimensional array
         cell &= np.abs(np.subtract.outer(value, value)) < 1.0
-    if sensor.alternation:
-        cell &= received.from_panel[:, None] == received.from_panel
     return join(received, _leaders(np.abs(received.gain), cell))
 
 
@@ -74,12 +70,12 @@ def join(received: Received, leader: Integers) -> Parts:
     weight = np.real(received.gain[order] * np.conj(np.repeat(gain, np.diff(start, append=len(order)))))
     joint = np.add.reduceat(weight[:, None] * points, start) / np.maximum(np.abs(gain) ** 2, 1e-300)[:, None]
     joint = np.clip(joint, np.minimum.reduceat(points, start), np.maximum.reduceat(points, start))
-    return Parts(received.path[rows], joint[:, 0], joint[:, 1:], gain, received.from_panel[rows])
+    return Parts(received.path[rows], joint[:, 0], joint[:, 1:], gain)
 
 
 def single(received: Received) -> Parts:
     """Every path on its own."""
-    return Parts(received.path, received.tau, received.direction[:, :2], received.gain, received.from_panel)
+    return Parts(received.path, received.tau, received.direction[:, :2], received.gain)
 
 
 def lone_errors(parts: Parts, radio: RadioConfig, draws: Floats) -> Errors:
@@ -92,8 +88,7 @@ def lone_errors(parts: Parts, radio: RadioConfig, draws: Floats) -> Errors:
 
 def audible(received: Received, keep: Booleans) -> Received:
     """The paths marked (N,)."""
-    path, tau, direction, gain, from_panel, radius = received
-    return Received(path[keep], tau[keep], direction[keep], gain[keep], from_panel[keep], radius[keep])
+    return Received._make(field[keep] for field in received)
 
 
 def in_cells(received: Received, radio: RadioConfig) -> Floats:

@@ -30,15 +30,26 @@ class Received(NamedTuple):
     """(N,) whether the path meets the panel: its gain changes sign under the phase-reversed code."""
     wave_radius: Floats
     """(N,) distance [m] from the array back to the point from which the wave spreads: the mirrored Tx or landmark."""
+    doppler: Floats
+    """(N,) Doppler shift [Hz]: what the paths turn by within the slot."""
 
 
-def receive(paths: Paths, cycle: int, heading: float, radio: RadioConfig, config: ReceiverConfig) -> Received:
+def receive(
+    paths: Paths,
+    cycle: int,
+    heading: float,
+    radio: RadioConfig,
+    config: ReceiverConfig,
+    doppler: Floats | None = None,
+) -> Received:
     """The paths of a cycle that the array hears.
 
     Parameters
     ----------
     heading
         Of the body about z [rad]; the body frame is the room's, turned back by it.
+    doppler
+        (P,) shifts of all paths [Hz] (`channel.doppler.doppler_shift`); None if nothing moves within the slot.
     """
     arrival = paths.arrival[cycle] @ rotation_z(np.array(heading))
     heard = paths.valid[cycle] & (paths.gain[cycle] != 0.0)
@@ -50,9 +61,10 @@ def receive(paths: Paths, cycle: int, heading: float, radio: RadioConfig, config
     gain = paths.gain[cycle, path] * np.where(kind == PathKind.LOS, leakage, 1.0)
     from_panel = (kind == PathKind.RIS) | (kind == PathKind.VRIS)
     radius = SPEED_OF_LIGHT * paths.tau[cycle, path]
+    shift = np.zeros(len(path)) if doppler is None else doppler[path]
     if config.element_exact:
         radius = radius - _tx_leg_length(paths, cycle, path)
-    return Received(path, paths.tau[cycle, path], arrival[path], gain, from_panel, radius)
+    return Received(path, paths.tau[cycle, path], arrival[path], gain, from_panel, radius, shift)
 
 
 def _tx_leg_length(paths: Paths, cycle: int, path: Integers) -> Floats:

@@ -17,7 +17,9 @@ from rislam_rt.measurement.joint import LEAST_CERTAINTY
 from rislam_rt.measurement.parts import capped, into_disc
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.refine import amplitude_covariance
+from rislam_rt.measurement.sides import Found, panel_probability
 from rislam_rt.measurement.signal import add_noise, converter_noise, quantise, tones
+from rislam_rt.measurement.slot import split
 from rislam_rt.model import Measurement, PathTruth, RadioConfig
 
 
@@ -28,8 +30,8 @@ class Capture(NamedTuple):
     """(L, M) tones [sqrt(J)] at full energy E."""
     noise_psd: float
     """Variance per tone, converters included [J]."""
-    from_panel: bool
-    """Whether it is the difference under alternation, which only the panel's paths enter."""
+    is_difference: bool
+    """Whether it is the difference under alternation, which the panel's paths enter, and what turns within the slot."""
 
 
 class Components(NamedTuple):
@@ -47,8 +49,8 @@ class Components(NamedTuple):
     """(N, 2)."""
     amplitude_std: Floats
     """(N,)."""
-    from_panel: Booleans
-    """(N,)."""
+    in_difference: Booleans
+    """(N,) whether it was found in the difference."""
 
 
 def capture(
@@ -57,17 +59,17 @@ def capture(
     """Sound the channel: one capture, or with alternation the sum and the difference of two at half the energy each.
 
     Sum and difference of the two halves, over sqrt 2, hold the walls' and the panel's paths at the full energy and the
-    noise of one sounding: splitting the slot costs nothing but a second code.
+    noise of one sounding: splitting the slot costs nothing but a second code. What turns within the slot is in both.
     """
+    heard = split(received, config)
     if not config.alternation:
-        noisy = add_noise(tones(received, radio, config), radio.noise_psd, rng=rng)
+        noisy = add_noise(tones(heard[0], radio, config), radio.noise_psd, rng=rng)
         extra = converter_noise(noisy, config.converter_bits, radio)
         return [Capture(quantise(noisy, config.converter_bits, radio), radio.noise_psd + extra, False)]
-    sign = np.where(received.from_panel, -1.0, 1.0)
+    clean = [tones(one, radio, config) for one in heard]
     halves, extra = [], 0.0
-    for gain in (received.gain, sign * received.gain):
-        clean = np.sqrt(0.5) * tones(received._replace(gain=gain), radio, config)
-        noisy = add_noise(clean, radio.noise_psd, rng=rng)
+    for sign in (1.0, -1.0):
+        noisy = add_noise(np.sqrt(0.5) * (clean[0] + sign * clean[1]), radio.noise_psd, rng=rng)
         extra += 0.5 * converter_noise(noisy, config.converter_bits, radio)
         halves.append(quantise(noisy, config.converter_bits, radio))
     level = radio.noise_psd + extra
@@ -84,8 +86,7 @@ def find_components(
     found = [_find(one, radio, config, _known(one, radio, previous)) for one in captures]
     joined = [np.concatenate(fields) for fields in zip(*found, strict=True)]
     order = np.argsort(joined[0])
-    tau, cosines, gain, tau_std, cosines_std, amplitude_std, from_panel = (field[order] for field in joined)
-    return Components(tau, cosines, gain, tau_std, cosines_std, amplitude_std, from_panel)
+    return Components._make(field[order] for field in joined)
 
 
 def measure_waveform(
@@ -98,11 +99,27 @@ def measure_waveform(
 ) -> tuple[Measurement, PathTruth]:
     """Components estimated from the cycle's signal, and the paths that they most likely are."""
     found = find_components(capture(received, radio, config, rng=rng), radio, config, previous)
-    return to_measurement(found, config), PathTruth(identify(found.tau, found.cosines, found.gain, received, radio))
+    return to_measurement(found, radio, config), PathTruth(true_paths(found, received, radio, config))
 
 
-def to_measurement(found: Components, config: ReceiverConfig) -> Measurement:
+def true_paths(found: Components, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
+    """Column (N,) of the path that each component most likely is, by what its capture holds; -1 for none."""
+    path = np.full(len(found.tau), -1)
+    for number, heard in enumerate(split(received, config)):
+        mine = found.in_difference == bool(number)
+        path[mine] = identify(found.tau[mine], found.cosines[mine], found.gain[mine], heard, radio)
+    return path
+
+
+def to_measurement(found: Components, radio: RadioConfig, config: ReceiverConfig) -> Measurement:
     """What the agent gets to see of the components."""
+    over_panel = None
+    if config.alternation:
+        points, deviation = (
+            np.column_stack(pair) for pair in ((found.tau, found.cosines), (found.tau_std, found.cosines_std))
+        )
+        seen = Found(points, deviation, found.gain, np.sqrt(2.0) * found.amplitude_std, found.in_difference)
+        over_panel = panel_probability(seen, radio, config)
     return Measurement(
         found.tau,
         found.cosines,
@@ -110,7 +127,7 @@ def to_measurement(found: Components, config: ReceiverConfig) -> Measurement:
         found.tau_std,
         found.cosines_std,
         found.amplitude_std,
-        found.from_panel if config.alternation else None,
+        over_panel,
     )
 
 
@@ -120,7 +137,7 @@ def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Fl
         return NOTHING
     mine = np.ones(len(previous), dtype=bool)
     if previous.from_panel is not None:
-        mine = previous.from_panel == one.from_panel
+        mine = (previous.from_panel > 0.5) == one.is_difference
     return np.column_stack([previous.tau * radio.bandwidth, previous.cosines])[mine]
 
 
@@ -145,7 +162,7 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
         np.sqrt(variance[:, 0]) / radio.bandwidth,
         np.hypot(capped(np.sqrt(variance[:, 1:]), radio), np.sqrt(mirrored)),
         scale * amplitude_std,
-        np.full(len(gain), one.from_panel),
+        np.full(len(gain), one.is_difference),
     )
 
 

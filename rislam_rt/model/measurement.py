@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers, freeze
+from rislam_rt.arrays import Floats, Integers, freeze
 from rislam_rt.geometry.angles import angles_from_direction
 
 
@@ -28,9 +28,9 @@ class Measurement:
     """(M, 2) standard deviations, likewise."""
     amplitude_std: Floats
     """(M,)."""
-    from_panel: Booleans | None = None
-    """(M,) whether it was found in the difference of a code and its phase-reversed twin, which only the panel's paths
-    enter; None where the receiver does not alternate."""
+    from_panel: Floats | None = None
+    """(M,) probability that it ran over the panel, if a path made it: what is found in the difference of a code and its
+    phase-reversed twin did, unless motion within the slot left it there. None where the receiver does not alternate."""
 
     def __post_init__(self) -> None:
         count = len(np.asarray(self.tau))
@@ -44,10 +44,14 @@ class Measurement:
         ):
             freeze(self, name, np.float64, shape)
         if self.from_panel is not None:
-            freeze(self, "from_panel", np.bool_, (count,))
+            freeze(self, "from_panel", np.float64, (count,))
 
     def __len__(self) -> int:
         return len(self.tau)
+
+    def __repr__(self) -> str:
+        span = f", {1e9 * self.tau.min():.3g} to {1e9 * self.tau.max():.3g} ns" if len(self) else ""
+        return f"Measurement: {len(self)} components{span}"
 
     @property
     def arrival(self) -> Floats:

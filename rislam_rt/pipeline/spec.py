@@ -30,7 +30,7 @@ def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()
 
 
 _Filter = _section("_Filter", SlamConfig, "Fields of `SlamConfig`.")
-_Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.")
+_Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.", without=("slot",))
 _BpSlam = _section("_BpSlam", BpSlamConfig, "Fields of `BpSlamConfig`.")
 _ChannelSlam = _section("_ChannelSlam", ChannelSlamConfig, "Fields of `ChannelSlamConfig`.")
 _Designers = _section("_Designers", DesignConfig, "Fields of `DesignConfig`.", without=("certify",))
@@ -49,7 +49,7 @@ class ChannelSlamSection(_ChannelSlam):  # type: ignore[misc, valid-type]
 
 
 class ReceiverSection(_Receiver):  # type: ignore[misc, valid-type]
-    """The receiver's settings, SI units."""
+    """The receiver's settings, SI units; its slot is `budget.measure_s`."""
 
 
 class ArraySection(Section):
@@ -287,7 +287,7 @@ def build_settings(spec: PipelineSpec) -> Settings:
     ConfigError
         A value is out of the range that the record itself checks.
     """
-    radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump())
+    radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump(), slot=spec.budget.measure_s)
     return Settings(
         radio,
         receiver,

@@ -16,6 +16,7 @@ from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.engine import Told, engine_of
 from rislam_rt.slam.expect import Belief, expected_returns, shown_share
 from rislam_rt.slam.health import Health, check
+from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.learn import Hits, learn
 from rislam_rt.slam.match import Outlook, candidates, hidden_tracks, look_ahead
 from rislam_rt.slam.moments import POSE, Moments, poses_of
@@ -23,12 +24,14 @@ from rislam_rt.slam.prune import keepers
 from rislam_rt.slam.returns import Poses, compact
 from rislam_rt.slam.sift import sift
 from rislam_rt.slam.suspect import weigh_tracks
-from rislam_rt.slam.tracks import OTHER, PANEL, Glance, Tracks, advance, begin, extend, has_ended, no_tracks
+from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance, Tracks, advance, begin, extend, has_ended, no_tracks
 
 LOS_MARGIN = 0.1
 """Length [m] beyond the baseline below which a component is the direct path: no landmark can be that near."""
 FAR = 1e5
 """Length [m], and standard deviation of anything, that stands for an infinite one."""
+SIDED = 3.0
+"""Log odds beyond which a component is held for the panel's, or for another's: 19 in 20."""
 STRANGERS = np.array([1.3, 2.0, 3.0])
 """Factor on the standard deviations of returns over 0, 1 and 2 walls, for paths in their cell that the map lacks."""
 PRUNE_STRIDE = 5
@@ -131,7 +134,14 @@ def step(
     *,
     rng: np.random.Generator,
 ) -> tuple[FilterState, StepInfo]:
-    """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied."""
+    """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied.
+
+    Raises
+    ------
+    ConfigError
+        One of them is no number, or not of the panel.
+    """
+    check_step(dt, heading, code, state.ris)
     state = _move(state, dt, heading, config, rng=rng)
     glance = glance_of(measurement, state.radio)
     landmark = np.where(is_los(glance, state.body), REMOVED, UNUSED)
@@ -267,7 +277,7 @@ def glance_of(measurement: Measurement, radio: RadioConfig) -> Glance:
         np.minimum(measurement.amplitude_std / amplitude, 1.0),
         np.clip(measurement.amplitude_std, 1e-30, 1e30),
         amplitude / free,
-        None if measurement.from_panel is None else np.where(measurement.from_panel, PANEL, OTHER),
+        *side_of(measurement.from_panel),
     )
 
 
@@ -279,6 +289,17 @@ def stranger_density(glance: Glance, sensor: SensorModel, new_density: float) ->
     snr = sensor.radio.integrated_snr(np.exp(glance.log_amplitude))
     false = sensor.false_alarm_density(glance.seen[:, 0] / SPEED_OF_LIGHT, glance.seen[:, 1:]) / SPEED_OF_LIGHT
     return new_density + false * 2.0 * snr * sensor.false_alarm_snr_density(snr)
+
+
+def side_of(probability: Floats | None) -> tuple[Integers | None, Floats | None]:
+    """Side (M,) of components that ran over the panel with a probability (M,), and its log odds; None without them.
+
+    What may be either is left open.
+    """
+    if probability is None:
+        return None, None
+    odds = np.log(probability / (1.0 - probability))
+    return np.where(odds > SIDED, PANEL, np.where(odds < -SIDED, OTHER, UNTOLD)), odds
 
 
 def free_space(radio: RadioConfig) -> float:

@@ -23,7 +23,7 @@ from rislam_rt.slam.identity import (
 from rislam_rt.slam.match import Outlook
 from rislam_rt.slam.moments import Moments, poses_of, square_root
 from rislam_rt.slam.returns import NONE, TX, Returns, compact, observe
-from rislam_rt.slam.tracks import OTHER, PANEL, Glance
+from rislam_rt.slam.tracks import Glance
 
 BELIEF_SAMPLES = 24
 """Samples of the belief over which the panel's predicted gain is averaged."""
@@ -79,7 +79,7 @@ def learn(
         direct = compact(expected.returns, hits.row[plain])
         pick = hits.pick[plain]
         amplitude = np.exp(glance.log_amplitude[pick])
-        told = glance.sides[pick]
+        told = glance.odds[pick]
         book = _weigh(book, belief, moments, direct, amplitude, glance.amplitude_std[pick], told, code, rng=rng)
     silent = (expected.bounces == 0) & ~outlook.merger.outshone & (outlook.merger.partner < 0)
     silent[hits.row] = False
@@ -122,21 +122,21 @@ def _weigh(
     direct: Returns,
     amplitude: Floats,
     std: Floats,
-    side: Integers,
+    told: Floats,
     code: RisCode | None,
     *,
     rng: np.random.Generator,
 ) -> Book:
-    """Amplitudes of direct returns weighed for every strength, and for the panel."""
+    """Amplitudes of direct returns weighed for every strength, and for the panel, by its odds as `told` (P,)."""
     points = direct.point
     sight = observe(direct, belief.features, book.anchor, belief.poses)
     scatterer = log_scatterer(amplitude, std, sight.tx_length, sight.rx_length, belief.radio)
     panel: Floats = np.full(len(points), -np.inf)
     if belief.ris is not None and code is not None:
         gain = _sampled_gains(belief, moments, points, code, rng=rng)
-        panel = np.where(side == OTHER, -np.inf, log_panel(amplitude, std, gain))
+        panel = log_panel(amplitude, std, gain) + np.minimum(told, 0.0)
     grid, log_ris = add_evidence(book.log_grid[points], book.log_ris[points], scatterer, panel)
-    log_ris += np.where(side == PANEL, TOLD, 0.0)
+    log_ris += np.clip(told, 0.0, TOLD)
     grids, all_ris = book.log_grid.copy(), book.log_ris.copy()
     grids[points], all_ris[points] = grid, np.clip(log_ris, -CERTAIN, CERTAIN)
     if belief.ris is None:

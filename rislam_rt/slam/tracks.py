@@ -37,12 +37,19 @@ class Glance(NamedTuple):
     ratio: Floats
     """(M,) amplitude over that of free space of the same length."""
     side: Integers | None = None
-    """(M,) `PANEL` or `OTHER`; None where the receiver does not tell."""
+    """(M,) `PANEL`, `OTHER` or, where either may be, `UNTOLD`; None where the receiver does not tell."""
+    panel_odds: Floats | None = None
+    """(M,) log odds of having run over the panel, likewise."""
 
     @property
     def sides(self) -> Integers:
         """(M,) with `UNTOLD` where the receiver does not tell."""
         return np.full(len(self.ratio), UNTOLD) if self.side is None else self.side
+
+    @property
+    def odds(self) -> Floats:
+        """(M,) log odds of having run over the panel, 0 where the receiver does not tell."""
+        return np.zeros(len(self.ratio)) if self.panel_odds is None else self.panel_odds
 
     def take(self, rows: Integers) -> "Glance":
         """Only some of the measurements."""

@@ -162,7 +162,7 @@ class TestAlternation:
         errors = []
         for measurement, truth in repeat(paths, config, 100):
             row = int(np.flatnonzero(truth.path == 1)[0])
-            assert measurement.from_panel[row]
+            assert measurement.from_panel[row] > 0.99
             errors.append(measurement.tau[row] - paths.tau[0, 1])
         bound = measurement_std(np.array(100.0), RADIO).tau
         # 100 draws: three standard errors are 21 %

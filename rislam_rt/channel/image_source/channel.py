@@ -10,7 +10,7 @@ from rislam_rt.channel.image_source.fresnel import Coatings, build_coatings
 from rislam_rt.channel.image_source.images import find_legs
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.walls import Walls, build_walls
-from rislam_rt.errors import ConfigError
+from rislam_rt.errors import ConfigError, expect
 from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
 from rislam_rt.ris import rephase
 
@@ -41,6 +41,9 @@ class ImageSourceChannel:
     looked: Search = field(init=False)
 
     def __post_init__(self) -> None:
+        expect("scene", self.scene, Scene)
+        expect("radio", self.radio, RadioConfig)
+        expect("depth", self.depth, int)
         if self.depth < 0:
             raise ConfigError(f"depth: {self.depth} received; give 0 or more wall bounces")
         if self.search not in SEARCHES:
@@ -52,6 +55,7 @@ class ImageSourceChannel:
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Every path of every cycle, with the panel at level 0."""
+        expect("trajectory", trajectory, Trajectory)
         tx, rx = trajectory.tx, trajectory.rx
         direct = find_legs(self.looked, self.coatings, tx, rx, self.depth)
         landmarks = range(len(self.scene.landmarks))

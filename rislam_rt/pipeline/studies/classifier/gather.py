@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.design.single import exact_code
 from rislam_rt.measurement import ReceiverConfig, TrackingConfig, init_tracks, measure, step_tracks
@@ -88,9 +89,11 @@ def gather_walk(
     believed = motion.position + np.outer(motion.time, rng.standard_normal(3) * [VELOCITY_STD, VELOCITY_STD, 0.0])
     baseline = float(np.linalg.norm(motion.body.tx_offset - motion.body.rx_offset))
     state, config, memory = init_tracks(), TrackingConfig(), _Memory()
-    found: list[Examples] = []
+    shift, found = doppler_shift(paths, motion, radio.wavelength), []
     for cycle in range(len(motion)):
-        measurement, truth = measure(paths, cycle, float(motion.heading[cycle]), radio, receiver, rng=rng)
+        measurement, truth = measure(
+            paths, cycle, float(motion.heading[cycle]), radio, receiver, None, shift[cycle], rng=rng
+        )
         dt = float(motion.time[cycle] - motion.time[cycle - 1]) if cycle else 0.0
         state, info = step_tracks(state, measurement, dt, config)
         length = SPEED_OF_LIGHT * measurement.tau
