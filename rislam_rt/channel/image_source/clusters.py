@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.image_source.facets import Facets
 from rislam_rt.channel.image_source.rectangles import Rectangles
 from rislam_rt.constants import SURFACE_TOLERANCE
@@ -30,18 +30,18 @@ class Clusters(NamedTuple):
         if beams == 0:
             return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
         flat, bound = normal.reshape(-1, 3), offset.reshape(-1, 1) - SURFACE_TOLERANCE
-        highest = flat @ self.center.T + np.abs(flat) @ self.half.T - bound
-        near = (highest >= 0.0).reshape(beams, planes, -1).all(axis=1)
+        highest: Floats = flat @ self.center.T + np.abs(flat) @ self.half.T
+        near: Booleans = (highest >= bound).reshape(beams, planes, -1).all(axis=1)
         found = []
         for number, members in enumerate(self.members):
             rows = np.flatnonzero(near[:, number])
             if len(rows) == 0:
                 continue
             n, o = normal[rows].reshape(-1, 3), offset[rows].reshape(-1, 1) - SURFACE_TOLERANCE
-            highest = n @ self.rectangles.center[members].T
+            within: Floats = n @ self.rectangles.center[members].T
             for half in self.rectangles.halves:
-                highest += np.abs(n @ half[members].T)
-            row, wall = np.nonzero((highest >= o).reshape(len(rows), planes, -1).all(axis=1))
+                within += np.abs(n @ half[members].T)
+            row, wall = np.nonzero((within >= o).reshape(len(rows), planes, -1).all(axis=1))
             found.append((rows[row], members[wall]))
         rows_found, walls_found = zip(*found, strict=True) if found else ([np.zeros(0, int)], [np.zeros(0, int)])
         return np.concatenate(rows_found), np.concatenate(walls_found)
