@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.facets import Facets
 from rislam_rt.channel.image_source.rectangles import Rectangles
 from rislam_rt.constants import SURFACE_TOLERANCE
@@ -31,7 +31,7 @@ class Clusters(NamedTuple):
             return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
         flat, bound = normal.reshape(-1, 3), offset.reshape(-1, 1) - SURFACE_TOLERANCE
         highest: Floats = flat @ self.center.T + np.abs(flat) @ self.half.T
-        near: Booleans = (highest >= bound).reshape(beams, planes, -1).all(axis=1)
+        near = np.logical_and.reduce((highest >= bound).reshape(beams, planes, -1), axis=1)
         found = []
         for number, members in enumerate(self.members):
             rows = np.flatnonzero(near[:, number])
