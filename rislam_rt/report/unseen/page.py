@@ -60,7 +60,8 @@ def _meaning() -> list[str]:
     of root mean squares over a run. Given are medians over the rooms with their 95 % bootstrap intervals, and 95th
     percentiles; shares with Wilson's intervals. Dead reckoning is the start's told velocity, kept."""
     lost = f"""Lost is a run whose relative error exceeds {LOST:g} m and {FAR_OVER:g} relative bounds for {LASTING:g} s
-    on end; silently so, if no cycle from then on says that it diverged. A wall or landmark counts as heard if a path of
+    on end; silently so, if no cycle from then on says that it diverged, and the error exceeds {FAR_OVER:g} of the
+    estimator's own deviations for as long. A wall or landmark counts as heard if a path of
     it is above the detection threshold for {HEARD:g} s in all; walls in one plane are one. A wall is found if at the
     end a plane of the map lies within {NEAR_WALL:g} m of it (RMS over its surface), one to one, and found well within
     {GOOD_ANGLE:g} degree and {GOOD_OFFSET:g} m at its middle; a landmark, within {NEAR_POINT:g} m. Ghosts are what

@@ -31,7 +31,8 @@ def test_every_room_passes_the_check_and_is_closed(rooms: list[RandomRoom]) -> N
     for room in rooms[:40]:
         findings = check_scene(room.scene)
         assert [f.line for f in findings if f.severity == "error"] == []
-        assert [f.line for f in findings if not any(words in f.message for words in MEANT)] == []
+        warnings = [f for f in findings if f.severity == "warning"]
+        assert [f.line for f in warnings if not any(words in f.message for words in MEANT)] == []
 
 
 def test_the_agent_keeps_clear(rooms: list[RandomRoom]) -> None:

@@ -4,7 +4,8 @@ import json
 from collections.abc import Mapping
 from dataclasses import fields
 from functools import lru_cache
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,7 +14,9 @@ from rislam_rt.pipeline.run import Stage, prepare_channel, run_scheme, set_stage
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.spec import PipelineSpec
 from rislam_rt.pipeline.studies.swept.cell import cell_spec
+from rislam_rt.pipeline.studies.unseen.file import Recording
 from rislam_rt.pipeline.studies.unseen.recording import Recorder
+from rislam_rt.pipeline.studies.unseen.save import save_room, save_run, save_signals
 from rislam_rt.pipeline.studies.unseen.score import score_run
 from rislam_rt.pipeline.studies.unseen.truth import build_truth
 from rislam_rt.pipeline.sweeps.work import one_line
@@ -34,20 +37,48 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     room, stage = find_stage(int(settings["room"]), trace_key(spec))
     schemes: dict[str, Any] = {}
     timing: dict[str, Any] = {"trace_seconds": stage.seconds}
+    keep = Keep(str(settings.get("save", "nothing")), Path(settings.get("data", ".")), cell_label(settings))
     for asked in spec.schemes:
         try:
-            scores, timing[asked] = _run(scheme_here(asked, room), stage, spec)
-            schemes[asked] = scores
+            schemes[asked], timing[asked] = _run(scheme_here(asked, room), stage, spec, room_traits(room), keep)
         except Exception as error:  # whatever it is, it is this scheme's alone
             schemes[asked] = {"failed": one_line(error)}
     return {"traits": room_traits(room), "schemes": schemes, "timing": timing}
 
 
-def _run(name: str, stage: Stage, spec: PipelineSpec) -> tuple[dict[str, Any], dict[str, Any]]:
+class Keep(NamedTuple):
+    """What is left of a run beside its scores."""
+
+    what: str
+    """As `UnseenSpec.save`."""
+    folder: Path
+    label: str
+    """Of the cell, in the names of files."""
+
+
+def _run(
+    name: str, stage: Stage, spec: PipelineSpec, traits: Mapping[str, Any], keep: Keep
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Scores and times of one scheme."""
     recorder = Recorder(ESTIMATORS[SCHEMES[name].estimator])
     result = run_scheme(name, stage, spec, lambda *_: None, recorder.estimator)
     truth = build_truth(stage.scene, stage.paths, result, spec)
-    return {"ran": name, **score_run(truth, recorder.inputs, recorder.answers)}, {"cycle_s": recorder.answers.seconds}
+    scores = {"ran": name, **score_run(truth, recorder.inputs, recorder.answers)}
+    if keep.what != "nothing":
+        label = f"{keep.label}{name}"
+        config = spec.model_dump(mode="json")
+        save_run(Recording(recorder.inputs, truth, name, config, traits, scores), keep.folder, label)
+        save_room(stage.scene, traits, keep.folder)
+        if keep.what == "signals":
+            save_signals(stage, result, spec, traits, keep.folder, label)
+    return scores, {"cycle_s": recorder.answers.seconds}
+
+
+def cell_label(settings: Mapping[str, Any]) -> str:
+    """Variant and SNR, for names of files."""
+    snr = settings["run"].get("radio", {}).get("reference_snr_db")
+    parts = [str(settings["variant"])] if settings.get("variant") else []
+    return "".join(f"{part}_" for part in [*parts, *([f"{snr:g}dB"] if snr is not None else [])])
 
 
 def scheme_here(asked: str, room: RandomRoom) -> str:

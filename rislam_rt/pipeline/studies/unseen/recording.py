@@ -1,13 +1,13 @@
 """What an estimator was given, cycle by cycle, and what it answered: so that others can be given the same."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
-from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SlamEstimate
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.model import Body, MapEstimate, Measurement, RisCode, RisSpec, SlamEstimate, empty_map
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.spec import PipelineSpec, build_settings
@@ -42,6 +42,53 @@ class Answers(NamedTuple):
     """(K,) diagnostics; of each, `landmark` and `outcome` are read."""
     seconds: float
     """CPU time [s] of a cycle, step and estimate."""
+
+
+class Report(NamedTuple):
+    """What is read of an estimator's diagnostics."""
+
+    landmark: Integers
+    """(M,) number of the landmark that each component went to, -1 for none."""
+    outcome: str = "ok"
+    """`diverged` where the estimator holds itself for lost."""
+
+
+def answers_from_arrays(
+    inputs: Inputs,
+    position: Floats,
+    covariance: Floats | None = None,
+    maps: Sequence[MapEstimate] | None = None,
+    lost: Booleans | None = None,
+    landmark: Sequence[Integers] | None = None,
+) -> Answers:
+    """The answers of an estimator that is none of this package's, from plain arrays.
+
+    Parameters
+    ----------
+    position
+        (K, 3) [m].
+    covariance
+        (K, 3, 3) of the position [m^2]; without it there is no NEES.
+    maps
+        (K,) one a cycle, or the last one alone; without them nothing is found.
+    lost
+        (K,) whether it holds itself for lost.
+    landmark
+        (K,) numbers (M,) of the landmarks, as in the maps, that each cycle's components were taken for.
+    """
+    cycles, known = len(position), list(maps or [])
+    found = (cycles - len(known)) * [empty_map()] + known
+    spread = np.zeros((cycles, 6, 6))
+    if covariance is not None:
+        spread[:, :3, :3] = covariance
+    estimates = [
+        SlamEstimate(place, np.zeros(3), float(heading), cov, np.zeros((0, 3)), inputs.body, one)
+        for place, heading, cov, one in zip(position, inputs.heading, spread, found, strict=True)
+    ]
+    none = [np.full(len(m), -1) for m in inputs.measurements]
+    said = np.zeros(cycles, dtype=np.bool_) if lost is None else lost
+    infos = [Report(np.asarray(own), "diverged" if s else "ok") for own, s in zip(landmark or none, said, strict=True)]
+    return Answers(tuple(estimates), tuple(infos), 0.0)
 
 
 class Recorder:

@@ -48,23 +48,35 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
         "dead_reckoning_m": root_mean_square(np.linalg.norm(drift, axis=1)),
         "nees": _nees(truth, answers),
     }
-    scores |= lost_scores(errors.relative, truth.relative_bound, inputs.time, [i.outcome for i in answers.infos])
+    own = np.array([np.sqrt(np.trace(estimate.covariance[:3, :3])) for estimate in answers.estimates])
+    outcomes = [info.outcome for info in answers.infos]
+    scores |= lost_scores(errors.relative, truth.relative_bound, own, inputs.time, outcomes)
     maps = [estimate.map for estimate in answers.estimates]
     scores |= wall_scores(truth, maps, inputs.time, told)
     scores |= point_scores(truth, maps, inputs, told)
     return scores | kind_scores(truth, maps, answers)
 
 
-def lost_scores(relative: Floats, bound: Floats, time: Floats, outcomes: list[Any]) -> dict[str, Any]:
-    """Whether the estimate was lost, when, and whether it said so from then on."""
+def lost_scores(relative: Floats, bound: Floats, own: Floats, time: Floats, outcomes: list[Any]) -> dict[str, Any]:
+    """Whether the estimate was lost, when, and whether it was so in silence.
+
+    It is not in silence if an outcome says so from then on, or if the believed deviation `own` (K,) [m] does.
+    """
     far = relative > np.maximum(LOST, FAR_OVER * bound)
-    length = max(1, round(LASTING / float(np.median(np.diff(time))))) if len(time) > 1 else 1
-    run = np.convolve(far, np.ones(length), "valid") >= length if len(far) >= length else np.zeros(0, dtype=np.bool_)
-    if not run.any():
+    lost = _lasting(far, time)
+    if not lost.any():
         return {"lost": False, "silent": False, "lost_at_s": None}
-    first = int(np.argmax(run))
+    first = int(np.argmax(lost))
     said = any(str(outcome) == "diverged" for outcome in outcomes[first:])
-    return {"lost": True, "silent": not said, "lost_at_s": float(time[first])}
+    surprised = _lasting(far & (relative > FAR_OVER * own), time).any()
+    return {"lost": True, "silent": bool(surprised and not said), "lost_at_s": float(time[first])}
+
+
+def _lasting(flag: Booleans, time: Floats) -> Booleans:
+    """Cycles from which on a flag (K,) stays for `LASTING` seconds."""
+    step = float(np.median(np.diff(time))) if len(time) > 1 else LASTING
+    length = max(1, round(LASTING / step))
+    return np.asarray(np.convolve(flag, np.ones(length), "valid") >= length) if len(flag) >= length else flag[:0]
 
 
 def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Floats) -> dict[str, Any]:

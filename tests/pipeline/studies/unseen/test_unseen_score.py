@@ -141,23 +141,30 @@ def test_without_a_panel_there_is_none_to_find() -> None:
 def test_lost_is_far_off_for_a_second(cycles: int, lost: bool) -> None:
     error = np.zeros(K)
     error[50 : 50 + cycles] = 0.11
-    scores = lost_scores(error, np.full(K, 0.01), TIME, K * ["ok"])
+    scores = lost_scores(error, np.full(K, 0.01), np.full(K, 0.01), TIME, K * ["ok"])
     assert scores["lost"] is lost
     assert scores["silent"] is lost
     assert scores["lost_at_s"] == (pytest.approx(5.0) if lost else None)
 
 
 def test_lost_asks_for_more_where_the_bound_is_large() -> None:
-    assert not lost_scores(np.full(K, 0.4), np.full(K, 0.1), TIME, K * ["ok"])["lost"]
-    assert lost_scores(np.full(K, 0.6), np.full(K, 0.1), TIME, K * ["ok"])["lost"]
+    assert not lost_scores(np.full(K, 0.4), np.full(K, 0.1), np.full(K, 0.1), TIME, K * ["ok"])["lost"]
+    assert lost_scores(np.full(K, 0.6), np.full(K, 0.1), np.full(K, 0.1), TIME, K * ["ok"])["lost"]
 
 
 def test_an_alarm_counts_from_the_loss_on() -> None:
     error = np.where(TIME >= 5.0, 1.0, 0.0)
     early, late = K * ["ok"], K * ["ok"]
     early[20], late[140] = "diverged", "diverged"
-    assert lost_scores(error, np.full(K, 0.01), TIME, early)["silent"]
-    assert not lost_scores(error, np.full(K, 0.01), TIME, late)["silent"]
+    assert lost_scores(error, np.full(K, 0.01), np.full(K, 0.01), TIME, early)["silent"]
+    assert not lost_scores(error, np.full(K, 0.01), np.full(K, 0.01), TIME, late)["silent"]
+
+
+def test_a_deviation_that_covers_the_error_says_so_too() -> None:
+    error, bound, outcomes = np.where(TIME >= 5.0, 1.0, 0.0), np.full(K, 0.01), K * ["ok"]
+    assert lost_scores(error, bound, np.full(K, 0.19), TIME, outcomes)["silent"]
+    assert not lost_scores(error, bound, np.full(K, 0.21), TIME, outcomes)["silent"]
+    assert lost_scores(error, bound, np.full(K, 0.21), TIME, outcomes)["lost"]
 
 
 def _with_walls(found: MapEstimate, normal: Any, offset: Any) -> MapEstimate:
