@@ -1,7 +1,8 @@
 """Accuracy of every estimator in random rooms, against dead reckoning and against its own posterior bound.
 
 Limits are about twice what was measured (seeds, rooms and settings are fixed, so that a run gives the same numbers
-until the code changes): room for another rounding, not for a filter that learns nothing, whose error is dead reckoning's.
+until the code changes): room for another rounding, not for a filter that learns nothing, whose error is that of dead
+reckoning.
 """
 
 from functools import cache
