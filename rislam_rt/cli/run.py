@@ -75,12 +75,13 @@ def run_main_job(spec: "PipelineSpec", given: Given) -> None:
     from rislam_rt.cli.scenes import open_scene, scene_of
     from rislam_rt.pipeline import run_slam
     from rislam_rt.pipeline.run import check_run, prepare_channel
+    from rislam_rt.pipeline.spec import build_radio
     from rislam_rt.pipeline.store import PartialRun, check_folder, run_folder, run_identity
     from rislam_rt.pipeline.summary import summarise
     from rislam_rt.report.tables import print_summary
 
     pipeline, scene, out, jobs, json, page = given
-    opened = open_scene(scene_of(scene, spec, pipeline))
+    opened = open_scene(scene_of(scene, spec, pipeline), build_radio(spec.radio))
     room = opened.scene
     check_run(room, spec)
     folder = out or run_folder(spec, room, Path("runs"))

@@ -23,6 +23,7 @@ def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.files import write_atomic
     from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.spec import build_radio
     from rislam_rt.pipeline.studies.classifier.run import ALL, run_training
     from rislam_rt.pipeline.studies.spec import study_record
     from rislam_rt.report.classifier import (
@@ -39,7 +40,8 @@ def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
     folder = given.out or Path("runs") / f"{spec.name}-{spec.seed}"
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"--out {folder}: is a file; give a folder")
-    scenes = [open_scene(Path(os.path.normpath(given.pipeline.parent / room.scene))).scene for room in spec.rooms]
+    radio, beside = build_radio(spec.radio), given.pipeline.parent
+    scenes = [open_scene(Path(os.path.normpath(beside / room.scene)), radio).scene for room in spec.rooms]
     prepare_channel(spec.channel)
     with show_progress() as progress:
         found = run_training(scenes, spec, progress=progress)
