@@ -1,6 +1,6 @@
 """Floor 5: scores. Errors, distances between maps, consistency, confidence intervals, association."""
 
-from rislam_rt.evaluate.association import AssociationScore, association_score, label_switches
+from rislam_rt.evaluate.association import AssociationScore, association_fractions, association_score, label_switches
 from rislam_rt.evaluate.consistency import Consistency, chi_square_bounds, consistency, normalised_squares
 from rislam_rt.evaluate.errors import (
     TrajectoryError,
@@ -33,6 +33,7 @@ __all__ = [
     "TrajectoryError",
     "WallError",
     "align",
+    "association_fractions",
     "association_score",
     "bootstrap",
     "bootstrap_ratio",

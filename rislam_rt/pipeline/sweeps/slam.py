@@ -13,6 +13,7 @@ from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.evaluate import bootstrap, rms_over_runs
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.files import write_atomic
+from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.read import Table, build_spec, read_table
 from rislam_rt.pipeline.run import check_run, library_versions, prepare_channel, run_slam
 from rislam_rt.pipeline.section import Positive, Section
@@ -105,7 +106,11 @@ def slam_sweep(
     """
     section = load_section(path, overrides)
     found = {key: Axis(key, tuple(values)) for key, values in section.axes.items()}
-    found |= {axis.key: axis for axis in map(parse_axis, axes)}
+    given = [parse_axis(text) for text in axes]
+    twice = [axis.key for number, axis in enumerate(given) if axis.key in {other.key for other in given[:number]}]
+    if twice:
+        raise ConfigError(f"--axis {twice[0]}: given twice; give all its values in one, as {twice[0]}=V1,V2")
+    found |= {axis.key: axis for axis in given}
     for key in ("seed", "kind", "name", "description"):
         if key in found:
             raise ConfigError(f"axis '{key}': no setting to go through; use --repeat for seeds")
@@ -204,7 +209,8 @@ def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]],
         spec = build_spec(Table(path, dict(settings), ()), PipelineSpec, build_settings)
         room: Scene = load(path.parent / str(spec.scene))
         check_run(room, spec)
-        return {"scene_sha256": room.digest, "versions": versions}
+        own = own_digests([*spec.schemes, spec.channel])
+        return {"scene_sha256": room.digest, "versions": versions} | ({"own": own} if own else {})
 
     def named(settings: Mapping[str, Any]) -> dict[str, Any]:
         try:

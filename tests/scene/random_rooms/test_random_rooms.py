@@ -11,7 +11,7 @@ from rislam_rt.scene.random_rooms.landmarks import MOST
 from rislam_rt.scene.random_rooms.motion import CLIMB, CORNER, CYCLE, OFF_WALLS, SPIN
 from rislam_rt.scene.random_rooms.plan import area, depth_inside, draw_plan, triangulate
 
-MEANT = ("below the array", "more than a perfect plate", "more than 1/B", "never in front")
+MEANT = ("below the array", "more than a perfect plate", "more than 1/B", "never in front", "a wavelength or more")
 """Warnings of the scene check about what is drawn on purpose."""
 
 
@@ -31,7 +31,8 @@ def test_every_room_passes_the_check_and_is_closed(rooms: list[RandomRoom]) -> N
     for room in rooms[:40]:
         findings = check_scene(room.scene)
         assert [f.line for f in findings if f.severity == "error"] == []
-        assert [f.line for f in findings if not any(words in f.message for words in MEANT)] == []
+        warnings = [f for f in findings if f.severity == "warning"]
+        assert [f.line for f in warnings if not any(words in f.message for words in MEANT)] == []
 
 
 def test_the_agent_keeps_clear(rooms: list[RandomRoom]) -> None:

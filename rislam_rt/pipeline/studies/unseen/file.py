@@ -139,6 +139,17 @@ def recording_to_dataset(recording: Recording) -> "xr.Dataset":
 def dataset_to_recording(data: "xr.Dataset") -> Recording:
     """The inverse of `recording_to_dataset`."""
     marks = data.attrs
+    values = {name: data[f"true_{name}"].to_numpy() for name in TRUTH}
+    for name in ("landmark_audible", "wall_audible"):
+        values[name] = values[name].astype(np.bool_)
+    truth = Truth(**values, panel=bool(marks["true_panel"]))
+    config, traits, scores = (json.loads(marks[name]) for name in ("config", "traits", "scores"))
+    return Recording(dataset_to_inputs(data), truth, str(marks["scheme"]), config, traits, scores)
+
+
+def dataset_to_inputs(data: "xr.Dataset") -> Inputs:
+    """What an estimator is given, from the variables of `INPUTS` alone: a file of one's own needs no truth."""
+    marks = data.attrs
     start = StartPrior(
         data["start_position"].to_numpy(),
         data["start_velocity"].to_numpy(),
@@ -147,13 +158,7 @@ def dataset_to_recording(data: "xr.Dataset") -> Recording:
     panel, codes = _panel(data)
     body = Body(data["tx_offset"].to_numpy(), data["rx_offset"].to_numpy())
     time, heading = data["time"].to_numpy(), data["heading"].to_numpy()
-    inputs = Inputs(start, body, panel, time, heading, _measurements(data), codes)
-    values = {name: data[f"true_{name}"].to_numpy() for name in TRUTH}
-    for name in ("landmark_audible", "wall_audible"):
-        values[name] = values[name].astype(np.bool_)
-    truth = Truth(**values, panel=bool(marks["true_panel"]))
-    config, traits, scores = (json.loads(marks[name]) for name in ("config", "traits", "scores"))
-    return Recording(inputs, truth, str(marks["scheme"]), config, traits, scores)
+    return Inputs(start, body, panel, time, heading, _measurements(data), codes)
 
 
 def _panel(data: "xr.Dataset") -> tuple[RisSpec | None, tuple[RisCode | None, ...]]:

@@ -24,7 +24,7 @@ RUN = {
     "channel": "image_source", "depth": 1, "cycles": 30, "schemes": ["random"], "slam": {"use_vt": True},
     "motion": {"sigma_a_m_s2": 0.01}, "radio": {"reference_snr_db": 13.0},
 }  # fmt: skip
-WITH_PANEL, WITHOUT = 5, 3
+WITH_PANEL, WITHOUT = 22, 3
 """Rooms whose classes the tests reckon with."""
 
 
