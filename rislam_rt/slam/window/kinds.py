@@ -23,8 +23,6 @@ KINDS = (
 WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS = range(len(KINDS))
 LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05]))
 """Log prior of each kind; over known walls, of all walls together."""
-LOG_LONELY = np.log(0.05)
-"""Log probability that what two walls throw is heard, and neither of their single returns: the floor, or hidden."""
 LOG_NONE = np.log(0.05)
 """Of a path of no kind here: over walls that the map lacks."""
 LOG_VOLUME = float(np.log(4.0 / 3.0 * np.pi * LEVELS.size**3))
@@ -132,7 +130,7 @@ def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
 def hypotheses(digest: Digest, known: Known, book: Book) -> Hypotheses:
     """Every kind for every track, with its first guess."""
     count, walls = len(digest.seen), book.walls
-    seen, tx, rx, _ = digest.mean
+    seen, tx, rx = digest.mean
     ray, length = digest.direction, seen[:, 0]
     middle, image = digest.middle, rx + length[:, None] * digest.direction
     kinds, knowns, tracks, starts, turns, shifts, doubts = [], [], [], [], [], [], []
@@ -201,18 +199,18 @@ def place_on_ray(ray: Floats, length: Floats, tx: Floats, rx: Floats) -> Floats:
 
 
 def judge(
-    digest: Digest, known: Known, book: Book, scene: Scene, explained: list[tuple[int, float]], first: Booleans
+    digest: Digest, known: Known, book: Book, scene: Scene, explained: list[tuple[int, float]], lonely: Floats
 ) -> tuple[list[Verdict], Floats]:
     """Verdicts of T tracks, and the posterior (E,) of each of the explanations (track, log evidence) by the map.
 
-    `first` (T,): nothing shorter and brighter is there.
+    `lonely` (T,) is the log probability that two walls throw so few single returns beside it.
     """
     table = hypotheses(digest, known, book)
     fits = try_all(table.trials, digest)
     track = table.trials.track
     rivals = np.where(table.known >= 0, np.log(max(len(book.walls), 1)), 0.0)
     evidence = fits.log_evidence - LOG_VOLUME - np.where(table.trials.is_wall | table.trials.is_pair, np.log(8.0), 0.0)
-    evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair & first[track], LOG_LONELY, 0.0)
+    evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair, lonely[track], 0.0)
     evidence += _amplitudes(table, fits, digest, book, scene) + _opacity(table, fits, digest, known, book)
     gain = _upright(table, fits, digest, known, book)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
@@ -220,6 +218,7 @@ def judge(
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
     none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LOG_VOLUME + LOG_NONE
+    evidence += _shared(table, fits, evidence, none, explained)
     verdicts, shares = [], np.zeros(len(explained))
     for row in range(len(digest.seen)):
         own = (track == row).nonzero()[0]
@@ -245,6 +244,48 @@ def judge(
     return verdicts, shares
 
 
+def _shared(
+    table: Hypotheses, fits: Fits, evidence: Floats, none: Floats, explained: list[tuple[int, float]]
+) -> Floats:
+    """Gain (H,) of hypotheses whose new feature other tracks ask for as well: shared planes and points decide.
+
+    A second track that the same feature explains has nothing free left: instead of a density over the volume it counts
+    that of one place given the other, against all else that it may be.
+    """
+    track, count = table.trials.track, len(none)
+    total = none.copy()
+    np.logaddexp.at(total, track, evidence)
+    for row, value in explained:
+        total[row] = np.logaddexp(total[row], value)
+    best = np.full(count, -np.inf)
+    np.maximum.at(best, track, evidence)
+    good = np.flatnonzero(np.isfinite(evidence) & (evidence > best[track] - ASIDE) & ~table.trials.is_pair)
+    wall = table.trials.is_wall[good]
+    same = (wall[:, None] == wall) & (track[good][:, None] != track[good])
+    off = fits.place[good][:, None] - fits.place[good]
+    same &= (np.abs(off) < NEARBY).all(axis=-1)
+    gain = np.zeros(len(evidence))
+    first, second = same.nonzero()
+    if not len(first):
+        return gain
+    spread = fits.covariance[good[first]] + fits.covariance[good[second]]
+    gap = off[first, second]
+    log_place = -0.5 * np.vecdot(gap, np.linalg.solve(spread, gap[..., None])[..., 0])
+    log_place -= 0.5 * np.linalg.slogdet(spread)[1] + 1.5 * np.log(2.0 * np.pi)
+    log_place += LOG_VOLUME + np.where(wall[first], np.log(8.0), 0.0)
+    other = track[good[second]]
+    odds = np.full((len(good), count), -np.inf)
+    np.logaddexp.at(odds, (first, other), evidence[good[second]] + log_place - total[other])
+    gain[good] = np.minimum(np.logaddexp(0.0, odds), MOST_SHARED).sum(axis=1)
+    return gain
+
+
+ASIDE = 10.0
+"""Log evidence behind a track's best from which on a hypothesis does not speak for others."""
+NEARBY = 2.0
+"""Distance [m] beyond which two places are not compared."""
+MOST_SHARED = 4.0
+"""Log odds that one more track may add, so that no chance coincidence decides alone."""
 COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(4 + 3) log(1 + chi^2 / 4)` for chi^2 with 3 degrees of freedom."""
 

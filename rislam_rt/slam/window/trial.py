@@ -116,7 +116,7 @@ def _equations(
     """Normal equations (H, 15, 15) of the rows, and their cost."""
     track, wall, pair = trials.track[rows], trials.is_wall[rows], trials.is_pair[rows]
     moving = wall | pair
-    tx, rx, heading = digest.tx[track], digest.rx[track], digest.heading[track]
+    tx, rx = digest.tx[track], digest.rx[track]
     turn, shift, doubt = trials.turn[rows], trials.shift[rows], trials.doubt[rows]
     first, second = turn[:, 0], turn[:, 1]
     # a point: fixed images; a wall: the image of the Tx, which moves
@@ -136,13 +136,10 @@ def _equations(
     to_rx = image - rx
     reach = np.maximum(np.sqrt(np.vecdot(to_rx, to_rx)), 1e-6)
     arrival = to_rx / reach[..., None]
-    cos, sin = np.cos(heading), np.sin(heading)
-    body = np.zeros((*heading.shape, 2, 3))
-    body[..., 0, 0], body[..., 0, 1], body[..., 1, 0], body[..., 1, 1] = cos, sin, -sin, cos
-    cosines = (body @ arrival[..., None])[..., 0]
-    by_image = np.empty((*heading.shape, 3, 3))
+    cosines = arrival[..., :2]
+    by_image = np.empty((*reach.shape, 3, 3))
     by_image[..., 0, :] = arrival
-    by_image[..., 1:, :] = (body - cosines[..., None] * arrival[..., None, :]) / reach[..., None, None]
+    by_image[..., 1:, :] = (AXES[:2] - cosines[..., None] * arrival[..., None, :]) / reach[..., None, None]
     # the point's leg to the Tx
     far = place[:, None, :] @ np.swapaxes(first, 1, 2) + shift[:, None, 0]
     to_tx = np.where(moving[:, None, None], 0.0, far - tx)

@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
-from rislam_rt.slam.returns import AXES, NONE, TX, linearise, reflect
+from rislam_rt.slam.returns import AXES, NONE, TX, Poses, linearise, reflect
 from rislam_rt.slam.window import trial
 from rislam_rt.slam.window.digest import Digest, scatter_of
 from rislam_rt.slam.window.forms import compile_forms
@@ -16,13 +16,12 @@ def _digest(count, *, std=0.01, rng):
     """A track seen from a way through a room; what is seen is filled in by the tests."""
     time = np.linspace(-3.0, 0.0, count)
     place = np.stack([0.3 * time, 0.2 * time + 0.05 * time**2, np.full(count, 1.0)], axis=1)
-    heading = 0.3 + 0.1 * time
-    ends = poses_of(place, heading, Body())
+    ends = poses_of(place, 0.3 + 0.1 * time, Body())
     doubt = 1e-3 * rng.standard_normal((3, 6))
     wide = doubt + time[:, None, None] * 1e-3 * rng.standard_normal((3, 6))
     weight = np.full((1, count, 3), 1.0 / std)
     return Digest(
-        np.zeros((1, count, 3)), weight, time[None], ends.tx[None], ends.rx[None], heading[None], wide[None],
+        np.zeros((1, count, 3)), weight, time[None], ends.tx[None], ends.rx[None], wide[None],
         np.zeros(1), np.ones((1, 3)), place[-1], 0.4,
     )  # fmt: skip
 
@@ -90,7 +89,7 @@ def test_the_kernel_sees_what_the_measurement_library_sees():
     rng = np.random.default_rng(2)
     digest = _digest(5, rng=rng)
     middle = digest.middle
-    poses = poses_of(0.5 * (digest.tx[0] + digest.rx[0]), digest.heading[0], Body())
+    poses = Poses(digest.tx[0], digest.rx[0], np.zeros(digest.tx.shape[1]))  # cosines in the room's axes
     known, new = middle + np.array([-3.0, 1.0, 0.5]), _wall(middle)
     anchors = np.stack([middle, middle, middle])
     for kind, form, start in (
@@ -112,7 +111,7 @@ def test_evidence_is_the_integral_of_the_likelihood():
     trials = trials._replace(turn=np.tile(AXES, (1, 2, 1, 1)), shift=np.zeros((1, 2, 3)), doubt=np.zeros((1, 2, 3, 3)))
     digest = digest._replace(doubt=np.zeros(digest.doubt.shape))
     truth = trials.start[0]
-    poses = poses_of(0.5 * (digest.tx[0] + digest.rx[0]), digest.heading[0], Body())
+    poses = Poses(digest.tx[0], digest.rx[0], np.zeros(digest.tx.shape[1]))  # cosines in the room's axes
     form = np.array([(0, NONE, NONE, NONE, NONE)])
     exact = linearise(compile_forms(form), truth[None], np.zeros((1, 3)), poses).seen[:, 0]
     digest = digest._replace(seen=(exact + 0.01 * rng.standard_normal(exact.shape))[None])
