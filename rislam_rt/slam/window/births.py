@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.returns import linearise
 from rislam_rt.slam.window import gauss, tracks
 from rislam_rt.slam.window.book import enter, idents
@@ -11,7 +11,8 @@ from rislam_rt.slam.window.digest import Digest, digest
 from rislam_rt.slam.window.expect import Clusters, Expected
 from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.gauss import HEAD
-from rislam_rt.slam.window.kinds import NEW, Verdict, judge, known_features, wanted
+from rislam_rt.slam.window.guesses import BESIDE, known_features
+from rislam_rt.slam.window.kinds import NEW, Verdict, judge, wanted
 from rislam_rt.slam.window.learn import seed
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.retract import behind, release
@@ -169,12 +170,12 @@ def _explain(
     return float(evidence)
 
 
-def _assign(context: Context, at: Integers, forms: Integers, scatter: Floats) -> Context:
+def _assign(context: Context, at: Integers, forms: Integers, scatter: Floats, part: float = 0.5) -> Context:
     """Rows of the log held to be forms (2, 5) of idents; they err by as much more as they scatter."""
     log = context.log
     form, share, extra = log.form.copy(), log.share.copy(), log.extra.copy()
     form[at] = forms
-    share[at] = 0.5 if forms[1, 0] != UNKNOWN else 0.0
+    share[at] = part if forms[1, 0] != UNKNOWN else 0.0
     extra[at] = LEVELS.memory * log.std[at] ** 2 * (scatter**2 - 1.0)
     return context._replace(log=log._replace(form=form, share=share, extra=extra))
 
@@ -187,7 +188,11 @@ def _enter(context: Context, at: Integers, verdict: Verdict, histories: Digest, 
     book = enter(context.book, verdict.is_wall, histories.middle, len(at), 5.0)
     forms = np.full((2, 5), UNKNOWN)
     forms[0] = [new if part == NEW else part for part in verdict.form]
-    grown = _assign(context._replace(window=window, book=book), at, idents(book, forms), histories.scatter[row])
+    if verdict.kind == BESIDE:
+        forms[1] = [*forms[0][:4], verdict.known]
+    grown = context._replace(window=window, book=book)
+    share = min(max(verdict.share, 0.0), 1.0)
+    grown = _assign(grown, at, idents(book, forms), histories.scatter[row], share)
     window, left = resolve(grown, 3)
     if not np.isfinite(window.head).all():
         return context, False

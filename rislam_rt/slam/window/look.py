@@ -44,8 +44,8 @@ class Look(NamedTuple):
 
 
 def echoes(glance: Glance, cell: Floats) -> Booleans:
-    """(M,) components that are others over again: what motion within the slot leaves of a strong one in the difference of
-    two alternated codes.
+    """(M,) components that are others over again: what motion within the slot leaves of a strong one in the difference
+    of two alternated codes.
 
     Two paths of one cell come out as one; a second component there comes from the difference, and if it did not run
     over the panel it is the stronger one.
@@ -92,7 +92,7 @@ def _associate(
     expected: Expected, groups: Clusters, shows: Floats, scatter: Floats, covariance: Floats, glance: Glance,
     sides: Integers | None, strangers: Floats,
 ) -> tuple[Integers, Integers, float, float]:  # fmt: skip
-    """Rows of the clusters that were seen, the components that they were seen as, the log likelihood that is gained over
+    """Rows of the clusters that were seen, the components that they were seen as, the log likelihood gained over
     strangers, and the strain: the best assignment."""
     if not len(groups.leader) or not len(glance.seen):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), 0.0, 1.0

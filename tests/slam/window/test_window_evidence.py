@@ -38,10 +38,12 @@ def _mirror(middle, wall):
 
 
 def _trials(kind, digest, rng):
-    """One hypothesis of a kind: `wall`, `point`, `pair`."""
+    """One hypothesis of a kind: `wall`, `point`, `pair`, `edge` (a wall beside its edge with a known one)."""
     turn, shift = np.tile(AXES, (1, 2, 1, 1)), np.zeros((1, 2, 3))
     known = _mirror(digest.middle, digest.middle + np.array([-3.0, 1.0, 0.5]))
-    if kind == "wall":
+    if kind == "edge":
+        start = _wall(digest.middle)
+    elif kind == "wall":
         turn[0, 1], shift[0, 1] = known
         start = _wall(digest.middle)
     elif kind == "point":
@@ -53,8 +55,11 @@ def _trials(kind, digest, rng):
     doubt = 1e-3 * rng.standard_normal((1, 2, 3, 3))
     if kind == "pair":
         doubt[:] = 0.0
-    flags = np.array([kind == "wall"]), np.array([kind == "pair"])
-    return Trials(np.zeros(1, dtype=np.int64), *flags, start[None], turn, shift, doubt)
+    flags = np.array([kind in ("wall", "edge")]), np.array([kind == "pair"])
+    mixed = np.array([kind == "edge"])
+    beyond = np.zeros((1, 3, 4))
+    beyond[0, :, :3], beyond[0, :, 3] = _mirror(digest.middle, digest.middle + np.array([0.2, 0.0, 3.0]))
+    return Trials(np.zeros(1, dtype=np.int64), *flags, start[None], turn, shift, doubt, mixed, beyond)
 
 
 def _left(trials, digest, place, error):
@@ -66,7 +71,7 @@ def _left(trials, digest, place, error):
 
 def test_slopes_are_those_of_the_cost():
     rng = np.random.default_rng(1)
-    for kind in ("wall", "point", "pair"):
+    for kind in ("wall", "point", "pair", "edge"):
         # measurements far off in metres and next to nothing in deviations: a slope, and tails that do not count
         digest = _digest(6, rng=rng)._replace(weight=np.full((1, 6, 3), 1e-3))
         trials = _trials(kind, digest, rng)
@@ -123,7 +128,7 @@ def test_evidence_is_the_integral_of_the_likelihood():
     places = fits.place[0] + (grid * np.sqrt(value)) @ vector.T
     every = Trials(
         np.zeros(len(places), dtype=np.int64), np.zeros(len(places), dtype=bool), np.zeros(len(places), dtype=bool),
-        places, *(np.repeat(field, len(places), axis=0) for field in (trials.turn, trials.shift, trials.doubt)),
+        places, *(np.repeat(field, len(places), axis=0) for field in trials[4:]),
     )  # fmt: skip
     rows = np.arange(len(places))
     cost = trial._equations(
