@@ -5,6 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.measurement.bound import measure_bound
 from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.nearby import measure_local
 from rislam_rt.measurement.received import receive
 from rislam_rt.measurement.waveform import measure_waveform
 from rislam_rt.model import Measurement, Paths, PathTruth, RadioConfig
@@ -41,4 +42,6 @@ def measure(
     received = receive(paths, cycle, heading, radio, config, doppler)
     if config.estimator == "waveform":
         return measure_waveform(received, radio, config, previous, rng=rng)
+    if config.estimator == "local":
+        return measure_local(received, radio, config, rng=rng)
     return measure_bound(received, radio, config, paths.num_paths, rng=rng)
