@@ -1,6 +1,7 @@
 # make demo   build .venv, run the paper's room end to end, write the report
 # make test   build .venv, run the tests
 # make check  linter and type checker
+# make docs   build the site of the documentation under site/
 # make lock   resolve the dependencies anew
 # make clean  remove .venv and caches (results under runs/ stay)
 
@@ -8,7 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test check lock clean
+.PHONY: demo test check docs lock clean
 .DELETE_ON_ERROR:
 
 demo: $(READY)
@@ -19,6 +20,9 @@ test: $(READY)
 
 check: $(READY)
 	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy
+
+docs: $(READY)
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet && echo "site/index.html"
 
 # Everything is pinned with hashes, the build back end too, so that no step resolves anything by itself.
 $(READY): requirements.lock pyproject.toml

@@ -18,6 +18,8 @@ _PUBLIC = {
     "compare_paths": "rislam_rt.channel.compare",
     "design_code": "rislam_rt.design",
     "run_slam": "rislam_rt.pipeline",
+    "localise": "rislam_rt.pipeline.own",
+    "read_inputs": "rislam_rt.pipeline.own",
 }
 
 __all__ = ["__version__", *_PUBLIC]

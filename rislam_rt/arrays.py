@@ -38,6 +38,11 @@ def frozen(value: ArrayLike, dtype: Any, shape: tuple[int | None, ...], name: st
     return array
 
 
+def show_point(point: ArrayLike) -> str:
+    """A point for people: `(0.5, 0.7, 0.5)`."""
+    return f"({', '.join(f'{value:.4g}' for value in np.asarray(point))})"
+
+
 def _fits(have: tuple[int, ...], want: tuple[int | None, ...]) -> bool:
     return len(have) == len(want) and all(w in (None, h) for w, h in zip(want, have, strict=True))
 

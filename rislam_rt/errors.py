@@ -22,6 +22,12 @@ class SceneError(RislamError):
     exit_code = 2
 
 
+class ResultError(RislamError):
+    """A result file is not as it was written: damaged, changed, or of another run."""
+
+    exit_code = 2
+
+
 class GeometryError(RislamError):
     """Points, directions or planes that have no answer (zero length, wrong shape)."""
 
@@ -44,3 +50,16 @@ class StoreError(RislamError):
     """A result could not be written or read back."""
 
     exit_code = 4
+
+
+def expect(name: str, value: object, kind: type | tuple[type, ...]) -> None:
+    """An argument of a public function must be of its kind.
+
+    Raises
+    ------
+    ConfigError
+        It is of another; the line names the argument and both kinds.
+    """
+    if not isinstance(value, kind) or (isinstance(value, bool) and kind is int):
+        wanted = " or ".join(one.__name__ for one in (kind if isinstance(kind, tuple) else (kind,)))
+        raise ConfigError(f"{name}: {type(value).__name__} received; give a {wanted}")

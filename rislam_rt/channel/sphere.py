@@ -6,7 +6,11 @@ import numpy as np
 from scipy.special import spherical_jn, spherical_yn
 
 from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.errors import SceneError
 from rislam_rt.model import Scene
+
+MAX_SIZE = 3000.0
+"""Largest k r of the series, whose time grows with its square (0.2 s there): from 1000 on it is pi r^2 within 3e-7."""
 
 
 def with_exact_spheres(scene: Scene) -> Scene:
@@ -37,7 +41,18 @@ def sphere_rcs(radius: float, wavelength: float, angle: Floats) -> tuple[Floats,
 
 
 def mie_amplitudes(size: float, cos_angle: Floats) -> tuple[Complexes, Complexes]:
-    """Scattering amplitudes S1 and S2 (...,) of a conducting sphere of size parameter k r, per cosine (...,)."""
+    """Scattering amplitudes S1 and S2 (...,) of a conducting sphere of size parameter k r, per cosine (...,).
+
+    Raises
+    ------
+    SceneError
+        The sphere is larger than `MAX_SIZE`.
+    """
+    if size > MAX_SIZE:
+        raise SceneError(
+            f"scatterer.mie: a sphere of k r = {size:.3g} received, of which the series takes as many terms; "
+            f"leave 'mie' out above {MAX_SIZE:g}, where pi r^2 is the same within 3e-7"
+        )
     electric, magnetic = mie_coefficients(size)
     cos_angle = np.asarray(cos_angle, dtype=np.float64)
     before, here = np.zeros_like(cos_angle), np.ones_like(cos_angle)

@@ -12,8 +12,18 @@ def command(
     ],
     template: Annotated[str, typer.Option(help="Built-in room to start from.")] = "paper_room",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the files of a folder that exists.")] = False,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="A random room instead: the one that 'unseen' draws from this number.")
+    ] = None,
 ) -> None:
-    """Make a scene folder from a built-in room, to be edited."""
-    from rislam_rt.scene import new_scene
+    """Make a scene folder from a built-in room, or of a random one, to be edited."""
+    from rislam_rt.scene import new_scene, write_scene
 
+    if seed is not None:
+        from rislam_rt.scene.random_rooms import draw_room
+
+        room = draw_room(seed)
+        write_scene(room.scene, scene, overwrite=overwrite)
+        typer.echo(f"{scene}: random room {seed} ({room.shape}, {room.motion}); edit its scene.toml")
+        return
     typer.echo(f"{new_scene(template, scene, overwrite=overwrite)}: made from '{template}'; edit its scene.toml")

@@ -1,6 +1,6 @@
 """Floor 5: scores. Errors, distances between maps, consistency, confidence intervals, association."""
 
-from rislam_rt.evaluate.association import AssociationScore, association_score, label_switches
+from rislam_rt.evaluate.association import AssociationScore, association_fractions, association_score, label_switches
 from rislam_rt.evaluate.consistency import Consistency, chi_square_bounds, consistency, normalised_squares
 from rislam_rt.evaluate.errors import (
     TrajectoryError,
@@ -13,7 +13,15 @@ from rislam_rt.evaluate.errors import (
     trajectory_error,
     wall_errors,
 )
-from rislam_rt.evaluate.intervals import Interval, bootstrap, bootstrap_ratio, mean_over_runs, rms_over_runs
+from rislam_rt.evaluate.intervals import (
+    Interval,
+    bootstrap,
+    bootstrap_ratio,
+    mean_over_runs,
+    median_over_runs,
+    rms_over_runs,
+    share_interval,
+)
 from rislam_rt.evaluate.sets import Gospa, Ospa, gospa, match_points, ospa
 
 __all__ = [
@@ -25,6 +33,7 @@ __all__ = [
     "TrajectoryError",
     "WallError",
     "align",
+    "association_fractions",
     "association_score",
     "bootstrap",
     "bootstrap_ratio",
@@ -35,12 +44,14 @@ __all__ = [
     "landmark_rmse",
     "match_points",
     "mean_over_runs",
+    "median_over_runs",
     "normalised_squares",
     "ospa",
     "position_errors",
     "rms_over_runs",
     "rmse",
     "root_mean_square",
+    "share_interval",
     "trajectory_error",
     "wall_errors",
 ]

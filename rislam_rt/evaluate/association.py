@@ -36,15 +36,23 @@ def association_score(label: Integers, truth: Integers) -> AssociationScore:
     identities, cols = np.unique(truth, return_inverse=True)
     counts = np.zeros((len(labels), len(identities)), dtype=np.int64)
     np.add.at(counts, (rows, cols), 1)
+    return AssociationScore(*association_fractions(labels, identities, counts), label_switches(label, truth))
+
+
+def association_fractions(labels: Integers, identities: Integers, counts: Integers) -> tuple[float, float, float]:
+    """Accuracy, precision and recall from how often (L, I) each label (L,) met each identity (I,); -1 for none."""
     own = counts[np.ix_(labels != NONE, identities != NONE)]
     right = int(own[linear_sum_assignment(own, maximize=True)].sum()) if own.size else 0
     left_alone = int(counts[np.ix_(labels == NONE, identities == NONE)].sum())
-    answered, known = int(np.sum(label != NONE)), int(np.sum(truth != NONE))
-    return AssociationScore(
-        (right + left_alone) / len(label),
+    total, answered, known = (
+        int(counts.sum()),
+        int(counts[labels != NONE].sum()),
+        int(counts[:, identities != NONE].sum()),
+    )
+    return (
+        (right + left_alone) / total if total else 1.0,
         right / answered if answered else 1.0,
         right / known if known else 1.0,
-        label_switches(label, truth),
     )
 
 

@@ -30,6 +30,21 @@ def rms_over_runs(samples: Floats) -> Floats:
     return np.asarray(np.sqrt(np.mean(np.asarray(samples) ** 2, axis=0)))
 
 
+def median_over_runs(samples: Floats) -> Floats:
+    """Median over the first axis."""
+    return np.asarray(np.median(samples, axis=0))
+
+
+def share_interval(count: int, runs: int, *, level: float = 0.95) -> Interval:
+    """A share `count / runs` with Wilson's interval (Wilson 1927), which holds at shares of 0 and 1 too."""
+    if not 0 <= count <= runs or runs < 1:
+        raise ConfigError(f"count, runs: {count} of {runs} received; give a part of at least one run")
+    z, share = float(ndtri(0.5 + 0.5 * level)), count / runs
+    middle = (share + z**2 / (2 * runs)) / (1.0 + z**2 / runs)
+    half = z / (1.0 + z**2 / runs) * float(np.sqrt(share * (1.0 - share) / runs + z**2 / (4.0 * runs**2)))
+    return Interval(share, min(share, max(0.0, middle - half)), max(share, min(1.0, middle + half)))
+
+
 def bootstrap(
     samples: Floats,
     *,

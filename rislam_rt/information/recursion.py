@@ -67,45 +67,43 @@ def posterior_bound(
     unknown_std
         (U,) standard deviation of each unknown beforehand; large where nothing is known.
 
-    `J_k+1 = (Q + F J_k^-1 F^T)^-1 + H^T R^-1 H` (Tichavsky et al. 1998), in covariance form.
+    `J_k+1 = (Q + F J_k^-1 F^T)^-1 + H^T R^-1 H` (Tichavsky et al. 1998), with a square root of the covariance: nothing
+    is subtracted, so that no SNR and no gap in time makes it indefinite (Kaminski, Bryson and Schmidt 1971).
     """
     axes, unknowns = motion.axes, len(unknown_std)
     size = 2 * axes + unknowns
     start = np.repeat([motion.start_position, motion.start_velocity], axes)
-    covariance = np.diag(np.concatenate([start, unknown_std]) ** 2)
+    spread = np.diag(np.concatenate([start, unknown_std]))
     agent = np.empty((len(time), 2 * axes, 2 * axes))
     unknown = np.empty((len(time), unknowns))
     for cycle, measured in enumerate(rows):
         if cycle:
-            covariance = _advance(covariance, time[cycle] - time[cycle - 1], motion)
+            spread = _advance(spread, time[cycle] - time[cycle - 1], motion)
         root = np.sqrt(measured.information)[:, None]
         slope = np.zeros((len(root), size))
         slope[:, :axes] = root * measured.agent[:, :axes]
         slope[:, 2 * axes :] = root * measured.unknown
-        covariance = _update(covariance, slope)
-        agent[cycle] = covariance[: 2 * axes, : 2 * axes]
-        unknown[cycle] = np.diagonal(covariance)[2 * axes :]
-    return PosteriorBound(agent, unknown, covariance[2 * axes :, 2 * axes :])
+        spread = _update(spread, slope)
+        agent[cycle] = spread[: 2 * axes] @ spread[: 2 * axes].T
+        unknown[cycle] = np.einsum("ij,ij->i", spread[2 * axes :], spread[2 * axes :])
+    return PosteriorBound(agent, unknown, spread[2 * axes :] @ spread[2 * axes :].T)
 
 
-def _advance(covariance: Floats, dt: float, motion: MotionPrior) -> Floats:
-    """Covariance after one time step: `F = [I dt; 0 I]`, discrete white-noise acceleration."""
+def _advance(spread: Floats, dt: float, motion: MotionPrior) -> Floats:
+    """Root (N, N) of the covariance after one time step, (N, N + D): `F = [I dt; 0 I]`, discrete white noise."""
     axes = motion.axes
-    moved = covariance.copy()
-    moved[:axes] += dt * moved[axes : 2 * axes]
-    moved[:, :axes] += dt * moved[:, axes : 2 * axes]
-    for axis in range(axes):
-        step = np.array([0.5 * dt**2, dt]) * motion.acceleration
-        moved[np.ix_([axis, axis + axes], [axis, axis + axes])] += np.outer(step, step)
-    return moved
+    moved = spread.copy()
+    moved[:axes] += dt * spread[axes : 2 * axes]
+    push = np.zeros((len(spread), axes))
+    push[:axes], push[axes : 2 * axes] = (np.eye(axes) * motion.acceleration * step for step in (0.5 * dt**2, dt))
+    return np.concatenate([moved, push], axis=1)
 
 
-def _update(covariance: Floats, slope: Floats) -> Floats:
-    """Covariance after measurements with derivatives (M, N) of unit variance."""
-    if not len(slope):
-        return covariance
-    seen = slope @ covariance
-    factor = np.linalg.cholesky(np.eye(len(slope)) + seen @ slope.T)
-    removed = np.linalg.solve(factor, seen)
-    updated = covariance - removed.T @ removed
-    return 0.5 * (updated + updated.T)
+def _update(spread: Floats, slope: Floats) -> Floats:
+    """Triangular root (N, N) after measurements with derivatives (M, N) of unit variance, of a root (N, N or more)."""
+    count, size = slope.shape
+    stacked = np.zeros((count + size, count + spread.shape[1]))
+    stacked[:count, :count] = np.eye(count)
+    stacked[:count, count:] = slope @ spread
+    stacked[count:, count:] = spread
+    return np.asarray(np.linalg.qr(stacked.T, mode="r")).T[count:, count:]

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers, freeze
+from rislam_rt.arrays import Floats, Integers, freeze, show_point
 from rislam_rt.model.trajectory import Body
 
 
@@ -51,6 +51,11 @@ class MapEstimate:
         ):
             freeze(self, name, dtype, shape)
 
+    def __repr__(self) -> str:
+        points, panel = int(np.sum(self.parent < 0)), "panel known" if self.ris >= 0 else "panel not known"
+        images = len(self.ident) - points
+        return f"MapEstimate: {points} landmarks, {images} images, {len(self.wall_offset)} walls, {panel}"
+
     @property
     def ris(self) -> int:
         """Row of the landmark held for the panel (probability above one half), -1 if none is."""
@@ -94,6 +99,10 @@ class SlamEstimate:
         freeze(self, "velocity", np.float64, (3,))
         freeze(self, "covariance", np.float64, (6, 6))
         freeze(self, "samples", np.float64, (None, 3))
+
+    def __repr__(self) -> str:
+        std = float(np.sqrt(np.trace(self.covariance[:2, :2])))
+        return f"SlamEstimate: at {show_point(self.position)} m, horizontal deviation {std:.2g} m; {self.map!r}"
 
 
 def empty_map() -> MapEstimate:

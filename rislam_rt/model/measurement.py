@@ -49,6 +49,10 @@ class Measurement:
     def __len__(self) -> int:
         return len(self.tau)
 
+    def __repr__(self) -> str:
+        span = f", {1e9 * self.tau.min():.3g} to {1e9 * self.tau.max():.3g} ns" if len(self) else ""
+        return f"Measurement: {len(self)} components{span}"
+
     @property
     def arrival(self) -> Floats:
         """(M, 3) unit vectors in the body frame, from the Rx towards the arriving ray."""

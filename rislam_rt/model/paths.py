@@ -99,6 +99,13 @@ class Paths:
         ):
             freeze(self, name, dtype, shape)
 
+    def __repr__(self) -> str:
+        classes = ", ".join(f"{kind.name} {count}" for kind in PathKind if (count := int(np.sum(self.kind == kind))))
+        present = self.valid.sum(axis=1)
+        at_once = f"{present.min()} to {present.max()} at a time" if len(present) else "no cycle"
+        source = f" ({self.source})" if self.source else ""
+        return f"Paths{source}: {self.num_cycles} cycles, {self.num_paths} identities ({classes}), {at_once}"
+
     @property
     def num_cycles(self) -> int:
         """K."""

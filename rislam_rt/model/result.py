@@ -9,6 +9,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, freeze
 from rislam_rt.model.estimate import MapEstimate
 from rislam_rt.model.paths import Paths
+from rislam_rt.model.picture import html_with
 from rislam_rt.model.scene import Scene
 
 STEPS = ("optimise", "communicate", "measure", "localise")
@@ -84,6 +85,10 @@ class SchemeResult:
         ):
             freeze(self, name, dtype, shape)
 
+    def __repr__(self) -> str:
+        ended = self.outcome[-1] if self.outcome else "before it began"
+        return f"SchemeResult '{self.scheme}': {len(self.position)} cycles, ended {ended}; {self.map!r}"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlamResult:
@@ -106,3 +111,18 @@ class SlamResult:
     """Time [s] of the stages that all schemes share."""
     warnings: tuple[str, ...] = ()
     """Where a formula left its range, one line each."""
+
+    def __repr__(self) -> str:
+        errors = ", ".join(f"{name} {self._rmse(scheme):.3g} m" for name, scheme in self.schemes.items())
+        seed = "no seed" if self.seed is None else f"seed {self.seed}"
+        return (
+            f"SlamResult '{self.name}' in '{self.scene.name}', {seed}, {len(self.scene.agent)} cycles; RMSE: {errors}"
+        )
+
+    def _repr_html_(self) -> str:
+        ways = ((name, scheme.position) for name, scheme in self.schemes.items())
+        return html_with(repr(self), self.scene.plan(("true way", self.scene.agent.position), *ways))
+
+    def _rmse(self, scheme: SchemeResult) -> float:
+        error = (scheme.position - self.scene.agent.position)[:, :2]
+        return float(np.sqrt(np.mean(np.sum(error**2, axis=1)))) if len(error) else 0.0

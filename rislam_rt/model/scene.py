@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, freeze
+from rislam_rt.arrays import Floats, freeze, show_point
 from rislam_rt.errors import SceneError
+from rislam_rt.model.picture import Plan, html_with, outline
 from rislam_rt.model.ris import RisPanel
 from rislam_rt.model.trajectory import Trajectory
 
@@ -117,6 +118,23 @@ class Scene:
     agent: Trajectory
     digest: str = ""
     """SHA-256 over the scene file and its meshes; empty for a scene built in memory."""
+
+    def __repr__(self) -> str:
+        size = " x ".join(f"{length:.3g}" for length in self.bounds[1] - self.bounds[0])
+        panel = "no panel"
+        if self.ris is not None:
+            spec = self.ris.spec
+            panel = f"panel of {spec.rows} x {spec.cols} elements at {show_point(self.ris.center)} m"
+        counts = f"{len(self.reflectors)} reflectors, {len(self.scatterers)} scatterers, {panel}"
+        return f"Scene '{self.name}': {size} m, {counts}, {len(self.agent)} cycles"
+
+    def _repr_html_(self) -> str:
+        return html_with(repr(self), self.plan(("true way", self.agent.position)))
+
+    def plan(self, *ways: tuple[str, Floats]) -> Plan:
+        """The room from above, with named courses (K, 3) [m] in it."""
+        edges = outline((reflector.vertices, reflector.faces) for reflector in self.reflectors)
+        return Plan(self.bounds, edges, list(zip(self.landmarks, self.landmark_positions, strict=True)), ways)
 
     @property
     def landmarks(self) -> tuple[str, ...]:

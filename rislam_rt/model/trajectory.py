@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, freeze
+from rislam_rt.arrays import Floats, freeze, show_point
 from rislam_rt.errors import GeometryError
 from rislam_rt.geometry.angles import rotation_z
 
@@ -55,6 +55,13 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def __repr__(self) -> str:
+        if not len(self):
+            return "Trajectory: no cycles"
+        length = np.linalg.norm(np.diff(self.position, axis=0), axis=1).sum()
+        ends = f"from {show_point(self.position[0])} to {show_point(self.position[-1])} m"
+        return f"Trajectory: {len(self)} cycles, {self.time[0]:g} to {self.time[-1]:g} s, {length:.3g} m {ends}"
 
     def __getitem__(self, cycles: slice) -> "Trajectory":
         return Trajectory(

@@ -1,8 +1,7 @@
 """The posterior bound of a scheme in a run: what no estimator could beat with the same room, codes and noise."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import repeat
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,6 +45,42 @@ class SchemeBound(NamedTuple):
     """At the end of the run, of each wall that a counted path meets; its distance at the middle of its surface."""
 
 
+class BoundProblem(NamedTuple):
+    """What the recursion of a bound goes through: it can be run under several assumptions about motion and start."""
+
+    rows: Sequence[Rows]
+    """(K,) measurements of each cycle."""
+    model: LandmarkModel | None
+    """None where nothing is heard."""
+    unknown_std: Floats
+    """(U,)."""
+    motion: MotionPrior
+    """What the scheme's filter takes for granted."""
+    heard: frozenset[str]
+    """Landmarks that a counted path comes from."""
+
+
+def bound_problem(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Mapping[str, Any]) -> BoundProblem:
+    """What of a scheme in a run counts for its bound; see `scheme_bound`."""
+    spec = PipelineSpec.model_validate(dict(config))
+    settings = build_settings(spec)
+    estimator, walls = ESTIMATORS[SCHEMES[scheme].estimator], build_walls(scene)
+    sensor = build_sensor(settings.radio, settings.receiver)
+    axes = 3 if settings.slam.height == "estimated" else 2
+    use_vt = settings.slam.use_vt and estimator.walls == "planes"
+    audible = heard_paths(paths.with_gain(gain), sensor, use_vt=use_vt)
+    motion = MotionPrior(settings.slam.sigma_a, spec.start.position_std_m, spec.start.velocity_std_m_s, axes)
+    if not audible.num_paths:
+        return BoundProblem(len(scene.agent) * [NO_ROWS], None, np.zeros(0), motion, frozenset())
+    model = build_landmark_model(
+        audible, scene.agent, scene.landmark_positions, walls.normal, walls.offset, settings.radio,
+        walls=estimator.walls,
+    )  # fmt: skip
+    rows = [fewer_rows(r) for r in model.rows(SILENT * sensor.threshold, angles=estimator.angles, use_vt=use_vt)]
+    heard = frozenset(scene.landmarks[number] for number in audible.landmark if number >= 0)
+    return BoundProblem(rows, model, prior_std(model, scene, upright=use_vt), motion, heard)
+
+
 def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Mapping[str, Any]) -> SchemeBound:
     """Least RMS errors of agent, landmarks and walls under a scheme.
 
@@ -65,28 +100,16 @@ def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Map
     config
         The run's specification, as a result holds it.
     """
-    spec = PipelineSpec.model_validate(dict(config))
-    settings = build_settings(spec)
-    estimator, walls = ESTIMATORS[SCHEMES[scheme].estimator], build_walls(scene)
-    sensor = build_sensor(settings.radio, settings.receiver)
-    axes = 3 if settings.slam.height == "estimated" else 2
-    use_vt = settings.slam.use_vt and estimator.walls == "planes"
-    audible = heard_paths(paths.with_gain(gain), sensor, use_vt=use_vt)
-    motion = MotionPrior(settings.slam.sigma_a, spec.start.position_std_m, spec.start.velocity_std_m_s, axes)
-    if not audible.num_paths:
-        silence: Iterable[Rows] = repeat(NO_ROWS, len(scene.agent))
-        bound = posterior_bound(silence, scene.agent.time, motion, np.zeros(0))
-        return SchemeBound(_position_rms(bound.agent, axes), {}, {})
-    model = build_landmark_model(
-        audible, scene.agent, scene.landmark_positions, walls.normal, walls.offset, settings.radio,
-        walls=estimator.walls,
-    )  # fmt: skip
-    rows = map(fewer_rows, model.rows(SILENT * sensor.threshold, angles=estimator.angles, use_vt=use_vt))
-    bound = posterior_bound(rows, scene.agent.time, motion, prior_std(model, scene, upright=use_vt))
-    heard = {scene.landmarks[number] for number in audible.landmark if number >= 0}
-    landmarks = {name: error for name, error in model.landmark_error(bound.last).items() if name in heard}
+    problem = bound_problem(scene, paths, gain, scheme, config)
+    model, motion = problem.model, problem.motion
+    bound = posterior_bound(problem.rows, scene.agent.time, motion, problem.unknown_std)
+    agent = position_rms(bound.agent, motion.axes)
+    if model is None:
+        return SchemeBound(agent, {}, {})
+    landmarks = {name: error for name, error in model.landmark_error(bound.last).items() if name in problem.heard}
+    walls = build_walls(scene)
     middle = np.array([wall_surface(walls, number)[0] for number in range(len(walls))]).reshape(-1, 3)
-    return SchemeBound(_position_rms(bound.agent, axes), landmarks, model.wall_error(bound.last, middle))
+    return SchemeBound(agent, landmarks, model.wall_error(bound.last, middle))
 
 
 def prior_std(model: LandmarkModel, scene: Scene, *, upright: bool) -> Floats:
@@ -112,7 +135,7 @@ def wall_surface(walls: Walls, number: int) -> tuple[Floats, Floats]:
     return weight @ triangles.mean(axis=1), weight
 
 
-def _position_rms(agent: Floats, axes: int) -> Floats:
+def position_rms(agent: Floats, axes: int) -> Floats:
     """(K,) from covariances (K, 2 D, 2 D) of position and velocity."""
     return np.asarray(np.sqrt(np.einsum("kii->k", agent[:, :axes, :axes])))
 

@@ -14,12 +14,10 @@ from rislam_rt.pipeline.spec import PipelineSpec, Settings
 from rislam_rt.pipeline.told import Told
 
 
-def build_designer(
-    scheme: Scheme, panel: RisSpec, room: Room, spec: PipelineSpec, settings: Settings, told: Told
-) -> Designer:
-    """The designer of a scheme that has a panel: true panel, room and settings serve the one that knows the truth."""
+def build_designer(scheme: Scheme, panel: RisSpec, spec: PipelineSpec, settings: Settings, told: Told) -> Designer:
+    """The designer of a scheme that has a panel: true panel and settings serve the one that knows the truth."""
     method = spec.design.method if scheme.method == "spec" else str(scheme.method)
-    return _on_truth(method, panel, room, spec, settings) if scheme.on_truth else _on_belief(method, spec, told)
+    return _on_truth(method, panel, spec, settings) if scheme.on_truth else _on_belief(method, spec, told)
 
 
 def _on_belief(method: str, spec: PipelineSpec, told: Told) -> Designer:
@@ -27,7 +25,7 @@ def _on_belief(method: str, spec: PipelineSpec, told: Told) -> Designer:
     assert panel is not None
     last: RisCode | None = None
 
-    def choose(belief: Callable[[], SlamEstimate], cycle: int, *, rng: np.random.Generator) -> RisCode:
+    def choose(belief: Callable[[], SlamEstimate], cycle: int, room: Room, *, rng: np.random.Generator) -> RisCode:
         nonlocal last
         if method == "random":  # looks at no belief
             return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)
@@ -42,17 +40,22 @@ def _on_belief(method: str, spec: PipelineSpec, told: Told) -> Designer:
     return choose
 
 
-def _on_truth(method: str, panel: RisSpec, room: Room, spec: PipelineSpec, settings: Settings) -> Designer:
+def _on_truth(method: str, panel: RisSpec, spec: PipelineSpec, settings: Settings) -> Designer:
     """The genie: true paths of the cycle in which the code will take effect, and the belief's own prior."""
-    last = len(room.trajectory) - 1
 
-    def choose(belief: Callable[[], SlamEstimate], cycle: int, *, rng: np.random.Generator) -> RisCode:
-        due = min(cycle + spec.control.delay_cycles, last)
+    def choose(belief: Callable[[], SlamEstimate], cycle: int, room: Room, *, rng: np.random.Generator) -> RisCode:
+        due = min(cycle + spec.control.delay_cycles, len(room.trajectory) - 1)
         prior = prior_from_covariance(belief().covariance[:2, :2])
-        tx, rx = room.trajectory.tx[due], room.trajectory.rx[due]
+        there = room.trajectory[due : due + 1]
         try:
             problem = problem_from_paths(
-                room.at(due), tx, rx, settings.radio, panel.levels, prior=prior, least_snr=spec.design.least_snr
+                room.at(due),
+                there.tx[0],
+                there.rx[0],
+                settings.radio,
+                panel.levels,
+                prior=prior,
+                least_snr=spec.design.least_snr,
             )
         except ConfigError:  # the panel is out of sight: any code will do
             return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)

@@ -40,10 +40,12 @@ class Room(NamedTuple):
     """(K, P) shifts [Hz]: what paths turn by within the measurement slot."""
     faults: PanelErrors | None = None
     """What the panel does wrong; None without a panel."""
+    first: int = 0
+    """The cycle that the paths begin at; the trajectory is the whole one."""
 
     def at(self, cycle: int) -> Paths:
         """The paths of one cycle alone."""
-        return self.paths.of_cycle(cycle)
+        return self.paths.of_cycle(cycle - self.first)
 
 
 class Agent(NamedTuple):
@@ -86,8 +88,10 @@ class Cycle(NamedTuple):
 class Designer(Protocol):
     """Chooses a code from the predicted belief."""
 
-    def __call__(self, belief: Callable[[], SlamEstimate], cycle: int, *, rng: np.random.Generator) -> RisCode:
-        """`belief` is worked out on being called, for not all need it; `cycle` is for the one that knows the truth."""
+    def __call__(
+        self, belief: Callable[[], SlamEstimate], cycle: int, room: Room, *, rng: np.random.Generator
+    ) -> RisCode:
+        """`belief` is worked out on being called, for not all need it; `room` is for the one that knows the truth."""
         ...
 
 
@@ -101,7 +105,7 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
     link, sent = agent.link, None
     if link is not None and means.designer is not None:
         ahead = dt + control.delay_cycles * _nominal_step(told.time)
-        sent = means.designer(partial(estimator.predict, agent.state, ahead, config), cycle, rng=rng.design)
+        sent = means.designer(partial(estimator.predict, agent.state, ahead, config), cycle, room, rng=rng.design)
     clock.append(perf_counter())
 
     air = 0.0
@@ -116,7 +120,7 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
         paths = rephase(paths, applied, 1.0 if room.faults is None else room.faults.weight)
     measurement, truth = measure(
         paths, 0, float(room.trajectory.heading[cycle]), means.settings.radio, means.settings.receiver, agent.heard,
-        room.doppler[cycle], rng=rng.noise,
+        room.doppler[cycle - room.first], rng=rng.noise,
     )  # fmt: skip
     clock.append(perf_counter())
 

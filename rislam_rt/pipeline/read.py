@@ -1,6 +1,5 @@
 """Read a pipeline file, with settings of the command line put over it."""
 
-import tomllib
 from collections.abc import Callable, Sequence
 from copy import deepcopy
 from difflib import get_close_matches
@@ -12,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.spec import PipelineSpec, build_settings
 from rislam_rt.shipped import shipped_pipelines
+from rislam_rt.toml import MAX_LEVELS, parse_toml
 
 MAX_BYTES = 1_000_000
 """A pipeline file is written by people; anything larger is another file by mistake."""
@@ -101,8 +101,8 @@ def _read_toml(path: Path) -> dict[str, Any]:
     if len(content) > MAX_BYTES:
         raise ConfigError(f"{path}: more than {MAX_BYTES} bytes; give a pipeline file in TOML")
     try:
-        return tomllib.loads(content.decode("utf-8"))
-    except (ValueError, RecursionError) as error:
+        return parse_toml(content.decode("utf-8"))
+    except ValueError as error:
         cause = " ".join(str(error).split())[:120]
         raise ConfigError(f"{path}: not valid TOML ({cause}); mend that place") from None
 
@@ -117,7 +117,7 @@ def _override(table: dict[str, Any], setting: str) -> str:
     """Put one `key=value` into the table; returns the key."""
     key, equals, text = setting.partition("=")
     parts = key.strip().split(".")
-    if not equals or not all(part.isidentifier() for part in parts):
+    if not equals or len(parts) > MAX_LEVELS or not all(part.isidentifier() for part in parts):
         raise ConfigError(f"--set {setting[:80]!r}: not of the form key=value; give e.g. --set radio.bandwidth_ghz=0.5")
     for part in parts[:-1]:
         table = table.setdefault(part, {})
@@ -130,7 +130,7 @@ def _override(table: dict[str, Any], setting: str) -> str:
 def _value(text: str) -> Any:
     """A TOML value, or the text itself (so that strings need no quotes)."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        return parse_toml(f"value = {text}")["value"]
     except (ValueError, KeyError):
         return text
 

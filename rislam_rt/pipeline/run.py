@@ -10,51 +10,26 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.backend import prepare_backend
-from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.channel.protocol import Channel
-from rislam_rt.errors import ConfigError, RislamError
-from rislam_rt.model import (
-    Body,
-    PathKind,
-    Paths,
-    RadioConfig,
-    Scene,
-    SchemeResult,
-    SlamResult,
-)
+from rislam_rt.errors import ConfigError, RislamError, expect
+from rislam_rt.model import Body, Paths, RadioConfig, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.change import change_room
-from rislam_rt.pipeline.choose import build_designer
-from rislam_rt.pipeline.control import check_control, open_link
-from rislam_rt.pipeline.cycle import Agent, Cycle, Means, Rng, Room, run_cycle
-from rislam_rt.pipeline.estimators import ESTIMATORS
+from rislam_rt.pipeline.control import check_control
+from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.motion import draw_motion
-from rislam_rt.pipeline.record import gather
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.spec import PipelineSpec, build_radio, build_settings
-from rislam_rt.pipeline.told import deceive, lean, tell_belief
+from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
+from rislam_rt.pipeline.spec import PipelineSpec, build_radio
+from rislam_rt.pipeline.told import lean
+from rislam_rt.pipeline.walk import Walk
 from rislam_rt.pipeline.workers import run_side_by_side
-from rislam_rt.ris import delay_spread_warnings, draw_panel
+from rislam_rt.ris import delay_spread_warnings
 
 Progress = Callable[[str, int, int], None]
 """Told the stage (`trace` or a scheme), how much of it is done, and how much there is."""
 
 LIBRARIES = ("numpy", "scipy", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-core")
 """Libraries that numbers depend on; their versions go into every result."""
-
-
-class Seeds(NamedTuple):
-    """Every scheme draws the same motion, start, noise, losses and filter numbers: only its codes differ."""
-
-    start: np.random.SeedSequence
-    noise: np.random.SeedSequence
-    control: np.random.SeedSequence
-    filter: np.random.SeedSequence
-    design: np.random.SeedSequence
-    motion: np.random.SeedSequence
-    panel: np.random.SeedSequence
-    room: np.random.SeedSequence
-    told: np.random.SeedSequence
-    """Of the compass, and of how the body sways."""
 
 
 class Stage(NamedTuple):
@@ -71,6 +46,21 @@ class Stage(NamedTuple):
     """Time [s] that the channel took."""
 
 
+def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> tuple[Scene, Body, Seeds]:
+    """The room of a run with its true motion, the body of a level agent, and the run's seeds.
+
+    Raises
+    ------
+    ConfigError
+        Scene and specification do not fit (see `check_run`).
+    """
+    check_run(scene, spec)
+    seeds = spawn_seeds(rng=rng)
+    scene = change_room(cut_scene(scene, spec.cycles), spec.room, rng=np.random.default_rng(seeds.room))
+    motion = draw_motion(scene, spec.motion.sigma_a_m_s2, rng=np.random.default_rng(seeds.motion))
+    return replace(scene, agent=lean(motion, spec.told)), motion.body, seeds
+
+
 def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> Stage:
     """Draw the true motion and find all paths along it. None of it depends on the noise, so that one stage serves many.
 
@@ -81,11 +71,7 @@ def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
-    check_run(scene, spec)
-    seeds = Seeds(*rng.bit_generator.seed_seq.spawn(len(Seeds._fields)))  # type: ignore[attr-defined]
-    scene = change_room(cut_scene(scene, spec.cycles), spec.room, rng=np.random.default_rng(seeds.room))
-    motion = draw_motion(scene, spec.motion.sigma_a_m_s2, rng=np.random.default_rng(seeds.motion))
-    scene, body = replace(scene, agent=lean(motion, spec.told)), motion.body
+    scene, body, seeds = set_scene(scene, spec, rng=rng)
     begin = perf_counter()
     paths = build_channel(spec.channel, scene, build_radio(spec.radio), spec.depth).paths(scene.agent)
     return Stage(scene, paths, body, seeds, perf_counter() - begin)
@@ -120,6 +106,9 @@ def run_slam(
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
+    expect("scene", scene, Scene)
+    expect("spec", spec, PipelineSpec)
+    expect("rng", rng, np.random.Generator)
     done = {} if done is None else done
     tell = progress or (lambda stage, at, total: None)
     tell("trace", 0, 1)
@@ -148,39 +137,12 @@ def result_of(stage: Stage, spec: PipelineSpec, schemes: Mapping[str, SchemeResu
     )
 
 
-def run_scheme(name: str, stage: Stage, spec: PipelineSpec, tell: Progress) -> SchemeResult:
-    """One scheme over all cycles."""
-    settings, scheme, seeds = build_settings(spec), SCHEMES[name], stage.seeds
-    motion, ris = stage.scene.agent, stage.scene.ris
-    panel = ris.spec if ris is not None and scheme.panel else None
-    compass, sway = (np.random.default_rng(seed) for seed in _children_of(seeds.told, 2))
-    start = np.random.default_rng(seeds.start)
-    told = tell_belief(motion, stage.body, panel, spec, settings, start=start, compass=compass)
-    paths = stage.paths if panel is not None else without_panel(stage.paths)
-    shift = doppler_shift(stage.paths, motion, settings.radio.wavelength)
-    room = Room(deceive(paths, motion, spec.told, rng=sway), motion, shift)
-    designer = None
-    if panel is not None:
-        tolerance = spec.panel.tolerance
-        room = room._replace(faults=draw_panel(panel, tolerance, rng=np.random.default_rng(seeds.panel)))
-        designer = build_designer(scheme, panel, room, spec, settings, told)
-    estimator = ESTIMATORS[scheme.estimator]
-    means = Means(panel, designer, estimator, spec, settings, told)
-    filter_rng, design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
-    config = estimator.config(told.settings)
-    state = estimator.init(told.start, told.body, told.panel, told.settings.sensor, config, rng=filter_rng)
-    agent = Agent(state, open_link(panel) if panel is not None else None)
-    noise, control = (
-        [np.random.default_rng(seed) for seed in _children_of(s, len(motion))] for s in (seeds.noise, seeds.control)
-    )
-    cycles: list[Cycle] = []
-    tell(name, 0, len(motion))
-    for cycle in range(len(motion)):
-        rng = Rng(design_rng, control[cycle], noise[cycle], filter_rng)
-        agent, outcome = run_cycle(agent, room, cycle, means, rng=rng)
-        cycles.append(outcome)
-        tell(name, cycle + 1, len(motion))
-    return gather(name, cycles, panel.levels if panel is not None else 0)
+def run_scheme(
+    name: str, stage: Stage, spec: PipelineSpec, tell: Progress, estimator: Estimator | None = None
+) -> SchemeResult:
+    """One scheme over all cycles, with its own estimator unless another is given."""
+    walk = Walk(name, stage.scene, stage.body, spec, stage.seeds, estimator)
+    return walk.lead(stage.paths, 0, len(stage.scene.agent), tell)
 
 
 def check_run(scene: Scene, spec: PipelineSpec) -> None:
@@ -236,12 +198,6 @@ def cut_scene(scene: Scene, cycles: int | None) -> Scene:
     return scene if cycles is None else replace(scene, agent=scene.agent[:cycles])
 
 
-def without_panel(paths: Paths) -> Paths:
-    """The paths of a plain wall where the panel hangs: identities stay, panel paths are never there."""
-    panel = np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS))
-    return replace(paths, valid=paths.valid & ~panel, gain=np.where(panel, 0.0, paths.gain), ris=None)
-
-
 def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
     """Where the panel's formulas leave their range along the true motion; one line each, empty if nowhere.
 
@@ -271,8 +227,3 @@ def _seed_of(rng: np.random.Generator) -> int | None:
     """The integer that the generator was made from, if it was."""
     entropy = getattr(rng.bit_generator.seed_seq, "entropy", None)
     return entropy if isinstance(entropy, int) else None
-
-
-def _children_of(seed: np.random.SeedSequence, count: int) -> list[np.random.SeedSequence]:
-    """Seeds by number, the same ones every time, however many numbers are drawn from each."""
-    return [np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, number)) for number in range(count)]

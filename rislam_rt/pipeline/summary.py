@@ -31,6 +31,10 @@ NEAR_WALL = 0.5
 """RMS distance [m] from a true wall, over its surface, beyond which an estimated plane is not held for it."""
 
 
+Source = tuple[int, int]
+"""Landmark of an image, and its wall next to the landmark; -1 for the landmark itself."""
+
+
 class LandmarkTrack(NamedTuple):
     """Estimates of the true landmarks over K cycles."""
 
@@ -62,11 +66,8 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     limit = least.agent if least else None
     rmse, bound = root_mean_square(errors), None if limit is None else root_mean_square(limit)
     motion = trajectory_error(scheme.position, truth) if len(truth) > 1 else None
-    axes = np.flatnonzero(np.einsum("kii->ki", scheme.covariance[:, :3, :3]).min(axis=0) > 0.0)
-    nees = None
-    if len(axes):
-        block = scheme.covariance[:, axes[:, None], axes]
-        nees = float(np.mean(normalised_squares((scheme.position - truth)[:, axes], block))) / len(axes)
+    squares = nees_per_dof(scheme, truth)
+    nees = None if squares is None else float(np.mean(squares))
     score = association_score(*component_labels(result.paths, scheme))
     largest = float(errors.max())
     walls = wall_scores(scene, scheme.map, least)
@@ -90,6 +91,15 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "over_budget": over_budget(seconds, result.config["budget"]),
         "seconds": float(scheme.seconds.sum()),
     }
+
+
+def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:
+    """(K,) normalised squared position errors per degree of freedom; None where no axis is filtered."""
+    axes = np.flatnonzero(np.einsum("kii->ki", scheme.covariance[:, :3, :3]).min(axis=0) > 0.0)
+    if not len(axes):
+        return None
+    block = scheme.covariance[:, axes[:, None], axes]
+    return normalised_squares((scheme.position - truth)[:, axes], block) / len(axes)
 
 
 def run_bound(result: SlamResult, scheme: SchemeResult) -> SchemeBound | None:
@@ -225,11 +235,19 @@ def component_labels(paths: Paths, scheme: SchemeResult) -> tuple[Integers, Inte
     """
     shown = scheme.component_path != NOTHING
     label = np.maximum(scheme.component_landmark[shown], -1)
-    numbers: dict[Any, int] = {}
+    numbers: dict[Source, int] = {}
     identity = np.full(paths.num_paths + 1, -1)
+    for path, source in enumerate(path_sources(paths)):
+        if source is not None:
+            identity[path] = numbers.setdefault(source, len(numbers))
+    return label, identity[scheme.component_path[shown]]
+
+
+def path_sources(paths: Paths) -> list[Source | None]:
+    """(P,) landmark and wall of the image that each path comes from; None for LOS and wall returns."""
+    found: list[Source | None] = []
     for path in range(paths.num_paths):
         kind, landmark, tx, rx = paths.identity(path)
-        if kind not in (PathKind.LOS, PathKind.VT):
-            wall = rx[0] if rx else tx[-1] if tx else -1
-            identity[path] = numbers.setdefault((landmark, wall), len(numbers))
-    return label, identity[scheme.component_path[shown]]
+        wall = rx[0] if rx else tx[-1] if tx else -1
+        found.append(None if kind in (PathKind.LOS, PathKind.VT) else (landmark, wall))
+    return found

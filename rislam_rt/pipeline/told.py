@@ -143,10 +143,13 @@ def lean(motion: Trajectory, told: ToldSection) -> Trajectory:
     return replace(motion, body=replace(body, tx_offset=tilt @ body.tx_offset, rx_offset=tilt @ body.rx_offset))
 
 
-def deceive(paths: Paths, motion: Trajectory, told: ToldSection, *, rng: np.random.Generator) -> Paths:
+def deceive(
+    paths: Paths, motion: Trajectory, told: ToldSection, *, rng: np.random.Generator, since: float | None = None
+) -> Paths:
     """The paths as a leaning, swaying array with a clock of its own hears them.
 
-    Arrivals are such that the body frame of a level agent gives them to the array; delays run with the clock.
+    Arrivals are such that the body frame of a level agent gives them to the array; delays run with the clock, which
+    drifts from the time `since` [s] on, the motion's first if it is not given.
     """
     arrival, tau = paths.arrival, paths.tau
     if told.tilt_deg or told.wobble_deg:
@@ -154,7 +157,8 @@ def deceive(paths: Paths, motion: Trajectory, told: ToldSection, *, rng: np.rand
         level, tilt = rotation_z(motion.heading), _rotations(np.radians(told.tilt_deg) + sway[:, 0], sway[:, 1])
         arrival = arrival @ np.swapaxes(level @ np.swapaxes(tilt, -1, -2) @ np.swapaxes(level, -1, -2), -1, -2)
     if told.clock_offset_ns or told.clock_drift_ns_s:
-        late = 1e-9 * (told.clock_offset_ns + told.clock_drift_ns_s * (motion.time - motion.time[0]))
+        elapsed = motion.time - (motion.time[0] if since is None else since)
+        late = 1e-9 * (told.clock_offset_ns + told.clock_drift_ns_s * elapsed)
         tau = np.where(paths.valid, tau + late[:, None], tau)
     return replace(paths, arrival=arrival, tau=tau)
 

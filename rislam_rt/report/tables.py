@@ -80,10 +80,13 @@ def print_paths(name: str, paths: Paths, rows: list[dict[str, Any]], seconds: fl
 
 
 def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> None:
-    """Matched, explained and unexplained paths, and the largest errors: refined, and the tracer's own float32."""
+    """Matched, explained and unexplained paths, the largest errors, and how near their limits the errors come.
+
+    Two columns: the tracer's own float32, which is the verdict, and refined numbers.
+    """
     title = f"{name}: {refined.cycles} poses"
-    table = Table("traced against analytic", "refined", "float32")
-    contents = refined.as_dict(), raw.as_dict()
+    table = Table("traced against analytic", "float32", "refined")
+    contents = raw.as_dict(), refined.as_dict()
     for key in ("matched", "unexplained"):
         table.add_row(f"{key} paths", *(str(content[key]) for content in contents))
     for reason in sorted({reason for content in contents for reason in content["explained"]}):
@@ -95,23 +98,39 @@ def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> Non
         ("angle", "max_angle_error_rad", "rad"),
     ):
         table.add_row(f"largest {label} error", *(f"{content[key]:.2g} {unit}" for content in contents))
+    for quantity in contents[0]["limits"]:
+        table.add_row(
+            f"{quantity.split(' [')[0]}: nearest to its limit", *(_nearest(c["limits"][quantity]) for c in contents)
+        )
     _show(title, table)
-    for report in (refined, raw):
+    for report, numbers in ((raw, "float32"), (refined, "refined")):
         for path in [p for p in report.one_sided if not p.reason][:10]:
-            print(f"unexplained: cycle {path.cycle}, {path.label}, only {path.side}")
+            print(f"unexplained: {numbers}, cycle {path.cycle}, {path.label}, only {path.side}")
+        for breach in report.breaches[:10]:
+            print(f"beyond its limit: {numbers}, {breach}")
+    print("agreed" if raw.passed and refined.passed else "NOT agreed")
+
+
+def _nearest(limits: "Mapping[str, Any]") -> str:
+    """How much of its limit the path uses up that comes nearest to it."""
+    return f"{limits['nearest']['share']:.1%}" if limits else "-"
 
 
 def print_validation(rows: Sequence["Validation"]) -> None:
-    """One line a room and kind of numbers: counts, and the largest error in length; unexplained paths after them."""
-    table = Table("room", "numbers", "matched", "explained", "unexplained", "length \\[m]")
+    """One line a room and kind of numbers: counts, and the largest error in length; then what fails."""
+    table = Table("room", "numbers", "matched", "explained", "open", "beyond", "length \\[m]")
     for scene, _, numbers, report in rows:
-        counts = (report.matched, sum(report.explained.values()), report.unexplained)
+        counts = (report.matched, sum(report.explained.values()), report.unexplained, report.num_breaches)
         length = report.as_dict()["max_length_error_m"]
         table.add_row(scene, numbers, *map(str, counts), f"{length:.0e}")
     _show("traced against analytic, largest error", table)
     for scene, _, numbers, report in rows:
         for path in [p for p in report.one_sided if not p.reason][:10]:
             print(f"unexplained: {scene}, {numbers}, pose {path.cycle}, {path.label}, only {path.side}")
+        for breach in report.breaches[:10]:
+            print(f"beyond its limit: {scene}, {numbers}, {breach}")
+    unexplained, beyond = sum(r.report.unexplained for r in rows), sum(r.report.num_breaches for r in rows)
+    print(f"{unexplained} unexplained paths, {beyond} errors beyond their limits")
 
 
 def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"]) -> None:

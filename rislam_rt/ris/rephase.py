@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Integers
+from rislam_rt.errors import ConfigError
 from rislam_rt.model.paths import Paths
 from rislam_rt.model.ris import RisCode
 
@@ -30,10 +31,19 @@ def rephase(paths: Paths, code: RisCode, weight: Complexes | float = 1.0) -> Pat
     """The same paths under another code, (N, M) or one a cycle (K, N, M): no new trace.
 
     `weight` (N, M) or (K, N, M): what the elements really do, divided by what they should (`PanelErrors.weight`).
+
+    Raises
+    ------
+    ConfigError
+        The code is not of this panel, or of other cycles.
     """
     if paths.ris is None:
         return paths
     cycles, _, rows, cols = paths.ris.tx.shape
+    if code.index.shape not in ((rows, cols), (cycles, rows, cols)):
+        raise ConfigError(
+            f"code: shape {code.index.shape} received; give ({rows}, {cols}), or one a cycle: ({cycles}, ...)"
+        )
     factor = np.broadcast_to(weight * np.exp(-1j * code.xi), (cycles, rows, cols)).reshape(cycles, 1, rows * cols)
     tx, rx = (legs.reshape(*legs.shape[:2], rows * cols) for legs in (paths.ris.tx, paths.ris.rx))
     gain = np.array(paths.gain)

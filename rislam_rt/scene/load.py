@@ -6,14 +6,25 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade
 from rislam_rt.scene.check import find_errors, find_warnings
+from rislam_rt.scene.containers import too_many_faces
 from rislam_rt.scene.findings import Fault, Finding, raise_errors
-from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, parse_mesh, read_inside
+from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, read_inside
 from rislam_rt.scene.motion import build_motion
-from rislam_rt.scene.schema import MaterialSection, ReflectorSection, RisSection, ScattererSection, SceneSpec, read_spec
+from rislam_rt.scene.schema import (
+    LimitsSection,
+    MaterialSection,
+    ReflectorSection,
+    RisSection,
+    ScattererSection,
+    SceneSpec,
+    read_spec,
+)
 from rislam_rt.scene.solids import solid_mesh
+from rislam_rt.shipped import find_room
 
 SCENE_FILE = "scene.toml"
 
@@ -27,13 +38,14 @@ class Draft(NamedTuple):
 
 
 def load_scene(path: str | Path) -> Scene:
-    """The scene of a folder, or of its `scene.toml`.
+    """The scene of a folder, of its `scene.toml`, or the built-in room of that name.
 
     Raises
     ------
     SceneError
         The scene file, a mesh or the trajectory is unusable; one line that says where, what and how to mend it.
     """
+    expect("path", path, (str, Path))
     draft = read_draft(path)
     raise_errors(draft.findings)
     assert draft.scene is not None
@@ -66,24 +78,23 @@ def read_draft(path: str | Path) -> Draft:
 
 def scene_file(path: str | Path) -> Path:
     """The scene file of a scene folder; a file is taken as it is."""
-    path = Path(path)
+    path = find_room(path)
     return path if path.suffix == ".toml" and not path.is_dir() else path / SCENE_FILE
 
 
 def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
     """Read what a specification names and put the scene together."""
-    folder, findings = file.parent, []
-    contents: dict[str, bytes] = {}
+    shelf, findings = Shelf(file.parent, spec.limits), []
     reflectors = []
     for number, section in enumerate(spec.reflector):
         try:
-            reflectors.append(_reflector(section, folder, contents))
+            reflectors.append(_reflector(section, shelf))
         except Fault as fault:
             findings.append(fault.at(str(file), f"reflector[{number}].mesh ({section.name})"))
     scatterers = []
     for number, scatterer in enumerate(spec.scatterer):
         try:
-            scatterers.append(_scatterer(scatterer, folder, contents))
+            scatterers.append(_scatterer(scatterer, shelf))
         except Fault as fault:
             findings.append(fault.at(str(file), f"scatterer[{number}].mesh ({scatterer.name})"))
     panel = None
@@ -92,27 +103,40 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
     except Fault as fault:
         findings.append(fault.at(str(file), "ris.up"))
     try:
-        agent, contents["trajectory"] = build_motion(spec.agent, folder)
+        agent, shelf.contents["trajectory"] = build_motion(spec.agent, file.parent)
     except Fault as fault:
         findings.append(fault.at(str(file), "agent"))
     if findings:
         return Draft(str(file), None, findings)
-    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), panel, agent, _digest(content, contents))
+    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), panel, agent, _digest(content, shelf.contents))
     return Draft(str(file), scene, [])
 
 
-def _reflector(section: ReflectorSection, folder: Path, contents: dict[str, bytes]) -> Reflector:
-    mesh = _mesh(section.mesh, section.up_axis, folder, contents)
+class Shelf:
+    """The mesh files of a scene: each is read once and kept for the digest, and together they have so many faces."""
+
+    def __init__(self, folder: Path, limits: LimitsSection) -> None:
+        self.folder, self.limits = folder, limits
+        self.contents: dict[str, bytes] = {}
+        self.reader = MeshReader()
+        self.faces = 0
+
+    def mesh(self, place: str, up_axis: str) -> Mesh:
+        """The mesh `file` or `file#node`."""
+        name, _, node = place.partition("#")
+        if name not in self.contents:
+            self.contents[name] = read_inside(self.folder, name, MAX_MESH_BYTES)
+        most = self.limits.faces
+        mesh = self.reader.parse(self.contents[name], name, node or None, most, self.limits.nodes)
+        self.faces += len(mesh.faces)
+        if self.faces > most:
+            raise too_many_faces(self.faces, most)
+        return _z_up(mesh) if up_axis == "y" else mesh
+
+
+def _reflector(section: ReflectorSection, shelf: Shelf) -> Reflector:
+    mesh = shelf.mesh(section.mesh, section.up_axis)
     return Reflector(section.name, mesh.vertices, mesh.faces, _material(section.material))
-
-
-def _mesh(place: str, up_axis: str, folder: Path, contents: dict[str, bytes]) -> Mesh:
-    """The mesh `file` or `file#node`; every file is read once and kept for the digest."""
-    name, _, node = place.partition("#")
-    if name not in contents:
-        contents[name] = read_inside(folder, name, MAX_MESH_BYTES)
-    mesh = parse_mesh(contents[name], name, node or None)
-    return _z_up(mesh) if up_axis == "y" else mesh
 
 
 def _z_up(mesh: Mesh) -> Mesh:
@@ -127,7 +151,7 @@ def _material(section: MaterialSection) -> Material:
     return Material(section.reflection, section.itu, section.thickness_m)
 
 
-def _scatterer(section: ScattererSection, folder: Path, contents: dict[str, bytes]) -> Scatterer:
+def _scatterer(section: ScattererSection, shelf: Shelf) -> Scatterer:
     """The paper's sphere has the cross-section pi r^2, unless the file gives another one.
 
     A cylinder's nominal one, pi r h / 2, is the mean of its backscattering over all directions.
@@ -141,7 +165,7 @@ def _scatterer(section: ScattererSection, folder: Path, contents: dict[str, byte
         rcs = np.pi * (radius or 0.0) ** 2
     mesh = None
     if section.mesh is not None:
-        mesh = _mesh(section.mesh, section.up_axis, folder, contents)
+        mesh = shelf.mesh(section.mesh, section.up_axis)
     elif section.shadow:
         mesh = solid_mesh(position, radius or 0.0, height, axis)
     shade = None if mesh is None else Shade(mesh.vertices, mesh.faces)

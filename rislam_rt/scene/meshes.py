@@ -1,23 +1,29 @@
 """Meshes on disk: only from inside the scene's folder, checked before anything else sees them."""
 
 import io
+import logging
 import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.scene.containers import check_glb, too_many_faces, without_comments
 from rislam_rt.scene.findings import Fault, one_line
 
 FORMATS = (".ply", ".obj", ".stl", ".glb")
 MAX_MESH_BYTES = 200_000_000
-MAX_FACES = 2_000_000
-"""More triangles than any channel of this package could serve."""
+MAX_FACES = 50_000
+"""What check and trace serve within minutes; a scene file can raise it."""
+MAX_NODES = 1_000
+"""Of a GLB file: reading takes time in proportion to their square."""
 
 _PLY_HEADER = re.compile(
-    rb"ply\nformat binary_little_endian 1\.0\n(?:comment [^\n]*\n)*"
+    rb"ply\nformat binary_little_endian 1\.0\n"
     rb"element vertex (\d{1,9})\nproperty (double|float) x\nproperty \2 y\nproperty \2 z\n"
     rb"element face (\d{1,9})\nproperty list uchar int vertex_ind(?:ices|ex)\nend_header\n"
 )
@@ -67,17 +73,55 @@ def parse_mesh(content: bytes, name: str, node: str | None = None) -> Mesh:
     Raises
     ------
     Fault
-        The content is not a mesh of that format, or it is damaged or empty.
+        The content is not a mesh of that format, or it is damaged, empty or too large.
     """
-    suffix = PurePosixPath(name).suffix.lower()
-    if suffix not in FORMATS:
-        raise Fault(f"'{name[:80]}' is of no known mesh format", f"give one of {', '.join(FORMATS)}")
-    if node is not None and suffix != ".glb":
-        raise Fault(f"'{name[:80]}#{node[:40]}' picks a node, which only GLB files have", "leave the '#' part out")
-    mesh = _own_ply(content) if suffix == ".ply" else None
-    if mesh is None:
-        mesh = _by_trimesh(content, suffix[1:], node)
-    return _checked(mesh)
+    return MeshReader().parse(content, name, node)
+
+
+class MeshReader:
+    """Reads meshes, and keeps the last file unfolded: a scene picks many nodes of one GLB file, one after the other."""
+
+    def __init__(self) -> None:
+        self._key: tuple[str, bytes] = ("", b"")
+        self._loaded: Any = None
+
+    def parse(
+        self, content: bytes, name: str, node: str | None = None, max_faces: int = MAX_FACES, max_nodes: int = MAX_NODES
+    ) -> Mesh:
+        """See `parse_mesh`. What is too large is refused before it is unfolded: a GLB file may name one mesh in
+        thousands of nodes.
+        """
+        suffix = PurePosixPath(name).suffix.lower()
+        if suffix not in FORMATS:
+            raise Fault(f"'{name[:80]}' is of no known mesh format", f"give one of {', '.join(FORMATS)}")
+        if node is not None and suffix != ".glb":
+            raise Fault(f"'{name[:80]}#{node[:40]}' picks a node, which only GLB files have", "leave the '#' part out")
+        if suffix == ".ply":
+            content = without_comments(content)
+        elif suffix == ".obj":
+            content = content.decode("latin-1").encode()  # keywords and numbers are ASCII, comments are anything
+        elif suffix == ".glb":
+            check_glb(content, max_faces, max_nodes)
+        mesh = _own_ply(content) if suffix == ".ply" else None
+        return _checked(mesh or self._by_trimesh(content, suffix[1:], node), max_faces)
+
+    def _by_trimesh(self, content: bytes, file_type: str, node: str | None) -> Mesh:
+        """Any format trimesh reads. It gets bytes, not a path, so it can follow no reference to another file."""
+        import trimesh
+
+        # A damaged file makes trimesh raise nearly anything and numpy warn; here every cause has the same answer.
+        try:
+            with warnings.catch_warnings(), np.errstate(all="ignore"), _silence("trimesh"):
+                warnings.simplefilter("ignore")
+                if self._key != (file_type, content):
+                    self._loaded = trimesh.load_scene(io.BytesIO(content), file_type=file_type, process=False)
+                    self._key = (file_type, content)
+                return _flatten(self._loaded, node)
+        except Fault:
+            raise
+        except Exception as error:
+            cause = f"{type(error).__name__} {one_line(str(error))[:80]}".strip()
+            raise Fault(f"not a readable {file_type.upper()} mesh ({cause})", "export the mesh again") from None
 
 
 def ply_bytes(vertices: Floats, faces: Integers) -> bytes:
@@ -110,21 +154,15 @@ def _own_ply(content: bytes) -> Mesh | None:
     return Mesh(vertices.astype(np.float64), rows["corner"].astype(np.int64))
 
 
-def _by_trimesh(content: bytes, file_type: str, node: str | None) -> Mesh:
-    """Any format trimesh reads. It gets bytes, not a path, so it can follow no reference to another file."""
-    import trimesh
-
-    # A damaged file makes trimesh raise nearly anything and numpy warn; here every cause has the same answer.
+@contextmanager
+def _silence(name: str) -> Iterator[None]:
+    """A logger that says nothing, tracebacks of failures that have an answer here least of all."""
+    logger = logging.getLogger(name)
+    before, logger.disabled = logger.disabled, True
     try:
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
-            loaded = trimesh.load_scene(io.BytesIO(content), file_type=file_type, process=False)
-            return _flatten(loaded, node)
-    except Fault:
-        raise
-    except Exception as error:
-        cause = f"{type(error).__name__} {one_line(str(error))[:80]}".strip()
-        raise Fault(f"not a readable {file_type.upper()} mesh ({cause})", "export the mesh again") from None
+        yield
+    finally:
+        logger.disabled = before
 
 
 def _flatten(loaded: Any, node: str | None) -> Mesh:
@@ -149,13 +187,13 @@ def _flatten(loaded: Any, node: str | None) -> Mesh:
     return Mesh(np.concatenate(vertices), np.concatenate(faces))
 
 
-def _checked(mesh: Mesh) -> Mesh:
+def _checked(mesh: Mesh, max_faces: int) -> Mesh:
     """The mesh without unused vertices (they would widen the room), if its numbers make sense on their own."""
     vertices, faces = mesh
     if len(faces) == 0:
         raise Fault("the mesh has no faces", "export a mesh with triangles")
-    if len(faces) > MAX_FACES:
-        raise Fault(f"the mesh has {len(faces)} faces", f"simplify it to {MAX_FACES} or fewer")
+    if len(faces) > max_faces:
+        raise too_many_faces(len(faces), max_faces)
     if faces.min() < 0 or faces.max() >= len(vertices):
         worst = int(faces.min() if faces.min() < 0 else faces.max())
         raise Fault(f"a face names vertex {worst} of {len(vertices)}", "export the mesh again")

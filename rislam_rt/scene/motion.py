@@ -10,9 +10,13 @@ from rislam_rt.errors import GeometryError
 from rislam_rt.model import Body, Trajectory
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.meshes import read_inside
-from rislam_rt.scene.schema import AgentSection
+from rislam_rt.scene.schema import SMALLEST, AgentSection
 
 MAX_TUM_BYTES = 100_000_000
+MAX_TIME = 1e11
+"""[s] From the epoch on, three thousand years: a recording's clock, and float64 still tells microseconds apart."""
+MAX_STEP = 1e6
+"""[s] Twelve days: longer gaps lie between recordings, not within one."""
 MAX_TILT = 1e-3
 """Largest angle [rad] of a pose's z axis from the room's: the body turns about z only."""
 
@@ -69,12 +73,22 @@ def parse_tum(content: bytes) -> tuple[Floats, Floats, Floats]:
         raise Fault("the trajectory file holds no pose", "give lines 'timestamp x y z qx qy qz qw'")
     table = np.array(rows)
     time, position, q = table[:, 0], table[:, 1:4], table[:, 4:]
-    if (np.diff(time) <= 0.0).any():
-        pose = int(np.argmax(np.diff(time) <= 0.0)) + 1
+    if np.abs(time).max() > MAX_TIME:
+        raise Fault(f"a time of {time[np.argmax(np.abs(time))]:.3g} s in the trajectory", "give seconds")
+    step = np.diff(time)
+    if (step <= 0.0).any():
+        pose = int(np.argmax(step <= 0.0)) + 1
         raise Fault(f"time does not grow at pose {pose} ({time[pose]} s)", "sort the poses and drop repeated ones")
+    odd = (step < SMALLEST) | (step > MAX_STEP)
+    if odd.any():
+        pose = int(np.argmax(odd)) + 1
+        raise Fault(
+            f"{step[pose - 1]:.3g} s from the pose before to pose {pose}",
+            f"give steps of {SMALLEST:g} to {MAX_STEP:g} s: cut the file at a gap, thin it out where it is too dense",
+        )
     if np.abs(position).max() > 1e5:
         raise Fault(f"a coordinate of {np.abs(position).max():.3g} m in the trajectory", "give metres")
-    length = np.linalg.norm(q, axis=1)
+    length = np.linalg.norm(np.clip(q, -2.0, 2.0), axis=1)  # a wrong length stays one, and no square overflows
     if (np.abs(length - 1.0) > 1e-3).any():
         raise Fault(
             f"quaternion of pose {int(np.argmax(np.abs(length - 1.0) > 1e-3))} has not length 1", "normalise it"

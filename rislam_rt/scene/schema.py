@@ -1,21 +1,30 @@
 """`scene.toml`: the keys, their types and ranges. Unknown keys are refused; all bad fields are found at once."""
 
-import tomllib
+import unicodedata
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.toml import parse_toml
 
-MAX_SCENE_BYTES = 4_000_000
+MAX_SCENE_BYTES = 1_000_000
 """A scene file is written by people; anything larger is another file by mistake."""
+SMALLEST = 1e-6
+"""A micrometre, or a microsecond: light's wavelength, and the time of a code. Nothing that a radio sees is finer."""
 
 Coordinate = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
-Length = Annotated[float, Field(gt=0.0, le=1e5, allow_inf_nan=False)]
+Length = Annotated[float, Field(ge=SMALLEST, le=1e5, allow_inf_nan=False)]
+Area = Annotated[float, Field(ge=SMALLEST**2, le=1e10, allow_inf_nan=False)]
 Vector = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=64)]
+Name = Annotated[
+    str,
+    Field(pattern=r"^[.\-]*[\p{L}\p{N}_][\p{L}\p{M}\p{N}_.\-]*$", max_length=64),
+    AfterValidator(lambda name: unicodedata.normalize("NFC", name)),
+]
+"""Letters and digits of any script, in the composed form, so that names which look alike are alike."""
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 ItuMaterial = Literal[
@@ -69,7 +78,7 @@ class ScattererSection(Section):
     name: Name
     position: Vector
     radius: Length | None = None
-    rcs_m2: Length | None = None
+    rcs_m2: Area | None = None
     mie: bool = False
     height_m: Length | None = None
     axis: Vector | None = None
@@ -129,6 +138,17 @@ class AgentSection(Section):
         return self
 
 
+class LimitsSection(Section):
+    """How large a room may be. The defaults keep check and trace within minutes; a file that knows better says so."""
+
+    faces: Annotated[int, Field(ge=1, le=20_000_000)] = 50_000
+    """Triangles of all meshes together: check and trace take time in proportion to them, times cycles."""
+    nodes: Annotated[int, Field(ge=1, le=1_000_000)] = 1_000
+    """Nodes of a GLB file: reading takes time in proportion to their square."""
+    scatterers: Annotated[int, Field(ge=1, le=1_000_000)] = 1_000
+    """Each is traced on its own, with every wall on both legs."""
+
+
 class SceneSpec(Section):
     """A whole scene file."""
 
@@ -137,6 +157,16 @@ class SceneSpec(Section):
     scatterer: list[ScattererSection] = []
     ris: RisSection | None = None
     agent: AgentSection
+    limits: LimitsSection = LimitsSection()
+
+    @model_validator(mode="after")
+    def _not_too_many(self) -> "SceneSpec":
+        if len(self.scatterer) > self.limits.scatterers:
+            raise ValueError(
+                f"{len(self.scatterer)} scatterers, of which each is traced on its own; "
+                f"take fewer, or raise limits.scatterers = {self.limits.scatterers}"
+            )
+        return self
 
 
 def parse_spec(content: bytes) -> SceneSpec:
@@ -150,10 +180,10 @@ def parse_spec(content: bytes) -> SceneSpec:
     if len(content) > MAX_SCENE_BYTES:
         raise Fault(f"{len(content)} bytes are too many for a scene file", f"keep it below {MAX_SCENE_BYTES}")
     try:
-        table = tomllib.loads(content.decode("utf-8"))
+        table = parse_toml(content.decode("utf-8"))
     except UnicodeDecodeError as error:
         raise Fault(f"not text in UTF-8 (byte {error.start})", "give a TOML file") from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise Fault(f"not valid TOML: {_short(str(error), 120)}", "mend that place") from None
     return validate_spec(table)
 
@@ -202,14 +232,15 @@ def _remark(item: Any) -> str:
         return f"{place}: unknown key" + (f" (did you mean '{near[0]}'?)" if near else "")
     message = item["msg"].removeprefix("Value error, ")
     if item["type"] == "string_pattern_mismatch":
-        message = "give letters, digits, '_', '-' and '.' only"
+        message = "give letters and digits of any script, '_', '-' and '.' only, and not dots alone"
     if isinstance(item["input"], dict):
         return f"{place}: {message}"
     return f"{place}: {_short(repr(item['input']), 60)} received, {message[:1].lower()}{message[1:]}"
 
 
 def _known_keys() -> list[str]:
-    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, RisSection, AgentSection)
+    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, RisSection, AgentSection,
+                LimitsSection)  # fmt: skip
     return [key for section in sections for key in section.model_fields]
 
 

@@ -14,6 +14,13 @@ CLASSIFIERS = ("amplitude", "geometric", "network")
 """Rules by which components are taken for wall returns."""
 
 
+MAX_BYTES = 1_000_000_000
+"""Of the covariances of pose and trail, in all Gaussian particles together: what a small machine has to spare."""
+MOST = {"num_particles": 100_000, "window": 10_000, "num_samples": 10_000, "agent_particles": 1_000_000,
+        "landmark_particles": 1_000_000}  # fmt: skip
+"""Largest counts: ten times and more what any study of this package takes."""
+
+
 @dataclass(frozen=True, slots=True)
 class SlamConfig:
     """Everything that the filter is free to choose. SI units."""
@@ -85,6 +92,15 @@ class SlamConfig:
         for name in ("num_particles", "birth_cycles", "window", "num_samples", "agent_particles", "landmark_particles"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"slam.{name}: {getattr(self, name)} received; give at least 1")
+        for name, most in MOST.items():
+            if getattr(self, name) > most:
+                raise ConfigError(f"slam.{name}: {getattr(self, name)} received; give at most {most}")
+        size = 8 * self.num_particles * (7 + 4 * self.window) ** 2
+        if self.filter == "rao_blackwellised" and size > MAX_BYTES:
+            raise ConfigError(
+                f"slam.window: {self.window} received with {self.num_particles} particles; covariances would take "
+                f"{size / 1e9:.3g} GB of at most {MAX_BYTES / 1e9:g}, give a shorter window or fewer particles"
+            )
         if self.window < self.birth_cycles:
             raise ConfigError(f"slam.window: {self.window} received; give at least birth_cycles, {self.birth_cycles}")
         for name in ("sigma_a", "gate", "new_density", "specular_ratio"):

@@ -16,6 +16,7 @@ from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.engine import Told, engine_of
 from rislam_rt.slam.expect import Belief, expected_returns, shown_share
 from rislam_rt.slam.health import Health, check
+from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.learn import Hits, learn
 from rislam_rt.slam.match import Outlook, candidates, hidden_tracks, look_ahead
 from rislam_rt.slam.moments import POSE, Moments, poses_of
@@ -133,7 +134,14 @@ def step(
     *,
     rng: np.random.Generator,
 ) -> tuple[FilterState, StepInfo]:
-    """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied."""
+    """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied.
+
+    Raises
+    ------
+    ConfigError
+        One of them is no number, or not of the panel.
+    """
+    check_step(dt, heading, code, state.ris)
     state = _move(state, dt, heading, config, rng=rng)
     glance = glance_of(measurement, state.radio)
     landmark = np.where(is_los(glance, state.body), REMOVED, UNUSED)

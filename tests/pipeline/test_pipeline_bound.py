@@ -12,9 +12,10 @@ from rislam_rt.information.landmarks import Rows
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.bound import FLOOR_TILT, UPRIGHT_TILT, fewer_rows, heard_paths, prior_std, scheme_bound
-from rislam_rt.pipeline.run import set_stage, without_panel
+from rislam_rt.pipeline.run import set_stage
 from rislam_rt.pipeline.spec import build_settings
 from rislam_rt.pipeline.summary import map_score, summarise
+from rislam_rt.pipeline.walk import without_panel
 
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
 SHORT = ["channel=image_source", "cycles=40", "depth=1"]

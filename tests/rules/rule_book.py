@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = "rislam_rt"
 
 FLOORS = {
-    0: ("errors", "constants", "arrays", "backend", "shipped"),
+    0: ("errors", "constants", "arrays", "backend", "shipped", "toml"),
     1: ("geometry",),
     2: ("model",),
     3: ("scene", "ris", "waveform"),

@@ -1,12 +1,14 @@
-"""Path certificate: two channels of one room compared path by path, and every difference proved from the geometry."""
+"""Path certificate: two channels of one room compared path by path, every difference proved from the geometry, every
+error judged by what precision explains."""
 
 from rislam_rt.channel.compare.channels import compare_channels, validate_rooms
 from rislam_rt.channel.compare.match import compare_paths
 from rislam_rt.channel.compare.poses import random_poses
-from rislam_rt.channel.compare.report import OneSided, PathReport
+from rislam_rt.channel.compare.report import Breach, OneSided, PathReport
 from rislam_rt.channel.compare.table import Validation, validation_page, validation_table
 
 __all__ = [
+    "Breach",
     "OneSided",
     "PathReport",
     "Validation",

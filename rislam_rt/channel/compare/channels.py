@@ -24,7 +24,7 @@ def compare_channels(
     from rislam_rt.channel.traced.limits import shortest_segment
 
     traced, analytic, trajectory = trace_both(scene, radio, poses=poses, depth=depth, rng=rng, refine=refine)
-    return compare_paths(traced, analytic, scene, trajectory, shortest_segment=shortest_segment(scene))
+    return compare_paths(traced, analytic, scene, trajectory, radio=radio, shortest_segment=shortest_segment(scene))
 
 
 def trace_both(

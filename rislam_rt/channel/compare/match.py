@@ -6,10 +6,13 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, Certifier, Identity
+from rislam_rt.channel.compare.limits import Limits, Precision, coherent_scale, with_mirrors
 from rislam_rt.channel.compare.report import OneSided, PathReport
+from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import angle_between
-from rislam_rt.model import Paths, Scene, Trajectory
+from rislam_rt.model import Paths, RadioConfig, Scene, Trajectory
 
 
 class Columns(NamedTuple):
@@ -20,20 +23,57 @@ class Columns(NamedTuple):
     analytic: Integers
 
 
+class Matched(NamedTuple):
+    """M paths that both sides have."""
+
+    labels: tuple[str, ...]
+    """(I,) of all identities."""
+    cycle: Integers
+    """(M,)."""
+    path: Integers
+    """(M,) identity."""
+    traced: Integers
+    """(M,) column."""
+    analytic: Integers
+    """(M,) column."""
+    scale: Floats
+    """(M,) coherent scale of the gain."""
+    limits: Limits
+
+
+_RADIO = RadioConfig()
+
+
 def compare_paths(
     traced: Paths,
     analytic: Paths,
     scene: Scene,
     trajectory: Trajectory,
     *,
+    radio: RadioConfig = _RADIO,
     shortest_segment: float = SHORTEST_SEGMENT,
 ) -> PathReport:
     """Compare two path sets of one scene and trajectory, cycle by cycle and identity by identity.
 
     Gains are compared as they are: give both sides the same code. Every path that one side lacks is looked up in the
-    geometry (`certificate.py`); what has no proof there counts as unexplained. `shortest_segment` [m] is the tracer's
-    limit: below it, and only for paths that the tracer lacks, a segment's length is a proof.
+    geometry (`certificate.py`); what has no proof there counts as unexplained. Errors of those that both have are
+    judged by limits that follow from precision and geometry (`limits.py`): float32 where `traced.source` says that the
+    numbers are the tracer's own.
+
+    Parameters
+    ----------
+    radio
+        That of both channels.
+    shortest_segment
+        [m] the tracer's limit: below it, and only for paths that the tracer lacks, a segment's length is a proof.
     """
+    for name, value, kind in (
+        ("traced", traced, Paths),
+        ("analytic", analytic, Paths),
+        ("scene", scene, Scene),
+        ("trajectory", trajectory, Trajectory),
+    ):
+        expect(name, value, kind)
     columns = _align(traced, analytic)
     in_traced, in_analytic = _valid(traced, columns.traced), _valid(analytic, columns.analytic)
     depth = min(traced.tx_walls.shape[1], analytic.tx_walls.shape[1])
@@ -43,7 +83,30 @@ def compare_paths(
         for cycle, path in np.argwhere(in_traced != in_analytic)
     ]
     cycle, path = np.nonzero(in_traced & in_analytic)
-    return _report(traced, analytic, (cycle, columns.traced[path]), (cycle, columns.analytic[path]), one_sided)
+    precision = Precision.of(scene, radio, single=traced.source == "traced")
+    scale = _scale(analytic, columns.identity, (cycle, columns.analytic[path], path), trajectory, precision)
+    limits = precision.limits(analytic, cycle, columns.analytic[path], trajectory, scale)
+    labels = tuple(certifier.label(identity) for identity in columns.identity)
+    here = Matched(labels, cycle, path, columns.traced[path], columns.analytic[path], scale, limits)
+    return _report(traced, analytic, here, one_sided)
+
+
+def _scale(
+    analytic: Paths,
+    identity: list[Identity],
+    matched: tuple[Integers, Integers, Integers],
+    trajectory: Trajectory,
+    precision: Precision,
+) -> Floats:
+    """(M,) coherent scale of matched paths, given by cycle, analytic column and identity."""
+    cycle, column, path = matched
+    mirrors = with_mirrors(precision.scene)
+    if mirrors is None or len(path) == 0:
+        return coherent_scale(analytic, cycle, column, trajectory, precision)
+    unit = ImageSourceChannel(mirrors, precision.radio, analytic.tx_walls.shape[1]).paths(trajectory)
+    place = {named_identity(unit, p): p for p in range(unit.num_paths)}
+    columns = np.array([place.get(i, -1) for i in identity], dtype=np.int64)[path]
+    return coherent_scale(unit, cycle, columns, trajectory, precision)
 
 
 def _align(traced: Paths, analytic: Paths) -> Columns:
@@ -79,20 +142,25 @@ def _certify(certifier: Certifier, identity: Identity, cycle: int, is_traced: bo
 def _report(
     traced: Paths,
     analytic: Paths,
-    at_traced: tuple[Integers, Integers],
-    at_analytic: tuple[Integers, Integers],
+    matched: Matched,
     one_sided: list[OneSided],
 ) -> PathReport:
     """Errors of the matched paths."""
+    at_traced, at_analytic = (matched.cycle, matched.traced), (matched.cycle, matched.analytic)
     gain_t, gain_a = traced.gain[at_traced], analytic.gain[at_analytic]
     return PathReport(
         cycles=traced.num_cycles,
+        labels=matched.labels,
+        path=matched.path,
+        cycle=matched.cycle,
         kind=analytic.kind[at_analytic[1]],
         length_error=SPEED_OF_LIGHT * np.abs(traced.tau[at_traced] - analytic.tau[at_analytic]),
         gain_error_db=_level_difference(np.abs(gain_t), np.abs(gain_a)),
+        gain_error=_relative(np.abs(np.abs(gain_t) - np.abs(gain_a)), matched.scale),
         phase_error=np.abs(np.angle(gain_t * np.conj(gain_a))),
         aod_error=angle_between(traced.departure[at_traced], analytic.departure[at_analytic]),
         aoa_error=angle_between(traced.arrival[at_traced], analytic.arrival[at_analytic]),
+        limits=matched.limits,
         one_sided=tuple(one_sided),
     )
 
@@ -101,3 +169,8 @@ def _level_difference(a: Floats, b: Floats) -> Floats:
     """|20 lg(a / b)| [dB], 0 where both are nothing (a panel seen edge-on, a horizontal polarisation)."""
     floor = np.finfo(np.float64).tiny
     return np.abs(20.0 * np.log10(np.maximum(a, floor) / np.maximum(b, floor)))
+
+
+def _relative(error: Floats, scale: Floats) -> Floats:
+    """Errors (M,) in units of their scale, 0 of nothing."""
+    return error / np.maximum(scale, np.finfo(np.float64).tiny)

@@ -7,7 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers, freeze
+from rislam_rt.channel.compare.limits import Limits
 from rislam_rt.model import PathKind
+
+MOST_LISTED = 20
+"""Breaches that are listed, the worst first; all are counted."""
 
 
 class OneSided(NamedTuple):
@@ -26,28 +30,57 @@ class OneSided(NamedTuple):
     """[m] the length or distance on which the proof rests, 0 where it rests on none."""
 
 
+class Breach(NamedTuple):
+    """A matched path on which the two sides are farther apart than precision and geometry explain."""
+
+    cycle: int
+    label: str
+    """Identity in words."""
+    quantity: str
+    value: float
+    """The error, in the unit that `quantity` names."""
+    limit: float
+
+    def __str__(self) -> str:
+        return (
+            f"cycle {self.cycle}, {self.label}: error of {self.quantity} {self.value:.3g}, more than {self.limit:.3g}"
+        )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PathReport:
     """Matched paths with their errors, traced against analytic, and one-sided paths with their proofs."""
 
     cycles: int
+    labels: tuple[str, ...]
+    """(P,) identities in words."""
+    path: Integers
+    """(M,) which of `labels` each matched path has."""
+    cycle: Integers
+    """(M,)."""
     kind: Integers
     """(M,) `PathKind` of each matched path."""
     length_error: Floats
     """(M,) [m] absolute."""
     gain_error_db: Floats
     """(M,) [dB] absolute."""
+    gain_error: Floats
+    """(M,) difference of the magnitudes, relative to the coherent scale (`limits.coherent_scale`)."""
     phase_error: Floats
     """(M,) [rad] absolute."""
     aod_error: Floats
     """(M,) [rad] angle between the directions of departure."""
     aoa_error: Floats
     """(M,) [rad] angle between the directions of arrival."""
+    limits: Limits
+    """Of `length_error`, `gain_error`, `phase_error`, `aod_error` and `aoa_error`."""
     one_sided: tuple[OneSided, ...]
 
     def __post_init__(self) -> None:
         freeze(self, "kind", np.int64, (None,))
-        for name in ("length_error", "gain_error_db", "phase_error", "aod_error", "aoa_error"):
+        for name in ("path", "cycle"):
+            freeze(self, name, np.int64, (len(self.kind),))
+        for name in ("length_error", "gain_error_db", "gain_error", "phase_error", "aod_error", "aoa_error"):
             freeze(self, name, np.float64, (len(self.kind),))
 
     @property
@@ -66,6 +99,37 @@ class PathReport:
         return sum(not path.reason for path in self.one_sided)
 
     @property
+    def judged(self) -> dict[str, tuple[Floats, Floats]]:
+        """Errors (M,) and limits (M,) by quantity."""
+        return {
+            "length [m]": (self.length_error, self.limits.length),
+            "gain [of the coherent scale]": (self.gain_error, self.limits.gain),
+            "phase [rad]": (self.phase_error, self.limits.phase),
+            "departure [rad]": (self.aod_error, self.limits.aod),
+            "arrival [rad]": (self.aoa_error, self.limits.aoa),
+        }
+
+    @property
+    def num_breaches(self) -> int:
+        """Errors beyond their limits, over all paths and quantities."""
+        return sum(int(np.sum(~(error <= limit))) for error, limit in self.judged.values())
+
+    @property
+    def breaches(self) -> list[Breach]:
+        """The worst of them first, at most `MOST_LISTED`."""
+        found = []
+        for quantity, (error, limit) in self.judged.items():
+            for row in np.flatnonzero(~(error <= limit)):
+                label = self.labels[self.path[row]]
+                found.append(Breach(int(self.cycle[row]), label, quantity, float(error[row]), float(limit[row])))
+        return sorted(found, key=lambda b: -b.value / b.limit)[:MOST_LISTED]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every one-sided path is explained and every error of a matched one within its limit."""
+        return not self.unexplained and not self.num_breaches
+
+    @property
     def proof_limits(self) -> dict[str, float]:
         """The weakest proof of each reason: the largest length or distance [m] it rests on."""
         return {r: max(path.size for path in self.one_sided if path.reason == r) for r in self.explained}
@@ -81,16 +145,37 @@ class PathReport:
             "max_gain_error_db": _largest(self.gain_error_db),
             "max_phase_error_rad": _largest(self.phase_error),
             "max_angle_error_rad": max(_largest(self.aod_error), _largest(self.aoa_error)),
+            "passed": self.passed,
+            "num_breaches": self.num_breaches,
+            "breaches": [breach._asdict() for breach in self.breaches],
+            "limits": {quantity: self._nearest(*pair) for quantity, pair in self.judged.items()},
             "proof_limits_m": self.proof_limits,
             "matched_by_kind": {k.name: int(np.sum(self.kind == k)) for k in PathKind if np.any(self.kind == k)},
             "percentiles": {
                 "length_error_m": _percentiles(self.length_error),
                 "gain_error_db": _percentiles(self.gain_error_db),
+                "gain_error": _percentiles(self.gain_error),
                 "phase_error_rad": _percentiles(self.phase_error),
                 "aod_error_rad": _percentiles(self.aod_error),
                 "aoa_error_rad": _percentiles(self.aoa_error),
             },
         }
+
+    def _nearest(self, error: Floats, limit: Floats) -> dict[str, Any]:
+        """Range of a quantity's limits, and the path that comes nearest to its own."""
+        if len(error) == 0:
+            return {}
+        share = error / limit
+        row = int(np.argmax(share))
+        return {
+            "smallest": float(limit.min()),
+            "median": float(np.median(limit)),
+            "largest": float(limit.max()),
+            "nearest": {
+                "cycle": int(self.cycle[row]), "path": self.labels[self.path[row]],
+                "error": float(error[row]), "limit": float(limit[row]), "share": float(share[row]),
+            },
+        }  # fmt: skip
 
 
 def _largest(errors: Floats) -> float:

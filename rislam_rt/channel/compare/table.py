@@ -7,7 +7,7 @@ from rislam_rt.channel.compare.report import PathReport
 
 _HEAD = [
     "room", "depth", "numbers", "poses", "matched", "explained", "unexplained",
-    "length [m]", "gain [dB]", "phase [rad]", "AoD [rad]", "AoA [rad]",
+    "beyond limits", "length [m]", "gain [dB]", "phase [rad]", "AoD [rad]", "AoA [rad]", "share of the limit",
 ]  # fmt: skip
 
 _TEXT = """\
@@ -20,10 +20,16 @@ landmark, walls in the order of travel. Written by `rislam-rt` from one run; do 
 - *explained*: one-sided paths with the proof recomputed from the geometry (`rislam_rt/channel/compare/certificate.py`);
   in brackets the weakest proof, the largest length or distance that any of them rests on.
 - errors are the largest of all matched paths, in brackets the 99th percentile; the panel at one random code. *traced*
-  rows are the tracer's own float32
-  numbers. In *refined* rows the tracer decides which paths exist and what its materials do to the field; lengths and
-  directions are recomputed in float64 on the walls it named, so that their errors say little beyond rounding.
-  Directions of float32 vertices suffer where a segment is short, and gains where the panel's elements nearly cancel.
+  rows are the tracer's own float32 numbers: the independent evidence, and the verdict. In *refined* rows the tracer
+  decides which paths exist and what its materials do to the field; lengths and directions are recomputed in float64 on
+  the walls it named, by formulas that image sources share, so that their errors say little beyond rounding.
+- every error is judged by a limit of its own path (`rislam_rt/channel/compare/limits.py`), which follows from the
+  rounding of float32 (of float64 in refined rows), the room's size, the path's length, its bounces and the segments
+  next to agent and landmark; none is fitted. *beyond limits* counts the errors that are larger: exit code 1.
+- *share of the limit*: the path that comes nearest to its own, for length, gain, phase, departure and arrival.
+- gains are judged against the sum of the magnitudes that make them up: over a panel's elements, and with slabs taken
+  for mirrors. A null of the panel, or a slab at Brewster's angle, is a difference of large numbers: its own size says
+  nothing about their error, and decibels of it (the column) may be large where nothing is wrong.
 
 """
 
@@ -47,7 +53,8 @@ def validation_table(rows: Sequence[Validation]) -> str:
         columns = ("length_error_m", "gain_error_db", "phase_error_rad", "aod_error_rad", "aoa_error_rad")
         errors = [_error(spread[name]) for name in columns]
         counts = [str(report.cycles), str(report.matched), _reasons(numbers), str(report.unexplained)]
-        lines.append(_row([scene, str(depth), kind, *counts, *errors]))
+        shares = " ".join(_share(limits) for limits in numbers["limits"].values())
+        lines.append(_row([scene, str(depth), kind, *counts, str(report.num_breaches), *errors, shares]))
     return "\n".join(lines) + "\n"
 
 
@@ -66,6 +73,11 @@ def _reasons(numbers: Mapping[str, Any]) -> str:
         for reason, n in numbers["explained"].items()
     ]
     return ", ".join(texts) or "none needed"
+
+
+def _share(limits: Mapping[str, Any]) -> str:
+    """Of the path that comes nearest to its limit."""
+    return f"{limits['nearest']['share']:.0%}" if limits else "-"
 
 
 def _error(spread: Mapping[str, float]) -> str:

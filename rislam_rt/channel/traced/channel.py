@@ -13,7 +13,7 @@ from rislam_rt.channel.traced.rows import Rows, in_blocks
 from rislam_rt.channel.traced.sequences import wall_sides
 from rislam_rt.channel.traced.start import start_tracer
 from rislam_rt.channel.walls import build_walls
-from rislam_rt.errors import ConfigError
+from rislam_rt.errors import ConfigError, expect
 from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
 from rislam_rt.ris import rephase
 
@@ -47,6 +47,9 @@ class TracedChannel:
     def __init__(
         self, scene: Scene, radio: RadioConfig, depth: int = 2, *, refine: bool = True, antennas: Antennas = _ISOTROPIC
     ) -> None:
+        expect("scene", scene, Scene)
+        expect("radio", radio, RadioConfig)
+        expect("depth", depth, int)
         if depth < 0:
             raise ConfigError(f"depth: {depth} received; give the largest number of bounces, 0 or more")
         start_tracer()
@@ -64,6 +67,7 @@ class TracedChannel:
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Every path of every cycle, with the panel at level 0."""
+        expect("trajectory", trajectory, Trajectory)
         tx, rx, heading = trajectory.tx, trajectory.rx, trajectory.heading
         problems = [Problem(tx, rx, heading, to_rx=True)]
         for number, point in enumerate(self.scene.landmark_positions):

@@ -4,5 +4,15 @@ from rislam_rt.pipeline.studies.classifier.spec import ClassifierSpec
 from rislam_rt.pipeline.studies.kinds import load_any
 from rislam_rt.pipeline.studies.spec import ClaimsSpec, CompareSpec, Fig4aSpec, StudySpec
 from rislam_rt.pipeline.studies.swept.spec import SweptSpec
+from rislam_rt.pipeline.studies.unseen.spec import UnseenSpec
 
-__all__ = ["ClaimsSpec", "ClassifierSpec", "CompareSpec", "Fig4aSpec", "StudySpec", "SweptSpec", "load_any"]
+__all__ = [
+    "ClaimsSpec",
+    "ClassifierSpec",
+    "CompareSpec",
+    "Fig4aSpec",
+    "StudySpec",
+    "SweptSpec",
+    "UnseenSpec",
+    "load_any",
+]

@@ -38,6 +38,16 @@ class Comparison(NamedTuple):
         """One-sided paths without a proof, over all rooms."""
         return sum(row.report.unexplained for row in self.rows)
 
+    @property
+    def breaches(self) -> int:
+        """Errors beyond their limits, over all rooms and both kinds of numbers."""
+        return sum(row.report.num_breaches for row in self.rows)
+
+    @property
+    def passed(self) -> bool:
+        """Whether every room's comparison passed."""
+        return all(row.report.passed for row in self.rows)
+
 
 def run_comparison(
     scenes: Sequence[Scene], spec: CompareSpec, *, jobs: int = 1, progress: Progress | None = None
@@ -85,12 +95,12 @@ def certify_pose(scene: Scene, depth: int, radio: RadioConfig, *, poses: int, se
     traced, analytic, motion = trace_both(
         scene, radio, poses=poses, depth=depth, rng=room_rng(scene, seed), refine=False
     )
-    whole = compare_paths(traced, analytic, scene, motion)
+    whole = compare_paths(traced, analytic, scene, motion, radio=radio)
     count = Counter(path.cycle for path in whole.one_sided)
     pose = min(count, key=lambda cycle: (-count[cycle], cycle), default=0)
     here = motion[pose : pose + 1]
     one_traced, one_analytic = (paths.of_cycle(pose) for paths in (traced, analytic))
-    report = compare_paths(one_traced, one_analytic, scene, here)
+    report = compare_paths(one_traced, one_analytic, scene, here, radio=radio)
     return Certificate(replace(scene, agent=here), pose, one_traced, one_analytic, report)
 
 

@@ -9,8 +9,9 @@ from rislam_rt.pipeline.spec import PipelineSpec, build_design, build_radio, bui
 from rislam_rt.pipeline.studies.classifier.spec import ClassifierSpec, build_receiver
 from rislam_rt.pipeline.studies.spec import ClaimsSpec, CompareSpec, Fig4aSpec
 from rislam_rt.pipeline.studies.swept import SWEPT, SweptSpec, check_swept
+from rislam_rt.pipeline.studies.unseen.spec import UnseenSpec
 
-KINDS = ("slam", "compare_channels", "fig4a", *SWEPT, "claims", "train_classifier")
+KINDS = ("slam", "compare_channels", "fig4a", *SWEPT, "unseen", "claims", "train_classifier")
 """What `kind` may say; `slam` if it is not there."""
 
 
@@ -33,6 +34,8 @@ def load_any(path: str | Path, overrides: Sequence[str] = ()) -> AnySpec:
         return build_spec(table, Fig4aSpec, lambda spec: (build_radio(spec.radio), build_design(spec.design)))
     if isinstance(kind, str) and kind in SWEPT:
         return build_spec(table, SWEPT[kind], check_swept)
+    if kind == "unseen":
+        return build_spec(table, UnseenSpec, check_swept)
     if kind == "train_classifier":
         return build_spec(table, ClassifierSpec, lambda spec: (build_radio(spec.radio), build_receiver(spec.receiver)))
     if kind == "claims":

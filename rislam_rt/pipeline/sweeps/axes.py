@@ -3,13 +3,13 @@
 import hashlib
 import json
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, NamedTuple
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.toml import parse_toml
 
 Scalar = str | int | float | bool
 Value = Scalar | list[Scalar]
@@ -128,7 +128,7 @@ def parse_axis(text: str) -> Axis:
     if not equals or not key.strip() or not all(parts):
         raise ConfigError(f"axis '{text[:80]}': not of the form key=v1,v2,...; give e.g. slam.sigma_a=0.01,0.1")
     try:
-        found = tomllib.loads(f"values = [{values}]")["values"]
+        found = parse_toml(f"values = [{values}]")["values"]
     except (ValueError, KeyError):
         found = [_parse(part) for part in parts]
     if {type(value) for value in found} == {int, float}:
@@ -155,7 +155,7 @@ def put(settings: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
 
 def _parse(text: str) -> Any:
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        return parse_toml(f"value = {text}")["value"]
     except (ValueError, KeyError):
         return text
 

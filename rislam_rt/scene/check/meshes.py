@@ -28,9 +28,14 @@ def face_errors(soup: Soup) -> Iterator[Finding]:
 
 
 def scatterer_errors(soup: Soup) -> Iterator[Finding]:
-    """Outside the meshes' bounds, or on a surface."""
+    """Outside the meshes' bounds, on a surface, or larger than the room."""
+    diagonal = float(np.linalg.norm(soup.bounds[1] - soup.bounds[0]))
     for number, scatterer in enumerate(soup.scene.scatterers):
         field, at = f"scatterer[{number}].position ({scatterer.name})", scatterer.position
+        if scatterer.radius is not None and scatterer.radius > diagonal:
+            message = f"{scatterer.radius:g} m, and the room measures {diagonal:.3g} m across"
+            yield soup.error(f"scatterer[{number}].radius ({scatterer.name})", message, "give its radius in metres")
+            continue
         if len(soup.outside(at[None])):
             yield soup.error(field, f"{at.tolist()} lies outside the meshes' bounds {_box(soup)}", "move it inside")
             continue

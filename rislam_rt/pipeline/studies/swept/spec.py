@@ -66,7 +66,7 @@ class Fig4bSpec(_OneRoom):
 
     @model_validator(mode="after")
     def _each_once(self) -> "Fig4bSpec":
-        _check_names(self.cases)
+        check_names(self.cases)
         return self
 
 
@@ -96,7 +96,7 @@ class RoomsSpec(SweptSpec):
 
     @model_validator(mode="after")
     def _each_once(self) -> "RoomsSpec":
-        _check_names(self.variants)
+        check_names(self.variants)
         return self
 
 
@@ -115,7 +115,7 @@ class AblationsSpec(_OneRoom):
 
     @model_validator(mode="after")
     def _each_once(self) -> "AblationsSpec":
-        _check_names(self.variants)
+        check_names(self.variants)
         return self
 
 
@@ -128,7 +128,8 @@ SWEPT: dict[str, type[SweptSpec]] = {
 """Swept studies by the `kind` of their file."""
 
 
-def _check_names(variants: list[VariantSection]) -> None:
+def check_names(variants: list[VariantSection]) -> None:
+    """Refuse variants of one name."""
     names = [variant.name for variant in variants]
     if len(set(names)) < len(names):
         raise ValueError("a name comes twice; give each once")

@@ -15,6 +15,7 @@ from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel, SlamEstimate
 from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los
+from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.schemes.bp_slam.association import Association
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
 from rislam_rt.slam.schemes.bp_slam.correct import absorb, claims, is_strong, newborn
@@ -100,7 +101,14 @@ def step(
     state: BpSlamState, measurement: Measurement, code: RisCode | None, dt: float, heading: float,
     config: BpSlamConfig, *, rng: np.random.Generator,
 ) -> tuple[BpSlamState, StepInfo]:  # fmt: skip
-    """Advance by one cycle: `dt` [s] since the last, `heading` [rad]. `code` and `rng` are there for the interface."""
+    """Advance by one cycle: `dt` [s] since the last, `heading` [rad]. `code` and `rng` are there for the interface.
+
+    Raises
+    ------
+    ConfigError
+        Time step or heading is no number.
+    """
+    check_step(dt, heading)
     config = told(config, state.sensor)
     state = _move(state, dt, np.full(state.course.axes, config.sigma_a), config)._replace(heading=float(heading))
     glance = glance_of(measurement, state.sensor.radio)

@@ -17,6 +17,7 @@ from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel, SlamEstimate
 from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los
+from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.schemes.bp_slam.association import Association
 from rislam_rt.slam.schemes.bp_slam.correct import absorb, is_strong
 from rislam_rt.slam.schemes.bp_slam.course import Course, advance, begin
@@ -84,7 +85,14 @@ def step(
     state: ChannelSlamState, measurement: Measurement, code: RisCode | None, dt: float, heading: float,
     config: ChannelSlamConfig, *, rng: np.random.Generator,
 ) -> tuple[ChannelSlamState, StepInfo]:  # fmt: skip
-    """Advance by one cycle: `dt` [s] since the last, `heading` [rad]. `code` and `rng` are there for the interface."""
+    """Advance by one cycle: `dt` [s] since the last, `heading` [rad]. `code` and `rng` are there for the interface.
+
+    Raises
+    ------
+    ConfigError
+        Time step or heading is no number.
+    """
+    check_step(dt, heading)
     state = _move(state, dt, config)._replace(heading=float(heading))
     glance = glance_of(measurement, state.sensor.radio)
     strong, free = is_strong(glance.ratio, config.specular_ratio), ~is_los(glance, state.body)

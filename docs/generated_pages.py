@@ -1,0 +1,68 @@
+"""Pages of the site that the program writes about itself: every command, every setting."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import typer
+from mkdocs.structure.files import File, Files
+
+from rislam_rt.cli.app import app
+from rislam_rt.pipeline.settings import Setting, list_settings
+from rislam_rt.pipeline.studies import load_any
+from rislam_rt.shipped import first_sentence, shipped_pipelines
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the pages before the site is put together."""
+    for name, lines in (("cli", cli_page()), ("settings", settings_page())):
+        files.append(File.generated(config, f"reference/{name}.md", content="\n".join(lines) + "\n"))
+    return files
+
+
+def cli_page() -> Iterator[str]:
+    """Every command with its arguments and options."""
+    yield "# Command line\n"
+    yield "`rislam-rt COMMAND --help` says the same. Exit codes: 0 done, 1 a failure in the work, 2 bad"
+    yield "input, 3 the machine lacks something, 4 the disk.\n"
+    group: Any = typer.main.get_command(app)
+    for name, command in group.commands.items():
+        context = command.context_class(command, info_name=f"rislam-rt {name}")
+        yield f"## {name}\n\n```\n{' '.join(command.get_usage(context).split())}\n```\n"
+        yield f"{command.help}\n"
+        yield "| argument | meaning |\n| --- | --- |"
+        for parameter in command.params:
+            record = parameter.get_help_record(context)
+            if record is not None:
+                yield f"| `{_cell(record[0])}` | {_cell(record[1])} |"
+        yield ""
+
+
+def settings_page() -> Iterator[str]:
+    """Every setting of every kind of pipeline, one section a kind."""
+    yield "# Settings\n"
+    yield "What a pipeline file may say. `rislam-rt config [PIPELINE]` prints the same as a file to edit,"
+    yield "`rislam-rt config --explain KEY` one of them; `--set KEY=VALUE` changes one on the command line.\n"
+    seen: set[type] = set()
+    for file in sorted(shipped_pipelines().values(), key=lambda file: file.stem != "trace_then_slam"):
+        model = type(load_any(file))
+        if model in seen:
+            continue
+        seen.add(model)
+        yield f"## {file.stem}\n\n{first_sentence(file)}\n"
+        yield "| setting | default | unit | allowed | meaning |\n| --- | --- | --- | --- | --- |"
+        yield from map(_row, list_settings(model))
+        yield ""
+
+
+def _row(one: Setting) -> str:
+    default = "required" if one.required else f"`{_short(one.default)}`"
+    return "| " + " | ".join((f"`{one.key}`", default, one.unit, *map(_cell, (one.allowed, one.meaning)))) + " |"
+
+
+def _short(value: Any) -> str:
+    text = "not set" if value is None else str(value) or '""'
+    return _cell(text if len(text) <= 40 else text[:37] + "...")
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|")

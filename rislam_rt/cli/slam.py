@@ -1,0 +1,174 @@
+"""`rislam-rt slam MEASUREMENTS`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, write_json
+from rislam_rt.shipped import find_pipeline
+
+if TYPE_CHECKING:
+    from rislam_rt.arrays import Floats
+    from rislam_rt.model import Body
+    from rislam_rt.pipeline.studies.unseen import Answers, Inputs
+    from rislam_rt.slam import StartPrior
+
+
+def command(
+    measurements: Annotated[
+        Path, typer.Argument(metavar="MEASUREMENTS", help="CSV or NetCDF file of components.", show_default=False)
+    ],
+    config: Annotated[
+        Path,
+        typer.Option(metavar="PIPELINE", help="Radio, receiver and filter, as for `run`.", parser=find_pipeline),
+    ] = MAIN_JOB,
+    set_: Settings = None,
+    start: Annotated[
+        str | None, typer.Option(metavar="X,Y,Z", help="Where the agent starts [m]; a NetCDF file brings its own.")
+    ] = None,
+    velocity: Annotated[str, typer.Option(metavar="X,Y,Z", help="Its first velocity [m/s].")] = "0,0,0",
+    tx: Annotated[
+        str | None, typer.Option(metavar="X,Y,Z", help="Tx from the agent's position [m], x forward, y left, z up.")
+    ] = None,
+    rx: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Centre of the Rx array, likewise.")] = None,
+    truth: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="True poses (TUM), one a cycle, for scoring alone.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="New folder for the estimate; <file>-slam by default.")
+    ] = None,
+    json: JsonFile = None,
+) -> None:
+    """Localise and map from measurements of your own: no scene is needed.
+
+    The columns of a CSV file are listed in docs/own_measurements.md; delays are in seconds, angles of arrival as
+    direction cosines or in radians, body frame. How well the start is known is set by start.position_std_m and
+    start.velocity_std_m_s.
+
+    Example: rislam-rt slam mine.csv --start 0.5,0.7,0.5 --set radio.noise_psd=1e-12 --set slam.use_vt=true
+    """
+    import numpy as np
+
+    from rislam_rt.pipeline import load_spec
+    from rislam_rt.pipeline.own import localise, read_inputs
+    from rislam_rt.pipeline.spec import build_radio
+
+    spec = load_spec(config, set_ or ())
+    prior = None if start is None else _prior(start, velocity, spec.start.position_std_m, spec.start.velocity_std_m_s)
+    inputs = read_inputs(measurements, prior, build_radio(spec.radio), _body(tx, rx))
+    true = None if truth is None else _true_positions(truth, len(inputs.time))
+    folder = _new_folder(out or Path(f"{measurements.stem}-slam"))
+    answers = localise(inputs, spec, rng=np.random.default_rng(spec.seed))
+    summary = _summary(inputs, answers, true)
+    _write(folder, inputs, answers)
+    for name, value in summary.items():
+        typer.echo(f"{name}: {value}")
+    typer.echo(f"folder: {folder}")
+    write_json(json, summary)
+
+
+def _prior(start: str, velocity: str, position_std: float, velocity_std: float) -> "StartPrior":
+    import numpy as np
+
+    from rislam_rt.slam import StartPrior
+
+    first, speed = _triple("--start", start), _triple("--velocity", velocity)
+    heading = float(np.arctan2(speed[1], speed[0])) if np.hypot(speed[0], speed[1]) > 0.0 else 0.0
+    return StartPrior(first, speed, heading, position_std, velocity_std)
+
+
+def _body(tx: str | None, rx: str | None) -> "Body | None":
+    """Where Tx and Rx sit; None if nothing is said."""
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.model import Body
+
+    if tx is None and rx is None:
+        return None
+    if tx is None or rx is None:
+        raise ConfigError("--tx, --rx: one alone received; give both")
+    return Body(_triple("--tx", tx), _triple("--rx", rx))
+
+
+def _triple(option: str, text: str) -> "Floats":
+    import numpy as np
+
+    from rislam_rt.errors import ConfigError
+
+    try:
+        values = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        values = np.zeros(0)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise ConfigError(f"{option}: '{text[:60]}' received; give three numbers, e.g. {option} 0.5,0.7,0.5")
+    return values
+
+
+def _true_positions(file: Path, cycles: int) -> "Floats":
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.scene.findings import Fault
+    from rislam_rt.scene.motion import parse_tum
+
+    try:
+        _, position, _ = parse_tum(file.read_bytes())
+    except OSError as error:
+        raise ConfigError(f"--truth {file}: cannot be read ({error.strerror}); give a TUM file") from None
+    except Fault as fault:
+        raise ConfigError(fault.at(f"--truth {file}", "").line) from None
+    if len(position) != cycles:
+        raise ConfigError(f"--truth {file}: {len(position)} poses for {cycles} cycles; give one a cycle")
+    return position
+
+
+def _new_folder(folder: Path) -> Path:
+    from rislam_rt.errors import ConfigError
+
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ConfigError(f"--out {folder}: exists and is not empty; give a new folder")
+    return folder
+
+
+def _summary(inputs: "Inputs", answers: "Answers", true: "Floats | None") -> dict[str, Any]:
+    import numpy as np
+
+    last = answers.estimates[-1]
+    outcomes = [str(info.outcome) for info in answers.infos]
+    found: dict[str, Any] = {
+        "cycles": len(inputs.time),
+        "components": sum(len(m) for m in inputs.measurements),
+        "ended": outcomes[-1],
+        "last_position_m": [round(float(value), 4) for value in last.position],
+        "deviation_m": float(np.sqrt(np.trace(last.covariance[:2, :2]))),
+        "landmarks": int(np.sum(last.map.parent < 0)),
+        "walls": len(last.map.wall_offset),
+        "panel_found": last.map.ris >= 0,
+        "ms_a_cycle": 1000.0 * answers.seconds,
+    }
+    if true is not None:
+        error = np.array([one.position for one in answers.estimates]) - true
+        found["rmse_m"] = float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
+    return found
+
+
+def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
+    """The estimate as TUM and as CSV, and the last map."""
+    import json
+
+    import numpy as np
+
+    from rislam_rt.pipeline.files import write_atomic
+    from rislam_rt.scene.write import tum_bytes
+
+    position = np.array([one.position for one in answers.estimates])
+    heading = np.array([one.heading for one in answers.estimates])
+    write_atomic(folder / "estimate.tum", tum_bytes(inputs.time, position, heading))
+    lines = ["time_s,x_m,y_m,z_m,std_x_m,std_y_m,std_z_m,heading_rad,components,outcome"]
+    for time, one, info, heard in zip(inputs.time, answers.estimates, answers.infos, inputs.measurements, strict=True):
+        std = np.sqrt(np.maximum(np.diag(one.covariance)[:3], 0.0))
+        numbers = [time, *one.position, *std, one.heading]
+        lines.append(",".join([*(f"{value:.9g}" for value in numbers), str(len(heard)), str(info.outcome)]))
+    write_atomic(folder / "estimate.csv", ("\n".join(lines) + "\n").encode())
+    last = answers.estimates[-1].map
+    fields = ("ident", "position", "covariance", "parent", "ris_probability", "strength", "wall_normal", "wall_offset")
+    content = {name: getattr(last, name).tolist() for name in (*fields, "wall_std")}
+    write_atomic(folder / "map.json", (json.dumps(content, indent=1) + "\n").encode())

@@ -1,0 +1,75 @@
+"""The files of a study in unseen rooms: page, CSV, JSON and figure, from the cells that there are."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.pipeline.files import write_atomic
+from rislam_rt.pipeline.studies.unseen.spec import UnseenSpec
+from rislam_rt.pipeline.sweeps import Row
+from rislam_rt.pipeline.sweeps.record import json_bytes, plain_result
+from rislam_rt.pipeline.sweeps.store import csv_bytes
+from rislam_rt.report.style import to_png
+from rislam_rt.report.unseen.cards import Run, by_series, card, class_cards, cycle_times, read_runs
+from rislam_rt.report.unseen.figure import draw_unseen
+from rislam_rt.report.unseen.page import about_lines, unseen_page
+
+
+def write_unseen(
+    rows: Sequence[Row], spec: UnseenSpec, record: Mapping[str, Any], folder: Path, *, tests: int,
+    timings: Sequence[Mapping[str, Any]], figures: bool = True,
+) -> Path | None:  # fmt: skip
+    """Write `<name>.md`, `.csv` (one row a run), `.json` and `figures/<name>.png`; returns the page, None without runs.
+
+    Parameters
+    ----------
+    tests
+        How often test rooms were run.
+    timings
+        Of the cells, as `sweeps.store.read_timings` gives them.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    runs = by_series(read_runs(rows))
+    if not any(run.scores for members in runs.values() for run in members):
+        return None
+    content = unseen_content(runs, timings)
+    figure = f"figures/{spec.name}.png" if figures else None
+    if figure is not None:
+        write_atomic(folder / figure, to_png(draw_unseen(runs)))
+    write_atomic(folder / f"{spec.name}.csv", csv_bytes(run_entries(runs)))
+    write_atomic(folder / f"{spec.name}.json", json_bytes(plain_result({**record, "tests": tests, **content})))
+    there = sum(row.state == "done" for row in rows)
+    about = about_lines(spec, record, tests, there, len(rows))
+    page = folder / f"{spec.name}.md"
+    write_atomic(page, unseen_page(content, runs, spec, about, figure).encode())
+    return page
+
+
+def unseen_content(runs: Mapping[str, Sequence[Run]], timings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Plain data: a card a series, and one a class of it."""
+    times = cycle_times(runs, timings)
+    cards = {name: {**card(members), "cycle_ms": times[name]} for name, members in runs.items()}
+    return {"cards": cards, "classes": {name: class_cards(members) for name, members in runs.items()}}
+
+
+def run_entries(runs: Mapping[str, Sequence[Run]]) -> list[dict[str, Any]]:
+    """One row a run: series, room, its classes, its scores with six digits."""
+    good = [run for members in runs.values() for run in members if run.scores]
+    names = list(dict.fromkeys(name for run in good for name in run.scores))
+    entries = []
+    for run in good:
+        scores = {name: _six(run.scores.get(name)) for name in names}
+        entries.append({"series": run.series, **{name: _six(value) for name, value in run.traits.items()}, **scores})
+    return entries
+
+
+def _six(value: Any) -> Any:
+    if isinstance(value, float):
+        return f"{value:.6g}" if np.isfinite(value) else ""
+    return "" if value is None else value

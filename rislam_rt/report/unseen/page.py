@@ -1,0 +1,200 @@
+"""The page of a study in unseen rooms."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rislam_rt.pipeline.studies.unseen.score import (
+    FAR_OVER,
+    GOOD_ANGLE,
+    GOOD_OFFSET,
+    HEARD,
+    LASTING,
+    LOST,
+    NEAR_POINT,
+    NEAR_WALL,
+    SETTLED,
+)
+from rislam_rt.pipeline.studies.unseen.spec import TEST, UnseenSpec
+from rislam_rt.report.swept.entries import NOTHING, paragraph, table_lines
+from rislam_rt.report.unseen.cards import Run
+
+MILLI = 1e3
+WORST = 12
+"""Runs that are listed by name."""
+
+
+def unseen_page(
+    content: Mapping[str, Any], runs: Mapping[str, Sequence[Run]], spec: UnseenSpec, about: Sequence[str],
+    figure: str | None,
+) -> str:  # fmt: skip
+    """Markdown."""
+    lines = ["# Unseen rooms", "", *about, "", *_meaning(), ""]
+    if figure is not None:
+        lines += [f"![Relative error of every run, by class of room and motion]({figure})", ""]
+    lines += ["## Score card", "", *card_table(content["cards"]), ""]
+    for name, cards in content["classes"].items():
+        lines += [f"## By class: {name}", "", *class_table(cards), ""]
+    lines += ["## Worst runs", "", *_worst(runs), "", "## Failures", "", *_failures(runs)]
+    return "\n".join(lines) + "\n"
+
+
+def card_table(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """One row a score, one column a series."""
+    rows = [[label, *(show(entry) for entry in cards.values())] for label, show in ROWS.items()]
+    return table_lines(["", *cards], rows)
+
+
+def class_table(cards: Sequence[Mapping[str, Any]]) -> list[str]:
+    """One row a class."""
+    head = ["class of", "", *COLUMNS]
+    return table_lines(
+        head, [[entry["division"], entry["class"], *(show(entry) for show in COLUMNS.values())] for entry in cards]
+    )
+
+
+def _meaning() -> list[str]:
+    text = """Errors of the agent's position, absolute and relative to the true start: the second is without the error
+    that the agent was told its start with, which no measurement of an unknown room can mend. Bounds are posterior
+    bounds of the same motion, codes and settings, with landmarks and walls unknown, the association known, and white
+    acceleration of the strength that the motion truly has; the relative one has the start as its origin. Ratios are
+    of root mean squares over a run. Given are medians over the rooms with their 95 % bootstrap intervals, and 95th
+    percentiles; shares with Wilson's intervals. Dead reckoning is the start's told velocity, kept."""
+    lost = f"""Lost is a run whose relative error exceeds {LOST:g} m and {FAR_OVER:g} relative bounds for {LASTING:g} s
+    on end; silently so, if no cycle from then on says that it diverged, and the error exceeds {FAR_OVER:g} of the
+    estimator's own deviations for as long. A wall or landmark counts as heard if a path of
+    it is above the detection threshold for {HEARD:g} s in all; walls in one plane are one. A wall is found if at the
+    end a plane of the map lies within {NEAR_WALL:g} m of it (RMS over its surface), one to one, and found well within
+    {GOOD_ANGLE:g} degree and {GOOD_OFFSET:g} m at its middle; a landmark, within {NEAR_POINT:g} m. Ghosts are what
+    stands for nothing. A birth is of the right kind if most components that the landmark got were of that kind. Delays
+    are medians from the first audible cycle to the first in which the map holds it."""
+    return [*paragraph(text), "", *paragraph(lost)]
+
+
+def about_lines(spec: UnseenSpec, record: Mapping[str, Any], tests: int, there: int, wanted: int) -> list[str]:
+    """Where the numbers come from."""
+    config = record["settings"]
+    unfinished = "" if there == wanted else f" Not complete: {there} of {wanted} cells."
+    purpose = "for tests" if spec.is_test else "for development"
+    counted = "never" if tests == 0 else "once" if tests == 1 else f"{tests} times"
+    text = f"""Rooms {spec.first} to {spec.first + spec.rooms - 1} ({purpose}), drawn at random each from its number:
+    shape, ceiling, size, materials, furniture, scatterers, panel and motion ([how](unseen_data.md)).
+    {config["cycles"] or "All"} cycles of 0.1 s, up to {config["depth"]} wall bounces. Written by
+    `rislam-rt run pipelines/unseen.toml`, do not edit. Code `{record["code"]}`.{unfinished}"""
+    count = f"""Test rooms (from {TEST} on) were run **{counted}**; every run of them is written into the ledger
+    `pipelines/{spec.ledger}`."""
+    return [*paragraph(text), "", *paragraph(count)]
+
+
+def _worst(runs: Mapping[str, Sequence[Run]]) -> list[str]:
+    """The runs farthest off, of all series."""
+    found = [(name, run) for name, members in runs.items() for run in members if run.scores]
+    found.sort(key=lambda item: -item[1].scores["relative_rmse_m"])
+    head = ["room", "series", "relative RMSE [m]", "bound [m]", "lost", "motion", "plan", "size [m]", "R", "panel"]
+    rows = []
+    for name, run in found[:WORST]:
+        scores, traits = run.scores, run.traits
+        lost = "silently" if scores["silent"] else "yes" if scores["lost"] else "no"
+        rows.append(
+            [str(run.room), name, f"{scores['relative_rmse_m']:.3f}", f"{scores['relative_bound_m']:.4f}", lost,
+             traits["motion"], traits["shape"], f"{traits['size']:.1f}", f"{traits['reflection']:.2f}",
+             traits["panel"]]
+        )  # fmt: skip
+    return table_lines(head, rows)
+
+
+def _failures(runs: Mapping[str, Sequence[Run]]) -> list[str]:
+    found = [(name, run) for name, members in runs.items() for run in members if run.failed]
+    if not found:
+        return ["None."]
+    return [f"- room {run.room}, {name}: {run.failed}" for name, run in found]
+
+
+def _median(name: str, scale: float = 1.0, digits: int = 2) -> Any:
+    """Median, its interval, and the 95th percentile."""
+
+    def show(entry: Mapping[str, Any]) -> str:
+        parts = [entry[name], entry[f"{name}_low"], entry[f"{name}_high"], entry[f"{name}_p95"]]
+        if parts[0] is None:
+            return NOTHING
+        value, low, high, p95 = (NOTHING if part is None else f"{scale * part:.{digits}f}" for part in parts)
+        return f"{value} ({low} to {high}); {p95}"
+
+    return show
+
+
+def _short(name: str, scale: float = 1.0, digits: int = 2) -> Any:
+    """Median and 95th percentile."""
+
+    def show(entry: Mapping[str, Any]) -> str:
+        if entry[name] is None:
+            return NOTHING
+        return f"{scale * entry[name]:.{digits}f}; {scale * entry[f'{name}_p95']:.{digits}f}"
+
+    return show
+
+
+def _share(name: str, between: bool = True) -> Any:
+    def show(entry: Mapping[str, Any]) -> str:
+        if entry[name] is None:
+            return NOTHING
+        text = f"{entry[name]:.0%}"
+        if between:
+            text += f" ({entry[f'{name}_low']:.0%} to {entry[f'{name}_high']:.0%})"
+        return f"{text} of {entry[f'{name}_of']}" if between else text
+
+    return show
+
+
+def _number(name: str, digits: int = 2) -> Any:
+    return lambda entry: NOTHING if entry[name] is None else f"{entry[name]:.{digits}f}"
+
+
+ROWS: dict[str, Any] = {
+    "runs (failed)": lambda entry: f"{entry['runs']} ({entry['failed']})",
+    "RMSE [mm]: median (interval); 95th percentile": _median("rmse_m", MILLI, 1),
+    "RMSE / bound": _median("ratio"),
+    "relative RMSE [mm]": _median("relative_rmse_m", MILLI),
+    "relative RMSE / relative bound": _median("relative_ratio"),
+    f"relative RMSE after {SETTLED:g} s [mm]": _median("late_relative_rmse_m", MILLI),
+    f"the same / relative bound after {SETTLED:g} s": _median("late_relative_ratio"),
+    "relative bound [mm]": _median("relative_bound_m", MILLI),
+    "dead reckoning [mm]": _median("dead_reckoning_m", MILLI, 0),
+    "NEES per degree of freedom": _median("nees"),
+    "NEES within 0.7 to 2": _share("consistent"),
+    "lost": _share("lost"),
+    "silently lost": _share("silent"),
+    "births a run": _number("births"),
+    "births of the right kind": _share("births_right"),
+    "walls found of those heard": _share("walls_found"),
+    "walls found well": _share("walls_good"),
+    "angle of those found [deg]": _median("wall_deg"),
+    "offset of those found [mm]": _median("wall_m", MILLI, 1),
+    "delay of walls [s]": _median("wall_delay_s"),
+    "landmarks found of those heard": _share("points_found"),
+    "error of those found [mm]": _median("point_m", MILLI, 1),
+    "delay of landmarks [s]": _median("point_delay_s"),
+    "panel found of those heard": _share("panel_found"),
+    "delay of the panel [s]": _median("panel_delay_s"),
+    "ghost walls a run": _number("ghost_walls"),
+    "ghost landmarks a run": _number("ghost_points"),
+    "GOSPA [m]": _median("gospa_m"),
+    "CPU time of the estimator a cycle [ms]": _number("cycle_ms", 1),
+}
+"""Scores of the whole card, in the page's words."""
+COLUMNS: dict[str, Any] = {
+    "runs": lambda entry: str(entry["runs"]),
+    "RMSE / bound": _short("ratio"),
+    "relative RMSE [mm]": _short("relative_rmse_m", MILLI, 1),
+    f"after {SETTLED:g} s [mm]": _short("late_relative_rmse_m", MILLI, 1),
+    "relative RMSE / bound": _short("relative_ratio", 1.0, 1),
+    "NEES": _short("nees"),
+    "lost": _share("lost", between=False),
+    "silently": _share("silent", between=False),
+    "right kind": _share("births_right", between=False),
+    "walls found": _share("walls_found", between=False),
+    "panel found": _share("panel_found", between=False),
+    "ghosts": lambda entry: NOTHING if entry["ghost_walls"] is None else (
+        f"{entry['ghost_walls'] + entry['ghost_points']:.1f}"
+    ),
+}  # fmt: skip
+"""Scores of a class."""

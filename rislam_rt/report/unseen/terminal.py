@@ -1,0 +1,25 @@
+"""The score card on the terminal."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from rislam_rt.pipeline.sweeps import Row
+from rislam_rt.report.unseen.cards import by_series, read_runs
+from rislam_rt.report.unseen.files import unseen_content
+from rislam_rt.report.unseen.page import ROWS
+
+
+def print_cards(rows: Sequence[Row], timings: Sequence[Mapping[str, Any]]) -> None:
+    """One column a series."""
+    cards = unseen_content(by_series(read_runs(rows)), timings)["cards"]
+    table = Table(title="median (95 % interval); 95th percentile")
+    table.add_column("score")
+    for name in cards:
+        table.add_column(name, justify="right")
+    for label, show in ROWS.items():
+        table.add_row(escape(label), *(show(entry) for entry in cards.values()))
+    Console().print(table, highlight=False)

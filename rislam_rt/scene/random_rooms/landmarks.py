@@ -1,0 +1,162 @@
+"""Scatterers and panel drawn at random: open, below the agent, or behind a screen; on any wall or in the ceiling."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.geometry.angles import unit
+from rislam_rt.model import RisPanel, RisSpec, Scatterer
+from rislam_rt.scene.check.probe import crossings
+from rislam_rt.scene.random_rooms.furniture import Ground, Piece, draw_piece, fits
+from rislam_rt.scene.random_rooms.plan import depth_inside
+from rislam_rt.scene.random_rooms.shell import ceiling_normal, wall_normal
+
+RADIUS = (0.03, 0.25)
+"""Range [m] of the scatterers' radii, log-uniform; each is a sphere of cross-section pi r^2."""
+PLACES = ("open", "below", "hidden")
+"""Where a scatterer is: anywhere, below the whole motion, or behind a screen for most of it."""
+SHARES = (0.6, 0.2, 0.2)
+"""How often each is asked for."""
+OFF_SURFACES, OFF_WAY, APART = 0.2, 0.45, 0.5
+"""Least distances [m] of a scatterer from surfaces, from the way and from other landmarks."""
+BELOW = 0.15
+"""[m] by which a scatterer lies below all of the motion."""
+BEHIND, TALLER = (0.35, 0.7), 0.4
+"""Range [m] of a screen's distance from what it hides, and by how much it is taller."""
+MOST = 0.6
+"""Least share of the motion from which a hidden scatterer is not seen over the straight line."""
+ELEMENTS = (4, 16)
+"""Range of a panel's elements along one side."""
+SQUARE = 0.6
+"""Share of panels that are square."""
+LEVELS, PATTERNS = (2, 4, 8), ("tang", "energy")
+"""Phase levels and element patterns, each as often."""
+SPACING = 0.015
+"""[m] half a wavelength at 10 GHz."""
+EDGE = 0.4
+"""Least distance [m] of a panel's centre from the edges of its wall or ceiling."""
+ABOVE = 0.3
+"""[m] by which a panel on a wall lies above the start: an array that looks up hears nothing from below."""
+_TRIES = 60
+
+
+class Found(NamedTuple):
+    """A scatterer's place, and the screen that hides it, if any."""
+
+    position: Floats
+    screen: Piece | None = None
+
+
+def draw_scatterer(
+    place: str, ground: Ground, pieces: list[Piece], landmarks: Floats, *, rng: np.random.Generator
+) -> Found | None:
+    """A place of one of `PLACES` for a scatterer; None where the room has none."""
+    low, high = ground.outline.min(axis=0), ground.outline.max(axis=0)
+    lowest = float(ground.way[:, 2].min())
+    for _ in range(_TRIES):
+        flat = rng.uniform(low, high)
+        roof = float(ground.roof.height(flat)) - OFF_SURFACES
+        bottom, top = (OFF_SURFACES, lowest - BELOW) if place == "below" else (OFF_SURFACES, roof)
+        if place == "hidden":
+            bottom, top = lowest + BELOW, min(roof, lowest + 1.2)
+        if top < bottom:
+            continue
+        point = np.array([*flat, rng.uniform(bottom, top)])
+        if not _is_free(point, ground, pieces, landmarks):
+            continue
+        if place != "hidden":
+            return Found(point)
+        screen = _screen_before(point, ground, rng)
+        clear = not any(screen.holds(mark, OFF_SURFACES) for mark in [*landmarks, point])
+        if clear and fits(screen, ground, pieces) and hidden_share(point, ground.way, [*pieces, screen]) >= MOST:
+            return Found(point, screen)
+    return None
+
+
+def hidden_share(point: Floats, way: Floats, pieces: list[Piece]) -> float:
+    """Share of a way (K, 3), every tenth of it looked at, from which pieces hide a point (3,)."""
+    seen_from = way[::10]
+    triangles = [mesh.vertices[mesh.faces] for mesh in (piece.mesh() for piece in pieces)]
+    if not triangles:
+        return 0.0
+    cycles, _ = crossings(seen_from, np.broadcast_to(point, seen_from.shape), np.concatenate(triangles))
+    return len(np.unique(cycles)) / len(seen_from)
+
+
+def make_scatterer(number: int, position: Floats, *, rng: np.random.Generator) -> Scatterer:
+    """A sphere of random radius."""
+    radius = float(np.exp(rng.uniform(*np.log(RADIUS))))
+    return Scatterer(f"sphere_{number}", position, float(np.pi * radius**2), radius)
+
+
+def draw_panel(
+    side: str, ground: Ground, pieces: list[Piece], landmarks: Floats, *, rng: np.random.Generator
+) -> RisPanel | None:
+    """A panel on a `wall` or in the `ceiling`; None where there is no room for its centre."""
+    for _ in range(_TRIES):
+        found = _on_wall(ground, rng) if side == "wall" else _in_ceiling(ground, rng)
+        if found is None:
+            continue
+        host, center, normal, up = found
+        apart = np.linalg.norm(landmarks - center, axis=1).min(initial=np.inf) >= APART
+        if apart and not any(piece.holds(center, OFF_SURFACES) for piece in pieces):
+            return RisPanel(_data_sheet(normal, up, rng), center, host)
+    return None
+
+
+def _data_sheet(normal: Floats, up: Floats, rng: np.random.Generator) -> RisSpec:
+    rows, cols = rng.integers(ELEMENTS[0], ELEMENTS[1] + 1, size=2)
+    if rng.uniform() < SQUARE:
+        cols = rows
+    levels, element = int(rng.choice(LEVELS)), str(rng.choice(PATTERNS))
+    return RisSpec(int(rows), int(cols), np.array([SPACING, SPACING]), normal, up, levels, element)
+
+
+def _on_wall(ground: Ground, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
+    """Host, centre, normal and up: a wall, longer ones more often, above the start and below its upper edge."""
+    outline = ground.outline
+    along = np.roll(outline, -1, axis=0) - outline
+    length = np.linalg.norm(along, axis=1)
+    number = int(rng.choice(len(outline), p=length / length.sum()))
+    share = rng.uniform()
+    if min(share, 1.0 - share) * length[number] < EDGE:
+        return None
+    foot = outline[number] + share * along[number]
+    ends = np.array([outline[number], foot, outline[(number + 1) % len(outline)]])
+    low, high = float(ground.way[0, 2]) + ABOVE, float(ground.roof.height(ends).min()) - EDGE
+    if high < low:
+        return None
+    return f"wall_{number}", np.array([*foot, rng.uniform(low, high)]), wall_normal(outline, number), np.eye(3)[2]
+
+
+def _in_ceiling(ground: Ground, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
+    outline, roof = ground.outline, ground.roof
+    flat = rng.uniform(outline.min(axis=0), outline.max(axis=0))
+    ridge = (flat - roof.point) @ roof.axis
+    if depth_inside(outline, flat) < EDGE or (roof.form == "gable" and abs(ridge) < EDGE):
+        return None
+    host = "ceiling" if roof.form != "gable" else "ceiling_a" if ridge > 0.0 else "ceiling_b"
+    normal = ceiling_normal(roof, flat)
+    angle = rng.uniform(-np.pi, np.pi)
+    level = np.array([np.cos(angle), np.sin(angle), 0.0])
+    up = unit(level - (level @ normal) * normal)
+    return host, np.array([*flat, roof.height(flat)]), normal, unit(up - (up @ normal) * normal)
+
+
+def _screen_before(point: Floats, ground: Ground, rng: np.random.Generator) -> Piece:
+    """A screen across the line from a point to the middle of the way."""
+    toward = unit(ground.way[len(ground.way) // 2, :2] - point[:2])
+    center = point[:2] + rng.uniform(*BEHIND) * toward
+    screen = draw_piece("screen", center, float(np.arctan2(toward[1], toward[0]) + np.pi / 2.0), rng=rng)
+    return screen._replace(top=max(screen.top, float(point[2]) + TALLER))
+
+
+def _is_free(point: Floats, ground: Ground, pieces: list[Piece], landmarks: Floats) -> bool:
+    if float(depth_inside(ground.outline, point[:2])) < OFF_SURFACES:
+        return False
+    if any(piece.holds(point, OFF_SURFACES) for piece in pieces):
+        return False
+    if np.linalg.norm(landmarks - point, axis=1).min(initial=np.inf) < APART:
+        return False
+    return bool(np.linalg.norm(ground.way - point, axis=1).min() >= OFF_WAY)

@@ -1,0 +1,149 @@
+"""Motions drawn at random: speed, rates of turn and of climb over time, integrated from a start that keeps clear."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.errors import SceneError
+from rislam_rt.geometry.angles import wrap
+from rislam_rt.model import Body, Trajectory
+from rislam_rt.scene.random_rooms.plan import depth_inside
+from rislam_rt.scene.random_rooms.shell import Roof
+
+MOTIONS = ("straight", "curve", "corner", "stop", "turn", "climb")
+"""Kinds of motion."""
+CYCLES, CYCLE = 300, 0.1
+"""Length of a motion, and time [s] between cycles: half a minute."""
+SPEED, SLOWEST = (0.05, 0.6), 0.01
+"""Range of speeds [m/s], log-uniform; in a room too small for a draw it is slowed down, no further than to this."""
+OFF_WALLS, BELOW_CEILING = 0.45, 0.6
+"""Least distances [m] of a motion from the walls and from the ceiling."""
+HEIGHT, CLIMB = (0.3, 1.6), (0.3, 0.9)
+"""Ranges [m] of the height at the start, and of a climb or descent."""
+WANDER = 0.12
+"""Standard deviation [rad/s] of the rate of turn of a curve."""
+CORNER, CORNER_TIME = (0.9, 2.2), 0.5
+"""Range [rad] of the turn at a corner, and the time [s] that it takes."""
+STANDING, WALKING, BRAKING = (1.0, 3.0), (2.0, 6.0), 0.6
+"""Ranges [s] of a stop and of the way between two, and the time [s] to brake or set off."""
+SPIN = (1.0, 3.0)
+"""Range [rad] of a turn on the spot."""
+_STARTS, _SLOWER = 64, 0.8
+
+
+class Course(NamedTuple):
+    """A motion about its start: shares of the speed, rates of turn [rad/s] and of climb [m/s], (K,) each."""
+
+    pace: Floats
+    turn: Floats
+    climb: Floats
+
+
+def draw_course(kind: str, *, rng: np.random.Generator) -> Course:
+    """A course of one of `MOTIONS`."""
+    time = _times()
+    still, steady = np.zeros(CYCLES), np.ones(CYCLES)
+    if kind == "straight":
+        return Course(steady, still, still)
+    if kind == "corner":
+        return Course(steady, _corners(time, rng), still)
+    if kind in ("stop", "turn"):
+        pace, stops = _stop_and_go(time, rng)
+        turn = 0.5 * _wander(time, rng)
+        return Course(pace, _spins(time, stops, rng) if kind == "turn" else turn * pace, still)
+    wander = _wander(time, rng)
+    return Course(steady, wander, _climb(time, rng) if kind == "climb" else still)
+
+
+def draw_motion(outline: Floats, roof: Roof, course: Course, *, rng: np.random.Generator) -> Trajectory:
+    """A course laid into a plan from a random start at a random speed, heading along the motion.
+
+    Raises
+    ------
+    SceneError
+        There is no room for it even at the slowest.
+    """
+    heading = CYCLE * np.cumsum(course.turn)
+    rise = CYCLE * (np.cumsum(course.climb) - course.climb)
+    steps = CYCLE * course.pace[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    shape = np.concatenate([np.zeros((1, 2)), np.cumsum(steps[:-1], axis=0)])
+    speed = float(np.exp(rng.uniform(*np.log(SPEED))))
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    while speed >= SLOWEST:
+        start = rng.uniform(low, high, size=(_STARTS, 2))
+        yaw = rng.uniform(-np.pi, np.pi, size=_STARTS)
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        turn = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
+        place = start[:, None] + speed * np.einsum("sij,kj->ski", turn, shape)
+        coarse = depth_inside(outline, place[:, ::10]).min(axis=1)
+        for number in np.flatnonzero(coarse >= OFF_WALLS):
+            height = _start_height(roof, place[number], rise, rng)
+            if height is not None and depth_inside(outline, place[number]).min() >= OFF_WALLS:
+                position = np.column_stack([place[number], height + rise])
+                angle = np.asarray(wrap(yaw[number] + heading))
+                velocity = np.column_stack(
+                    [speed * course.pace[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1), course.climb]
+                )
+                return Trajectory(_times(), position, velocity, angle, Body())
+        speed *= _SLOWER
+    raise SceneError("no room for a motion; draw another plan")
+
+
+def _times() -> Floats:
+    """(K,) [s]."""
+    return CYCLE * np.arange(CYCLES, dtype=np.float64)
+
+
+def _start_height(roof: Roof, place: Floats, rise: Floats, rng: np.random.Generator) -> float | None:
+    """Height [m] at the start: the whole motion stays between the lowest height and the ceiling."""
+    room = roof.height(place) - BELOW_CEILING - rise
+    low, high = HEIGHT[0] - min(0.0, float(rise.min())), min(HEIGHT[1], float(room.min()))
+    return None if high < low else float(rng.uniform(low, high))
+
+
+def _wander(time: Floats, rng: np.random.Generator) -> Floats:
+    """A smooth rate of turn: three sines of 6 to 20 s and a mean."""
+    period, phase = rng.uniform(6.0, 20.0, size=3), rng.uniform(0.0, 2.0 * np.pi, size=3)
+    weight = rng.standard_normal(4) * WANDER * np.array([0.6, 0.6, 0.6, 0.5])
+    waves = np.sin(2.0 * np.pi * time[:, None] / period + phase)
+    return np.asarray(waves @ weight[:3] + weight[3])
+
+
+def _corners(time: Floats, rng: np.random.Generator) -> Floats:
+    """Turns at random times, 4 to 10 s apart."""
+    rate, at = np.zeros(len(time)), rng.uniform(2.0, 6.0)
+    while at < time[-1]:
+        turn = rng.uniform(*CORNER) * rng.choice([-1.0, 1.0])
+        rate[(time >= at) & (time < at + CORNER_TIME - 1e-9)] = turn / CORNER_TIME
+        at += rng.uniform(4.0, 10.0)
+    return rate
+
+
+def _stop_and_go(time: Floats, rng: np.random.Generator) -> tuple[Floats, list[tuple[float, float]]]:
+    """Shares of the speed, and from when to when the agent stands."""
+    pace, stops, at = np.ones(len(time)), [], rng.uniform(*WALKING)
+    while at < time[-1]:
+        end = at + rng.uniform(*STANDING)
+        ramp = np.maximum(np.maximum(at - time, time - end) / BRAKING, 0.0)
+        pace = np.minimum(pace, ramp)
+        stops.append((at, end))
+        at = end + BRAKING + rng.uniform(*WALKING)
+    return np.clip(pace, 0.0, 1.0), stops
+
+
+def _spins(time: Floats, stops: list[tuple[float, float]], rng: np.random.Generator) -> Floats:
+    """A turn in every stop, at a constant rate over all of it."""
+    rate = np.zeros(len(time))
+    for begin, end in stops:
+        angle = rng.uniform(*SPIN) * rng.choice([-1.0, 1.0])
+        rate[(time >= begin) & (time < end)] = angle / (end - begin)
+    return rate
+
+
+def _climb(time: Floats, rng: np.random.Generator) -> Floats:
+    """One rise or fall over 4 to 10 s, its rate a raised cosine."""
+    begin, length = rng.uniform(2.0, 8.0), rng.uniform(4.0, 10.0)
+    share = np.clip((time - begin) / length, 0.0, 1.0)
+    height = rng.uniform(*CLIMB) * rng.choice([-1.0, 1.0])
+    return np.asarray(height / length * (1.0 - np.cos(2.0 * np.pi * share)))

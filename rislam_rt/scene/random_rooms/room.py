@@ -1,0 +1,173 @@
+"""A whole room from one integer: plan, shell, motion, furniture, scatterers, panel, materials."""
+
+import hashlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.errors import SceneError
+from rislam_rt.model import Material, Reflector, RisPanel, Scatterer, Scene, Trajectory
+from rislam_rt.scene.check import find_errors
+from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.random_rooms.furniture import Ground, Piece, draw_pieces
+from rislam_rt.scene.random_rooms.landmarks import (
+    MOST,
+    PLACES,
+    SHARES,
+    draw_panel,
+    draw_scatterer,
+    hidden_share,
+    make_scatterer,
+)
+from rislam_rt.scene.random_rooms.motion import MOTIONS, draw_course, draw_motion
+from rislam_rt.scene.random_rooms.plan import SHAPES, area, draw_plan, extent
+from rislam_rt.scene.random_rooms.shell import CEILINGS, build_shell, draw_roof
+
+SHAPE_SHARES = (0.4, 0.2, 0.2, 0.2)
+"""How often each of `SHAPES` is drawn."""
+REFLECTION, FURNITURE_REFLECTION = (0.2, 0.9), (0.2, 0.8)
+"""Ranges of the reflection coefficients of walls and of furniture."""
+ALIKE = 0.5
+"""Share of rooms whose walls are all of one coefficient; else each has its own."""
+MAX_PIECES, MAX_SCATTERERS = 6, 6
+PER_PIECE = 3.0
+"""Area [m^2] for each piece of furniture."""
+PANEL, CEILING_PANEL = 0.7, 0.4
+"""Share of rooms with a panel, and of panels in the ceiling."""
+_TRIES = 200
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RandomRoom:
+    """A room, and the classes that it belongs to."""
+
+    scene: Scene
+    seed: int
+    shape: str
+    ceiling: str
+    motion: str
+    size: float
+    """Longest way across the plan [m]."""
+    reflection: float
+    """Mean over walls and ceiling."""
+    pieces: int
+    """Of furniture."""
+    below: int
+    """Scatterers below all of the motion."""
+    hidden: int
+    """Scatterers not seen over the straight line, because of furniture, from `MOST` of the motion."""
+    panel: str
+    """`none`, `ceiling` or `wall`."""
+    speed: float
+    """Mean over the motion [m/s]."""
+
+
+def draw_room(seed: int) -> RandomRoom:
+    """The room of a seed, the same to the last bit on every call; it passes the scene check.
+
+    Shape, ceiling, motion and whether there is a panel are drawn once; all else is drawn anew until it fits together,
+    so that what is hard to fit is no rarer for it.
+
+    Raises
+    ------
+    SceneError
+        The seed is negative, or nothing fits.
+    """
+    if seed < 0:
+        raise SceneError(f"seed: {seed} received; give a number that is not negative")
+    rng = np.random.default_rng([seed, 0])
+    shape, motion = str(rng.choice(SHAPES, p=SHAPE_SHARES)), str(rng.choice(MOTIONS))
+    ceiling = str(rng.choice(CEILINGS if shape == "convex" else CEILINGS[:2]))
+    panel = "none" if rng.uniform() >= PANEL else "ceiling" if rng.uniform() < CEILING_PANEL else "wall"
+    for attempt in range(1, _TRIES):
+        try:
+            room = _attempt(seed, shape, ceiling, motion, panel, rng=np.random.default_rng([seed, attempt]))
+        except SceneError:
+            continue
+        if not find_errors(room.scene, room.scene.name):
+            return room
+    raise SceneError(f"seed: {seed}: nothing fits in {_TRIES} draws; take another seed")
+
+
+def _attempt(seed: int, shape: str, ceiling: str, motion: str, panel: str, *, rng: np.random.Generator) -> RandomRoom:
+    outline = draw_plan(shape, rng=rng)
+    roof = draw_roof(outline, ceiling, rng=rng)
+    agent = draw_motion(outline, roof, draw_course(motion, rng=rng), rng=rng)
+    ground = Ground(outline, roof, agent.position)
+    most = min(MAX_PIECES, int(area(outline) / PER_PIECE))
+    pieces = draw_pieces(ground, int(rng.integers(0, most + 1)), rng=rng)
+    landmarks, ris = _landmarks(ground, pieces, panel, rng)
+    shell = build_shell(outline, roof)
+    reflectors = _reflectors(shell, pieces, rng)
+    if not landmarks or (panel != "none" and ris is None):
+        raise SceneError("no room for what is asked for; draw another plan")
+    name = f"random_{seed}"
+    scene = Scene(name, reflectors, tuple(landmarks), ris, agent)
+    points = [scatterer.position for scatterer in landmarks]
+    lowest = float(agent.position[:, 2].min())
+    return RandomRoom(
+        scene=replace(scene, digest=scene_digest(scene)),
+        seed=seed,
+        shape=shape,
+        ceiling=ceiling,
+        motion=motion,
+        size=extent(outline),
+        reflection=float(np.mean([r.material.reflection for r in reflectors[: len(shell)]])),
+        pieces=len(pieces),
+        below=sum(float(point[2]) < lowest for point in points),
+        hidden=sum(hidden_share(point, agent.position, pieces) >= MOST for point in points),
+        panel=panel,
+        speed=float(np.linalg.norm(agent.velocity, axis=1).mean()),
+    )
+
+
+def _landmarks(
+    ground: Ground, pieces: list[Piece], panel: str, rng: np.random.Generator
+) -> tuple[list[Scatterer], RisPanel | None]:
+    """Scatterers, as many as fit, and the panel; screens that hide something join the pieces."""
+    positions = np.zeros((0, 3))
+    ris = None if panel == "none" else draw_panel(panel, ground, pieces, positions, rng=rng)
+    marks = positions if ris is None else ris.center[None]
+    for place in rng.choice(PLACES, p=SHARES, size=int(rng.integers(1, MAX_SCATTERERS + 1))):
+        found = draw_scatterer(str(place), ground, pieces, np.concatenate([marks, positions]), rng=rng)
+        if found is not None:
+            positions = np.concatenate([positions, found.position[None]])
+            pieces += [found.screen] if found.screen is not None else []
+    scatterers = [make_scatterer(number, point, rng=rng) for number, point in enumerate(positions)]
+    return scatterers, ris
+
+
+def _reflectors(shell: dict[str, Mesh], pieces: list[Piece], rng: np.random.Generator) -> tuple[Reflector, ...]:
+    """Walls and furniture with their materials."""
+    common = float(rng.uniform(*REFLECTION))
+    own = rng.uniform(*REFLECTION, size=len(shell))
+    walls = np.full(len(shell), common) if rng.uniform() < ALIKE else own
+    meshes = [*shell.items(), *((f"{piece.kind}_{number}", piece.mesh()) for number, piece in enumerate(pieces))]
+    reflection = [*walls, *rng.uniform(*FURNITURE_REFLECTION, size=len(pieces))]
+    return tuple(
+        Reflector(name, mesh.vertices, mesh.faces, Material(reflection=float(share)))
+        for (name, mesh), share in zip(meshes, reflection, strict=True)
+    )
+
+
+def scene_digest(scene: Scene) -> str:
+    """SHA-256 over all numbers of a scene that was made in memory; the room of a file has that of its files."""
+    digest = hashlib.sha256()
+
+    def take(name: str, *arrays: Floats) -> None:
+        digest.update(f"{name}\0".encode())
+        for array in arrays:
+            digest.update(np.ascontiguousarray(array).tobytes())
+
+    for reflector in scene.reflectors:
+        take(f"{reflector.name} {reflector.material}", reflector.vertices, reflector.faces)
+    for scatterer in scene.scatterers:
+        take(f"{scatterer.name} {scatterer.rcs!r}", scatterer.position)
+    if scene.ris is not None:
+        spec = scene.ris.spec
+        take(f"{spec.rows} {spec.cols} {spec.levels} {spec.element} {scene.ris.host}", scene.ris.center)
+        take("panel", spec.normal, spec.up, spec.spacing)
+    agent: Trajectory = scene.agent
+    take("agent", agent.time, agent.position, agent.velocity, agent.heading)
+    return digest.hexdigest()

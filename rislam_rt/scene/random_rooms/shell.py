@@ -1,0 +1,103 @@
+"""Floor, walls and ceiling over a plan."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.geometry.angles import unit
+from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.random_rooms.plan import extent, halve, triangulate
+
+CEILINGS = ("flat", "shed", "gable")
+"""Forms of a ceiling: level, one slope, two slopes (over convex plans)."""
+LOWEST = (2.2, 6.0)
+"""Range [m] of the height at the lowest wall, log-uniform; a small room is at most `SLENDER` times as high as wide."""
+SLENDER, RISE, STEEPEST = 1.3, (0.3, 5.0), 0.5
+"""Range [m] by which a sloped ceiling rises, log-uniform, and its largest slope."""
+
+
+class Roof(NamedTuple):
+    """Height of the ceiling: `top - slope * |axis . (x - point)|` for a gable, `low + slope * ...` for a shed."""
+
+    form: str
+    lowest: float
+    """[m] at the lowest wall."""
+    slope: float
+    axis: Floats
+    """(2,) horizontal unit vector along which it rises."""
+    point: Floats
+    """(2,) on the line where a gable is highest and a shed lowest."""
+    highest: float
+
+    def height(self, points: Floats) -> Floats:
+        """(...,) [m] over points (..., 2)."""
+        along = (points - self.point) @ self.axis
+        if self.form == "gable":
+            return np.asarray(self.highest - self.slope * np.abs(along))
+        return np.asarray(self.lowest + self.slope * along)
+
+
+def draw_roof(outline: Floats, form: str, *, rng: np.random.Generator) -> Roof:
+    """A ceiling of one of `CEILINGS` over a plan."""
+    width = extent(outline)
+    lowest = min(float(np.exp(rng.uniform(*np.log(LOWEST)))), max(LOWEST[0], SLENDER * width))
+    angle = rng.uniform(-np.pi, np.pi)
+    axis = np.array([np.cos(angle), np.sin(angle)])
+    along = outline @ axis
+    rise = 0.0 if form == "flat" else float(np.exp(rng.uniform(*np.log(RISE))))
+    run = np.ptp(along)
+    if form == "gable":
+        share = rng.uniform(0.35, 0.65)
+        point = axis * (along.min() + share * run)
+        run = max(share, 1.0 - share) * run
+    else:
+        point = axis * along.min()
+    slope = min(rise / run, STEEPEST)
+    return Roof(form, lowest, float(slope), axis, point, lowest + float(slope * run))
+
+
+def build_shell(outline: Floats, roof: Roof) -> dict[str, Mesh]:
+    """Meshes by name, normals inwards: `floor`, `ceiling` (a gable has `ceiling_a` and `ceiling_b`), `wall_0`, ..."""
+    faces = triangulate(outline)
+    meshes = {"floor": Mesh(_lifted(outline, np.zeros(len(outline))), faces)}
+    if roof.form == "gable":
+        for name, side in (("ceiling_a", 1.0), ("ceiling_b", -1.0)):
+            part = halve(outline, roof.point, side * roof.axis)
+            meshes[name] = Mesh(_lifted(part, roof.height(part)), triangulate(part)[:, ::-1])
+    else:
+        meshes["ceiling"] = Mesh(_lifted(outline, roof.height(outline)), faces[:, ::-1])
+    for number, (a, b) in enumerate(zip(outline, np.roll(outline, -1, axis=0), strict=True)):
+        meshes[f"wall_{number}"] = _wall(a, b, roof)
+    return meshes
+
+
+def wall_normal(outline: Floats, number: int) -> Floats:
+    """(3,) unit normal of a wall, into the room."""
+    along = outline[(number + 1) % len(outline)] - outline[number]
+    return unit(np.array([-along[1], along[0], 0.0]))
+
+
+def ceiling_normal(roof: Roof, point: Floats) -> Floats:
+    """(3,) unit normal of the ceiling over a point (2,), downwards."""
+    rising = -np.sign((point - roof.point) @ roof.axis) if roof.form == "gable" else 1.0
+    return unit(np.array([*(rising * roof.slope * roof.axis), -1.0]))
+
+
+def _wall(a: Floats, b: Floats, roof: Roof) -> Mesh:
+    """A strip from the floor to the ceiling, with a corner more where a ridge meets it."""
+    feet = [a, b]
+    near, far = ((p - roof.point) @ roof.axis for p in (a, b))
+    if roof.form == "gable" and near * far < 0.0:
+        feet.insert(1, a + near / (near - far) * (b - a))
+    foot = np.array(feet)
+    count = len(foot)
+    vertices = np.concatenate([_lifted(foot, np.zeros(count)), _lifted(foot, roof.height(foot))])
+    k = np.arange(count - 1)
+    low = np.stack([k + 1, k, k + count], axis=-1)
+    high = np.stack([k + 1, k + count, k + count + 1], axis=-1)
+    return Mesh(vertices, np.concatenate([low, high]))
+
+
+def _lifted(points: Floats, height: Floats) -> Floats:
+    return np.column_stack([points, height])

@@ -1,0 +1,28 @@
+"""TOML from people who may be mistaken, or mean harm: one kind of exception, and no text that takes minutes."""
+
+import re
+import tomllib
+from typing import Any
+
+MAX_LEVELS = 100
+"""Tables within tables that a dotted key may name; the time that a longer one takes grows with its square."""
+
+_LONG_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+)""" + f"{{{MAX_LEVELS}}}")
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """The table of a TOML text.
+
+    Raises
+    ------
+    ValueError
+        It is not TOML, or is nested too deeply; the message says where.
+    """
+    long_key = _LONG_KEY.search(text)
+    if long_key is not None:
+        line = text.count("\n", 0, long_key.start()) + 1
+        raise ValueError(f"a key of more than {MAX_LEVELS} parts (at line {line}); take shorter ones")
+    try:
+        return tomllib.loads(text)
+    except (RecursionError, OverflowError) as error:
+        raise ValueError(f"nested too deeply, or a number too long ({type(error).__name__})") from None

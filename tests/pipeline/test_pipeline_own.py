@@ -1,0 +1,150 @@
+"""Measurements of one's own: the same answer as in the run they came from, and a clear line for a wrong unit."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rislam_rt
+from rislam_rt.cli.slam import command
+from rislam_rt.errors import ConfigError
+from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline.estimators import ESTIMATORS
+from rislam_rt.pipeline.own import inputs_of, localise
+from rislam_rt.pipeline.spec import PipelineSpec, build_radio
+from rislam_rt.pipeline.studies.unseen import Inputs, Recorder
+from rislam_rt.scene.write import tum_bytes
+from rislam_rt.shipped import find_pipeline
+from rislam_rt.slam import StartPrior
+
+CYCLES = 40
+CHANGES = [f"cycles={CYCLES}", "channel=image_source", "depth=1", "schemes=['no_ris']", "slam.use_vt=true"]
+Table = dict[str, list[float]]
+
+
+@pytest.fixture(scope="module")
+def spec() -> PipelineSpec:
+    return load_spec(find_pipeline("trace_then_slam"), CHANGES)
+
+
+@pytest.fixture(scope="module")
+def recorded(spec: PipelineSpec) -> tuple[Inputs, np.ndarray]:
+    """What the filter was given in a run, and where it held itself to be."""
+    recorder, own = Recorder(ESTIMATORS["slam"]), ESTIMATORS["slam"]
+    ESTIMATORS["slam"] = recorder.estimator
+    try:
+        result = rislam_rt.run_slam(rislam_rt.load_scene("paper_room"), spec, rng=np.random.default_rng(spec.seed))
+    finally:
+        ESTIMATORS["slam"] = own
+    return recorder.inputs, result.schemes["no_ris"].position
+
+
+@pytest.fixture
+def table(recorded: tuple[Inputs, np.ndarray]) -> Table:
+    inputs, _ = recorded
+    names = "time_s heading_rad delay_s cos_x cos_y amplitude delay_std_s cos_x_std cos_y_std amplitude_std"
+    rows = [
+        (t, h, m.tau[k], *m.cosines[k], m.amplitude[k], m.tau_std[k], *m.cosines_std[k], m.amplitude_std[k])
+        for t, h, m in zip(inputs.time, inputs.heading, inputs.measurements, strict=True)
+        for k in range(len(m))
+    ]
+    return {
+        name: [float(v) for v in column] for name, column in zip(names.split(), zip(*rows, strict=True), strict=True)
+    }
+
+
+def test_from_a_file_comes_the_answer_of_the_run(
+    recorded: tuple[Inputs, np.ndarray], table: Table, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    inputs, position = recorded
+    file, poses = tmp_path / "mine.csv", tmp_path / "true.tum"
+    with file.open("w", newline="") as lines:
+        writer = csv.writer(lines)
+        writer.writerow(table)
+        writer.writerows(zip(*table.values(), strict=True))
+    true = rislam_rt.load_scene("paper_room").agent[:CYCLES]
+    poses.write_bytes(tum_bytes(true.time, true.position, true.heading))
+    told = (inputs.start.position, inputs.start.velocity, inputs.body.tx_offset, inputs.body.rx_offset)
+    start, speed, tx, rx = (",".join(map(repr, map(float, v))) for v in told)
+    pipeline = find_pipeline("trace_then_slam")
+    command(
+        file,
+        pipeline,
+        set_=CHANGES,
+        start=start,
+        velocity=speed,
+        tx=tx,
+        rx=rx,
+        truth=poses,
+        out=tmp_path / "out",
+        json=tmp_path / "said.json",
+    )
+    said = capsys.readouterr().out
+    assert f"cycles: {CYCLES}" in said
+    assert "rmse_m: " in said
+    with (tmp_path / "out" / "estimate.csv").open() as lines:
+        rows = list(csv.DictReader(lines))
+    found = np.array([[float(row[name]) for name in ("x_m", "y_m", "z_m")] for row in rows])
+    # nine digits in the file; the run's own deviations pass through the table unrounded
+    np.testing.assert_allclose(found, position, rtol=1e-8)
+    with pytest.raises(ConfigError, match="not empty; give a new folder"):
+        command(file, pipeline, set_=CHANGES, start=start, out=tmp_path / "out")
+
+
+def test_snr_and_angles_say_the_same_as_amplitudes_and_cosines(
+    recorded: tuple[Inputs, np.ndarray], table: Table, spec: PipelineSpec
+) -> None:
+    inputs, _ = recorded
+    radio, body = build_radio(spec.radio), inputs.body
+    x, y = np.array(table["cos_x"]), np.array(table["cos_y"])
+    inside = np.hypot(x, y) < 1.0
+    rows = {name: np.array(column)[inside] for name, column in table.items()}
+    plain = inputs_of(rows, inputs.start, radio, body)
+    other = {name: rows[name] for name in ("time_s", "heading_rad", "delay_s", "delay_std_s", "cos_x_std", "cos_y_std")}
+    other["theta_r_rad"], other["phi_r_rad"] = np.arcsin(np.hypot(x, y)[inside]), np.arctan2(y, x)[inside]
+    other["snr_db"] = 10.0 * np.log10(radio.integrated_snr(rows["amplitude"]))
+    again = inputs_of(other, inputs.start, radio, body)
+    for one, two in zip(plain.measurements, again.measurements, strict=True):
+        np.testing.assert_allclose(two.cosines, one.cosines, atol=1e-12)
+        np.testing.assert_allclose(two.amplitude, one.amplitude, rtol=1e-12)
+
+
+def test_a_cycle_in_which_nothing_is_heard_counts(table: Table, spec: PipelineSpec) -> None:
+    start = StartPrior(np.zeros(3), np.zeros(3), 0.0)
+    rows = {name: [*column, np.nan] for name, column in table.items()}
+    rows["time_s"][-1], rows["heading_rad"][-1] = 99.0, 0.0
+    inputs = inputs_of(rows, start, build_radio(spec.radio))
+    assert len(inputs.measurements) == CYCLES + 1
+    assert len(inputs.measurements[-1]) == 0
+    assert len(localise(inputs, spec, rng=np.random.default_rng(0)).estimates) == CYCLES + 1
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "said"),
+    [
+        ("delay_s", 33.0, "delays are in seconds"),
+        ("delay_s", -1e-9, "give positive ones"),
+        ("cos_x", 1.7, "direction cosines from -1 to 1"),
+        ("delay_std_s", -1e-10, "tau_std of -1e-10 received"),
+        ("delay_std_s", np.inf, "tau_std: not a finite number"),
+        ("cos_y_std", 0.0, "cosines_std of 0 received"),
+        ("amplitude", -1.0, "amplitude of -1 received"),
+        ("delay_s", 1e-9 + 1j, "complex numbers received"),
+        ("cos_x", "north", "not numbers"),
+        ("speed", 1.0, "unknown column"),
+    ],
+)
+def test_a_wrong_unit_or_range_is_one_line(
+    table: Table, spec: PipelineSpec, name: str, values: object, said: str
+) -> None:
+    rows = {**table, name: [values] * len(table["time_s"])}
+    with pytest.raises(ConfigError, match=said) as raised:
+        inputs_of(rows, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
+    assert "\n" not in str(raised.value)
+
+
+def test_a_missing_column_is_named(table: Table, spec: PipelineSpec) -> None:
+    del table["amplitude"]
+    with pytest.raises(ConfigError, match="amplitude or snr_db: column missing"):
+        inputs_of(table, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
