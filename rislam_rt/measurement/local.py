@@ -19,8 +19,8 @@ from rislam_rt.measurement.refine import LARGEST_STEP, PRIOR
 
 COUPLED = 0.8
 """Correlation of two signals from which on the weaker waits until the stronger was refined."""
-ROUNDS = 2
-"""Rounds in which the residual is asked for more paths; each ends with a step of all, and one more follows."""
+ROUNDS = 1
+"""Rounds in which the residual is asked for more paths, after the first; each ends with a step of all."""
 DAMPING = 1e-3
 RIDGE = 1e-9
 """Share of the diagonal added to matrices, so that coinciding paths do not stop the solver."""
@@ -63,18 +63,13 @@ def estimate_local(
 ) -> LocalEstimate:
     """All paths that samples (C, L, M) of unit noise show at or about the places of some waves."""
     beside = np.abs(signal_products(there)) > COUPLED * sounding.num_samples
-    fit, residual = None, samples
-    for _ in range(ROUNDS):
-        rows = _peaks(there, beside, residual, sounding.num_samples, threshold)
-        if not len(rows):
-            break
-        grown = there.take(rows) if fit is None else fit.waves.join(there.take(rows))
-        fit = _step(sounding, _fit(sounding, grown, samples), samples)
-        fit = _without_idle(fit, samples, threshold, window)
-        residual = fit.residual
-    if fit is None:
-        fit = _fit(sounding, there.take(np.zeros(0, dtype=np.int64)), samples)
+    fit = _fit(sounding, there.take(_peaks(there, beside, samples, sounding.num_samples, threshold)), samples)
     fit = _without_idle(_step(sounding, fit, samples), samples, threshold, window)
+    for _ in range(ROUNDS):
+        rows = _peaks(there, beside, fit.residual, sounding.num_samples, threshold)
+        if len(rows):
+            fit = _fit(sounding, fit.waves.join(there.take(rows)), samples)
+        fit = _without_idle(_step(sounding, fit, samples), samples, threshold, window)
     deviation, amplitude_std = _bound(fit)
     return LocalEstimate(fit.waves.parameters, fit.waves.capture, fit.amplitude, deviation, amplitude_std, fit.inverse)
 

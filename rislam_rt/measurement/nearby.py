@@ -1,5 +1,7 @@
 """The local receiver: the waveform's samples, noise and decisions, its search spared (`local`)."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats
@@ -33,10 +35,10 @@ def measure_local(
 ) -> tuple[Measurement, PathTruth]:
     """Components estimated from the cycle's samples, begun at the paths' own places, and noise taken for paths."""
     sensor, heard = build_sensor(radio, config), split(received, config)
-    sounding = build_sounding(num_tones(radio, config), radio)
     snr = np.array([radio.integrated_snr(one.gain) for one in heard])
     near = (snr > SILENT * sensor.threshold).any(axis=0)
     places = np.column_stack([received.tau * radio.bandwidth, received.direction[:, :2]])[near]
+    sounding = build_sounding(_tones_needed(places, radio, config), radio)
     waves = waves_at(sounding, places, np.zeros(len(places), dtype=np.int64))
     if config.converter_bits:
         captures = capture(received, radio, config, rng=rng)
@@ -53,6 +55,14 @@ def measure_local(
     components = by_delay(parts)
     truth = true_paths(components, received, radio, config)
     return to_measurement(components, radio, config), PathTruth(truth)
+
+
+def _tones_needed(places: Floats, radio: RadioConfig, config: ReceiverConfig) -> int:
+    """As many as the latest path needs: nothing is searched for behind it. All, where converters see them."""
+    if config.num_subcarriers or config.converter_bits or not len(places):
+        return num_tones(radio, config)
+    latest = max(float(places[:, 0].max()) / radio.bandwidth, 1e-12)
+    return num_tones(radio, replace(config, min_delay=0.0, max_delay=min(latest, config.max_delay)))
 
 
 def _samples(
