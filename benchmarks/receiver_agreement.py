@@ -1,17 +1,18 @@
 """Does a cheap receiver agree with the waveform receiver, class by class, in rooms that neither was made for?
 
-Random rooms and walks (those of the classifier's study; each seed is one room). In each, every receiver hears the same
-paths under the same codes (exact for the true place in even seeds, random in odd ones), cycle after cycle, and the filter
-walks along on what it hears. Per class: share of paths found, errors over reported deviations and deviations themselves,
-shares beyond five of them, false components, their lives, error of the agent, and whether the panel was named. Run:
-`python benchmarks/receiver_agreement.py --first 1000 --rooms 50 [--cycles 60] [--receivers waveform,local]`
-`[--keep FOLDER] [--figure FILE]`. What was run is kept in FOLDER by receiver and seed; delete a file to run it again.
+Random rooms with a panel, and walks (those of the classifier's study; each seed is one room). In each, every receiver
+hears the same paths under the same codes, exact for the true place in even seeds, random in odd ones, the reference
+sphere at 0 or 13 dB, codes held or alternated. With `--walk` the filter is led along on what it hears. Per class: share
+of paths found, errors over reported deviations and deviations, shares beyond five of them; false components, error of
+the agent, and whether the panel was named. Run: `python benchmarks/receiver_agreement.py --first 1000 --rooms 50
+[--cycles 60] [--receivers waveform,local,cell] [--walk] [--keep FOLDER] [--figure FILE]`. What was run is kept in
+FOLDER by receiver and seed; a file that is taken away is run again.
 """
 
 import argparse
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,7 +40,6 @@ SNR_DB = (0.0, 13.0)
 CLASSES = [kind for kind in PathKind if kind is not PathKind.LOS]
 FAR = 5.0
 """Reported deviations beyond which an error counts as a tail."""
-COLUMNS = ("cycle", "kind", "path", "e0", "e1", "e2", "d0", "d1", "d2", "snr", "far", "alive")
 
 
 def main() -> None:
@@ -163,22 +163,30 @@ def walk(name: str, seed: int, arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def report_walks(names: list[str], walks: dict[str, list[dict[str, Any]]]) -> None:
-    """Errors of the agent, and in which runs the panel was named within half a metre."""
+    """Errors of the agent, and in which runs the panel was named within half a metre of its place."""
     rms = {name: np.array([np.sqrt(np.mean(one["error"] ** 2)) for one in walks[name]]) for name in names}
-    right = {name: np.array([bool(np.nanmin(np.append(one["away"][-10:], np.inf)) < 0.5) for one in walks[name]]) for name in names}
+    right = {
+        name: np.array([bool(np.min(np.nan_to_num(one["away"][-10:], nan=np.inf)) < 0.5) for one in walks[name]])
+        for name in names
+    }
+    rng = np.random.default_rng(0)
     for name in names:
-        ratio = np.exp(np.mean(np.log(rms[name] / rms[names[0]])))
+        alike = np.sum(right[name] == right[names[0]])
+        ratio = np.log(rms[name] / rms[names[0]])
+        draws = np.exp(ratio[rng.integers(len(ratio), size=(4000, len(ratio)))].mean(axis=1))
+        low, high = np.quantile(draws, [0.025, 0.975])
         print(
-            f"{name:>14s}: RMSE root mean square {1e3 * np.sqrt(np.mean(rms[name] ** 2)):.1f} mm, median {1e3 * np.median(rms[name]):.1f}, "
-            f"geometric mean of the ratio to {names[0]} {ratio:.3f}; panel named in its place {right[name].sum()} of {len(right[name])}, "
-            f"in the same runs {np.mean(right[name] == right[names[0]]):.2f}"
+            f"{name}: RMSE of the agent, median {1e3 * np.median(rms[name]):.1f} mm, root mean square "
+            f"{1e3 * np.sqrt(np.mean(rms[name] ** 2)):.1f} mm, over that with {names[0]} run by run "
+            f"{np.exp(ratio.mean()):.3f} ({low:.3f} to {high:.3f}); panel named in its place in "
+            f"{right[name].sum()} of {len(right[name])} runs, as with {names[0]} in {alike}"
         )
 
 
 def score(
     paths: Paths, motion: Trajectory, cycle: int, radio: RadioConfig, found: Measurement, truth: PathTruth
 ) -> Floats:
-    """(M, 12) what each component is, its error and deviations in cells, and how far it lies from any path."""
+    """(M, 11) cycle, what each component is, path, errors and deviations in cells, SNR, distance to any path."""
     cells = np.array([radio.bandwidth, radio.array.rows * radio.array.spacing, radio.array.cols * radio.array.spacing])
     place = np.column_stack([found.tau, found.cosines]) * cells
     deviation = np.column_stack([found.tau_std, found.cosines_std]) * cells
@@ -191,47 +199,99 @@ def score(
     gap = (place[:, None] - true[there]) / deviation[:, None]
     nearest = np.sqrt(np.min(np.max(gap**2, axis=-1), axis=1, initial=np.inf))
     kind = np.where(known, paths.kind[truth.path], -1)
-    return np.column_stack(
-        [np.full(len(snr), cycle), kind, truth.path, error, deviation, snr, nearest, np.zeros(len(snr))]
+    return np.column_stack([np.full(len(snr), cycle), kind, truth.path, error, deviation, snr, nearest])
+
+
+class Row(NamedTuple):
+    """One receiver on one class."""
+
+    found: float
+    """Share of the paths above 10 dB that were found."""
+    count: float
+    """Components a cycle."""
+    ratio: Floats
+    """(3,) half-width that holds 68 % of errors over reported deviations: 1, were they right and normal."""
+    deviation: Floats
+    """(3,) median reported deviation [cells]."""
+    error: Floats
+    """(3,) half-width that holds 68 % of the errors [cells]."""
+    tail: float
+    """Share beyond five reported deviations in any parameter."""
+
+
+def row_of(runs: list[dict[str, Any]], kind: int) -> Row:
+    """One class."""
+    table, offered = (np.vstack([one[name] for one in runs]) for name in ("table", "offered"))
+    mine, loud = table[table[:, 1] == kind], offered[(offered[:, 0] == kind) & (offered[:, 1] > 10.0)]
+    error, deviation = np.abs(mine[:, 3:6]), mine[:, 6:9]
+    return Row(
+        float(np.mean(loud[:, 2])),
+        len(mine) / sum(int(one["cycles"]) for one in runs),
+        np.quantile(error / deviation, 0.683, axis=0),
+        np.median(deviation, axis=0),
+        np.quantile(error, 0.683, axis=0),
+        float(np.mean((error / deviation > FAR).any(axis=1))),
     )
 
 
 def report(names: list[str], found: dict[str, list[dict[str, Any]]]) -> None:
-    """One block a class, one line a receiver."""
-    tables = {name: np.vstack([one["table"] for one in found[name]]) for name in names}
-    offered = {name: np.vstack([one["offered"] for one in found[name]]) for name in names}
-    cycles = {name: sum(int(one["cycles"]) for one in found[name]) for name in names}
-    print(f"{len(found[names[0]])} rooms, {cycles[names[0]]} cycles")
-    print("class      receiver   found by SNR 10-13 13-16 16-20 20-30 30+  | comps/cycle | error/dev 68 % | dev median [cells] | beyond 5")
-    for kind in [*CLASSES, PathKind.LOS]:
+    """One block a class, one line a receiver; then what belongs to no path."""
+    print(f"{len(found[names[0]])} rooms, {sum(int(one['cycles']) for one in found[names[0]])} cycles")
+    print(
+        "class receiver: found above 10 dB, components a cycle; error / reported deviation (68 %), reported deviation"
+    )
+    print("(median) and error (68 %) in cells, of delay and cosines; beyond five deviations")
+    for kind in PathKind:
         for name in names:
-            t, o = tables[name], offered[name]
-            mine, here = t[t[:, 1] == kind], o[o[:, 0] == kind]
-            shares = [
-                np.mean(here[(here[:, 1] > a) & (here[:, 1] <= b), 2]) if np.any((here[:, 1] > a) & (here[:, 1] <= b)) else np.nan
-                for a, b in ((10, 13), (13, 16), (16, 20), (20, 30), (30, 99))
-            ]
-            if not len(mine):
-                continue
-            ratio = np.abs(mine[:, 3:6] / mine[:, 6:9])
+            row = row_of(found[name], kind)
             print(
-                f"{kind.name:5s} {name:>14s} {np.mean(here[here[:, 1] > 10, 2]):6.3f} {np.round(shares, 2)} {len(mine) / cycles[name]:6.2f}  "
-                f"{np.quantile(ratio, 0.683, axis=0).round(2)} {np.median(mine[:, 6:9], axis=0).round(4)} "
-                f"{np.mean((ratio > FAR).any(axis=1)):.4f}"
+                f"{kind.name:5s}{name:>9s}: {row.found:.3f} {row.count:6.2f}  {row.ratio.round(2)} "
+                f"{row.deviation.round(4)} {row.error.round(4)}  {row.tail:.4f}"
             )
     for name in names:
-        t = tables[name]
-        false = t[t[:, 1] < 0]
-        far = t[t[:, 10] > FAR]
+        table = np.vstack([one["table"] for one in found[name]])
+        cycles = sum(int(one["cycles"]) for one in found[name])
+        known, far = table[:, 1] >= 0, table[:, 10] > FAR
+        tail = np.mean((np.abs(table[known, 3:6]) / table[known, 6:9] > FAR).any(axis=1))
         print(
-            f"{name:>14s}: {len(t) / cycles[name]:.1f} components a cycle, {len(false) / cycles[name]:.2f} of no path, "
-            f"{len(far) / cycles[name]:.2f} beyond 5 deviations of every path ({len(far[far[:, 9] > 16]) / cycles[name]:.2f} of them above 16 dB); "
-            f"{1e3 * np.mean([float(one['seconds']) for one in found[name]]):.2f} ms a cycle"
+            f"{name}: {len(table) / cycles:.2f} components a cycle, {np.sum(~known) / cycles:.3f} of no path, "
+            f"{np.sum(far) / cycles:.3f} farther than five deviations from every path, of those above 16 dB "
+            f"{np.sum(far & (table[:, 9] > 16.0)) / cycles:.3f}; of all of a path {tail:.4f} "
+            f"beyond five; {1e3 * np.mean([float(one['seconds']) for one in found[name]]):.2f} ms a cycle"
         )
 
 
 def draw(names: list[str], found: dict[str, list[dict[str, Any]]], file: str) -> None:
-    """Later."""
+    """Detection, deviations, errors over them, and tails, class by class."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, 4, figsize=(14.0, 3.8), layout="constrained")
+    titles = (
+        "share of paths above 10 dB found",
+        "reported deviation of the delay [cells], median",
+        "error of the delay over it, 68 %",
+        "share beyond five deviations",
+    )
+    for number, name in enumerate(names):
+        rows = [row_of(found[name], kind) for kind in CLASSES]
+        place = np.arange(len(CLASSES)) + (number - (len(names) - 1) / 2.0) * 0.8 / len(names)
+        values = (
+            [r.found for r in rows],
+            [r.deviation[0] for r in rows],
+            [r.ratio[0] for r in rows],
+            [r.tail for r in rows],
+        )
+        for axis, heights in zip(axes, values, strict=True):
+            axis.bar(place, heights, 0.8 / len(names), label=name)
+    for axis, title in zip(axes, titles, strict=True):
+        axis.set(title=title, xticks=range(len(CLASSES)))
+        axis.set_xticklabels([kind.name for kind in CLASSES])
+        axis.title.set_fontsize(10)
+    axes[3].legend(frameon=False, fontsize=8, loc="upper right")
+    figure.savefig(file, dpi=130)
 
 
 if __name__ == "__main__":
