@@ -22,6 +22,12 @@ class SceneError(RislamError):
     exit_code = 2
 
 
+class ResultError(RislamError):
+    """A result file is not as it was written: damaged, changed, or of another run."""
+
+    exit_code = 2
+
+
 class GeometryError(RislamError):
     """Points, directions or planes that have no answer (zero length, wrong shape)."""
 

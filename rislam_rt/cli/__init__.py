@@ -9,26 +9,42 @@ def main() -> None:
     # One thread: the matrices are small, and sums in one order give the same bits on every machine.
     for library in ("OMP", "OPENBLAS", "MKL"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    from rislam_rt.cli.interrupts import EXIT_CODE, Interrupted, interruptible
+
+    try:
+        with interruptible():
+            code = _run()
+    except Interrupted as told:
+        code = _say(str(told), EXIT_CODE)
+    except KeyboardInterrupt:
+        code = _say("interrupted", EXIT_CODE)
+    sys.exit(code)
+
+
+def _run() -> int:
+    """Run a command; its exit code."""
     import typer
 
     from rislam_rt.cli.app import app
+    from rislam_rt.cli.interrupts import EXIT_CODE
     from rislam_rt.errors import RislamError
 
     try:
         code = app(sys.argv[1:] or ["--help"], prog_name="rislam-rt", standalone_mode=False)
     except RislamError as error:
-        _leave(str(error), error.exit_code)
+        return _say(f"error: {error}", error.exit_code)
     except typer.Abort:
-        _leave("interrupted", 130)
+        return _say("interrupted", EXIT_CODE)
     except Exception as error:
         # Wrong usage: the parser's exceptions have no public base class, but all can say what is wrong.
         if not hasattr(error, "format_message"):
             raise
-        _leave(f"{error.format_message()}; see rislam-rt --help", 2)
-    else:
-        sys.exit(code if isinstance(code, int) else 0)
+        return _say(f"error: {error.format_message()}; see rislam-rt --help", 2)
+    if code == EXIT_CODE:  # an interrupt that no command has answered
+        return _say("interrupted", EXIT_CODE)
+    return code if isinstance(code, int) else 0
 
 
-def _leave(message: str, code: int) -> None:
-    print("error: " + " ".join(message.split()), file=sys.stderr)
-    sys.exit(code)
+def _say(line: str, code: int) -> int:
+    print(" ".join(line.split()), file=sys.stderr)
+    return code

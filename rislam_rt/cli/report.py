@@ -13,7 +13,7 @@ def command(
     json: JsonFile = None,
 ) -> None:
     """Score a completed run again and draw its figures and page."""
-    from rislam_rt.pipeline.store import read_run
+    from rislam_rt.pipeline.store import hold_run, read_run
     from rislam_rt.pipeline.summary import summarise
     from rislam_rt.report import write_report
     from rislam_rt.report.tables import print_summary
@@ -21,5 +21,7 @@ def command(
     result = read_run(run)
     summary = summarise(result)
     print_summary(summary)
-    typer.echo(f"report: {write_report(result, summary, run)}")
+    with hold_run(run):
+        page = write_report(result, summary, run)
+    typer.echo(f"report: {page}")
     write_json(json, summary)

@@ -1,7 +1,7 @@
 """`rislam-rt run PIPELINE`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -9,7 +9,11 @@ from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption,
 from rislam_rt.cli.study import Given
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rislam_rt.model import Scene
     from rislam_rt.pipeline import PipelineSpec
+    from rislam_rt.pipeline.identity import Identity
 
 
 def command(
@@ -17,7 +21,7 @@ def command(
     scene: SceneOption = None,
     set_: Settings = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Run folder; runs/<pipeline>-<scene>-<seed> by default.")
+        Path | None, typer.Option(metavar="DIR", help="Run folder; runs/<pipeline>-<scene>-<seed>-<hash> by default.")
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Schemes at a time; one a core by default.")] = None,
     json: JsonFile = None,
@@ -27,7 +31,8 @@ def command(
 ) -> None:
     """Run a pipeline in a room: trace, then design, measure, localise and map, cycle by cycle.
 
-    An interrupted run goes on where it stopped when the same command is given again; a completed one is replaced.
+    An interrupted run goes on where it stopped when the same command is given again, and a completed one is shown;
+    other settings make another folder.
     A file of another kind is a study: 'compare_channels' (exit code 1 if the channels differ), 'fig4a', 'claims',
     'train_classifier', or 'fig4b', 'fig4c', 'rooms', 'ablations', 'unseen', which go through settings, rooms and seeds
     (exit code 1 if a run failed).
@@ -66,53 +71,84 @@ def command(
 
 
 def run_main_job(spec: "PipelineSpec", given: Given) -> None:
-    """All schemes over all cycles of a room."""
+    """All schemes over all cycles of a room; a run that is there already is shown."""
+    from rislam_rt.cli.scenes import open_scene, scene_of
+    from rislam_rt.pipeline.identity import run_identity
+    from rislam_rt.pipeline.run import check_run, prepare_channel
+    from rislam_rt.pipeline.store import DONE, find_run
+
+    opened = open_scene(scene_of(given.scene, spec, given.pipeline))
+    check_run(opened.scene, spec)
+    identity = run_identity(spec, opened.scene)
+    folder = given.out or Path("runs") / identity.folder
+    about = find_run(folder, identity)
+    if about is not None and about["state"] == DONE:
+        show_run(folder, about, given)
+        return
+    prepare_channel(spec.channel)
+    opened.warn()
+    compute_run(spec, opened.scene, identity, folder, given)
+
+
+def show_run(folder: Path, about: "Mapping[str, Any]", given: Given) -> None:
+    """A completed run of these very settings, as it was written."""
+    from rislam_rt.pipeline.store import hold_run, is_left_locked, read_run, read_summary
+    from rislam_rt.report.page import PAGE, write_report
+    from rislam_rt.report.tables import print_summary
+
+    summary = read_summary(folder, about)
+    typer.echo("this run is complete already; nothing was computed")
+    print_summary(summary)
+    page = folder / PAGE
+    draw = given.page and not page.is_file()
+    if draw or is_left_locked(folder):  # a process died at the report, or is at it
+        with hold_run(folder):
+            if draw:
+                write_report(read_run(folder), summary, folder)
+    if given.page:
+        typer.echo(f"report: {page}")
+    typer.echo(f"run folder: {folder}")
+    write_json(given.json, summary)
+
+
+def compute_run(spec: "PipelineSpec", room: "Scene", identity: "Identity", folder: Path, given: Given) -> None:
+    """Begin a run or go on with it, and report it."""
     import os
 
     import numpy as np
 
+    from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.cli.progress import show_progress
-    from rislam_rt.cli.scenes import open_scene, scene_of
     from rislam_rt.pipeline import run_slam
-    from rislam_rt.pipeline.run import check_run, prepare_channel
-    from rislam_rt.pipeline.store import PartialRun, check_folder, run_folder, run_identity
+    from rislam_rt.pipeline.store import open_run
     from rislam_rt.pipeline.summary import summarise
     from rislam_rt.report.tables import print_summary
 
-    pipeline, scene, out, jobs, json, page = given
-    opened = open_scene(scene_of(scene, spec, pipeline))
-    room = opened.scene
-    check_run(room, spec)
-    folder = out or run_folder(spec, room, Path("runs"))
-    check_folder(folder)
-    prepare_channel(spec.channel)
-
-    partial = PartialRun(folder, run_identity(spec, room))
-    opened.warn()
+    kept = 0
     try:
-        with show_progress() as progress:
-            result = run_slam(
-                room,
-                spec,
-                rng=np.random.default_rng(spec.seed),
-                jobs=jobs or os.cpu_count() or 1,
-                done=partial,
-                progress=progress,
-            )
-    except KeyboardInterrupt:
-        kept = len(partial)
-        partial.abandon()
-        typer.echo(f"interrupted: {kept} schemes kept; the same command goes on from there", err=True)
-        raise typer.Exit(130) from None
-    except BaseException:
-        partial.abandon()
-        raise
-    summary = summarise(result)
-    folder = partial.complete(result, summary)
-    print_summary(summary)
-    if page:
-        from rislam_rt.report import write_report
+        with open_run(folder, identity) as store:
+            for name in store.spoiled:
+                typer.echo(f"warning: {folder}: scheme '{name}' is not as it was written; it runs again", err=True)
+            try:
+                with show_progress() as progress:
+                    result = run_slam(
+                        room,
+                        spec,
+                        rng=np.random.default_rng(spec.seed),
+                        jobs=given.jobs or os.cpu_count() or 1,
+                        done=store,
+                        progress=progress,
+                    )
+                summary = summarise(result)
+                store.complete(result, summary)
+            finally:
+                kept = len(store)
+            print_summary(summary)
+            if given.page:
+                from rislam_rt.report import write_report
 
-        typer.echo(f"report: {write_report(result, summary, folder)}")
+                typer.echo(f"report: {write_report(result, summary, folder)}")
+    except KeyboardInterrupt:
+        raise Interrupted(f"interrupted: {kept} schemes kept; the same command goes on from there") from None
     typer.echo(f"run folder: {folder}")
-    write_json(json, summary)
+    write_json(given.json, summary)

@@ -2,14 +2,14 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 
 from rislam_rt.cli.options import write_json
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from rislam_rt.pipeline.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec
     from rislam_rt.pipeline.sweeps import Row
@@ -40,15 +40,16 @@ def run_compare_channels(spec: "CompareSpec", given: Given) -> None:
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'compare_channels' names its rooms; set 'rooms'")
     opened = [open_scene(_beside(given.pipeline, room.scene)) for room in spec.rooms]
-    folder = output_folder(given.out, Path("runs") / f"{spec.name}-{spec.seed}")
+    scenes = [one.scene for one in opened]
+    record = study_record(spec, scenes)
+    folder = output_folder(given.out, f"{spec.name}-{spec.seed}", record)
     prepare_channel("traced")
     for one in opened:
         one.warn()
-    scenes = [one.scene for one in opened]
     with show_progress() as progress:
         found = run_comparison(scenes, spec, jobs=given.jobs or os.cpu_count() or 1, progress=progress)
     counts = {"passed": found.passed, "unexplained": found.unexplained, "breaches": found.breaches}
-    content = {**study_record(spec, scenes), **counts, "rooms": comparison_table(found)}
+    content = {**record, **counts, "rooms": comparison_table(found)}
     print_validation(found.rows)
     typer.echo(f"page: {write_comparison(found, spec, content, folder, figures=given.page)}")
     write_json(given.json, content)
@@ -71,12 +72,13 @@ def run_gain_curves(spec: "Fig4aSpec", given: Given) -> None:
     opened = open_scene(scene_of(given.scene, spec, given.pipeline))
     scene = opened.scene
     check_fig4a(scene, spec)
-    folder = output_folder(given.out, Path("runs") / f"{spec.name}-{scene.name}-{spec.seed}")
+    record = study_record(spec, [scene])
+    folder = output_folder(given.out, f"{spec.name}-{scene.name}-{spec.seed}", record)
     prepare_channel(spec.channel)
     opened.warn()
     with show_progress() as progress:
         found = run_fig4a(scene, spec, rng=np.random.default_rng(spec.seed), progress=progress)
-    content = {**study_record(spec, [scene]), **fig4a_table(found)}
+    content = {**record, **fig4a_table(found)}
     for element in found.curves:
         typer.echo("\n".join([*verdict(found, element), ""]))
     typer.echo(f"page: {write_fig4a(found, spec, scene.name, content, folder, figures=given.page)}")
@@ -85,18 +87,22 @@ def run_gain_curves(spec: "Fig4aSpec", given: Given) -> None:
 
 def run_swept(spec: "SweptSpec", given: Given) -> None:
     """A study on the sweep engine; its page grows while it runs. Exit code 1 if a cell failed."""
+    from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.cli.progress import show_sweep
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.studies.swept import build_sweep
     from rislam_rt.pipeline.studies.swept.record import swept_record
     from rislam_rt.pipeline.sweeps import Effort, build_cells, run_sweep
+    from rislam_rt.pipeline.sweeps.store import check_folder
     from rislam_rt.report.swept import write_swept
 
     sweep = build_sweep(spec, given.pipeline, given.scene)
-    folder, cells = output_folder(given.out, Path("runs") / f"{spec.name}-{spec.seed}"), Path("sweeps") / spec.name
-    for kind in {cell.depends["config"]["channel"] for cell in build_cells(sweep)}:
+    found = build_cells(sweep)
+    record, cells = swept_record(spec, sweep, given.pipeline), Path("sweeps") / spec.name
+    folder = output_folder(given.out, f"{spec.name}-{spec.seed}", record)
+    check_folder(cells)
+    for kind in {cell.depends["config"]["channel"] for cell in found}:
         prepare_channel(kind)
-    record = swept_record(spec, sweep, given.pipeline)
 
     def grow(rows: "Sequence[Row]") -> None:
         write_swept(rows, spec, record, folder, figures=given.page)
@@ -106,8 +112,7 @@ def run_swept(spec: "SweptSpec", given: Given) -> None:
         with show_sweep() as tell:
             report = run_sweep(sweep, cells, effort, tell=tell, grow=grow)
     except KeyboardInterrupt:
-        typer.echo("interrupted: what is done is kept; the same command goes on from there", err=True)
-        raise typer.Exit(130) from None
+        raise Interrupted("interrupted: what is done is kept; the same command goes on from there") from None
     typer.echo(f"page: {write_swept(report.rows, spec, record, folder, figures=given.page)}")
     typer.echo(f"cells: {cells}")
     write_json(given.json, {**record, "failed": len(report.failed)})
@@ -125,9 +130,9 @@ def run_claims(spec: "ClaimsSpec", given: Given) -> None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'claims' runs in no room; leave it out")
     results = read_results(_beside(given.pipeline, spec.results))
     found = judge(results)
-    folder = output_folder(given.out, Path("runs") / spec.name)
     names = ("seed", "scenes", "versions")
     sources = {study: {name: content[name] for name in names} for study, content in results.items()}
+    folder = output_folder(given.out, spec.name, results)
     for claim in found:
         typer.echo(f"{claim.verdict}: {claim.claim}")
     typer.echo(f"page: {write_claims(found, spec.name, sources, folder)}")
@@ -139,8 +144,8 @@ def _beside(pipeline: Path, scene: str) -> Path:
     return Path(os.path.normpath(pipeline.parent / scene))
 
 
-def output_folder(out: Path | None, default: Path) -> Path:
-    """Where the files go; a study's files may join others in a folder.
+def output_folder(out: Path | None, name: str, record: "Mapping[str, Any]") -> Path:
+    """Where the files go: `--out`, whose folder they may share with others, or `runs/<name>-<hash of the record>`.
 
     Raises
     ------
@@ -148,8 +153,10 @@ def output_folder(out: Path | None, default: Path) -> Path:
         There is a file of that name.
     """
     from rislam_rt.errors import ConfigError
+    from rislam_rt.pipeline.identity import short_name
+    from rislam_rt.pipeline.seal import checksum
 
-    folder = out or default
+    folder = out or Path("runs") / short_name(name, checksum(record))
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"--out {folder}: is a file; give a folder")
     return folder

@@ -40,23 +40,20 @@ def command(
 ) -> None:
     """Run a pipeline over settings and seeds. What is there already is not run again. Exit code 1 if a run failed."""
     import os
-    import signal
 
-    # A queue that ends the process is answered as a keyboard that does: workers are stopped, the table is written.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    from rislam_rt.cli.interrupts import Interrupted
+    from rislam_rt.pipeline.sweeps import Effort
+    from rislam_rt.pipeline.sweeps.slam import load_section, score_rows, slam_sweep
+    from rislam_rt.report.tables import print_sweep
+
+    sweep = slam_sweep(pipeline, set_ or (), axis or (), scene=scene, repeat=repeat)
+    limit = time_limit if time_limit is not None else load_section(pipeline, set_ or ()).time_limit_s
+    effort = Effort(jobs or os.cpu_count() or 1, dask, limit, retry, estimate)
+    target = out or Path("sweeps") / f"{sweep.name}-{Path(sweep.base['scene']).name}"
     try:
-        from rislam_rt.pipeline.sweeps import Effort
-        from rislam_rt.pipeline.sweeps.slam import load_section, score_rows, slam_sweep
-        from rislam_rt.report.tables import print_sweep
-
-        sweep = slam_sweep(pipeline, set_ or (), axis or (), scene=scene, repeat=repeat)
-        limit = time_limit if time_limit is not None else load_section(pipeline, set_ or ()).time_limit_s
-        effort = Effort(jobs or os.cpu_count() or 1, dask, limit, retry, estimate)
-        target = out or Path("sweeps") / f"{sweep.name}-{Path(sweep.base['scene']).name}"
         report = _run(sweep, target, effort)
     except KeyboardInterrupt:
-        typer.echo("interrupted: what is done is kept; the same command goes on from there", err=True)
-        raise typer.Exit(130) from None
+        raise Interrupted("interrupted: what is done is kept; the same command goes on from there") from None
     if estimate and report.cost.cells:
         return
     scores = score_rows(report.rows)
@@ -73,8 +70,10 @@ def _run(sweep: "Sweep", target: Path, effort: "Effort") -> "Report":
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.sweeps import build_cells, run_sweep
     from rislam_rt.pipeline.sweeps.slam import score_rows, write_scores
+    from rislam_rt.pipeline.sweeps.store import check_folder
     from rislam_rt.report.sweep import draw_scores
 
+    check_folder(target)
     if effort.dask is None:
         for kind in {cell.settings["channel"] for cell in build_cells(sweep)}:
             prepare_channel(kind)

@@ -20,6 +20,7 @@ def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
     """Train the classifier of components and score it; weights, page, data and figures."""
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
+    from rislam_rt.cli.study import output_folder
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.files import write_atomic
     from rislam_rt.pipeline.run import prepare_channel
@@ -36,14 +37,13 @@ def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
 
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'train_classifier' names its rooms; set 'rooms'")
-    folder = given.out or Path("runs") / f"{spec.name}-{spec.seed}"
-    if folder.exists() and not folder.is_dir():
-        raise ConfigError(f"--out {folder}: is a file; give a folder")
     scenes = [open_scene(Path(os.path.normpath(given.pipeline.parent / room.scene))).scene for room in spec.rooms]
+    record = study_record(spec, scenes)
+    folder = output_folder(given.out, f"{spec.name}-{spec.seed}", record)
     prepare_channel(spec.channel)
     with show_progress() as progress:
         found = run_training(scenes, spec, progress=progress)
-    content = {**study_record(spec, scenes), **classifier_table(found)}
+    content = {**record, **classifier_table(found)}
     files = {
         f"{PAGE}.md": classifier_page(found, spec, (SCORES, IMPORTANCE) if given.page else None).encode(),
         f"{PAGE}.json": (json.dumps(content, indent=1, allow_nan=False) + "\n").encode(),

@@ -18,24 +18,27 @@ if TYPE_CHECKING:
 
 def run_unseen(spec: "UnseenSpec", given: Given) -> None:
     """Draw the rooms, run what the file asks for in each, print and write the score card; exit code 1 if one failed."""
+    from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.cli.progress import show_sweep
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.studies.unseen import build_unseen, count_tests
     from rislam_rt.pipeline.studies.unseen.record import unseen_record
     from rislam_rt.pipeline.sweeps import Effort, build_cells, run_sweep
-    from rislam_rt.pipeline.sweeps.store import read_timings
+    from rislam_rt.pipeline.sweeps.store import check_folder, read_timings
     from rislam_rt.report.unseen import write_unseen
     from rislam_rt.report.unseen.terminal import print_cards
 
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'unseen' draws its rooms; leave it out")
     cells = Path("sweeps") / spec.name
-    folder = output_folder(given.out, Path("runs") / f"{spec.name}-{spec.first}")
+    record = unseen_record(spec)
+    folder = output_folder(given.out, f"{spec.name}-{spec.first}", record)
+    check_folder(cells)
     sweep = build_unseen(spec, given.pipeline, Path("sweeps") / f"{spec.name}_data")
     for kind in {cell.depends["config"]["channel"] for cell in build_cells(sweep)}:
         prepare_channel(kind)
-    record, tests = unseen_record(spec), count_tests(spec, given.pipeline)
+    tests = count_tests(spec, given.pipeline)
 
     def write(rows: "Sequence[Row]") -> Path | None:
         timings = read_timings(cells)
@@ -49,8 +52,7 @@ def run_unseen(spec: "UnseenSpec", given: Given) -> None:
         with show_sweep() as tell:
             report = run_sweep(sweep, cells, effort, tell=tell, grow=grow)
     except KeyboardInterrupt:
-        typer.echo("interrupted: what is done is kept; the same command goes on from there", err=True)
-        raise typer.Exit(130) from None
+        raise Interrupted("interrupted: what is done is kept; the same command goes on from there") from None
     print_cards(report.rows, read_timings(cells))
     typer.echo(f"page: {write(report.rows)}")
     typer.echo(f"cells: {cells}")

@@ -1,14 +1,17 @@
 """Results as NetCDF data sets, with units and meaning in the attributes, and back."""
 
+import hashlib
+import json
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rislam_rt.errors import StoreError
+from rislam_rt.errors import ResultError, StoreError
 from rislam_rt.model import MapEstimate, Paths, SchemeResult, Trajectory
 from rislam_rt.pipeline.files import write_atomic
+from rislam_rt.pipeline.seal import SCHEMA
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -108,6 +111,51 @@ def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
     )
 
 
+def seal_dataset(data: "xr.Dataset", **about: str) -> "xr.Dataset":
+    """The data set with `about`, the schema's version, the number of cycles, and a checksum over all there is in it."""
+    found = data.assign_attrs(about, schema=SCHEMA, cycles=int(data.sizes["cycle"]))
+    return found.assign_attrs(checksum=_checksum(found))
+
+
+def check_dataset(data: "xr.Dataset", path: Path, **about: str | int) -> None:
+    """Whether a data set is as `seal_dataset` gave it, and of what it should be.
+
+    Raises
+    ------
+    ResultError
+        It is not. One line.
+    """
+    expected = {"schema": SCHEMA, "cycles": data.sizes.get("cycle"), **about, "checksum": _checksum(data)}
+    for name, value in expected.items():
+        found = data.attrs.get(name)
+        if found is None or str(found) != str(value):
+            raise ResultError(f"{path}: {name} is {str(found)[:70]} and should be {str(value)[:70]}; run again")
+
+
+def _checksum(data: "xr.Dataset") -> str:
+    """SHA-256 over names, shapes, types, values and attributes; not over how the file packs them."""
+    digest = hashlib.sha256()
+    for name in sorted(map(str, data.variables)):
+        variable = data.variables[name]
+        values = np.ascontiguousarray(variable.to_numpy())
+        head = [name, variable.dims, values.shape, values.dtype.str, _plain(variable.attrs)]
+        digest.update(json.dumps(head).encode())
+        digest.update(values.tobytes())
+    attributes = {name: value for name, value in data.attrs.items() if name != "checksum"}
+    digest.update(json.dumps(_plain(attributes)).encode())
+    return digest.hexdigest()
+
+
+def _plain(attributes: Any) -> list[tuple[str, list[Any]]]:
+    """Attributes in one form: NetCDF gives numbers as arrays, and a list of one as its only entry."""
+    found = []
+    for name in sorted(map(str, attributes)):
+        value = attributes[name]
+        value = value.tolist() if hasattr(value, "tolist") else value
+        found.append((name, [str(part) for part in (value if isinstance(value, list | tuple) else [value])]))
+    return found
+
+
 def write_dataset(data: "xr.Dataset", path: Path) -> None:
     """Write NetCDF whole or not at all.
 
@@ -116,11 +164,14 @@ def write_dataset(data: "xr.Dataset", path: Path) -> None:
     StoreError
         The disk refused.
     """
+    write_atomic(path, dataset_bytes(data))
+
+
+def dataset_bytes(data: "xr.Dataset") -> bytes:
+    """A data set as a NetCDF file."""
     squeeze = {"zlib": True, "complevel": 1}
-    content = data.to_netcdf(
-        engine="h5netcdf", encoding={name: squeeze for name, value in data.data_vars.items() if value.size > 1000}
-    )
-    write_atomic(path, bytes(content))
+    packed = {name: squeeze for name, value in data.data_vars.items() if value.size > 1000}
+    return bytes(data.to_netcdf(engine="h5netcdf", encoding=packed))
 
 
 def read_dataset(path: Path) -> "xr.Dataset":

@@ -1,10 +1,17 @@
-"""Writing files so that they are there whole or not at all."""
+"""Writing files so that they are there whole or not at all, and taking away what a killed process was writing."""
 
 import os
+import re
 import tempfile
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 from rislam_rt.errors import StoreError
+
+PREFIX, SUFFIX = ".rislam-rt-", ".tmp"
+TEMPORARY = re.compile(r"\.rislam-rt-[a-z0-9_]{8}\.tmp")
+"""Names under which files grow; nobody else gives such names, and no other file is ever removed."""
 
 
 def write_atomic(path: Path, content: bytes) -> None:
@@ -17,7 +24,7 @@ def write_atomic(path: Path, content: bytes) -> None:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+        handle, name = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=path.parent)
         try:
             with os.fdopen(handle, "wb") as file:
                 file.write(content)
@@ -29,4 +36,41 @@ def write_atomic(path: Path, content: bytes) -> None:
             Path(name).unlink(missing_ok=True)
             raise
     except OSError as error:
-        raise StoreError(f"{path}: cannot be written ({error.strerror}); check permissions and free space") from None
+        raise refused(path, error) from None
+
+
+def remove_temporaries(folders: Iterable[Path]) -> None:
+    """Take away what a killed process was writing, in folders that nobody else is writing to."""
+    for folder in folders:
+        with suppress(OSError):
+            for entry in os.scandir(folder):
+                if TEMPORARY.fullmatch(entry.name) and entry.is_file(follow_symlinks=False):
+                    os.unlink(entry.path)
+
+
+def make_folders(folder: Path) -> list[Path]:
+    """Make a folder and those above it; returns those that were not there, the outermost first.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    try:
+        missing = [place for place in (folder, *folder.parents) if not place.exists()][::-1]
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise refused(folder, error) from None
+    return missing
+
+
+def remove_empty(folders: Iterable[Path]) -> None:
+    """Take away those of the folders, the outermost first, that hold nothing."""
+    for folder in reversed(list(folders)):
+        with suppress(OSError):
+            folder.rmdir()
+
+
+def refused(path: Path, error: OSError) -> StoreError:
+    """The disk's refusal as one line."""
+    return StoreError(f"{path}: cannot be written ({error.strerror}); check permissions and free space")

@@ -4,7 +4,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=64)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$", max_length=64)]
+"""Of a pipeline: part of folders' names, so that it holds no separator and begins with no dot."""
 Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, le=1e12, allow_inf_nan=False)]
 Real = Annotated[float, Field(ge=-1e12, le=1e12, allow_inf_nan=False)]

@@ -1,71 +1,76 @@
-"""The run folder: everything of a run, readable without this package, there whole or not at all.
+"""The run folder: everything of a run, readable without this package, and never anybody else's.
 
-While a run is under way its folder has `.partial` at the end of its name; a scheme's file appears there as soon as the
-scheme is complete, so that an interrupted run goes on where it stopped. The last step is one rename.
+`run.json` is its marker: it holds the run's whole identity, whether the run is `running` or `done`, and the SHA-256 of
+every file. A scheme's file appears as soon as the scheme is complete, so that a run that was stopped in any way goes on
+where it was. One process at a time writes there.
 """
 
 import hashlib
 import json
-import shutil
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rislam_rt.errors import ConfigError, RislamError, StoreError
+from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.model import MapEstimate, Scene, SchemeResult, SlamResult, Trajectory
 from rislam_rt.pipeline.dataset import (
+    check_dataset,
+    dataset_bytes,
     dataset_to_paths,
     dataset_to_scheme,
     paths_to_dataset,
     read_dataset,
     scheme_to_dataset,
-    write_dataset,
+    seal_dataset,
 )
-from rislam_rt.pipeline.files import write_atomic
-from rislam_rt.pipeline.run import library_versions
-from rislam_rt.pipeline.spec import PipelineSpec
-from rislam_rt.scene import load_scene, write_scene
-from rislam_rt.scene.write import toml_bytes, tum_bytes
+from rislam_rt.pipeline.files import TEMPORARY, make_folders, remove_empty, remove_temporaries, write_atomic
+from rislam_rt.pipeline.identity import Identity
+from rislam_rt.pipeline.lock import LOCK_FILE, hold
+from rislam_rt.pipeline.seal import file_digest, read_sealed, seal
+from rislam_rt.scene import load_scene
+from rislam_rt.scene.write import scene_files, toml_bytes, tum_bytes
 
 RUN_FILE, PATHS_FILE, SUMMARY_FILE = "run.json", "paths.nc", "summary.json"
+RUNNING, DONE = "running", "done"
+"""States of a run."""
+OWN_FOLDERS = ("", "figures", "scene", "scene/meshes")
+"""In which files of ours grow."""
 
 
-class PartialRun(MutableMapping[str, SchemeResult]):
-    """Schemes of a run that is under way, on disk. One that cannot be read counts as not there, and runs again."""
+class RunFolder(MutableMapping[str, SchemeResult]):
+    """Schemes of a run that is under way, on disk. One that is not as it was written counts as not there."""
 
-    def __init__(self, folder: Path, identity: str) -> None:
-        """Open the partial folder; one of another identity (other settings, room or versions) is emptied."""
-        self.final = folder
-        self.folder = folder.with_name(folder.name + ".partial")
-        mark = self.folder / "identity"
-        try:
-            if self.folder.exists() and not (mark.is_file() and mark.read_text() == identity):
-                shutil.rmtree(self.folder)
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise _refused(self.folder, error) from None
-        write_atomic(mark, identity.encode())
+    def __init__(self, folder: Path, identity: Identity, files: Mapping[str, str] | None = None) -> None:
+        """`files`: SHA-256 by name of what was written before."""
+        self.folder, self.identity, self.files = folder, identity, dict(files or {})
 
     def __getitem__(self, name: str) -> SchemeResult:
         file = scheme_file(self.folder, name)
-        if not file.is_file():
+        if file.name not in self.files:
             raise KeyError(name)
         try:
-            return dataset_to_scheme(read_dataset(file))
-        except (RislamError, KeyError):
+            if file_digest(file) != self.files[file.name]:
+                raise KeyError(name)
+            return _read_scheme(file, name, self.identity.digest)
+        except RislamError:
             raise KeyError(name) from None
 
     def __setitem__(self, name: str, result: SchemeResult) -> None:
-        write_dataset(scheme_to_dataset(result), scheme_file(self.folder, name))
+        data = seal_dataset(scheme_to_dataset(result), **self._stamp())
+        self._write(scheme_file(self.folder, name).name, dataset_bytes(data))
+        self.mark(RUNNING)
 
     def __delitem__(self, name: str) -> None:
-        scheme_file(self.folder, name).unlink()
+        file = scheme_file(self.folder, name)
+        file.unlink()
+        self.files.pop(file.name, None)
 
     def __iter__(self) -> Iterator[str]:
-        files = self.folder.glob("scheme_*.nc")
-        return iter(sorted(file.stem.removeprefix("scheme_") for file in files))
+        names = (file.removesuffix(".nc") for file in sorted(self.files) if file.startswith("scheme_"))
+        return (name.removeprefix("scheme_") for name in names)
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
@@ -76,57 +81,159 @@ class PartialRun(MutableMapping[str, SchemeResult]):
         except KeyError:
             return False
 
-    def abandon(self) -> None:
-        """Remove the folder if no scheme was completed."""
-        if not len(self):
-            shutil.rmtree(self.folder, ignore_errors=True)
+    @property
+    def spoiled(self) -> list[str]:
+        """Schemes that were written and are not as they were; they run again."""
+        return [name for name in self if name not in self]
 
-    def complete(self, result: SlamResult, summary: dict[str, Any]) -> Path:
-        """Add what the schemes' files do not hold and give the folder its final name. Returns it.
+    def mark(self, state: str, more: Mapping[str, Any] | None = None) -> None:
+        """Say where the run stands.
 
         Raises
         ------
         StoreError
             The disk refused.
         """
-        write_exports(result, summary, self.folder)
-        try:
-            (self.folder / "identity").unlink(missing_ok=True)
-            if self.final.exists():
-                aside = self.final.with_name(self.final.name + ".old")
-                shutil.rmtree(aside, ignore_errors=True)
-                self.final.rename(aside)
-                self.folder.rename(self.final)
-                shutil.rmtree(aside, ignore_errors=True)
-            else:
-                self.folder.rename(self.final)
-        except OSError as error:
-            raise _refused(self.final, error) from None
-        return self.final
+        about = {"state": state, "identity": self.identity.digest, **self.identity.content, **(more or {})}
+        write_atomic(self.folder / RUN_FILE, _json(seal({**about, "files": self.files})))
+
+    def complete(self, result: SlamResult, summary: Mapping[str, Any]) -> Path:
+        """Add what the schemes' files do not hold; the last step is the marker. Returns the folder.
+
+        Raises
+        ------
+        StoreError
+            The disk refused.
+        """
+        paths = seal_dataset(paths_to_dataset(result.paths, result.scene.agent), **self._stamp())
+        self._write(PATHS_FILE, dataset_bytes(paths))
+        for name, content in export_files(result, summary).items():
+            self._write(name, content)
+        told = {
+            "name": result.name,
+            "seed": result.seed,
+            "cycles": len(result.scene.agent),
+            "schemes": list(result.schemes),
+            "seconds": dict(result.seconds),
+            "warnings": list(result.warnings),
+            "config": dict(result.config),
+        }
+        self.mark(DONE, told)
+        return self.folder
+
+    def abandon(self) -> None:
+        """Take the marker away if no scheme was completed."""
+        if not self.files:
+            (self.folder / RUN_FILE).unlink(missing_ok=True)
+
+    def _stamp(self) -> dict[str, str]:
+        return {"run": self.identity.digest, "scene_sha256": self.identity.content["scene"]["sha256"]}
+
+    def _write(self, name: str, content: bytes) -> None:
+        write_atomic(self.folder / name, content)
+        self.files[name] = hashlib.sha256(content).hexdigest()
 
 
-def run_folder(spec: PipelineSpec, scene: Scene, parent: Path) -> Path:
-    """`<pipeline>-<scene>-<seed>` below the folder of all runs."""
-    return parent / f"{spec.name}-{scene.name}-{spec.seed}"
-
-
-def run_identity(spec: PipelineSpec, scene: Scene) -> str:
-    """What must be equal for a scheme's file to be taken over: settings, room, versions; not the list of schemes."""
-    config = spec.model_dump(mode="json", exclude={"schemes", "description", "scene"})
-    content = json.dumps([config, scene.digest, library_versions()], sort_keys=True)
-    return hashlib.sha256(content.encode()).hexdigest()
-
-
-def check_folder(folder: Path) -> None:
-    """Refuse a folder that holds something other than a run, which the new run would replace.
+def find_run(folder: Path, identity: Identity) -> dict[str, Any] | None:
+    """What the marker of a folder says; None if there is no folder, or nothing in it.
 
     Raises
     ------
     ConfigError
-        It does.
+        It holds something else, or a run of another identity: nothing there may be replaced.
+    ResultError
+        The marker is not as it was written.
     """
-    if folder.exists() and not (folder / RUN_FILE).is_file() and (not folder.is_dir() or any(folder.iterdir())):
+    try:
+        names = sorted(entry.name for entry in folder.iterdir())
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise ConfigError(f"--out {folder}: cannot be used ({error.strerror}); give another folder") from None
+    if RUN_FILE not in names:
+        if all(name == LOCK_FILE or TEMPORARY.fullmatch(name) for name in names):
+            return None
         raise ConfigError(f"--out {folder}: exists and is not a run; give a folder that does not exist yet")
+    about = read_sealed(folder / RUN_FILE)
+    if about.get("identity") != identity.digest:
+        differ = identity.difference({key: about.get(key, {}) for key in identity.content})
+        raise ConfigError(f"--out {folder}: holds another run ({differ}); give another folder")
+    return about
+
+
+@contextmanager
+def open_run(folder: Path, identity: Identity) -> Iterator[RunFolder]:
+    """The folder of a run, to be gone on with or begun; nobody else writes there meanwhile.
+
+    Raises
+    ------
+    ConfigError
+        It holds something else, or another process is at work there.
+    ResultError
+        Its marker is not as it was written.
+    StoreError
+        The disk refused.
+    """
+    find_run(folder, identity)
+    made = make_folders(folder)
+    try:
+        with hold_run(folder):
+            about = find_run(folder, identity)
+            store = RunFolder(folder, identity, about["files"] if about else None)
+            try:
+                store.mark(RUNNING)
+                yield store
+            except BaseException:
+                store.abandon()
+                raise
+    finally:
+        remove_empty(made)
+
+
+@contextmanager
+def hold_run(folder: Path) -> Iterator[None]:
+    """Keep others out of the folder of a run, and remove what a killed process was writing there.
+
+    Raises
+    ------
+    ConfigError
+        Another process is at work there.
+    StoreError
+        The disk refused.
+    """
+    with hold(folder, "run"):
+        remove_temporaries(folder / part for part in OWN_FOLDERS)
+        yield
+
+
+def is_left_locked(folder: Path) -> bool:
+    """Whether somebody is at work in a folder, or died there."""
+    return (folder / LOCK_FILE).exists()
+
+
+def check_files(folder: Path, about: Mapping[str, Any]) -> None:
+    """Whether every file of a completed run is as it was written.
+
+    Raises
+    ------
+    ResultError
+        One is not. One line that names it.
+    """
+    for name, digest in about["files"].items():
+        if file_digest(folder / name) != digest:
+            raise ResultError(f"{folder / name}: changed since it was written; run again with another --out")
+
+
+def read_summary(folder: Path, about: Mapping[str, Any]) -> dict[str, Any]:
+    """The scores of a completed run, every file of which is as it was written.
+
+    Raises
+    ------
+    ResultError
+        One is not.
+    """
+    check_files(folder, about)
+    return dict(json.loads((folder / SUMMARY_FILE).read_bytes()))
 
 
 def scheme_file(folder: Path, name: str) -> Path:
@@ -134,48 +241,37 @@ def scheme_file(folder: Path, name: str) -> Path:
     return folder / f"scheme_{name}.nc"
 
 
-def write_exports(result: SlamResult, summary: dict[str, Any], folder: Path) -> None:
-    """Paths, trajectories, maps, room, configuration and summary."""
+def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, bytes]:
+    """Trajectories, maps, room, configuration and summary: name -> content."""
     motion = result.scene.agent
-    write_dataset(paths_to_dataset(result.paths, motion), folder / PATHS_FILE)
-    write_atomic(folder / "truth.tum", tum_bytes(motion.time, motion.position, motion.heading))
+    files = {"truth.tum": tum_bytes(motion.time, motion.position, motion.heading)}
     for name, scheme in result.schemes.items():
-        write_atomic(folder / f"estimate_{name}.tum", tum_bytes(motion.time, scheme.position, scheme.heading))
+        files[f"estimate_{name}.tum"] = tum_bytes(motion.time, scheme.position, scheme.heading)
     maps = {name: map_table(scheme.map) for name, scheme in result.schemes.items()}
-    write_atomic(folder / "map.json", _json(maps))
-    write_atomic(folder / "config.toml", toml_bytes(_without_none({**result.config})))
-    write_scene(result.scene, folder / "scene", overwrite=True)
-    about = {
-        "name": result.name,
-        "seed": result.seed,
-        "scene": {"name": result.scene.name, "sha256": result.scene.digest},
-        "cycles": len(motion),
-        "schemes": list(result.schemes),
-        "versions": dict(result.versions),
-        "seconds": dict(result.seconds),
-        "warnings": list(result.warnings),
-        "config": dict(result.config),
-    }
-    write_atomic(folder / SUMMARY_FILE, _json(summary))
-    write_atomic(folder / RUN_FILE, _json(about))
+    files |= {"map.json": _json(maps), "config.toml": toml_bytes(_without_none({**result.config}))}
+    files |= {f"scene/{name}": content for name, content in scene_files(result.scene).items()}
+    return files | {SUMMARY_FILE: _json(summary)}
 
 
 def read_run(folder: Path) -> SlamResult:
-    """A completed run.
+    """A completed run, every file of which is as it was written.
 
     Raises
     ------
-    StoreError
-        One of its files is missing or damaged.
+    ResultError
+        One of its files is missing, damaged or changed.
     ConfigError
         The folder is not a completed run.
     """
     if not (folder / RUN_FILE).is_file():
         raise ConfigError(f"{folder}: not a completed run (no {RUN_FILE}); give a folder that `run` wrote")
+    about = read_sealed(folder / RUN_FILE)
     try:
-        about = json.loads((folder / RUN_FILE).read_text())
-        names = [str(name) for name in about["schemes"]]
+        if about["state"] != DONE:
+            raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
+        check_files(folder, about)
         data = read_dataset(folder / PATHS_FILE)
+        check_dataset(data, folder / PATHS_FILE, run=about["identity"], cycles=about["cycles"])
         paths, scene = dataset_to_paths(data), load_scene(folder / "scene")
         agent = Trajectory(
             data["time"].to_numpy(),
@@ -184,7 +280,10 @@ def read_run(folder: Path) -> SlamResult:
             data["true_heading"].to_numpy(),
             scene.agent.body,
         )
-        schemes = {name: dataset_to_scheme(read_dataset(scheme_file(folder, name))) for name in names}
+        schemes = {
+            name: _read_scheme(scheme_file(folder, name), name, about["identity"], about["cycles"])
+            for name in about["schemes"]
+        }
         return SlamResult(
             name=about["name"],
             scene=Scene(scene.name, scene.reflectors, scene.scatterers, scene.ris, agent, about["scene"]["sha256"]),
@@ -196,11 +295,11 @@ def read_run(folder: Path) -> SlamResult:
             seconds=about["seconds"],
             warnings=tuple(about["warnings"]),
         )
-    except StoreError:
+    except (ConfigError, ResultError):
         raise
-    except (OSError, ValueError, KeyError, TypeError, RislamError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RislamError) as error:
         cause = f"{type(error).__name__}: {error}"[:120]
-        raise StoreError(f"{folder}: a file of the run is damaged ({cause}); run again") from None
+        raise ResultError(f"{folder}: a file of the run is damaged ({cause}); run again with another --out") from None
 
 
 def map_table(estimate: MapEstimate) -> dict[str, Any]:
@@ -224,6 +323,13 @@ def map_table(estimate: MapEstimate) -> dict[str, Any]:
     return {"landmarks": features, "walls": walls}
 
 
+def _read_scheme(file: Path, name: str, run: str, cycles: int | None = None) -> SchemeResult:
+    """A scheme's data set, which must be of this scheme and run."""
+    data = read_dataset(file)
+    check_dataset(data, file, scheme=name, run=run, **({} if cycles is None else {"cycles": cycles}))
+    return dataset_to_scheme(data)
+
+
 def _without_none(table: dict[str, Any]) -> dict[str, Any]:
     """TOML has no null: what is not set is left out."""
     return {
@@ -235,7 +341,3 @@ def _without_none(table: dict[str, Any]) -> dict[str, Any]:
 
 def _json(content: Any) -> bytes:
     return (json.dumps(content, indent=2, allow_nan=False) + "\n").encode()
-
-
-def _refused(path: Path, error: OSError) -> StoreError:
-    return StoreError(f"{path}: cannot be written ({error.strerror}); check permissions and free space")

@@ -2,9 +2,8 @@
 
 import multiprocessing as mp
 import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, NamedTuple
@@ -65,23 +64,14 @@ def _start(work: Work, name: str, common: tuple[Any, ...]) -> Worker:
     context = mp.get_context("spawn")
     ear, mouth = context.Pipe(duplex=False)
     process = context.Process(target=_run, args=(mouth, work, name, common), daemon=True)
-    with _deaf():
+    # the keyboard's interrupt reaches the whole group, and one that comes while Python starts would be a traceback
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
         process.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
     mouth.close()
     return Worker(name, process, ear)
-
-
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """A process started in here ignores the keyboard from its first instruction on; this one does again afterwards."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread may, and an interrupt goes to nobody else
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _run(mouth: Connection, work: Work, name: str, common: tuple[Any, ...]) -> None:

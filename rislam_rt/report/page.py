@@ -89,6 +89,8 @@ def draw_figures(result: SlamResult) -> dict[str, bytes]:
 def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping[str, bytes]) -> str:
     """One HTML page with everything in it."""
     title = f"{result.name} in {result.scene.name}"
+    about = f"{summary['cycles']} cycles, seed {summary['seed']}, paths {result.paths.source} in "
+    about += f"{summary['trace_seconds']:.1f} s."
     names = list(summary["schemes"])
     head = "".join(f"<th>{html.escape(name)}</th>" for name in names)
     rows = "".join(
@@ -104,8 +106,7 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title><style>{STYLE}</style></head><body>
 <h1>{html.escape(title)}</h1>
-<p class="note">{summary["cycles"]} cycles, seed {summary["seed"]}, paths {html.escape(result.paths.source)} in
-{summary["trace_seconds"]:.1f} s.</p>
+<p class="note">{html.escape(about)}</p>
 {warnings}<h2>RMSE</h2>
 <table><tr><th></th>{head}</tr>{rows}</table>
 <p class="note">Agent and landmarks: over the cycles (for a landmark, those in which the map holds it).

@@ -1,5 +1,7 @@
 """New scene folders from the built-in rooms."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 from textwrap import fill
 
@@ -11,7 +13,7 @@ from rislam_rt.scene.write import toml_bytes, write_files
 
 
 def new_scene(template: str, folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Write one of the built-in rooms into a folder, the same bytes every time. Returns the folder.
+    """Write one of the built-in rooms into a folder, the same bytes every time, named after it. Returns the folder.
 
     Raises
     ------
@@ -22,14 +24,22 @@ def new_scene(template: str, folder: str | Path, *, overwrite: bool = False) -> 
     """
     if template not in ROOMS:
         raise SceneError(f"template: '{template}' received; give one of {', '.join(ROOMS)}")
-    return write_files(room_files(ROOMS[template]()), folder, overwrite=overwrite)
+    room = ROOMS[template]()
+    named = replace(room, table={**room.table, "name": room_name(Path(folder), template)})
+    origin = f"Made by `rislam-rt new --template {template}`."
+    return write_files(room_files(named, origin), folder, overwrite=overwrite)
 
 
-def room_files(room: Room) -> dict[str, bytes]:
-    """The files of a scene folder: relative name -> content."""
+def room_name(folder: Path, template: str) -> str:
+    """What a room is called that lies in a folder: the folder's name, with what a room's name cannot hold as `_`."""
+    name = re.sub(r"[^A-Za-z0-9_.\-]", "_", folder.resolve().name)[:64]
+    return name if name.strip("._-") else template
+
+
+def room_files(room: Room, origin: str = "") -> dict[str, bytes]:
+    """The files of a scene folder: relative name -> content. `origin`: where it comes from, if not from the build."""
     files = {f"meshes/{name}.ply": ply_bytes(mesh.vertices, mesh.faces) for name, mesh in room.meshes.items()}
     name = room.table["name"]
-    readme = (
-        f"# {name}\n\n{fill(room.readme, 110)}\n\nWritten by `python -m rislam_rt.scene.build {name} --out scenes`.\n"
-    )
+    origin = origin or f"Written by `python -m rislam_rt.scene.build {name} --out scenes`."
+    readme = f"# {name}\n\n{fill(room.readme, 110)}\n\n{origin}\n"
     return files | room.files | {SCENE_FILE: toml_bytes(room.table), "README.md": readme.encode()}

@@ -22,9 +22,7 @@ TRAJECTORY_FILE = "path.tum"
 
 
 def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Write a scene as `scene.toml`, one PLY mesh a reflector and, unless it is straight, the agent's path.
-
-    Returns the folder.
+    """Write a scene's files into a folder, which it returns.
 
     Raises
     ------
@@ -33,6 +31,11 @@ def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) ->
     StoreError
         The disk refused.
     """
+    return write_files(scene_files(scene), folder, overwrite=overwrite)
+
+
+def scene_files(scene: Scene) -> dict[str, bytes]:
+    """A scene as files, name -> content: `scene.toml`, one PLY mesh a reflector, the agent's path unless straight."""
     files = {f"meshes/{r.name}.ply": ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
     for scatterer in scene.scatterers:
         if scatterer.shade is not None and not _has_own_shadow(scatterer):
@@ -40,8 +43,7 @@ def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) ->
     agent = _agent_table(scene.agent)
     if "trajectory" in agent:
         files[TRAJECTORY_FILE] = tum_bytes(scene.agent.time, scene.agent.position, scene.agent.heading)
-    files[SCENE_FILE] = toml_bytes(_scene_table(scene, agent))
-    return write_files(files, folder, overwrite=overwrite)
+    return files | {SCENE_FILE: toml_bytes(_scene_table(scene, agent))}
 
 
 def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bool = False) -> Path:

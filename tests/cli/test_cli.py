@@ -162,22 +162,51 @@ def test_run_report_and_json(run, tmp_path):
     ]
 
 
-def test_second_run_replaces_the_first(run, tmp_path):
-    for seed in (1, 2):
-        run(
-            "run",
-            PIPELINE,
-            *SHORT,
-            "--set",
-            f"seed={seed}",
-            "--no-report",
-            "--out",
-            "mine",
-            "--set",
-            'schemes=["random"]',
-        )
-    assert json.loads((tmp_path / "mine" / "summary.json").read_text())["seed"] == 2
-    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+def test_a_run_is_shown_and_other_settings_make_another_folder(run, tmp_path):
+    words = ("run", PIPELINE, *SHORT, "--set", 'schemes=["random"]', "--no-report")
+    code, first, _ = run(*words)
+    assert code == 0
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert folder.name.startswith("trace_then_slam-paper_room-7-")
+    before = {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in folder.rglob("*.*")}
+    code, again, _ = run(*words)
+    assert code == 0
+    assert again.splitlines()[0] == "this run is complete already; nothing was computed"
+    assert again.splitlines()[1:] == first.splitlines()
+    assert {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in folder.rglob("*.*")} == before
+    # another SNR at the same seed is another run, beside it or, in the same folder, none
+    other = ("--set", "radio.reference_snr_db=0")
+    assert run(*words, *other)[0] == 0
+    assert len(list((tmp_path / "runs").iterdir())) == 2
+    code, _, err = run(*words, *other, "--out", folder)
+    assert code == 2
+    assert "config.radio.reference_snr_db is 13.0 there and 0.0 here" in err
+    assert {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in folder.rglob("*.*")} == before
+
+
+def test_a_run_touches_nothing_of_the_user(run, tmp_path):
+    words = ("run", PIPELINE, *SHORT, "--set", 'schemes=["random"]', "--no-report", "--jobs", 1)
+    mine = ("X.partial/notes", "X.old/notes", "runs/notes", ".git-credentials", ".x-y", "Y/run.json", "Y/thesis.tex")
+    for name in mine:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(f"{{}} {name}")
+    assert run(*words, "--out", "X")[0] == 0
+    for place in ("Y", "X.old", "."):
+        code, _, err = run(*words, "--out", place)
+        assert code == 2
+        assert len(err.splitlines()) == 1
+    assert all((tmp_path / name).read_text() == f"{{}} {name}" for name in mine)
+    assert sorted(path.name for path in (tmp_path / "X.old").iterdir()) == ["notes"]
+
+
+def test_an_own_room_is_called_after_its_folder(run, tmp_path):
+    from rislam_rt.scene import load_scene
+
+    assert run("new", "my room")[0] == 0
+    assert load_scene(tmp_path / "my room").name == "my_room"
+    assert "rislam_rt.scene.build" not in (tmp_path / "my room" / "README.md").read_text()
+    assert run("run", PIPELINE, *SHORT, "--set", 'schemes=["random"]', "--no-report", "--scene", "my room")[0] == 0
+    assert [path.name[:26] for path in (tmp_path / "runs").iterdir()] == ["trace_then_slam-my_room-7-"]
 
 
 def test_interrupted_run_goes_on(run, tmp_path, monkeypatch):
@@ -196,8 +225,9 @@ def test_interrupted_run_goes_on(run, tmp_path, monkeypatch):
     code, _, err = run("run", PIPELINE, *SHORT, "--no-report", "--jobs", 1)
     assert code == 130
     assert "1 schemes kept" in err
-    folder = tmp_path / "runs" / "trace_then_slam-paper_room-7"
-    assert not folder.exists()
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert sorted(path.name for path in folder.iterdir()) == ["run.json", "scheme_optimized.nc"]
+    assert run("report", folder)[0] == 2
     assert run("run", PIPELINE, *SHORT, "--no-report", "--jobs", 1)[0] == 0
     assert seen == ["optimized", "random", "random"]
     assert [path.name for path in folder.parent.iterdir()] == [folder.name]

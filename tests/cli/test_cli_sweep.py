@@ -1,7 +1,6 @@
 """`rislam-rt sweep`: exit codes, what it writes, one line for every failure."""
 
 import json
-import signal
 import sys
 from pathlib import Path
 
@@ -19,17 +18,15 @@ TINY = ("--set", "channel=image_source", "--set", "cycles=3", "--set", "slam.num
 def run(capsys, monkeypatch, tmp_path):
     """Sweep in an empty folder; returns exit code, output and error stream."""
     monkeypatch.chdir(tmp_path)
-    before = signal.getsignal(signal.SIGTERM)
 
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["rislam-rt", "sweep", *arguments])
+    def _run(*arguments, command="sweep"):
+        monkeypatch.setattr(sys, "argv", ["rislam-rt", command, *arguments])
         with pytest.raises(SystemExit) as left:
             main()
         captured = capsys.readouterr()
         return left.value.code, captured.out, captured.err
 
-    yield _run
-    signal.signal(signal.SIGTERM, before)
+    return _run
 
 
 def test_estimate_then_sweep_then_nothing_left(run, tmp_path):
@@ -70,6 +67,7 @@ def test_a_failed_run_is_told_and_exit_1(run, tmp_path):
         (PIPELINE, "--axis", "seed=1,2"),
         (PIPELINE, "--axis", "cycles=3,1000"),
         (PIPELINE, "--axis", "slam.sigma_a=0.1", "--axis", "slam=1"),
+        (PIPELINE, "--axis", "slam.sigma_a=0.1", "--axis", "slam.sigma_a=0.2"),
         (PIPELINE, "--repeat", "0"),
         (PIPELINE, "--jobs", "0"),
         (PIPELINE, "--time-limit", "0"),
@@ -85,13 +83,36 @@ def test_bad_input_is_one_line_and_leaves_nothing(run, tmp_path, words):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_no_scheduler_is_exit_3(run, monkeypatch):
+def test_no_scheduler_is_exit_3(run, tmp_path, monkeypatch):
     from rislam_rt.pipeline.sweeps import cluster
 
+    assert cluster.CONNECT_SECONDS <= 3  # the command as a whole is to end within 10 s
     monkeypatch.setattr(cluster, "CONNECT_SECONDS", 0.2)
-    code, _, err = run(PIPELINE, *TINY, "--dask", "tcp://127.0.0.1:9")
-    assert code == 3
-    assert "no scheduler answers" in err
+    for address in ("tcp://127.0.0.1:9", "nonsense", "nonsense://here", "tcp://127.0.0.1:99999"):
+        code, _, err = run(PIPELINE, *TINY, "--dask", address)
+        assert code == 3
+        assert "no scheduler answers" in err
+        assert list(tmp_path.iterdir()) == []
+    assert run(PIPELINE, *TINY, "--dask", " ")[0] == 2
+
+
+def test_a_sweep_touches_nothing_of_the_user(run, tmp_path):
+    mine = (".git-credentials", ".pre-commit-config.yaml", "cells/.a-b", "notes.txt")
+    for name in mine:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(name)
+    for place in (".", "cells", "notes.txt"):
+        code, _, err = run(PIPELINE, *TINY, "--repeat", "1", "--out", place)
+        assert code == 2
+        assert len(err.splitlines()) == 1
+    study = 'kind = "rooms"\nname = "{}"\nscenes = ["{}"]\nrepetitions = 1\n'
+    for name in ("..", ".", ".hidden", "a/b", "../a", ""):
+        (tmp_path / "study.toml").write_text(study.format(name, ROOT / "scenes" / "paper_room"))
+        code, _, err = run("study.toml", command="run")
+        assert (code, len(err.splitlines())) == (2, 1)
+    (tmp_path / "study.toml").unlink()
+    assert {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*")} == {*mine, "cells"}
+    assert all((tmp_path / name).read_text() == name for name in mine)
 
 
 def test_interrupt_is_one_line(run, monkeypatch):

@@ -6,8 +6,9 @@ import pytest
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind, RisCode, RisSpec
 from rislam_rt.pipeline.control import check_control, open_link, send_code
+from rislam_rt.pipeline.identity import run_identity
 from rislam_rt.pipeline.spec import ControlSection
-from rislam_rt.pipeline.store import PartialRun, read_run, run_identity
+from rislam_rt.pipeline.store import open_run, read_run
 from rislam_rt.pipeline.summary import summarise
 
 SPEC = RisSpec(20, 30, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]), 4)
@@ -76,6 +77,7 @@ def test_a_panel_too_wide_for_the_band_is_said_and_kept(run_short, room, short_s
     assert len(result.warnings) == 1
     assert "delays over the panel spread" in result.warnings[0]
     assert summarise(result)["warnings"] == list(result.warnings)
-    partial = PartialRun(tmp_path / "run", run_identity(short_spec, scene))
-    partial["random"] = result.schemes["random"]
-    assert read_run(partial.complete(result, summarise(result))).warnings == result.warnings
+    with open_run(tmp_path / "run", run_identity(short_spec, scene)) as store:
+        store["random"] = result.schemes["random"]
+        store.complete(result, summarise(result))
+    assert read_run(tmp_path / "run").warnings == result.warnings

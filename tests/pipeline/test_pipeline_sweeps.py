@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 import sweep_cells
 
-from rislam_rt.errors import ConfigError, SetupError
+from rislam_rt.errors import ConfigError, ResultError, SetupError
 from rislam_rt.pipeline.sweeps import Axis, Effort, Sweep, build_cells, parse_axis, run_sweep
 from rislam_rt.pipeline.sweeps.cost import estimate_cost
 
@@ -172,11 +173,37 @@ def test_resumed_sweep_runs_what_is_missing(tmp_path):
     torn, foreign = (out / "cells" / f"{row.cell.ident}.json" for row in report.rows[:2])
     torn.write_bytes(torn.read_bytes()[:40])
     foreign.write_bytes((out / "cells" / f"{report.rows[2].cell.ident}.json").read_bytes())
-    (out / "cells" / ".half.json-abc").write_text("{")
+    (out / "cells" / ".rislam-rt-half_abc.tmp").write_text("{")
+    (out / "cells" / ".half.json-abc").write_text("mine")
     run_sweep(sweep(1, 2, 3), out)
     assert {path.name: path.read_text() for path in marks.iterdir()} == {"1": "xx", "2": "xx", "3": "x"}
-    assert not list(out.rglob(".*"))
+    assert [path.name for path in out.rglob(".*")] == [".half.json-abc"]
     assert str(tmp_path) not in torn.read_text()
+
+
+def test_a_changed_value_is_not_taken_over(whole, tmp_path):
+    folder = tmp_path / "out"
+    shutil.copytree(whole[0], folder)
+    rng, changed = np.random.default_rng(5), 0
+    for file in sorted((folder / "cells").iterdir()):
+        content = file.read_bytes()
+        digits = [place for place, byte in enumerate(content) if chr(byte) in "123456789"]
+        place = int(rng.choice(digits))
+        other = b"1" if content[place : place + 1] != b"1" else b"2"
+        file.write_bytes(content[:place] + other + content[place + 1 :])
+        changed += 1
+    told = []
+    run_sweep(DRAW, folder, Effort(jobs=2), tell=told.append)
+    assert sum(one.last is not None for one in told) == changed == 12
+    assert written(folder) == written(whole[0])
+
+
+@pytest.mark.parametrize("text", ["{}", "[1]", '{"schema": 1, "checksum": ""}', "\xff", "NaN", "[" * 9999])
+def test_a_folder_with_another_sweep_json_is_refused(text, tmp_path):
+    (tmp_path / "sweep.json").write_text(text, encoding="latin-1")
+    with pytest.raises(ResultError, match=r"sweep\.json: [^\n]+; give another folder$"):
+        run_sweep(DRAW, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["sweep.json"]
 
 
 def test_trouble_is_recorded_and_the_rest_goes_on(tmp_path):
@@ -243,7 +270,7 @@ def test_cost_comes_from_similar_cells():
 
 def test_two_sweeps_do_not_share_a_folder(tmp_path):
     def intrude(told):
-        with pytest.raises(ConfigError, match="another sweep is at work"):
+        with pytest.raises(ConfigError, match=rf"another sweep is at work there \(process {os.getpid()} on "):
             run_sweep(DRAW, tmp_path)
 
     run_sweep(Sweep("sweep_cells:misbehave", (Axis("kind", ("good",)),)), tmp_path, tell=intrude)
@@ -260,6 +287,8 @@ def start(folder, jobs):
     return subprocess.Popen(
         [sys.executable, HERE / "sweep_cells.py", str(folder), str(jobs)],
         stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True, cwd=HERE,
+        # whoever runs the tests in the background may ignore it, and a child inherits that
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL) and None,
     )  # fmt: skip
 
 

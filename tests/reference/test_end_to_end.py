@@ -7,7 +7,8 @@ import pytest
 
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec, run_slam
-from rislam_rt.pipeline.store import PartialRun, read_run, run_identity
+from rislam_rt.pipeline.identity import run_identity
+from rislam_rt.pipeline.store import open_run, read_run
 from rislam_rt.pipeline.summary import summarise
 from rislam_rt.scene import load_scene
 
@@ -58,8 +59,8 @@ def test_same_seed_same_bits(chain, result):
 
 def test_result_survives_the_disk(chain, result, tmp_path):
     room, spec, _ = chain
-    partial = PartialRun(tmp_path / "run", run_identity(spec, room))
-    for name, scheme in result.schemes.items():
-        partial[name] = scheme
-    again = read_run(partial.complete(result, summarise(result)))
+    with open_run(tmp_path / "run", run_identity(spec, room)) as store:
+        store.update(result.schemes)
+        store.complete(result, summarise(result))
+    again = read_run(tmp_path / "run")
     assert summarise(again) == summarise(result)

@@ -5,12 +5,12 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
-from rislam_rt.errors import SetupError
+from rislam_rt.errors import ConfigError, SetupError
 from rislam_rt.pipeline.sweeps.crew import Crew, Run
 from rislam_rt.pipeline.sweeps.work import LOST, Outcome, Task
 
-CONNECT_SECONDS = 30
-"""How long to wait for the scheduler."""
+CONNECT_SECONDS = 3
+"""How long to wait for the scheduler, which is there already: it only has to answer."""
 
 _CREW = Crew()
 """Of the Dask worker that this module is imported in."""
@@ -24,6 +24,8 @@ def crew_there(address: str, limit: float | None) -> Iterator[tuple[Run, int]]:
 
     Raises
     ------
+    ConfigError
+        The address is empty.
     SetupError
         Dask is not installed, there is no scheduler at the address, or it has gone.
     """
@@ -31,9 +33,11 @@ def crew_there(address: str, limit: float | None) -> Iterator[tuple[Run, int]]:
         distributed: Any = import_module("distributed")
     except ImportError:
         raise SetupError("--dask needs dask.distributed, which is missing; pip install 'rislam-rt[cluster]'") from None
+    if not address.strip():
+        raise ConfigError("--dask: no address received; give that of a scheduler, e.g. tcp://127.0.0.1:8786")
     try:
         client = distributed.Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
-    except (OSError, ValueError) as error:
+    except Exception as error:  # an address that is none raises nearly anything
         cause = " ".join(str(error).split())[:120]
         raise SetupError(f"--dask {address}: no scheduler answers ({cause}); start one, or mend the address") from None
 

@@ -16,11 +16,11 @@ from rislam_rt.pipeline.sweeps.store import (
     MISSING,
     Row,
     append_timing,
+    check_folder,
     open_folder,
     read_row,
     read_timings,
     write_cell,
-    write_sweep,
     write_table,
 )
 from rislam_rt.pipeline.sweeps.work import LOST, Outcome, Task, find_function
@@ -102,8 +102,8 @@ def run_sweep(
 
     Raises
     ------
-    ConfigError
-        The settings are unusable, or another sweep is at work in the folder.
+    ConfigError, ResultError
+        The settings are unusable, the folder holds something else, or another sweep is at work in it.
     StoreError
         The disk refused.
     SetupError
@@ -113,12 +113,15 @@ def run_sweep(
     find_function(sweep.function)
     cells = build_cells(sweep)
     with ExitStack() as stack:
-        stack.enter_context(open_folder(folder))
-        write_sweep(folder, sweep)
+        check_folder(folder)
+        left = any(read_row(folder, cell).state != DONE for cell in cells)
+        # a cluster first: one that is not there leaves no folder behind
+        hired = _hire(stack, effort) if left and effort.dask is not None else None
+        stack.enter_context(open_folder(folder, sweep))
         board = _Board(sweep, folder, effort, cells, tell, grow)
         stack.callback(board.write)
         if board.left:
-            run, board.width = _hire(stack, effort)
+            run, board.width = hired or _hire(stack, effort)
             for share in _shares(board):
                 for ident, outcome in run(share):
                     board.take(ident, outcome)

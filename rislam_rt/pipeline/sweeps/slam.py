@@ -105,7 +105,11 @@ def slam_sweep(
     """
     section = load_section(path, overrides)
     found = {key: Axis(key, tuple(values)) for key, values in section.axes.items()}
-    found |= {axis.key: axis for axis in map(parse_axis, axes)}
+    given = [parse_axis(text) for text in axes]
+    twice = [axis.key for number, axis in enumerate(given) if axis.key in {other.key for other in given[:number]}]
+    if twice:
+        raise ConfigError(f"--axis {twice[0]}: given twice; give all its values in one, as {twice[0]}=V1,V2")
+    found |= {axis.key: axis for axis in given}
     for key in ("seed", "kind", "name", "description"):
         if key in found:
             raise ConfigError(f"axis '{key}': no setting to go through; use --repeat for seeds")

@@ -1,26 +1,29 @@
 """A sweep's folder: one file a cell, what differs from run to run apart, and a table that grows.
 
 sweep.json               what is swept
-cells/<ident>.json       what a cell gave, or how it failed; the same bytes from every run
+cells/<ident>.json       what a cell gave, or how it failed, with a checksum; the same bytes from every run
 table.csv, table.json    all cells in their order, those that are missing too; the same bytes from every run
 timings.jsonl            seconds and machine of every cell that ran, in the order in which they ended
 """
 
 import csv
-import fcntl
 import io
 import json
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rislam_rt.errors import ConfigError, StoreError
-from rislam_rt.pipeline.files import write_atomic
+from rislam_rt.errors import ConfigError, RislamError
+from rislam_rt.pipeline.files import TEMPORARY, make_folders, remove_empty, remove_temporaries, write_atomic
+from rislam_rt.pipeline.lock import LOCK_FILE, hold
+from rislam_rt.pipeline.seal import read_sealed, seal
 from rislam_rt.pipeline.sweeps.axes import Cell, Sweep
 from rislam_rt.pipeline.sweeps.record import flatten, json_bytes
 from rislam_rt.pipeline.sweeps.work import Outcome
+
+SWEEP_FILE = "sweep.json"
+"""The folder's marker."""
 
 MISSING, DONE = "missing", "done"
 """States of a cell, beside the causes of a failure."""
@@ -46,40 +49,53 @@ class Row(NamedTuple):
         return self.state not in (MISSING, DONE)
 
 
+def check_folder(folder: Path) -> None:
+    """Refuse a folder that holds something else than a sweep: nothing of anybody else's may be replaced.
+
+    Raises
+    ------
+    ConfigError
+        It does.
+    ResultError
+        `sweep.json` is not as it was written.
+    """
+    try:
+        names = [entry.name for entry in folder.iterdir()]
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise ConfigError(f"{folder}: cannot be used ({error.strerror}); give another folder") from None
+    if SWEEP_FILE in names:
+        read_sealed(folder / SWEEP_FILE)
+    elif not all(name == LOCK_FILE or TEMPORARY.fullmatch(name) for name in names):
+        raise ConfigError(f"{folder}: exists and is not a sweep; give a folder that does not exist yet")
+
+
 @contextmanager
-def open_folder(folder: Path) -> Iterator[None]:
-    """Make the folder, keep other sweeps out, and remove what a killed one was writing.
+def open_folder(folder: Path, sweep: Sweep) -> Iterator[None]:
+    """Make the folder, say what is swept, keep other sweeps out, and remove what a killed one was writing.
 
     Raises
     ------
     StoreError
         The disk refused.
-    ConfigError
-        Another sweep is at work there.
+    ConfigError, ResultError
+        It holds something else, or another sweep is at work there.
     """
-    cells = folder / "cells"
+    check_folder(folder)
+    made = make_folders(folder)
     try:
-        cells.mkdir(parents=True, exist_ok=True)
-        handle = os.open(cells, os.O_RDONLY)
-    except OSError as error:
-        raise StoreError(f"{folder}: cannot be written ({error.strerror}); check permissions and free space") from None
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise ConfigError(f"{folder}: another sweep is at work there; wait, or give another folder") from None
-        except OSError:
-            pass  # a file system without locks
-        for torn in (*folder.glob(".*-*"), *cells.glob(".*-*")):
-            with suppress(OSError):
-                torn.unlink()
-        yield
+        with hold(folder, "sweep"):
+            check_folder(folder)
+            remove_temporaries((folder, folder / "cells"))
+            write_sweep(folder, sweep)
+            yield
     finally:
-        os.close(handle)
+        remove_empty(made)
 
 
 def write_sweep(folder: Path, sweep: Sweep) -> None:
-    """Say what is swept.
+    """Say what is swept; the file is the folder's marker.
 
     Raises
     ------
@@ -95,7 +111,7 @@ def write_sweep(folder: Path, sweep: Sweep) -> None:
         "seed": sweep.seed,
         "paired": list(sweep.paired),
     }
-    write_atomic(folder / "sweep.json", json_bytes(about))
+    write_atomic(folder / SWEEP_FILE, json_bytes(seal(about)))
 
 
 def write_cell(folder: Path, cell: Cell, function: str, outcome: Outcome) -> Row:
@@ -108,17 +124,18 @@ def write_cell(folder: Path, cell: Cell, function: str, outcome: Outcome) -> Row
     """
     state = outcome.cause or DONE
     content = {"function": function, "state": state, "message": outcome.message, "result": outcome.result or {}}
-    write_atomic(_file(folder, cell), json_bytes({**cell._asdict(), **content}))
+    write_atomic(_file(folder, cell), json_bytes(seal({**cell._asdict(), **content})))
     return Row(cell, state, outcome.message, outcome.result or {})
 
 
 def read_row(folder: Path, cell: Cell) -> Row:
-    """What there is of a cell; a file that is damaged, or another cell's, counts as missing."""
+    """What there is of a cell; a file that is not as it was written, or another cell's, counts as missing."""
+    file = _file(folder, cell)
     try:
-        found = json.loads(_file(folder, cell).read_bytes())
+        found = read_sealed(file)
         if found["ident"] == cell.ident:
             return Row(cell, str(found["state"]), str(found["message"]), dict(found["result"]))
-    except (OSError, ValueError, KeyError, TypeError):
+    except (RislamError, KeyError, TypeError, ValueError):
         pass
     return Row(cell, MISSING, "", {})
 

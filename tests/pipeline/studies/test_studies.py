@@ -117,7 +117,7 @@ def test_options_that_do_not_fit_are_refused(run, tmp_path):
 def test_fig4a_writes_page_figure_and_data(run, tmp_path):
     code, out, _ = run(FIG4A, *TINY, "elements=['energy']", more=("--json", "copy.json"))
     assert code == 0
-    folder = tmp_path / "runs" / "fig4a-paper_room-7"
+    folder = next((tmp_path / "runs").glob("fig4a-paper_room-7-*"))
     assert {p.relative_to(folder).as_posix() for p in folder.rglob("*.*")} == {
         "fig4a.md", "fig4a.csv", "fig4a.json", "figures/fig4a.png",
     }  # fmt: skip

@@ -1,0 +1,77 @@
+"""Plain data with a schema version and a checksum, so that a value changed on the disk is noticed when it is read."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rislam_rt.errors import ResultError
+
+SCHEMA = 1
+"""Of run folders and sweep folders; another number is another meaning of some entry."""
+
+
+def seal(content: Mapping[str, Any]) -> dict[str, Any]:
+    """The content with `schema` and `checksum`."""
+    found = {"schema": SCHEMA, **content}
+    return {**found, "checksum": checksum(found)}
+
+
+def check_seal(content: Any, file: Path) -> dict[str, Any]:
+    """The content, which must be as `seal` gave it.
+
+    Raises
+    ------
+    ResultError
+        It is not.
+    """
+    if not isinstance(content, dict) or "schema" not in content or "checksum" not in content:
+        raise ResultError(f"{file}: no schema or no checksum, so not written by this version; give another folder")
+    if content["schema"] != SCHEMA:
+        text = repr(content["schema"])[:20]
+        raise ResultError(f"{file}: schema {text}, this version reads {SCHEMA}; give another folder")
+    if content["checksum"] != checksum({key: value for key, value in content.items() if key != "checksum"}):
+        raise ResultError(f"{file}: changed since it was written (its checksum does not fit); give another folder")
+    return content
+
+
+def read_sealed(file: Path) -> dict[str, Any]:
+    """A JSON file that holds sealed content.
+
+    Raises
+    ------
+    ResultError
+        It cannot be read, or is not as it was written.
+    """
+    try:
+        content = json.loads(file.read_bytes())
+    except OSError as error:
+        raise ResultError(f"{file}: cannot be read ({error.strerror}); give another folder") from None
+    except (ValueError, RecursionError):
+        raise ResultError(f"{file}: not JSON, so damaged or not ours; give another folder") from None
+    return check_seal(content, file)
+
+
+def checksum(content: Any) -> str:
+    """SHA-256 of plain data in one spelling: sorted keys, shortest numbers that read back the same.
+
+    NaN, which no sealed file holds but a damaged one may, has a spelling as well.
+    """
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def file_digest(file: Path) -> str:
+    """SHA-256 of a file's bytes.
+
+    Raises
+    ------
+    ResultError
+        It is missing or cannot be read.
+    """
+    try:
+        with file.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise ResultError(f"{file}: cannot be read ({error.strerror}); run again with another --out") from None
