@@ -55,6 +55,7 @@ def command(
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.report.tables import path_table, print_paths
+    from rislam_rt.scene.names import safe_name
 
     if set_ and not signals:
         raise ConfigError(f"--set {set_[0][:60]}: settings are for --signals; add it, or leave them out")
@@ -62,7 +63,9 @@ def command(
     room = thinned(opened.scene, cycles, stride)
     prepare_channel(channel)
     if signals:
-        traced = trace_signals(room, channel, depth, set_ or (), out or Path(f"{room.name}-signals.nc"), opened.warn)
+        traced = trace_signals(
+            room, channel, depth, set_ or (), out or Path(f"{safe_name(room.name)}-signals.nc"), opened.warn
+        )
     else:
         opened.warn()
         traced = trace_paths(room, channel, depth, out)
