@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, write_json
-from rislam_rt.shipped import find_pipeline
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, pipeline_file, write_json
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
+    from rislam_rt.model import Body
     from rislam_rt.pipeline.studies.unseen import Answers, Inputs
     from rislam_rt.slam import StartPrior
 
@@ -20,13 +20,17 @@ def command(
     ],
     config: Annotated[
         Path,
-        typer.Option(metavar="PIPELINE", help="Radio, receiver and filter, as for `run`.", parser=find_pipeline),
+        typer.Option(metavar="PIPELINE", help="Radio, receiver and filter, as for `run`.", parser=pipeline_file),
     ] = MAIN_JOB,
     set_: Settings = None,
     start: Annotated[
         str | None, typer.Option(metavar="X,Y,Z", help="Where the agent starts [m]; a NetCDF file brings its own.")
     ] = None,
     velocity: Annotated[str, typer.Option(metavar="X,Y,Z", help="Its first velocity [m/s].")] = "0,0,0",
+    tx: Annotated[
+        str | None, typer.Option(metavar="X,Y,Z", help="Tx from the agent's position [m], x forward, y left, z up.")
+    ] = None,
+    rx: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Centre of the Rx array, likewise.")] = None,
     truth: Annotated[
         Path | None, typer.Option(metavar="FILE", help="True poses (TUM), one a cycle, for scoring alone.")
     ] = None,
@@ -51,7 +55,7 @@ def command(
 
     spec = load_spec(config, set_ or ())
     prior = None if start is None else _prior(start, velocity, spec.start.position_std_m, spec.start.velocity_std_m_s)
-    inputs = read_inputs(measurements, prior, build_radio(spec.radio))
+    inputs = read_inputs(measurements, prior, build_radio(spec.radio), _body(tx, rx))
     true = None if truth is None else _true_positions(truth, len(inputs.time))
     folder = _new_folder(out or Path(f"{measurements.stem}-slam"))
     answers = localise(inputs, spec, rng=np.random.default_rng(spec.seed))
@@ -71,6 +75,18 @@ def _prior(start: str, velocity: str, position_std: float, velocity_std: float) 
     first, speed = _triple("--start", start), _triple("--velocity", velocity)
     heading = float(np.arctan2(speed[1], speed[0])) if np.hypot(speed[0], speed[1]) > 0.0 else 0.0
     return StartPrior(first, speed, heading, position_std, velocity_std)
+
+
+def _body(tx: str | None, rx: str | None) -> "Body | None":
+    """Where Tx and Rx sit; None if nothing is said."""
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.model import Body
+
+    if tx is None and rx is None:
+        return None
+    if tx is None or rx is None:
+        raise ConfigError("--tx, --rx: one alone received; give both")
+    return Body(_triple("--tx", tx), _triple("--rx", rx))
 
 
 def _triple(option: str, text: str) -> "Floats":

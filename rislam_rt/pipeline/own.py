@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +112,8 @@ def inputs_of(
         measurements.append(Measurement(**parts, from_panel=None if probability is None else probability[rows]))
     first = np.searchsorted(cycle, np.arange(len(cycles)))
     heading = columns.get("heading_rad", np.zeros(len(time)))[first]
+    if "heading_rad" in columns:  # the compass shows the first heading, too
+        start = replace(start, heading=float(heading[0]))
     nothing = (None,) * len(cycles)
     made = Inputs(start, body or Body(), None, cycles - cycles[0], heading, tuple(measurements), nothing)
     return checked(made, place)

@@ -17,6 +17,7 @@ from rislam_rt.pipeline.change import change_room
 from rislam_rt.pipeline.control import check_control
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.motion import draw_motion
+from rislam_rt.pipeline.own_methods import load_own
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
 from rislam_rt.pipeline.spec import PipelineSpec, build_radio
@@ -183,11 +184,14 @@ def prepare_channel(kind: str) -> None:
 
 
 def build_channel(kind: str, scene: Scene, radio: RadioConfig, depth: int) -> Channel:
-    """The channel of that name; the tracer is imported only if it is asked for."""
+    """The channel of that name, or of one's own; the tracer is imported only if it is asked for."""
     if kind == "traced":
         from rislam_rt.channel.traced import TracedChannel
 
         return TracedChannel(scene, radio, depth)
+    if kind != "image_source":
+        own: Channel = load_own(kind)(scene, radio, depth)
+        return own
     from rislam_rt.channel.image_source import ImageSourceChannel
 
     return ImageSourceChannel(scene, radio, depth)

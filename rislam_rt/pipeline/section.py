@@ -1,5 +1,6 @@
 """What every table of a pipeline file is made of: strict sections, and numbers with ranges."""
 
+from collections.abc import Iterable
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -18,6 +19,13 @@ Wide = Annotated[float, Field(ge=0.0, le=1e5)]
 Carrier = Annotated[float, Field(ge=1e-3, le=3000.0)]
 """[GHz] Radio waves end at 3000 GHz (ITU Radio Regulations, 1.5)."""
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class Choices:
+    """What a text may be besides names of the user's own: for the list of settings."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self.names = tuple(names)
 
 
 class Section(BaseModel):

@@ -3,7 +3,7 @@
 import multiprocessing as mp
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, NamedTuple
@@ -64,14 +64,21 @@ def _start(work: Work, name: str, common: tuple[Any, ...]) -> Worker:
     context = mp.get_context("spawn")
     ear, mouth = context.Pipe(duplex=False)
     process = context.Process(target=_run, args=(mouth, work, name, common), daemon=True)
-    # the keyboard's interrupt reaches the whole group, and one that comes while Python starts would be a traceback
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
+    with _deaf():
         process.start()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
     mouth.close()
     return Worker(name, process, ear)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """A process started in here hears no interrupt of the keyboard, which reaches the whole group, from its first
+    instruction on; this one hears afterwards what came meanwhile."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _run(mouth: Connection, work: Work, name: str, common: tuple[Any, ...]) -> None:

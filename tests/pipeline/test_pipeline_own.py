@@ -65,7 +65,8 @@ def test_from_a_file_comes_the_answer_of_the_run(
         writer.writerows(zip(*table.values(), strict=True))
     true = rislam_rt.load_scene("paper_room").agent[:CYCLES]
     poses.write_bytes(tum_bytes(true.time, true.position, true.heading))
-    start, speed = (",".join(map(repr, map(float, v))) for v in (inputs.start.position, inputs.start.velocity))
+    told = (inputs.start.position, inputs.start.velocity, inputs.body.tx_offset, inputs.body.rx_offset)
+    start, speed, tx, rx = (",".join(map(repr, map(float, v))) for v in told)
     pipeline = find_pipeline("trace_then_slam")
     command(
         file,
@@ -73,6 +74,8 @@ def test_from_a_file_comes_the_answer_of_the_run(
         set_=CHANGES,
         start=start,
         velocity=speed,
+        tx=tx,
+        rx=rx,
         truth=poses,
         out=tmp_path / "out",
         json=tmp_path / "said.json",
@@ -80,10 +83,11 @@ def test_from_a_file_comes_the_answer_of_the_run(
     said = capsys.readouterr().out
     assert f"cycles: {CYCLES}" in said
     assert "rmse_m: " in said
-    rows = list(csv.DictReader((tmp_path / "out" / "estimate.csv").open()))
+    with (tmp_path / "out" / "estimate.csv").open() as lines:
+        rows = list(csv.DictReader(lines))
     found = np.array([[float(row[name]) for name in ("x_m", "y_m", "z_m")] for row in rows])
     # nine digits in the file; the run's own deviations pass through the table unrounded
-    np.testing.assert_allclose(found, position, atol=1e-7)
+    np.testing.assert_allclose(found, position, rtol=1e-8)
     with pytest.raises(ConfigError, match="not empty; give a new folder"):
         command(file, pipeline, set_=CHANGES, start=start, out=tmp_path / "out")
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.compose import compose_paths
+from rislam_rt.channel.image_source.candidates import SEARCHES, Search, build_search
 from rislam_rt.channel.image_source.facets import Facets, build_facets
 from rislam_rt.channel.image_source.fresnel import Coatings, build_coatings
 from rislam_rt.channel.image_source.images import find_legs
@@ -16,12 +17,16 @@ from rislam_rt.ris import rephase
 
 @dataclass(frozen=True, eq=False)
 class ImageSourceChannel:
-    """All paths of a room of planar facets, exact: wall sequences by pruned recursion, images, facets, occlusion.
+    """All paths of a room of planar facets, exact: wall sequences, images, facets, occlusion.
+
+    `search` says how sequences are found: `exhaustive` tries all that the walls' sides allow, `beams` those that
+    mirrored beams leave possible, which loses none; `auto` takes the first where sequences are few. `Paths.source`
+    names the one taken.
 
     Raises
     ------
     ConfigError
-        The depth is negative.
+        The depth is negative, or the search unknown.
     SceneError
         A wall's material is not specified at the carrier.
     """
@@ -29,9 +34,11 @@ class ImageSourceChannel:
     scene: Scene
     radio: RadioConfig
     depth: int = 2
+    search: str = "auto"
     walls: Walls = field(init=False)
     facets: Facets = field(init=False)
     coatings: Coatings = field(init=False)
+    looked: Search = field(init=False)
 
     def __post_init__(self) -> None:
         expect("scene", self.scene, Scene)
@@ -39,15 +46,18 @@ class ImageSourceChannel:
         expect("depth", self.depth, int)
         if self.depth < 0:
             raise ConfigError(f"depth: {self.depth} received; give 0 or more wall bounces")
+        if self.search not in SEARCHES:
+            raise ConfigError(f"search: '{self.search}' received; give one of {', '.join(SEARCHES)}")
         object.__setattr__(self, "walls", build_walls(self.scene))
         object.__setattr__(self, "facets", build_facets(self.walls))
         object.__setattr__(self, "coatings", build_coatings(self.walls.material, self.radio.carrier))
+        object.__setattr__(self, "looked", build_search(self.facets, self.depth, self.search))
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Every path of every cycle, with the panel at level 0."""
         expect("trajectory", trajectory, Trajectory)
         tx, rx = trajectory.tx, trajectory.rx
-        direct = find_legs(self.facets, self.coatings, tx, rx, self.depth)
+        direct = find_legs(self.looked, self.coatings, tx, rx, self.depth)
         landmarks = range(len(self.scene.landmarks))
         return compose_paths(
             self.scene,
@@ -57,7 +67,7 @@ class ImageSourceChannel:
             direct,
             [self._landmark_legs(tx, number) for number in landmarks],
             [self._landmark_legs(rx, number) for number in landmarks],
-            "image source",
+            f"image source, {self.looked.words}",
         )
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
@@ -69,7 +79,7 @@ class ImageSourceChannel:
         panel = self.scene.ris if number == len(self.scene.scatterers) else None
         point = self.scene.landmark_positions[number : number + 1]
         if panel is None:
-            return find_legs(self.facets, self.coatings, device, point, self.depth, landmark=number)
+            return find_legs(self.looked, self.coatings, device, point, self.depth, landmark=number)
         return find_legs(
-            self.facets, self.coatings, device, point, self.depth, host=self.walls.host, front=panel.spec.normal
+            self.looked, self.coatings, device, point, self.depth, host=self.walls.host, front=panel.spec.normal
         )

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.image_source.rectangles import Rectangles, bounding_rectangles
 from rislam_rt.channel.shades import Shades
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
@@ -12,6 +13,9 @@ from rislam_rt.geometry.triangles import edge_planes
 
 SEAM = 1e-9
 """[m] Triangles reach this far over their edges, so that no ray slips between two that share one (float64 rounding)."""
+
+_SIMPLE = 4
+"""Walls of up to so many triangles are looked at all together, the others one by one."""
 
 _BLOCK = 2_000_000
 """Numbers in the largest temporary array."""
@@ -40,6 +44,8 @@ class Facets:
     """(2, W, 3) [m] lowest and highest corner of each wall."""
     extent: Floats
     """(2, W) [m] lowest and highest signed distance of all walls' corners from wall w's plane."""
+    rectangles: Rectangles
+    """Bounding rectangles in the walls' planes."""
     plane: Integers
     """(W,) of `Walls.plane`."""
     over: tuple[Integers, ...]
@@ -56,15 +62,28 @@ class Facets:
 
     def contains(self, points: Floats, wall: Integers) -> Booleans:
         """Whether points (N, 3), each in the plane of its wall (N,), lie on one of the wall's triangles."""
-        box = self.box[:, wall]
-        inside = ((points >= box[0] - SURFACE_TOLERANCE) & (points <= box[1] + SURFACE_TOLERANCE)).all(axis=-1)
-        candidates = np.flatnonzero(inside)
-        order = candidates[np.argsort(wall[candidates], kind="stable")]
+        inside = self.rectangles.contains(points, wall, SEAM)
+        rows = np.flatnonzero(inside & ~self.rectangles.whole[wall])
+        counts = np.diff(self.first)[wall[rows]]
+        simple = rows[counts <= _SIMPLE]
+        inside[simple] = self._on_few(points[simple], wall[simple])
+        rest = rows[counts > _SIMPLE]
+        order = rest[np.argsort(wall[rest], kind="stable")]
         present, start = np.unique(wall[order], return_index=True)
         ends = np.append(start[1:], len(order))
         for number, first, last in zip(present, start, ends, strict=False):  # of no points, `ends` has one too many
-            rows = order[first:last]
-            inside[rows] = self._on_wall(points[rows], int(number))
+            part = order[first:last]
+            inside[part] = self._on_wall(points[part], int(number))
+        return inside
+
+    def _on_few(self, points: Floats, wall: Integers) -> Booleans:
+        """Whether points (N, 3) lie on walls (N,) of few triangles: each triangle in turn."""
+        inside = np.zeros(len(points), dtype=np.bool_)
+        for number in range(_SIMPLE):
+            rows = np.flatnonzero(~inside & (self.first[wall] + number < self.first[wall + 1]))
+            triangle = self.first[wall[rows]] + number
+            depth = np.einsum("nei,ni->ne", self.edge_normal[triangle], points[rows]) - self.edge_offset[triangle]
+            inside[rows] = depth.min(axis=-1, initial=np.inf) >= -SEAM
         return inside
 
     def reflects(self, points: Floats, wall: Integers) -> Booleans:
@@ -106,7 +125,8 @@ class Facets:
         normal, offset = self.normal[walls].T, self.offset[walls]
         for rows in blocks(len(start), len(walls)) if len(walls) else []:
             a, b = start[rows] @ normal - offset, end[rows] @ normal - offset
-            crossing = (a * b < 0.0) & (np.minimum(np.abs(a), np.abs(b)) > SURFACE_TOLERANCE)
+            crossing = np.minimum(a, b) < -SURFACE_TOLERANCE
+            crossing &= np.maximum(a, b) > SURFACE_TOLERANCE
             segment, column = np.nonzero(crossing)
             fraction = a[segment, column] / (a[segment, column] - b[segment, column])
             segment, wall = segment + rows.start, walls[column]
@@ -142,9 +162,9 @@ def build_facets(walls: Walls) -> Facets:
     first = np.searchsorted(walls.wall_of_triangle[order], np.arange(len(walls) + 1))
     edge_normal, edge_offset = edge_planes(corners)
     points = corners.reshape(-1, 3)
-    extent = np.zeros((2, len(walls)))
+    extent, distinct = np.zeros((2, len(walls))), np.unique(points, axis=0)
     for rows in blocks(len(walls), len(points)):
-        distance = walls.normal[rows] @ points.T - walls.offset[rows, None]
+        distance = walls.normal[rows] @ distinct.T - walls.offset[rows, None]
         extent[:, rows] = distance.min(axis=1), distance.max(axis=1)
     starts = 3 * first[:-1]
     box = [op.reduceat(points, starts, axis=0) if len(points) else points for op in (np.minimum, np.maximum)]
@@ -157,6 +177,7 @@ def build_facets(walls: Walls) -> Facets:
         edge_offset=edge_offset,
         box=np.stack(box),
         extent=extent,
+        rectangles=bounding_rectangles(corners, first, walls.normal, walls.offset),
         plane=walls.plane,
         over=walls.over,
         shades=walls.shades,

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.image_source.candidates import Search, candidate_rows
 from rislam_rt.channel.image_source.facets import SEAM, Facets
 from rislam_rt.channel.image_source.fresnel import Coatings
-from rislam_rt.channel.image_source.sequences import wall_sequences
 from rislam_rt.channel.legs import Legs
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.geometry.angles import unit
@@ -28,7 +28,7 @@ class Rays(NamedTuple):
 
 
 def find_legs(
-    facets: Facets,
+    search: Search,
     coatings: Coatings,
     device: Floats,
     far: Floats,
@@ -49,21 +49,19 @@ def find_legs(
     landmark
         Number of the landmark at the far end, which its own shade does not hide; -1 for none.
     """
-    found = [_direct_rays(device, far)]
-    found += [_reflected_rays(facets, walls, device, far) for walls in wall_sequences(facets, device, far, depth, host)]
+    facets = search.facets
+    found = {0: [_direct_rays(device, far)]}
+    for cycle, walls in candidate_rows(search, device, far, depth, host):
+        rays = _reflected_rays(facets, cycle, walls, device, far)
+        found.setdefault(walls.shape[1], []).append(rays)
     blockers = facets.possible_blockers(np.concatenate([device, far]))
-    visible = [_visible(facets, rays, device, far, blockers, host, front, landmark) for rays in found]
+    visible = [_visible(facets, _joined(p), device, far, blockers, host, front, landmark) for p in found.values()]
     return _legs(facets, coatings, [rays for rays in visible if len(rays.cycle)], device, far, depth)
 
 
-def mirrored(facets: Facets, walls: Integers, far: Floats) -> list[Floats]:
-    """Images of far ends (K, 3) for sequences (S, d): item j (K, S, 3) [m] is mirrored in walls d-1, d-2, .. j."""
-    image = np.broadcast_to(far[:, None, :], (len(far), len(walls), 3))
-    images = []
-    for column in walls.T[::-1]:
-        image = mirror(image, facets.normal[column], facets.offset[column])
-        images.append(image)
-    return images[::-1]
+def _joined(parts: list[Rays]) -> Rays:
+    """All rays of one number of bounces."""
+    return Rays(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def _direct_rays(device: Floats, far: Floats) -> Rays:
@@ -73,23 +71,22 @@ def _direct_rays(device: Floats, far: Floats) -> Rays:
     return Rays(np.arange(cycles), nothing, np.zeros((cycles, 0, 3)), np.broadcast_to(far, device.shape))
 
 
-def _reflected_rays(facets: Facets, walls: Integers, device: Floats, far: Floats) -> Rays:
-    """The legs over sequences (S, d) whose every bounce lies on its wall; occlusion is not looked at."""
-    images = mirrored(facets, walls, far)
-    cycle, sequence = (index.ravel() for index in np.indices((len(device), len(walls))))
-    static = 0 if len(far) == 1 else 1
-    bounces = np.zeros((len(cycle), walls.shape[1], 3))
-    point = device[cycle]
-    for bounce, image in enumerate(images):
-        wall = walls[sequence, bounce]
-        target = image[cycle * static, sequence]
-        tolerance = (SURFACE_TOLERANCE if bounce == 0 else SEAM, SURFACE_TOLERANCE if image is images[-1] else SEAM)
+def _reflected_rays(facets: Facets, cycle: Integers, walls: Integers, device: Floats, far: Floats) -> Rays:
+    """The legs of cycles (N,) over walls (N, d) whose every bounce lies on its wall; occlusion is not looked at."""
+    images = [far[cycle if len(far) > 1 else np.zeros_like(cycle)]]
+    for wall in walls.T[::-1]:
+        images.insert(0, mirror(images[0], facets.normal[wall], facets.offset[wall]))
+    bounces = np.zeros((*walls.shape, 3))
+    row, point = np.arange(len(cycle)), device[cycle]
+    for bounce in range(walls.shape[1]):
+        wall, target = walls[row, bounce], images[bounce][row]
+        last = bounce == walls.shape[1] - 1
+        tolerance = (SURFACE_TOLERANCE if bounce == 0 else SEAM, SURFACE_TOLERANCE if last else SEAM)
         crosses, hit = _plane_crossing(point, target, facets.normal[wall], facets.offset[wall], tolerance)
         on_wall = facets.reflects(hit, wall[crosses])
-        keep = np.flatnonzero(crosses)[on_wall]
-        cycle, sequence, bounces, point = cycle[keep], sequence[keep], bounces[keep], hit[on_wall]
-        bounces[:, bounce] = point
-    return Rays(cycle, walls[sequence], bounces, images[0][cycle * static, sequence])
+        row, point = row[np.flatnonzero(crosses)[on_wall]], hit[on_wall]
+        bounces[row, bounce] = point
+    return Rays(cycle[row], walls[row], bounces[row], images[0][row])
 
 
 def _plane_crossing(

@@ -1,0 +1,213 @@
+"""Mirrored beams: which wall sequences can exist at all, found without trying every sequence.
+
+Seen from the far end's mirror image, a ray that bounces on a wall leaves through that wall's bounding rectangle: it
+stays inside the beam of that rectangle. Only walls that reach into the beam can come next, each with a beam of its own,
+and only devices in the last beam can have the path. A beam is a set of half-spaces; nothing outside one can be met, so
+nothing is lost. Positions near each other share beams: their image is then a ball, and each half-space is laid through
+an edge of the rectangle such that the whole ball stays on its far side.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.image_source.clusters import Clusters
+from rislam_rt.channel.image_source.rectangles import Rectangles
+from rislam_rt.constants import SURFACE_TOLERANCE
+from rislam_rt.geometry.planes import mirror
+
+_BLOCK = 4_000_000
+"""Numbers in the largest temporary array."""
+
+
+class Balls(NamedTuple):
+    """B balls of positions: centre (B, 3) and radius (B,) [m]."""
+
+    center: Floats
+    radius: Floats
+
+
+def group_positions(points: Floats, limit: float) -> list[Integers]:
+    """Part positions (K, 3) [m] into groups that each fit a ball of radius `limit`, halving the longest side."""
+    groups, waiting = [], [np.arange(len(points))] if len(points) else []
+    while waiting:
+        group = waiting.pop()
+        size = np.ptp(points[group], axis=0)
+        if len(group) == 1 or np.linalg.norm(size) <= 2.0 * limit:
+            groups.append(group)
+            continue
+        order = group[np.argsort(points[group, np.argmax(size)], kind="stable")]
+        waiting += [order[len(order) // 2 :], order[: len(order) // 2]]
+    return groups
+
+
+def enclosing_balls(points: Floats, groups: list[Integers]) -> Balls:
+    """The balls about the middle of each group's bounds."""
+    middle = np.array([(points[g].min(axis=0) + points[g].max(axis=0)) / 2.0 for g in groups]).reshape(-1, 3)
+    radius = [np.linalg.norm(points[g] - m, axis=-1).max() for g, m in zip(groups, middle, strict=True)]
+    return Balls(middle, np.array(radius, dtype=np.float64))
+
+
+class Beams(NamedTuple):
+    """N beams, each behind a sequence of d walls from device to far end."""
+
+    ball: Integers
+    """(N,) number of the far end's ball."""
+    walls: Integers
+    """(N, d), the newest first."""
+    image: Floats
+    """(N, 3) [m] of the ball's centre in all the walls."""
+    normal: Floats
+    """(N, P, 3) of half-spaces: inside are points with `normal . x >= offset`."""
+    offset: Floats
+    """(N, P) [m]."""
+
+    def only(self, keep: Booleans | Integers | slice) -> "Beams":
+        """The rows chosen."""
+        return Beams(self.ball[keep], self.walls[keep], self.image[keep], self.normal[keep], self.offset[keep])
+
+
+class Found(NamedTuple):
+    """Sequences (N, d) from device to far end that may exist for some device and far end of their balls (N,)."""
+
+    device: Integers
+    far: Integers
+    walls: Integers
+
+
+def search_beams(
+    clusters: Clusters, device: Balls, far: Balls, pairs: Integers, depth: int, barred: Booleans
+) -> Iterator[Found]:
+    """Sequences of 1 to `depth` walls, in blocks.
+
+    Parameters
+    ----------
+    device, far
+        Balls of either end; `pairs` (A, 2) says which device ball goes with which far ball.
+    barred
+        (W,) walls that may not come last.
+    """
+    count = len(barred)
+    if depth < 1 or count == 0:
+        return
+    ball, wall = (index.ravel() for index in np.indices((len(far.radius), count)))
+    keep = ~barred[wall]
+    ball, wall = ball[keep], wall[keep]
+    for rows in _blocks(len(ball), 40):
+        start = far.center[ball[rows]]
+        nothing = np.zeros((len(start), 0), dtype=np.int64)
+        empty = Beams(ball[rows], nothing, start, np.zeros((len(start), 0, 3)), np.zeros((len(start), 0)))
+        beams = _through(clusters.rectangles, empty, wall[rows], far.radius)
+        yield from _followed(clusters, beams, device, far, pairs, depth - 1)
+
+
+def _followed(
+    clusters: Clusters, beams: Beams, device: Balls, far: Balls, pairs: Integers, more: int
+) -> Iterator[Found]:
+    """The sequences of these beams, and of up to `more` walls put in front."""
+    yield _reaching(beams, device, pairs)
+    if more == 0:
+        return
+    for rows in _blocks(len(beams.ball), len(clusters.rectangles.center)):
+        block = beams.only(rows)
+        row, wall = clusters.reached(block.normal, block.offset)
+        row, wall = _facing(clusters.rectangles, block, row, wall, far.radius)
+        for some in _blocks(len(row), 4 * (block.normal.shape[1] + 5)):
+            grown = _through(clusters.rectangles, block.only(row[some]), wall[some], far.radius)
+            yield from _followed(clusters, grown, device, far, pairs, more - 1)
+
+
+def _blocks(count: int, width: int) -> Iterator[slice]:
+    """Slices of rows that each make `width` numbers, 256 at the least."""
+    step = max(256, _BLOCK // width)
+    return (slice(i, i + step) for i in range(0, count, step))
+
+
+def _facing(
+    rectangles: Rectangles, beams: Beams, row: Integers, wall: Integers, radius: Floats
+) -> tuple[Integers, Integers]:
+    """Those pairs whose new wall has part of the last wall on the side of the image: the ray comes from there."""
+    last = beams.walls[row, 0]
+    keep = wall != last
+    row, wall, last = row[keep], wall[keep], last[keep]
+    normal, offset = rectangles.normal[wall], rectangles.offset[wall]
+    side = np.einsum("ni,ni->n", beams.image[row], normal) - offset
+    middle = np.einsum("ni,ni->n", rectangles.center[last], normal) - offset
+    reach = sum(np.abs(np.einsum("ni,ni->n", half[last], normal)) for half in rectangles.halves)
+    ball = radius[beams.ball[row]]
+    ahead = (side > -ball) & (middle + reach > -SURFACE_TOLERANCE)
+    behind = (side < ball) & (middle - reach < SURFACE_TOLERANCE)
+    keep = ahead | behind
+    return row[keep], wall[keep]
+
+
+def _through(rectangles: Rectangles, beams: Beams, wall: Integers, radius: Floats) -> Beams:
+    """Reflect beams on a wall each (N,), and narrow them to its rectangle.
+
+    A ball that reaches through the plane has beams on both sides.
+    """
+    normal, offset = rectangles.normal[wall], rectangles.offset[wall]
+    side = np.einsum("ni,ni->n", beams.image, normal) - offset
+    ball = radius[beams.ball]
+    ahead, behind = np.flatnonzero(side > -ball), np.flatnonzero(side < ball)
+    row = np.concatenate([ahead, behind])
+    front = np.concatenate([np.ones(len(ahead)), -np.ones(len(behind))])
+    normal, offset, wall, ball, side = normal[row], offset[row], wall[row], ball[row], side[row]
+    image = mirror(beams.image[row], normal, offset)
+    new = _half_spaces(rectangles, wall, front[:, None] * normal, image, front * side, ball)
+    turned = np.einsum("npi,ni->np", beams.normal[row], normal)
+    old_normal = beams.normal[row] - 2.0 * turned[..., None] * normal[:, None]
+    old_offset = beams.offset[row] - 2.0 * turned * offset[:, None]
+    walls = np.concatenate([wall[:, None], beams.walls[row]], axis=1)
+    return Beams(
+        beams.ball[row],
+        walls,
+        image,
+        np.concatenate([new[0], old_normal], axis=1),
+        np.concatenate([new[1], old_offset], axis=1),
+    )
+
+
+def _half_spaces(
+    rectangles: Rectangles, wall: Integers, front: Floats, image: Floats, height: Floats, radius: Floats
+) -> tuple[Floats, Floats]:
+    """Normals (N, 5, 3) and offsets (N, 5): beyond the wall's plane, and inside its rectangle's four edges.
+
+    Through each edge goes the plane that touches the image's ball, `height` (N,) behind the wall, such that ball and
+    beam are on different sides of it. With the edge's inward normal q, and the ball's centre at (m, -height)
+    in the frame (q, front), that plane leans by atan2(m, height) + asin(radius / distance) from q towards the front.
+    """
+    inward = np.stack([s * d[wall] for d in rectangles.directions for s in (1.0, -1.0)], axis=1)
+    edge = rectangles.center[wall][:, None] - np.stack(
+        [s * h[wall] for h in rectangles.halves for s in (1.0, -1.0)], axis=1
+    )
+    across = np.einsum("nei,nei->ne", image[:, None] - edge, inward)
+    distance = np.maximum(np.hypot(across, height[:, None]), np.finfo(np.float64).tiny)
+    sine = np.minimum(radius[:, None] / distance, 1.0)
+    cosine = np.sqrt(1.0 - sine**2)
+    lean_cos = (height[:, None] * cosine - across * sine) / distance
+    lean_sin = (across * cosine + height[:, None] * sine) / distance
+    level = (lean_cos <= 0.0) | (radius[:, None] >= distance)  # no such plane: only the wall's own is left
+    lean_cos, lean_sin = np.where(level, 0.0, lean_cos), np.where(level, 1.0, lean_sin)
+    normal = lean_cos[..., None] * inward + lean_sin[..., None] * front[:, None]
+    normal = np.concatenate([front[:, None], normal], axis=1)
+    points = np.concatenate([rectangles.center[wall][:, None], edge], axis=1)
+    return normal, np.einsum("nei,nei->ne", normal, points)
+
+
+def _reaching(beams: Beams, device: Balls, pairs: Integers) -> Found:
+    """The beams that a device ball of their far ball reaches into."""
+    order = np.argsort(pairs[:, 1], kind="stable")
+    first = np.searchsorted(pairs[order, 1], beams.ball)
+    last = np.searchsorted(pairs[order, 1], beams.ball, side="right")
+    row = np.repeat(np.arange(len(beams.ball)), last - first)
+    place = np.arange(len(row)) - np.repeat(np.cumsum(last - first) - (last - first), last - first)
+    ball = pairs[order[first[row] + place], 0]
+    keep = np.ones(len(row), dtype=np.bool_)
+    for plane in range(beams.normal.shape[1]):
+        row, ball = row[keep], ball[keep]
+        height = np.einsum("ni,ni->n", beams.normal[row, plane], device.center[ball]) - beams.offset[row, plane]
+        keep = height >= -device.radius[ball] - SURFACE_TOLERANCE
+    return Found(ball[keep], beams.ball[row[keep]], beams.walls[row[keep]])
