@@ -10,10 +10,11 @@ from rislam_rt.design import DESIGNERS, DesignConfig
 from rislam_rt.measurement import ReceiverConfig, build_sensor, with_reference_snr
 from rislam_rt.model import RadioConfig, RxArray, SensorModel
 from rislam_rt.pipeline.mistold import ToldSection
-<<<<<<< HEAD
-from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.pipeline.own_methods import is_own
+from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
 from rislam_rt.pipeline.section import (
     Carrier,
+    Choices,
     Count,
     Decibel,
     Name,
@@ -24,11 +25,6 @@ from rislam_rt.pipeline.section import (
     Side,
     Wide,
 )
-=======
-from rislam_rt.pipeline.own_methods import is_own
-from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
-from rislam_rt.pipeline.section import Choices, Count, Decibel, Name, NotNegative, Positive, Probability, Section
->>>>>>> main
 from rislam_rt.ris import PanelTolerance
 from rislam_rt.slam import SlamConfig
 from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
