@@ -88,10 +88,13 @@ def thinned(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
     from dataclasses import replace
 
     from rislam_rt.errors import ConfigError
+    from rislam_rt.pipeline.run import check_one_piece
 
     if cycles is not None and cycles > len(scene.agent):
         raise ConfigError(f"--cycles: {cycles} received; the scene has {len(scene.agent)}, give no more")
-    return replace(scene, agent=scene.agent[:cycles:stride])
+    agent = scene.agent[:cycles:stride]
+    check_one_piece(len(agent), "--cycles, --stride")
+    return replace(scene, agent=agent)
 
 
 def trace_paths(scene: "Scene", channel: str, depth: int, file: Path | None) -> Traced:
