@@ -34,8 +34,8 @@ def command(
     An interrupted run goes on where it stopped when the same command is given again, and a completed one is shown;
     other settings make another folder.
     A file of another kind is a study: 'compare_channels' (exit code 1 if the channels differ), 'fig4a', 'claims',
-    'train_classifier', or 'fig4b', 'fig4c', 'rooms', 'ablations', 'unseen', which go through settings, rooms and seeds
-    (exit code 1 if a run failed).
+    'train_classifier', or 'fig4b', 'fig4c', 'rooms', 'ablations', 'robustness', 'hardware', 'unseen', which go through
+    settings, rooms and seeds (exit code 1 if a run failed).
     """
     from rislam_rt.cli.study import run_claims, run_compare_channels, run_gain_curves, run_swept
     from rislam_rt.pipeline.studies import (
@@ -75,9 +75,10 @@ def run_main_job(spec: "PipelineSpec", given: Given) -> None:
     from rislam_rt.cli.scenes import open_scene, scene_of
     from rislam_rt.pipeline.identity import run_identity
     from rislam_rt.pipeline.run import check_run, prepare_channel
+    from rislam_rt.pipeline.spec import build_radio
     from rislam_rt.pipeline.store import DONE, find_run
 
-    opened = open_scene(scene_of(given.scene, spec, given.pipeline))
+    opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
     check_run(opened.scene, spec)
     identity = run_identity(spec, opened.scene)
     folder = given.out or Path("runs") / identity.folder

@@ -25,6 +25,8 @@ from rislam_rt.pipeline.told import lean
 from rislam_rt.pipeline.walk import Walk
 from rislam_rt.pipeline.workers import run_side_by_side
 from rislam_rt.ris import delay_spread_warnings
+from rislam_rt.scene.check import material_errors
+from rislam_rt.scene.findings import raise_errors
 
 Progress = Callable[[str, int, int], None]
 """Told the stage (`trace` or a scheme), how much of it is done, and how much there is."""
@@ -176,7 +178,10 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     ConfigError
         The budget is not the cycle, there are fewer cycles than asked for, a scheme needs a panel that is not there, or
         the room cannot be changed as asked.
+    SceneError
+        A wall's material is not specified at the radio's carrier.
     """
+    raise_errors(list(material_errors(scene, f"scene '{scene.name}'", build_radio(spec.radio))))
     scene = change_room(scene, spec.room, rng=np.random.default_rng(0))
     motion, budget = scene.agent, spec.budget
     if spec.cycles is not None and spec.cycles > len(motion):

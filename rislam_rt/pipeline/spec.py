@@ -7,7 +7,8 @@ import numpy as np
 from pydantic import AfterValidator, Field, create_model, model_validator
 
 from rislam_rt.design import DESIGNERS, DesignConfig
-from rislam_rt.measurement import ReceiverConfig, build_sensor, with_reference_snr
+from rislam_rt.errors import ConfigError
+from rislam_rt.measurement import HardwareConfig, ReceiverConfig, build_sensor, with_reference_snr
 from rislam_rt.model import RadioConfig, RxArray, SensorModel
 from rislam_rt.pipeline.mistold import ToldSection
 from rislam_rt.pipeline.own_methods import is_own
@@ -49,6 +50,9 @@ _ChannelSlam = _section("_ChannelSlam", ChannelSlamConfig, "Fields of `ChannelSl
 _Designers = _section("_Designers", DesignConfig, "Fields of `DesignConfig`.", without=("certify",))
 
 
+_Hardware = _section("_Hardware", HardwareConfig, "Fields of `HardwareConfig`.")
+
+
 class SlamSection(_Filter):  # type: ignore[misc, valid-type]
     """The filter's settings, SI units."""
 
@@ -63,6 +67,10 @@ class ChannelSlamSection(_ChannelSlam):  # type: ignore[misc, valid-type]
 
 class ReceiverSection(_Receiver):  # type: ignore[misc, valid-type]
     """The receiver's settings, SI units; its slot is `budget.measure_s`."""
+
+
+class HardwareSection(_Hardware):  # type: ignore[misc, valid-type]
+    """What the real front end does wrong (`receiver.estimator = "waveform"`); an ideal one by default."""
 
 
 def _check_channel(name: str) -> str:
@@ -243,6 +251,7 @@ class PipelineSpec(Section):
     Also `module:function`, a designer or an estimator of one's own."""
     radio: RadioSection = RadioSection()
     receiver: ReceiverSection = ReceiverSection()
+    hardware: HardwareSection = HardwareSection()
     design: DesignSection = DesignSection()
     budget: BudgetSection = BudgetSection()
     control: ControlSection = ControlSection()
@@ -302,6 +311,8 @@ class Settings(NamedTuple):
     channel_slam: ChannelSlamConfig
     sensor: SensorModel
     """What the estimators are told of the receiver."""
+    hardware: HardwareConfig
+    """What the front end does wrong."""
 
 
 def build_settings(spec: PipelineSpec) -> Settings:
@@ -321,7 +332,17 @@ def build_settings(spec: PipelineSpec) -> Settings:
         BpSlamConfig(**spec.bp_slam.model_dump()),
         ChannelSlamConfig(**spec.channel_slam.model_dump()),
         build_sensor(radio, receiver),
+        _build_hardware(spec.hardware, receiver),
     )
+
+
+def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> HardwareConfig:
+    hardware = HardwareConfig(**section.model_dump())
+    if receiver.estimator != "waveform" and hardware != HardwareConfig():
+        raise ConfigError(
+            f"hardware: set, with receiver.estimator '{receiver.estimator}', which makes no signal; give 'waveform'"
+        )
+    return hardware
 
 
 def build_radio(section: RadioSection) -> RadioConfig:
