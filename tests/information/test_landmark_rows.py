@@ -46,6 +46,14 @@ def test_a_path_counts_from_the_least_snr_on_with_its_own(model, least_snr):
         np.testing.assert_allclose(information[:, 1:], cosine_information(per_antenna, RADIO))
 
 
+def test_the_first_row_is_the_gradient_of_the_length(model):
+    """Minus both directions from the agent's ends, whatever lies between."""
+    for cycle, rows in enumerate(model.rows(0.0)):
+        here = np.flatnonzero(model.paths.valid[cycle] & (model.paths.landmark >= 0))
+        toward = model.paths.departure[cycle, here] + model.paths.arrival[cycle, here]
+        np.testing.assert_allclose(rows.agent[::3], -toward, atol=1e-9)
+
+
 def test_a_path_without_a_landmark_sees_no_point(model):
     direct = model.paths.landmark < 0
     assert (model.tx_point[direct] == -1).all()
