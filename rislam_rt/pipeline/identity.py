@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rislam_rt.model import Scene
+from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import library_versions
 from rislam_rt.pipeline.seal import SCHEMA, checksum
 from rislam_rt.pipeline.spec import PipelineSpec
+from rislam_rt.scene.names import safe_name
 
 SHORT = 8
 """Digits of the hash in a folder's name; the marker inside has all of them."""
@@ -27,6 +29,7 @@ class Identity(NamedTuple):
 
     content: Mapping[str, Any]
     """`config` (every setting, defaults filled in), `scene` (name, SHA-256 of its files), `versions` of the libraries,
+    `own` (SHA-256 of methods of one's own),
     `code` (SHA-256 of this package), `backend` (what the environment says of the tracer), `schema`."""
 
     @property
@@ -38,7 +41,7 @@ class Identity(NamedTuple):
     def folder(self) -> str:
         """`<pipeline>-<scene>-<seed>-<hash>`."""
         config = self.content["config"]
-        name = f"{config['name']}-{self.content['scene']['name']}-{config['seed']}"
+        name = f"{config['name']}-{safe_name(self.content['scene']['name'])}-{config['seed']}"
         return short_name(name, self.digest)
 
     def difference(self, other: Mapping[str, Any]) -> str:
@@ -59,6 +62,7 @@ def run_identity(spec: PipelineSpec, scene: Scene) -> Identity:
             "scene": {"name": scene.name, "sha256": scene.digest},
             "versions": library_versions(),
             "code": code_digest(),
+            "own": own_digests([*spec.schemes, spec.channel]),
             "backend": {name: os.environ.get(name, "") for name in BACKEND},
         }
     )

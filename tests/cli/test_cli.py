@@ -1,8 +1,10 @@
 """Every command on good and on bad input: exit codes, one line for each failure, nothing written."""
 
 import json
+import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -209,7 +211,8 @@ def test_an_own_room_is_called_after_its_folder(run, tmp_path):
     assert [path.name[:26] for path in (tmp_path / "runs").iterdir()] == ["trace_then_slam-my_room-7-"]
 
 
-def test_interrupted_run_goes_on(run, tmp_path, monkeypatch):
+@pytest.mark.parametrize("blow", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_run_goes_on(run, tmp_path, monkeypatch, blow):
     import rislam_rt.pipeline.run as module
 
     whole = module.run_scheme
@@ -218,13 +221,16 @@ def test_interrupted_run_goes_on(run, tmp_path, monkeypatch):
     def broken(name, *rest):
         seen.append(name)
         if name == "random" and seen.count("random") == 1:
-            raise KeyboardInterrupt
+            signal.raise_signal(blow)
         return whole(name, *rest)
 
     monkeypatch.setattr(module, "run_scheme", broken)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # it may be ignored in the background
     code, _, err = run("run", PIPELINE, *SHORT, "--no-report", "--jobs", 1)
+    signal.signal(signal.SIGINT, before)
     assert code == 130
-    assert "1 schemes kept" in err
+    assert err.splitlines()[-1] == "interrupted: 1 schemes kept; the same command goes on from there"
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     (folder,) = (tmp_path / "runs").iterdir()
     assert sorted(path.name for path in folder.iterdir()) == ["run.json", "scheme_optimized.nc"]
     assert run("report", folder)[0] == 2
@@ -269,6 +275,59 @@ def test_design_lists_every_method(run, tmp_path):
     assert content["bound"] <= min(m["crlb_m2"] for m in content["methods"].values())
     assert (tmp_path / "codes.png").read_bytes().startswith(b"\x89PNG")
     assert "exact" in out
+
+
+def test_design_does_not_take_a_walled_path_for_the_direct_one(run, tmp_path):
+    from rislam_rt.model import Reflector
+    from rislam_rt.scene import load_scene, write_scene
+
+    scene = load_scene(SCENE)
+    corners = [[2.5, 2.5, 2.5], [3.5, 2.5, 2.5], [3.5, 3.5, 2.5], [2.5, 3.5, 2.5]]
+    board = Reflector("board", corners, [[0, 1, 2], [0, 2, 3]], scene.reflectors[0].material)
+    write_scene(replace(scene, reflectors=(*scene.reflectors, board)), tmp_path / "room")
+    for room, direct in ((SCENE, True), ("room", False)):
+        code, out, _ = run("design", room, "--at", "3.1,2.9,0.4", "--json", "design.json")
+        content = json.loads((tmp_path / "design.json").read_text())
+        assert code == 0
+        assert content["direct_path"] == direct
+        assert content["target"].startswith("RIS ris" if direct else "VRIS wall_")
+        for method in content["methods"].values():
+            assert method["gain_db"] == (method["target_gain_db"] if direct else None)
+            assert method["gap_db"] == (method["target_gap_db"] if direct else None)
+        assert ("is hidden" in out) != direct
+
+
+def test_a_material_not_specified_at_the_carrier_names_the_file(run, tmp_path):
+    room = ROOT / "scenes" / "itu_room"
+    code, out, _ = run("check", room, "--carrier-ghz", "0.3")
+    assert code == 2
+    assert "itu_room/scene.toml: reflector[" in out
+    code, out, _ = run("check", room)
+    assert code == 0
+    for command in (["run", PIPELINE, "--scene", room, *SHORT], ["trace", room, "--signals"]):
+        code, _, err = run(*command, "--set", "radio.carrier_ghz=0.6")
+        assert code == 2
+        assert err.count("\n") == 1
+        assert "itu_room/scene.toml: reflector[" in err
+        assert "not specified at the carrier of 0.6 GHz" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_warnings_on_elements_follow_the_carrier(run, monkeypatch):
+    """15 mm are half a wavelength at 10 GHz, where `tang` reflects too much, and a whole one at 20 GHz."""
+    import rislam_rt.pipeline
+    from rislam_rt.errors import TraceError
+
+    def stop(*_, **__):
+        raise TraceError("far enough")
+
+    monkeypatch.setattr(rislam_rt.pipeline, "run_slam", stop)
+    for ghz, wanted, not_wanted in ((10, "ris.element", "ris.spacing_m"), (20, "ris.spacing_m", "ris.element")):
+        code, _, err = run("run", PIPELINE, *SHORT, "--set", f"radio.carrier_ghz={ghz}")
+        assert code == 1
+        assert "far enough" in err
+        assert wanted in err
+        assert not_wanted not in err
 
 
 def test_new_check_and_show(run, tmp_path):
