@@ -28,7 +28,7 @@ def command(
     from rislam_rt.model import RadioConfig
     from rislam_rt.report.tables import print_comparison
 
-    opened = open_scene(scene)
+    opened = open_scene(scene, RadioConfig())
     room = opened.scene
     prepare_backend()
     opened.warn()

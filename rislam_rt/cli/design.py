@@ -26,16 +26,18 @@ def command(
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.report.tables import print_designs
 
-    opened = open_scene(scene)
+    opened = open_scene(scene, RadioConfig())
     room = opened.scene
     point = parse_point(at, room)
     prepare_channel(channel)
     opened.warn()
-    designs = design_at(room, RadioConfig(), point, channel=channel, depth=depth, rng=np.random.default_rng(seed))
-    table = design_table(designs)
-    print_designs(room.name, point, designs)
+    found = design_at(room, RadioConfig(), point, channel=channel, depth=depth, rng=np.random.default_rng(seed))
+    table = design_table(found)
+    print_designs(room.name, point, found.designs, found.target)
+    if not found.is_direct:
+        typer.echo(f"the direct path to the panel is hidden; gains and gaps are those of {found.target}")
     if figure is not None:
         from rislam_rt.report.code import draw_codes
 
-        typer.echo(f"figure: {draw_codes(designs, figure)}")
+        typer.echo(f"figure: {draw_codes(found.designs, figure)}")
     write_json(json, {"scene": room.name, "at_m": point.tolist(), "seed": seed, **table})

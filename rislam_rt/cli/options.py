@@ -1,11 +1,23 @@
 """Arguments that several commands share, and the machine-readable copy of what they print."""
 
+import os
+import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 
 from rislam_rt.shipped import find_pipeline, find_room
+
+
+def pipeline_file(name: str) -> Path:
+    """The file of a pipeline; modules beside it and in the working folder can be named in it from now on."""
+    file = find_pipeline(name)
+    for folder in (str(file.parent.resolve()), os.getcwd()):
+        if folder not in sys.path:
+            sys.path.append(folder)  # last, so that nobody's file hides a library
+    return file
+
 
 SceneFolder = Annotated[
     Path,
@@ -16,7 +28,7 @@ SceneFolder = Annotated[
 PipelineFile = Annotated[
     Path,
     typer.Argument(
-        metavar="PIPELINE", help="Pipeline file (TOML), or the name of a built-in one.", parser=find_pipeline
+        metavar="PIPELINE", help="Pipeline file (TOML), or the name of a built-in one.", parser=pipeline_file
     ),
 ]
 MAIN_JOB = Path("trace_then_slam")

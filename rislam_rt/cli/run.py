@@ -75,9 +75,10 @@ def run_main_job(spec: "PipelineSpec", given: Given) -> None:
     from rislam_rt.cli.scenes import open_scene, scene_of
     from rislam_rt.pipeline.identity import run_identity
     from rislam_rt.pipeline.run import check_run, prepare_channel
+    from rislam_rt.pipeline.spec import build_radio
     from rislam_rt.pipeline.store import DONE, find_run
 
-    opened = open_scene(scene_of(given.scene, spec, given.pipeline))
+    opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
     check_run(opened.scene, spec)
     identity = run_identity(spec, opened.scene)
     folder = given.out or Path("runs") / identity.folder

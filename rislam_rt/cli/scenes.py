@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
-    from rislam_rt.model import Scene
+    from rislam_rt.model import RadioConfig, Scene
     from rislam_rt.pipeline import PipelineSpec
     from rislam_rt.pipeline.studies import Fig4aSpec
 
@@ -23,8 +23,8 @@ class Opened(NamedTuple):
             print(f"warning: {line}", file=sys.stderr)
 
 
-def open_scene(path: Path) -> Opened:
-    """Read and check a scene.
+def open_scene(path: Path, radio: "RadioConfig | None" = None) -> Opened:
+    """Read and check a scene, its materials and its panel for a radio where one is given.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def open_scene(path: Path) -> Opened:
     from rislam_rt.scene import check_scene, load_scene
     from rislam_rt.scene.findings import raise_errors
 
-    findings = check_scene(path)
+    findings = check_scene(path, radio)
     raise_errors(findings)
     return Opened(load_scene(path), tuple(f.line for f in findings if f.severity == "warning"))
 

@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, write_json
-from rislam_rt.shipped import find_pipeline
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, pipeline_file, write_json
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
@@ -21,7 +20,7 @@ def command(
     ],
     config: Annotated[
         Path,
-        typer.Option(metavar="PIPELINE", help="Radio, receiver and filter, as for `run`.", parser=find_pipeline),
+        typer.Option(metavar="PIPELINE", help="Radio, receiver and filter, as for `run`.", parser=pipeline_file),
     ] = MAIN_JOB,
     set_: Settings = None,
     start: Annotated[

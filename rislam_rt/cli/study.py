@@ -32,6 +32,7 @@ def run_compare_channels(spec: "CompareSpec", given: Given) -> None:
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.spec import build_radio
     from rislam_rt.pipeline.studies.compare import comparison_table, run_comparison
     from rislam_rt.pipeline.studies.spec import study_record
     from rislam_rt.report.study import write_comparison
@@ -39,7 +40,8 @@ def run_compare_channels(spec: "CompareSpec", given: Given) -> None:
 
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'compare_channels' names its rooms; set 'rooms'")
-    opened = [open_scene(_beside(given.pipeline, room.scene)) for room in spec.rooms]
+    radio = build_radio(spec.radio)
+    opened = [open_scene(_beside(given.pipeline, room.scene), radio) for room in spec.rooms]
     scenes = [one.scene for one in opened]
     record = study_record(spec, scenes)
     folder = output_folder(given.out, f"{spec.name}-{spec.seed}", record)
@@ -64,12 +66,13 @@ def run_gain_curves(spec: "Fig4aSpec", given: Given) -> None:
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene, scene_of
     from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.spec import build_radio
     from rislam_rt.pipeline.studies.fig4a import check_fig4a, run_fig4a
     from rislam_rt.pipeline.studies.spec import study_record
     from rislam_rt.report.fig4a import fig4a_table, verdict
     from rislam_rt.report.study import write_fig4a
 
-    opened = open_scene(scene_of(given.scene, spec, given.pipeline))
+    opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
     scene = opened.scene
     check_fig4a(scene, spec)
     record = study_record(spec, [scene])

@@ -53,12 +53,15 @@ def command(
     """Trace a scene along the agent's trajectory and print what was found, class by class."""
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.errors import ConfigError
+    from rislam_rt.model import RadioConfig
     from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.signals import load_signals_spec, signal_settings
     from rislam_rt.report.tables import path_table, print_paths
 
     if set_ and not signals:
         raise ConfigError(f"--set {set_[0][:60]}: settings are for --signals; add it, or leave them out")
-    opened = open_scene(scene)
+    radio = signal_settings(load_signals_spec(set_ or ()))[0] if signals else RadioConfig()
+    opened = open_scene(scene, radio)
     room = thinned(opened.scene, cycles, stride)
     prepare_channel(channel)
     if signals:

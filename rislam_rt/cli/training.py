@@ -24,6 +24,7 @@ def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.files import write_atomic
     from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.spec import build_radio
     from rislam_rt.pipeline.studies.classifier.run import ALL, run_training
     from rislam_rt.pipeline.studies.spec import study_record
     from rislam_rt.report.classifier import (
@@ -37,7 +38,8 @@ def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
 
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'train_classifier' names its rooms; set 'rooms'")
-    scenes = [open_scene(Path(os.path.normpath(given.pipeline.parent / room.scene))).scene for room in spec.rooms]
+    radio, beside = build_radio(spec.radio), given.pipeline.parent
+    scenes = [open_scene(Path(os.path.normpath(beside / room.scene)), radio).scene for room in spec.rooms]
     record = study_record(spec, scenes)
     folder = output_folder(given.out, f"{spec.name}-{spec.seed}", record)
     prepare_channel(spec.channel)

@@ -118,7 +118,7 @@ def _relaxed_optimum(
     if np.isinf(sharpness):
         top, soft = lead, (np.arange(len(level)) == len(level) - 1).astype(np.float64)
     else:
-        soft = np.exp(sharpness * (level / lead - 1.0))
+        soft = np.exp(sharpness * (level - level[-1]) / lead)  # all of them 1 where nothing is relaxed and all are 0
         width = np.log(soft.sum()) / sharpness
         soft = soft / soft.sum()
         top = lead * (1.0 + width)

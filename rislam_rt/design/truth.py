@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.design.problem import DesignProblem
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import range_information, vertex_gradient
@@ -36,6 +36,12 @@ def problem_from_arrays(
     )  # fmt: skip
 
 
+def panel_columns(paths: Paths, cycle: int) -> Integers:
+    """Panel paths (P,) of a cycle, the direct one first if it is there."""
+    over_panel = np.flatnonzero(paths.valid[cycle] & np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS)))
+    return over_panel[np.argsort(paths.kind[over_panel] != PathKind.RIS, kind="stable")]
+
+
 def problem_from_paths(
     paths: Paths, tx: Floats, rx: Floats, radio: RadioConfig, levels: int, *, cycle: int = 0,
     prior: Floats | None = None, least_snr: float = 0.0,
@@ -50,11 +56,10 @@ def problem_from_paths(
         No path meets the panel at that cycle.
     """
     here = paths.valid[cycle]
-    over_panel = np.flatnonzero(here & np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS)))
+    over_panel = panel_columns(paths, cycle)
     static = np.flatnonzero(here & np.isin(paths.kind, (PathKind.PS, PathKind.VS)))
     if paths.ris is None or not len(over_panel):
         raise ConfigError("design: no path meets the panel from this position; choose one that the panel sees")
-    over_panel = over_panel[np.argsort(paths.kind[over_panel] != PathKind.RIS, kind="stable")]
     order = np.concatenate([over_panel, static])
     gradient = vertex_gradient(tx, rx, paths.vertices[cycle, order], paths.num_vertices[order])[:, :2]
     legs = paths.ris

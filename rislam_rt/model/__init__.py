@@ -1,6 +1,6 @@
 """Floor 2: frozen data, checked once on construction. No behaviour beyond what a field's name promises."""
 
-from rislam_rt.model.estimate import MapEstimate, SlamEstimate, Suspect, empty_map
+from rislam_rt.model.estimate import MapEstimate, SlamEstimate, Suspect, empty_map, pose_estimate
 from rislam_rt.model.measurement import Measurement, PathTruth
 from rislam_rt.model.paths import PathKind, Paths, RisLegs
 from rislam_rt.model.radio import RadioConfig, RxArray
@@ -39,4 +39,5 @@ __all__ = [
     "detection_probability",
     "empty_map",
     "merged_pull",
+    "pose_estimate",
 ]

@@ -105,6 +105,13 @@ class SlamEstimate:
         return f"SlamEstimate: at {show_point(self.position)} m, horizontal deviation {std:.2g} m; {self.map!r}"
 
 
+def pose_estimate(
+    position: Floats, velocity: Floats, heading: float, covariance: Floats, body: Body, known: MapEstimate | None = None
+) -> SlamEstimate:
+    """The estimate of a pose: position, velocity (3,) [m, m/s] covariance (6, 6); an empty map if none is given."""
+    return SlamEstimate(position, velocity, heading, covariance, np.asarray(position)[None], body, known or empty_map())
+
+
 def empty_map() -> MapEstimate:
     """A map of nothing."""
     none: list[Any] = []

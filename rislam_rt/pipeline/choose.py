@@ -9,6 +9,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.information import prior_from_covariance
 from rislam_rt.model import RisCode, RisSpec, SlamEstimate
 from rislam_rt.pipeline.cycle import Designer, Room
+from rislam_rt.pipeline.own_methods import is_own, own_code
 from rislam_rt.pipeline.schemes import Scheme
 from rislam_rt.pipeline.spec import PipelineSpec, Settings
 from rislam_rt.pipeline.told import Told
@@ -29,6 +30,8 @@ def _on_belief(method: str, spec: PipelineSpec, told: Told) -> Designer:
         nonlocal last
         if method == "random":  # looks at no belief
             return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)
+        if is_own(method):
+            return own_code(method, belief(), panel, settings.radio, rng=rng)
         design = design_code(
             belief(), panel, settings.radio, method=method, rng=rng, samples=section.samples, config=settings.design,
             landmark_uncertainty=section.landmark_uncertainty, least_snr=section.least_snr,

@@ -1,20 +1,29 @@
 """Every designer at one position of a room, on the true paths: what the command line's `design` shows."""
 
-from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.design import DESIGNERS, Design, problem_from_paths
+from rislam_rt.design import DESIGNERS, Design, panel_columns, problem_from_paths
 from rislam_rt.errors import ConfigError
-from rislam_rt.model import RadioConfig, Scene, Trajectory
+from rislam_rt.model import PathKind, RadioConfig, Scene, Trajectory
 from rislam_rt.pipeline.run import build_channel
+
+
+class DesignsAt(NamedTuple):
+    """Designs at one position."""
+
+    designs: dict[str, Design]
+    """By method. Their gains are those of the `target`."""
+    target: str
+    """The panel path that single-path methods aim at: the direct one, or where it is hidden the first walled one."""
+    is_direct: bool
 
 
 def design_at(
     scene: Scene, radio: RadioConfig, point: Floats, *, channel: str, depth: int, rng: np.random.Generator
-) -> dict[str, Design]:
+) -> DesignsAt:
     """Designs by method for the agent's midpoint (3,) [m], its body and first heading as in the scene.
 
     Raises
@@ -28,17 +37,28 @@ def design_at(
     here = Trajectory(np.zeros(1), point[None], np.zeros((1, 3)), agent.heading[:1], agent.body)
     paths = build_channel(channel, scene, radio, depth).paths(here)
     problem = problem_from_paths(paths, here.tx[0], here.rx[0], radio, scene.ris.spec.levels)
+    target = panel_columns(paths, 0)[0]
     children = rng.spawn(len(DESIGNERS))
-    return {name: design(problem, rng=child) for (name, design), child in zip(DESIGNERS.items(), children, strict=True)}
+    designs = {
+        name: design(problem, rng=child) for (name, design), child in zip(DESIGNERS.items(), children, strict=True)
+    }
+    return DesignsAt(designs, paths.label(int(target)), bool(paths.kind[target] == PathKind.RIS))
 
 
-def design_table(designs: Mapping[str, Design]) -> dict[str, Any]:
-    """For JSON: figures by method, and the bound of all methods; null where the position is not observable."""
+def design_table(found: DesignsAt) -> dict[str, Any]:
+    """For JSON: figures by method, and the bound of all methods; null where the position is not observable.
+
+    `gain_db` and `gap_db` are the direct path's, and null where it is hidden; `target_gain_db` and `target_gap_db` are
+    those of the path that `target` names, whichever it is.
+    """
+    designs = found.designs
     methods = {
         name: {
-            "gain_db": design.gain_db,
+            "gain_db": design.gain_db if found.is_direct else None,
             "crlb_m2": design.crlb if np.isfinite(design.crlb) else None,
-            "gap_db": design.gap_db,
+            "gap_db": design.gap_db if found.is_direct else None,
+            "target_gain_db": design.gain_db,
+            "target_gap_db": design.gap_db,
             "seconds": design.seconds,
             "outcome": design.outcome.name,
             "code": design.code.index.tolist(),
@@ -46,4 +66,5 @@ def design_table(designs: Mapping[str, Design]) -> dict[str, Any]:
         for name, design in designs.items()
     }
     bound = max(design.bound for design in designs.values())
-    return {"methods": methods, "bound": bound if bound > 0.0 else None}
+    about = {"target": found.target, "direct_path": found.is_direct}
+    return {**about, "methods": methods, "bound": bound if bound > 0.0 else None}

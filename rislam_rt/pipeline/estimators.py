@@ -3,8 +3,13 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from rislam_rt import slam
+from rislam_rt.arrays import Integers
 from rislam_rt.information.landmarks import Unknown
+from rislam_rt.model import Measurement, RisCode, SlamEstimate
+from rislam_rt.pipeline.own_methods import load_own
 from rislam_rt.pipeline.spec import Settings
 from rislam_rt.slam.schemes import bp_slam, channel_slam
 
@@ -24,7 +29,46 @@ class Estimator(NamedTuple):
     """How its bound holds mirror images: `planes`, tied to walls; `images`, each a point of its own."""
 
 
-ESTIMATORS: dict[str, Estimator] = {
+class Outcomes(NamedTuple):
+    """What is read of the diagnostics of an estimator of one's own: it has none."""
+
+    landmark: Integers
+    """(M,) -1: no component is known to be of a landmark."""
+    outcome: str = "ok"
+
+
+def own_estimator(name: str) -> Estimator:
+    """An estimator of one's own (`OwnEstimator`) behind the functions of all others."""
+    own = load_own(name)
+
+    def predict(state: Any, ahead: float, config: Any) -> SlamEstimate:
+        found: SlamEstimate = own.predict(state, ahead) if hasattr(own, "predict") else own.estimate(state)
+        return found
+
+    def step(
+        state: Any, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: Any,
+        *, rng: np.random.Generator,
+    ) -> tuple[Any, Outcomes]:  # fmt: skip
+        state = own.step(state, measurement, code, dt, heading, rng=rng)
+        return state, Outcomes(np.full(len(measurement), -1))
+
+    return Estimator(
+        lambda start, body, panel, sensor, config, *, rng: own.init(start, body, panel, sensor, rng=rng),
+        predict,
+        step,
+        lambda state, config: own.estimate(state),
+        lambda settings: None,
+    )
+
+
+class Estimators(dict[str, Estimator]):
+    """Estimators by name; one that is not built in is looked up among methods of one's own."""
+
+    def __missing__(self, name: str) -> Estimator:
+        return own_estimator(name)
+
+
+ESTIMATORS = Estimators({
     "slam": Estimator(slam.init, slam.predict, slam.step, slam.estimate, lambda settings: settings.slam),
     "bp_slam": Estimator(
         bp_slam.init, bp_slam.predict, bp_slam.step, bp_slam.estimate, lambda settings: settings.bp_slam,
@@ -34,5 +78,5 @@ ESTIMATORS: dict[str, Estimator] = {
         channel_slam.init, channel_slam.predict, channel_slam.step, channel_slam.estimate,
         lambda settings: settings.channel_slam, angles=False, walls="images",
     ),
-}  # fmt: skip
-"""All estimators by name."""
+})  # fmt: skip
+"""All built-in estimators by name, and those of one's own when they are asked for."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rislam_rt.model import Scene
+from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import library_versions
 from rislam_rt.pipeline.seal import SCHEMA, checksum
 from rislam_rt.pipeline.spec import PipelineSpec
@@ -27,6 +28,7 @@ class Identity(NamedTuple):
 
     content: Mapping[str, Any]
     """`config` (every setting, defaults filled in), `scene` (name, SHA-256 of its files), `versions` of the libraries,
+    `own` (SHA-256 of methods of one's own),
     `code` (SHA-256 of this package), `backend` (what the environment says of the tracer), `schema`."""
 
     @property
@@ -59,6 +61,7 @@ def run_identity(spec: PipelineSpec, scene: Scene) -> Identity:
             "scene": {"name": scene.name, "sha256": scene.digest},
             "versions": library_versions(),
             "code": code_digest(),
+            "own": own_digests([*spec.schemes, spec.channel]),
             "backend": {name: os.environ.get(name, "") for name in BACKEND},
         }
     )

@@ -17,6 +17,7 @@ from rislam_rt.pipeline.change import change_room
 from rislam_rt.pipeline.control import check_control
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.motion import draw_motion
+from rislam_rt.pipeline.own_methods import load_own
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
 from rislam_rt.pipeline.spec import PipelineSpec, build_radio
@@ -24,6 +25,8 @@ from rislam_rt.pipeline.told import lean
 from rislam_rt.pipeline.walk import Walk
 from rislam_rt.pipeline.workers import run_side_by_side
 from rislam_rt.ris import delay_spread_warnings
+from rislam_rt.scene.check import material_errors
+from rislam_rt.scene.findings import raise_errors
 
 Progress = Callable[[str, int, int], None]
 """Told the stage (`trace` or a scheme), how much of it is done, and how much there is."""
@@ -153,7 +156,10 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     ConfigError
         The budget is not the cycle, there are fewer cycles than asked for, a scheme needs a panel that is not there, or
         the room cannot be changed as asked.
+    SceneError
+        A wall's material is not specified at the radio's carrier.
     """
+    raise_errors(list(material_errors(scene, f"scene '{scene.name}'", build_radio(spec.radio))))
     scene = change_room(scene, spec.room, rng=np.random.default_rng(0))
     motion, budget = scene.agent, spec.budget
     if spec.cycles is not None and spec.cycles > len(motion):
@@ -183,11 +189,14 @@ def prepare_channel(kind: str) -> None:
 
 
 def build_channel(kind: str, scene: Scene, radio: RadioConfig, depth: int) -> Channel:
-    """The channel of that name; the tracer is imported only if it is asked for."""
+    """The channel of that name, or of one's own; the tracer is imported only if it is asked for."""
     if kind == "traced":
         from rislam_rt.channel.traced import TracedChannel
 
         return TracedChannel(scene, radio, depth)
+    if kind != "image_source":
+        own: Channel = load_own(kind)(scene, radio, depth)
+        return own
     from rislam_rt.channel.image_source import ImageSourceChannel
 
     return ImageSourceChannel(scene, radio, depth)

@@ -1,5 +1,6 @@
 """What every table of a pipeline file is made of: strict sections, and numbers with ranges."""
 
+from collections.abc import Iterable
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -12,6 +13,13 @@ Real = Annotated[float, Field(ge=-1e12, le=1e12, allow_inf_nan=False)]
 Decibel = Annotated[float, Field(ge=-300.0, le=300.0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class Choices:
+    """What a text may be besides names of the user's own: for the list of settings."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self.names = tuple(names)
 
 
 class Section(BaseModel):

@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.pipeline.section import Choices
 from rislam_rt.pipeline.spec import RECORDS
 
 UNITS = {
@@ -137,11 +138,11 @@ def _kind(annotation: Any) -> str:
 
 def _of_constraints(field: FieldInfo) -> str:
     """What a field's type says of its values."""
-    choices = list(_choices(field.annotation))
+    metadata = [*field.metadata, *_inner_metadata(field.annotation)]
+    choices = list(_choices(field.annotation)) + [name for m in metadata if isinstance(m, Choices) for name in m.names]
     if choices:
         return "one of " + ", ".join(map(str, choices))
     words = {Ge: "at least", Gt: "above", Le: "at most", Lt: "below"}
-    metadata = [*field.metadata, *_inner_metadata(field.annotation)]
     return ", ".join(
         f"{word} {_short(getattr(item, kind.__name__.lower()))}"
         for kind, word in words.items()

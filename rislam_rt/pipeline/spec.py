@@ -4,14 +4,15 @@ from dataclasses import fields
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field, create_model, model_validator
+from pydantic import AfterValidator, Field, create_model, model_validator
 
 from rislam_rt.design import DESIGNERS, DesignConfig
 from rislam_rt.measurement import ReceiverConfig, build_sensor, with_reference_snr
 from rislam_rt.model import RadioConfig, RxArray, SensorModel
 from rislam_rt.pipeline.mistold import ToldSection
-from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.section import Count, Decibel, Name, NotNegative, Positive, Probability, Section
+from rislam_rt.pipeline.own_methods import is_own
+from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
+from rislam_rt.pipeline.section import Choices, Count, Decibel, Name, NotNegative, Positive, Probability, Section
 from rislam_rt.ris import PanelTolerance
 from rislam_rt.slam import SlamConfig
 from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
@@ -50,6 +51,17 @@ class ChannelSlamSection(_ChannelSlam):  # type: ignore[misc, valid-type]
 
 class ReceiverSection(_Receiver):  # type: ignore[misc, valid-type]
     """The receiver's settings, SI units; its slot is `budget.measure_s`."""
+
+
+def _check_channel(name: str) -> str:
+    if name not in CHANNELS and not is_own(name):
+        raise ValueError(f"give one of {', '.join(CHANNELS)}, or module:Class of your own")
+    return name
+
+
+CHANNELS = ("traced", "image_source")
+SchemeName = Annotated[str, AfterValidator(check_scheme), Choices(SCHEMES)]
+ChannelName = Annotated[str, AfterValidator(_check_channel), Choices(CHANNELS)]
 
 
 class ArraySection(Section):
@@ -210,12 +222,13 @@ class PipelineSpec(Section):
     """Of every random draw; the same seed gives the same result."""
     cycles: Count | None = None
     """Only the first so many cycles of the scene's trajectory; all of them by default."""
-    channel: Literal["traced", "image_source"] = "traced"
-    """Ray tracer, or exact image sources."""
+    channel: ChannelName = "traced"
+    """Ray tracer, exact image sources, or `module:Class` of one's own."""
     depth: Annotated[int, Field(ge=0, le=4)] = 2
     """Largest number of wall bounces on a path, both legs together."""
-    schemes: list[Literal[tuple(SCHEMES)]] = Field(default=["optimized", "random"], min_length=1)  # type: ignore[valid-type]
-    """What is compared: who chooses the panel's codes, and who estimates; under the same motion, channel and noise."""
+    schemes: list[SchemeName] = Field(default=["optimized", "random"], min_length=1)
+    """What is compared: who chooses the panel's codes, and who estimates; under the same motion, channel and noise.
+    Also `module:function`, a designer or an estimator of one's own."""
     radio: RadioSection = RadioSection()
     receiver: ReceiverSection = ReceiverSection()
     design: DesignSection = DesignSection()

@@ -19,6 +19,7 @@ from rislam_rt.evaluate import (
 )
 from rislam_rt.model import NOTHING, STEPS, MapEstimate, PathKind, Paths, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.bound import SchemeBound, scheme_bound, wall_surface
+from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
 
 DIVERGED = 0.5
@@ -104,7 +105,7 @@ def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:
 
 def run_bound(result: SlamResult, scheme: SchemeResult) -> SchemeBound | None:
     """The posterior bound of agent, landmarks and walls; None where the scheme's name says nothing of it."""
-    if scheme.scheme not in SCHEMES:
+    if scheme.scheme not in SCHEMES and not is_own(scheme.scheme):
         return None
     return scheme_bound(result.scene, result.paths, scheme.gain, scheme.scheme, result.config)
 

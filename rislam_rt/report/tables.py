@@ -133,10 +133,10 @@ def print_validation(rows: Sequence["Validation"]) -> None:
     print(f"{unexplained} unexplained paths, {beyond} errors beyond their limits")
 
 
-def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"]) -> None:
-    """One row a method: gain of the direct path, its gap to the optimum, the bound on the position, time."""
+def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"], target: str) -> None:
+    """One row a method: gain of the target path, its gap to the optimum, the bound on the position, time."""
     at = ", ".join(f"{x:g}" for x in point)
-    title = f"{name}, agent at ({at}) m"
+    title = f"{name}, agent at ({at}) m, target {target}"
     table = Table("method", "gain \\[dB]", "gap \\[dB]", "CRLB \\[m]", "time \\[ms]")
     for method, design in designs.items():
         crlb = f"{np.sqrt(design.crlb):.4g}" if np.isfinite(design.crlb) else design.outcome.name.lower()

@@ -9,7 +9,7 @@ import numpy as np
 from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade
-from rislam_rt.scene.check import find_errors, find_warnings
+from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.containers import too_many_faces
 from rislam_rt.scene.findings import Fault, Finding, raise_errors
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, read_inside
@@ -56,13 +56,16 @@ def load_scene(path: str | Path) -> Scene:
 def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> list[Finding]:
     """Everything wrong (errors), suspicious (warnings) or worth knowing (notes) about a scene, or a scene folder.
 
-    A bad scene is an answer, not an exception. Warnings about the panel depend on the radio, the default one if none
-    is given; where there are errors, warnings are not looked for.
+    A bad scene is an answer, not an exception. Materials are held against the carrier of a radio that is given;
+    warnings about the panel depend on the radio too, the default one if none is given. Where there are errors, warnings
+    are not looked for.
     """
     draft = Draft(scene.name, scene, []) if isinstance(scene, Scene) else read_draft(scene)
     if draft.scene is None:
         return draft.findings
     errors = find_errors(draft.scene, draft.file)
+    if radio is not None:
+        errors += material_errors(draft.scene, draft.file, radio)
     return errors or find_warnings(draft.scene, draft.file, radio or RadioConfig())
 
 

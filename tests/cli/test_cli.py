@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -269,6 +270,59 @@ def test_design_lists_every_method(run, tmp_path):
     assert content["bound"] <= min(m["crlb_m2"] for m in content["methods"].values())
     assert (tmp_path / "codes.png").read_bytes().startswith(b"\x89PNG")
     assert "exact" in out
+
+
+def test_design_does_not_take_a_walled_path_for_the_direct_one(run, tmp_path):
+    from rislam_rt.model import Reflector
+    from rislam_rt.scene import load_scene, write_scene
+
+    scene = load_scene(SCENE)
+    corners = [[2.5, 2.5, 2.5], [3.5, 2.5, 2.5], [3.5, 3.5, 2.5], [2.5, 3.5, 2.5]]
+    board = Reflector("board", corners, [[0, 1, 2], [0, 2, 3]], scene.reflectors[0].material)
+    write_scene(replace(scene, reflectors=(*scene.reflectors, board)), tmp_path / "room")
+    for room, direct in ((SCENE, True), ("room", False)):
+        code, out, _ = run("design", room, "--at", "3.1,2.9,0.4", "--json", "design.json")
+        content = json.loads((tmp_path / "design.json").read_text())
+        assert code == 0
+        assert content["direct_path"] == direct
+        assert content["target"].startswith("RIS ris" if direct else "VRIS wall_")
+        for method in content["methods"].values():
+            assert method["gain_db"] == (method["target_gain_db"] if direct else None)
+            assert method["gap_db"] == (method["target_gap_db"] if direct else None)
+        assert ("is hidden" in out) != direct
+
+
+def test_a_material_not_specified_at_the_carrier_names_the_file(run, tmp_path):
+    room = ROOT / "scenes" / "itu_room"
+    code, out, _ = run("check", room, "--carrier-ghz", "0.3")
+    assert code == 2
+    assert "itu_room/scene.toml: reflector[" in out
+    code, out, _ = run("check", room)
+    assert code == 0
+    for command in (["run", PIPELINE, "--scene", room, *SHORT], ["trace", room, "--signals"]):
+        code, _, err = run(*command, "--set", "radio.carrier_ghz=0.6")
+        assert code == 2
+        assert err.count("\n") == 1
+        assert "itu_room/scene.toml: reflector[" in err
+        assert "not specified at the carrier of 0.6 GHz" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_warnings_on_elements_follow_the_carrier(run, monkeypatch):
+    """15 mm are half a wavelength at 10 GHz, where `tang` reflects too much, and a whole one at 20 GHz."""
+    import rislam_rt.pipeline
+    from rislam_rt.errors import TraceError
+
+    def stop(*_, **__):
+        raise TraceError("far enough")
+
+    monkeypatch.setattr(rislam_rt.pipeline, "run_slam", stop)
+    for ghz, wanted, not_wanted in ((10, "ris.element", "ris.spacing_m"), (20, "ris.spacing_m", "ris.element")):
+        code, _, err = run("run", PIPELINE, *SHORT, "--set", f"radio.carrier_ghz={ghz}")
+        assert code == 1
+        assert "far enough" in err
+        assert wanted in err
+        assert not_wanted not in err
 
 
 def test_new_check_and_show(run, tmp_path):

@@ -1,6 +1,7 @@
 """The dual bound: below every code, above the plain relaxation, and its slope."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,6 +30,21 @@ def test_dual_bound_certifies_fine_phases_of_one_path(make_problem, rng):
     problem = make_problem(rng, rows=3, cols=3, levels=4, panel=1)
     design = DESIGNERS["exact"](problem, rng=rng)
     assert dual_bound(problem, design.code.index) == pytest.approx(design.crlb, rel=1e-4)
+
+
+@pytest.mark.parametrize("silent", ["gains", "gradients"])
+@pytest.mark.filterwarnings("error")
+def test_dual_bound_of_paths_that_say_nothing(silent, make_problem, rng):
+    """Panel paths without a gain, or across the plane: what is left is known without a code, and no logarithm of 0."""
+    problem = make_problem(rng, rows=2, cols=2, panel=2, static=2)
+    gradient, response = problem.gradient.copy(), problem.response.copy()
+    if silent == "gains":
+        response[:] = 0.0
+    else:
+        gradient[:, :2] = 0.0
+    problem = replace(problem, gradient=gradient, response=response)
+    every = build_objective(problem).of_index(np.zeros(4, dtype=np.int64))
+    assert dual_bound(problem, np.zeros(4, dtype=np.int64)) == pytest.approx(float(every), rel=1e-6)
 
 
 def test_dual_bound_holds_from_any_start(make_problem, rng):

@@ -113,12 +113,13 @@ class Precision:
             shift[:, leg] += np.where(there, self.tilt[walls], 0.0).sum(axis=1) * reach[:, leg]
         beside = shift + self.offset_rays * (1.0 + reach) * (shape.bounces > 0)
         bend = [_bend(segments, beside[:, leg]) for leg, segments in enumerate(shape.segments)]
-        length = 2.0 * shift.sum(axis=1) + bend[0] + bend[1]
+        leg_length = 2.0 * shift + np.stack(bend, axis=-1)
+        length = leg_length.sum(axis=1)
         direct = paths.landmark[path] < 0
         ends = np.where(direct[:, None], beside[:, :1], beside)
         angle = np.minimum(_ratio(ends, shape.at_device) + 8.0 * self.roundoff, np.pi)
         turn = _ratio(beside, shape.at_landmark) + 8.0 * self.roundoff
-        gain = self._field(shape) + _ratio(shift, shape.length).sum(axis=1)
+        gain = self._field(shape) + _ratio(leg_length, shape.length).sum(axis=1)
         gain += self._landmark(paths, cycle, path, trajectory, turn)
         share = np.minimum(gain * scale / np.maximum(np.abs(paths.gain[cycle, path]), np.finfo(np.float64).tiny), 1.0)
         phase = 2.0 * np.pi / self.radio.wavelength * length + np.where(share < 1.0, np.arcsin(share), np.pi)

@@ -6,31 +6,12 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.errors import SceneError
 from rislam_rt.geometry.planes import mirror_direction
 from rislam_rt.model import Material
+from rislam_rt.model.itu import itu_parameters
 
 VACUUM_PERMITTIVITY = 8.8541878128e-12
 """[F/m], CODATA 2018."""
-
-ITU_MATERIALS: dict[str, tuple[tuple[float, float, float, float, float, float], ...]] = {
-    "vacuum": ((0.001, 100.0, 1.0, 0.0, 0.0, 0.0),),
-    "concrete": ((1.0, 100.0, 5.24, 0.0, 0.0462, 0.7822), (110.0, 330.0, 5.17, 0.0, 0.0145, 1.09)),
-    "brick": ((1.0, 40.0, 3.91, 0.0, 0.0238, 0.16), (110.0, 330.0, 4.15, 0.0, 0.0006, 1.5712)),
-    "plasterboard": ((1.0, 100.0, 2.73, 0.0, 0.0085, 0.9395), (110.0, 330.0, 2.56, 0.0, 0.0001, 1.7799)),
-    "wood": ((0.001, 100.0, 1.99, 0.0, 0.0047, 1.0718), (110.0, 330.0, 1.82, 0.0, 0.004, 1.0761)),
-    "glass": ((0.1, 100.0, 6.31, 0.0, 0.0036, 1.3394), (220.0, 450.0, 5.79, 0.0, 0.0004, 1.658)),
-    "ceiling_board": ((1.0, 100.0, 1.48, 0.0, 0.0011, 1.075), (220.0, 450.0, 1.52, 0.0, 0.0029, 1.029)),
-    "chipboard": ((1.0, 100.0, 2.58, 0.0, 0.0217, 0.78),),
-    "plywood": ((1.0, 40.0, 2.71, 0.0, 0.33, 0.0),),
-    "marble": ((1.0, 60.0, 7.074, 0.0, 0.0055, 0.9262),),
-    "floorboard": ((50.0, 100.0, 3.66, 0.0, 0.0044, 1.3515),),
-    "metal": ((1.0, 100.0, 1.0, 0.0, 1e7, 0.0),),
-    "very_dry_ground": ((1.0, 10.0, 3.0, 0.0, 0.00015, 2.52),),
-    "medium_dry_ground": ((1.0, 10.0, 15.0, -0.1, 0.035, 1.63),),
-    "wet_ground": ((1.0, 10.0, 30.0, -0.4, 0.15, 1.3),),
-}
-"""ITU-R P.2040, table 3: lowest and highest frequency [GHz], a, b, c, d."""
 
 
 def relative_permittivity(name: str, carrier: float) -> complex:
@@ -41,14 +22,9 @@ def relative_permittivity(name: str, carrier: float) -> complex:
     SceneError
         The material is unknown, or not specified at the carrier.
     """
-    if name not in ITU_MATERIALS:
-        raise SceneError(f"material.itu: '{name}' received; give one of {', '.join(ITU_MATERIALS)}")
+    a, b, c, d = itu_parameters(name, carrier)
     ghz = carrier / 1e9
-    for low, high, a, b, c, d in ITU_MATERIALS[name]:
-        if low <= ghz <= high:
-            return complex(a * ghz**b, -c * ghz**d / (2.0 * np.pi * carrier * VACUUM_PERMITTIVITY))
-    ranges = " or ".join(f"{row[0]:g} to {row[1]:g} GHz" for row in ITU_MATERIALS[name])
-    raise SceneError(f"material.itu: '{name}' at {ghz:g} GHz received; it is specified from {ranges}")
+    return complex(a * ghz**b, -c * ghz**d / (2.0 * np.pi * carrier * VACUUM_PERMITTIVITY))
 
 
 def slab_coefficients(

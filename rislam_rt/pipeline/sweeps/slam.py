@@ -13,6 +13,7 @@ from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.evaluate import bootstrap, rms_over_runs
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.files import write_atomic
+from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.read import Table, build_spec, read_table
 from rislam_rt.pipeline.run import check_run, library_versions, prepare_channel, run_slam
 from rislam_rt.pipeline.section import Positive, Section
@@ -208,7 +209,8 @@ def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]],
         spec = build_spec(Table(path, dict(settings), ()), PipelineSpec, build_settings)
         room: Scene = load(path.parent / str(spec.scene))
         check_run(room, spec)
-        return {"scene_sha256": room.digest, "versions": versions}
+        own = own_digests([*spec.schemes, spec.channel])
+        return {"scene_sha256": room.digest, "versions": versions} | ({"own": own} if own else {})
 
     def named(settings: Mapping[str, Any]) -> dict[str, Any]:
         try:

@@ -73,7 +73,7 @@ def _banded(name: str, limits: Sequence[float], unit: str = "") -> Callable[[Map
 
 CLASSES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "motion": lambda traits: str(traits["motion"]),
-    "plan": lambda traits: str(traits["shape"]),
+    "plan": lambda traits: traits["shape"] if traits["shape"] == "convex" else str(traits["shape"]).upper(),
     "ceiling": lambda traits: str(traits["ceiling"]),
     "size": _banded("size", (6.0, 15.0), " m"),
     "reflection": _banded("reflection", (0.4, 0.65)),

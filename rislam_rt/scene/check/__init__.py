@@ -2,6 +2,7 @@
 
 from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.scene.check.agent import agent_errors, agent_warnings
+from rislam_rt.scene.check.materials import material_errors
 from rislam_rt.scene.check.meshes import face_errors, mesh_warnings, name_errors, scatterer_errors
 from rislam_rt.scene.check.panel import panel_errors, panel_warnings
 from rislam_rt.scene.check.shades import cylinder_warnings, shade_errors, shade_face_errors
@@ -9,7 +10,7 @@ from rislam_rt.scene.check.soup import build_soup
 from rislam_rt.scene.check.walls import wall_findings
 from rislam_rt.scene.findings import Finding
 
-__all__ = ["find_errors", "find_warnings"]
+__all__ = ["find_errors", "find_warnings", "material_errors"]
 
 
 def find_errors(scene: Scene, file: str) -> list[Finding]:

@@ -34,7 +34,7 @@ def panel_errors(soup: Soup) -> Iterator[Finding]:
 
 
 def panel_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
-    """Never seen from the front; reflecting more than a plate; delay spread above 1 / B."""
+    """Never seen from the front; reflecting more than a plate; ambiguous; delay spread above 1 / B."""
     panel = soup.scene.ris
     if panel is None:
         return
@@ -46,6 +46,13 @@ def panel_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
     if spec.element == "tang" and excess > 0.5:
         message = f"at {radio.carrier / 1e9:g} GHz 'tang' elements reflect {excess:.2f} dB more than a perfect plate"
         yield soup.warning("ris.element", message, "take 'energy', unless the paper's model is wanted")
+    widest = max((float(d) for d, n in zip(spec.spacing, (spec.cols, spec.rows), strict=True) if n > 1), default=0.0)
+    if widest >= radio.wavelength:
+        message = (
+            f"elements {widest:g} m apart, a wavelength or more ({radio.wavelength:.4g} m at "
+            f"{radio.carrier / 1e9:g} GHz): whatever the code, another direction is met as strongly"
+        )
+        yield soup.warning("ris.spacing_m", message, "take half a wavelength or less")
     spread = _delay_spread(soup, panel)
     if spread * radio.bandwidth > 1.0:
         message = f"delays over the panel spread by up to {spread * 1e9:.2f} ns, more than 1/B"

@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rislam_rt.channel.compare import compare_channels, validate_rooms
+from rislam_rt.channel.compare import compare_channels, compare_paths, validate_rooms
+from rislam_rt.channel.image_source import ImageSourceChannel
+from rislam_rt.channel.traced import TracedChannel, shortest_segment
 from rislam_rt.model import RadioConfig
 from rislam_rt.scene import load_scene
 
@@ -43,6 +45,27 @@ def test_the_tracers_own_vertices_agree_to_float32(name):
     # a direction over a short segment is worse than its vertices; the bulk is not
     assert np.percentile(np.concatenate([report.aod_error, report.aoa_error]), 99) <= 1e-4
     assert np.percentile(report.phase_error, 99) <= 5e-3
+
+
+def test_a_hall_of_100_m_loses_nothing_without_a_reason(rooms):
+    """Corners met within millimetres: what float32 loses there follows from the room's size."""
+    scene = rooms.scene(rooms.box((0, 0, 0), (100, 80, 30)), (), name="hall")
+    rng = np.random.default_rng(5)
+    poses = rng.uniform([5, 5, 2], [95, 75, 28], size=(200, 3))
+    lost = 0
+    for baseline in (0.003, 0.02):
+        trajectory = rooms.at(poses, tx=(-0.5 * baseline, -0.2 * baseline, 0.1 * baseline), rx=(0.5 * baseline, 0, 0))
+        traced, analytic = (
+            channel.paths(trajectory)
+            for channel in (
+                TracedChannel(scene, RadioConfig(), 2, refine=False),
+                ImageSourceChannel(scene, RadioConfig(), 2),
+            )
+        )
+        report = compare_paths(traced, analytic, scene, trajectory, shortest_segment=shortest_segment(scene))
+        assert report.passed
+        lost += sum(report.explained.values())
+    assert lost > 10
 
 
 def test_a_rooms_poses_depend_on_seed_and_name_alone():

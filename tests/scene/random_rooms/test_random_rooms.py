@@ -11,7 +11,7 @@ from rislam_rt.scene.random_rooms.landmarks import MOST
 from rislam_rt.scene.random_rooms.motion import CLIMB, CORNER, CYCLE, OFF_WALLS, SPIN
 from rislam_rt.scene.random_rooms.plan import area, depth_inside, draw_plan, triangulate
 
-MEANT = ("below the array", "more than a perfect plate", "more than 1/B", "never in front")
+MEANT = ("below the array", "more than a perfect plate", "more than 1/B", "never in front", "a wavelength or more")
 """Warnings of the scene check about what is drawn on purpose."""
 
 

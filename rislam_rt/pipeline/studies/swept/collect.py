@@ -26,9 +26,9 @@ class Group(NamedTuple):
 
     @property
     def schemes(self) -> list[str]:
-        """Names, in the order of `SCHEMES`: what is read back from a cell's file has lost its own."""
+        """Names, in the order of `SCHEMES`: what is read back from a cell's file has lost its own; others last."""
         ran = {name for result in self.results if result for name in result["schemes"]}
-        return [name for name in SCHEMES if name in ran]
+        return [name for name in SCHEMES if name in ran] + sorted(ran - set(SCHEMES))
 
     def column(self, scheme: str, *name: str) -> Floats:
         """(R,) a score by its names, outermost first, e.g. `"landmarks", "ris", "rmse_m"`; NaN where there is none."""

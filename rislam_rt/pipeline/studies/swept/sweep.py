@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rislam_rt.errors import ConfigError, RislamError
+from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions
 from rislam_rt.pipeline.studies.swept.cell import FUNCTION, cell_spec
 from rislam_rt.pipeline.studies.swept.spec import AblationsSpec, Fig4bSpec, Fig4cSpec, RoomsSpec, SweptSpec
@@ -92,6 +93,7 @@ def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str,
         except RislamError as error:
             raise type(error)(f"{pipeline}: {settings['scene']}: {error}") from None
         config = spec.model_dump(mode="json", exclude={"name", "description", "scene", "seed"})
-        return {"config": config, "scene_sha256": room.digest, "versions": versions}
+        own = own_digests([*spec.schemes, spec.channel])
+        return {"config": config, "scene_sha256": room.digest, "versions": versions} | ({"own": own} if own else {})
 
     return depends

@@ -15,7 +15,9 @@ class UnseenSpec(SweptSpec):
     """An estimator in many random rooms."""
 
     kind: Literal["unseen"]
+    """Which study the file is."""
     repetitions: Literal[1] = 1
+    """Each room is run once: other draws are other rooms."""
     first: Annotated[int, Field(ge=0, lt=2**31)] = 0
     """Seed of the first room."""
     rooms: Count = 60

@@ -11,6 +11,7 @@ from typing import Any
 
 from rislam_rt.errors import RislamError, StoreError
 from rislam_rt.pipeline.files import write_atomic
+from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions
 from rislam_rt.pipeline.studies.swept.cell import cell_spec
 from rislam_rt.pipeline.studies.unseen.cell import FUNCTION, scheme_here
@@ -63,7 +64,9 @@ class _Depends:
         except RislamError as error:
             raise type(error)(f"{self.pipeline}: room {settings['room']}: {error}") from None
         config = spec.model_dump(mode="json", exclude={"name", "description", "scene", "seed"})
-        return {"config": config, "room_sha256": room.scene.digest, "versions": self.versions, "code": self.code}
+        own = own_digests([*spec.schemes, spec.channel])
+        told = {"config": config, "room_sha256": room.scene.digest, "versions": self.versions, "code": self.code}
+        return told | ({"own": own} if own else {})
 
 
 @cache

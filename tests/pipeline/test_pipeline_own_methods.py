@@ -1,0 +1,112 @@
+"""Methods of one's own, as the how-to shows them: in a run, in a sweep on workers, in the identity of a run."""
+
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rislam_rt
+from rislam_rt.errors import ConfigError
+from rislam_rt.model import SlamResult, empty_map, pose_estimate
+from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline.own_methods import load_own, own_code, own_digests
+from rislam_rt.pipeline.sweeps import Effort, run_sweep
+from rislam_rt.pipeline.sweeps.slam import slam_sweep
+from rislam_rt.shipped import find_pipeline
+
+PAGE = (Path(__file__).parents[2] / "docs" / "own_methods.md").read_text()
+FILES = [block for block in re.findall(r"```python\n(.*?)```", PAGE, re.S) if block.startswith("# mine.py")]
+QUICK = ["cycles=8", "channel=image_source", "depth=1", "radio.reference_snr_db=30"]
+
+
+@pytest.fixture
+def mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The how-to's three examples in one file, where Python finds it."""
+    assert len(FILES) == 3
+    file = tmp_path / "mine.py"
+    file.write_text("\n".join(FILES) + "\n\ndef bad(belief, panel, radio, *, rng):\n    return [1.5]\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "mine", raising=False)
+    load_own.cache_clear()
+    return file
+
+
+def run(schemes: str, *more: str) -> SlamResult:
+    spec = load_spec(find_pipeline("trace_then_slam"), [*QUICK, f"schemes={schemes}", *more])
+    return rislam_rt.run_slam(rislam_rt.load_scene("paper_room"), spec, rng=np.random.default_rng(3))
+
+
+@pytest.mark.usefixtures("mine")
+def test_a_designer_and_a_filter_take_part_in_a_run() -> None:
+    found = run('["random", "mine:my_designer", "mine:DeadReckoning"]').schemes
+    codes = found["mine:my_designer"].applied
+    assert codes.shape == (8, 6, 6)
+    # the panel is not in the map within 8 cycles: the example searches, with the draws that every scheme gets
+    assert (codes == found["random"].applied).all()
+    reckoned = found["mine:DeadReckoning"]
+    step = np.diff(reckoned.position, axis=0)
+    np.testing.assert_allclose(step, reckoned.velocity[1:] * 0.1, atol=1e-12)
+    # its own deviations: 0.01 m at the start, and 0.01 m/s over seven steps of 0.1 s
+    assert np.sqrt(reckoned.covariance[-1, 0, 0]) == pytest.approx(0.017)
+
+
+@pytest.mark.usefixtures("mine")
+def test_the_example_focuses_once_the_panel_is_known() -> None:
+    scene, radio = rislam_rt.load_scene("paper_room"), rislam_rt.RadioConfig()
+    assert scene.ris is not None
+    panel, place = scene.ris.spec, np.array([1.5, 1.0, 0.5])
+    known = replace(
+        empty_map(), ident=[0], position=scene.ris.center[None], covariance=np.eye(3)[None], parent=[-1],
+        ris_probability=[1.0], strength=[1.0],
+    )  # fmt: skip
+    belief = pose_estimate(place, np.zeros(3), 0.0, np.eye(6), scene.agent.body, known)
+    code = own_code("mine:my_designer", belief, panel, radio, rng=np.random.default_rng(0))
+    way = 2.0 * np.linalg.norm(scene.ris.center + panel.offsets() - place, axis=-1)
+    phase = -2.0 * np.pi * way / radio.wavelength - code.xi
+    # four levels leave each element within 45 degrees of the best phase: at least cos 45 degrees of the full sum
+    assert np.abs(np.exp(1j * phase).sum()) > np.sqrt(0.5) * panel.num_elements
+
+
+@pytest.mark.usefixtures("mine")
+def test_a_channel_takes_the_place_of_ours() -> None:
+    paths = run('["no_ris"]', "channel=mine:WithoutFloor").paths
+    floor = paths.walls.index("floor")
+    over = ((paths.tx_walls == floor) | (paths.rx_walls == floor)).any(axis=1)
+    assert over.any()
+    assert not paths.valid[:, over].any()
+
+
+@pytest.mark.usefixtures("mine")
+def test_in_a_sweep_on_workers(tmp_path: Path) -> None:
+    settings = [*QUICK, 'schemes=["mine:DeadReckoning", "no_ris"]']
+    sweep = slam_sweep(find_pipeline("trace_then_slam"), settings, ["radio.reference_snr_db=0,30"], repeat=1)
+    report = run_sweep(sweep, tmp_path / "sweep", Effort(jobs=2))
+    assert not report.failed
+    assert len(report.rows) == 2
+    assert all(set(row.result["schemes"]) == {"mine:DeadReckoning", "no_ris"} for row in report.rows)
+
+
+def test_the_file_is_part_of_the_identity(mine: Path) -> None:
+    before = own_digests(["random", "mine:my_designer"])
+    assert list(before) == ["mine:my_designer"]
+    mine.write_text(mine.read_text() + "\n# changed\n")
+    assert own_digests(["mine:my_designer"]) != before
+
+
+@pytest.mark.usefixtures("mine")
+@pytest.mark.parametrize(
+    ("schemes", "said"),
+    [
+        ('["optimised"]', "did you mean 'optimized'"),
+        ('["mine:nobody"]', "module 'mine' has no 'nobody'"),
+        ('["nowhere:f"]', "put nowhere.py beside the pipeline file"),
+        ('["mine:bad"]', r"give whole numbers \(6, 6\) from 0 to 3"),
+    ],
+)
+def test_what_is_wrong_is_one_line(schemes: str, said: str) -> None:
+    with pytest.raises(ConfigError, match=said) as raised:
+        run(schemes)
+    assert "\n" not in str(raised.value)
