@@ -34,9 +34,9 @@ class TracedChannel:
         Largest number of wall bounces on a path, both legs together.
     refine
         Recompute the bounce points of what the tracer found in float64 on the walls' planes; `Paths.source` says
-        `traced, refined`, and which sequences were asked about. Without it the tracer's own float32 vertices stand, good to some
-        micrometres (a segment of a millimetre then has a direction of three digits, so reflection is computed on the
-        refined points in either case).
+        `traced, refined`, and which sequences were asked about. Without it the tracer's own float32 vertices stand,
+        good to some micrometres (a segment of a millimetre then has a direction of three digits, so reflection is
+        computed on the refined points in either case).
 
     antennas
         Patterns and polarisation of the agent's antennas; by default both are isotropic and vertical.

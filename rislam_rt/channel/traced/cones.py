@@ -1,7 +1,7 @@
-"""Wall sequences that no position of either end can have, told by cones: for rooms with too many walls to ask about all.
+"""Cones that rule out wall sequences by where both ends are: for rooms with too many walls to ask about all.
 
-Seen from the far end's image, whatever comes after a bounce lies in the cone over a ball about the wall. A next wall, or
-a device, outside all these cones is never met. Positions come in balls, so that one look serves all near each other;
+Seen from the far end's image, whatever comes after a bounce lies in the cone over a ball about the wall. A next wall,
+or a device, outside all these cones is never met. Positions come in balls, so that one look serves all near each other;
 walls are balls too. It errs towards keeping: nothing that exists is ruled out.
 """
 

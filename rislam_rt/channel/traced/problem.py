@@ -139,9 +139,7 @@ def build_batch(problems: Sequence[Problem], stage: "Stage", sides: Integers, de
     for problem in problems:
         device_side, far_side = (np.bitwise_or.reduce(point_sides(walls, p)) for p in (problem.device, problem.far))
         cones = partial(build_cones, stage, problem.device, problem.far)
-        table, all_of_them = possible_sequences(
-            sides, device_side, far_side, depth, walls.beside(problem.host), cones
-        )
+        table, all_of_them = possible_sequences(sides, device_side, far_side, depth, walls.beside(problem.host), cones)
         sequences.append(table)
         complete &= all_of_them
     device = np.concatenate([problem.device for problem in problems])
