@@ -1,8 +1,10 @@
 """Floor 5: the receiver. What arrives, the noise, and multipath components with their standard deviations."""
 
+from rislam_rt.measurement.calibrate import calibrate
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.dataset import NO_COMPONENT, load_signals, signals_dataset
 from rislam_rt.measurement.false_alarms import detection_threshold, expected_false_alarms
+from rislam_rt.measurement.hardware import Correction, FrontEnd, HardwareConfig, build_front_end
 from rislam_rt.measurement.measure import measure
 from rislam_rt.measurement.noise import (
     paper_snr_db,
@@ -23,12 +25,17 @@ __all__ = [
     "NO_COMPONENT",
     "Capture",
     "Components",
+    "Correction",
+    "FrontEnd",
+    "HardwareConfig",
     "Received",
     "ReceiverConfig",
     "TrackInfo",
     "TrackState",
     "TrackingConfig",
+    "build_front_end",
     "build_sensor",
+    "calibrate",
     "capture",
     "detection_probability",
     "detection_threshold",

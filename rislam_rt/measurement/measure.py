@@ -5,7 +5,8 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.measurement.bound import measure_bound
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.received import receive
+from rislam_rt.measurement.hardware import FrontEnd
+from rislam_rt.measurement.received import direct_gain, receive
 from rislam_rt.measurement.waveform import measure_waveform
 from rislam_rt.model import Measurement, Paths, PathTruth, RadioConfig
 
@@ -18,6 +19,7 @@ def measure(
     config: ReceiverConfig,
     previous: Measurement | None = None,
     doppler: Floats | None = None,
+    front_end: FrontEnd | None = None,
     *,
     rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
@@ -37,8 +39,13 @@ def measure(
         more; `bound` has no use for it.
     doppler
         (P,) Doppler shifts [Hz] of the paths, which turn within the slot; None if nothing moves.
+    front_end
+        A receiver as it was built (`waveform`); None for an ideal one.
     """
+    if front_end is not None and front_end.config.carrier_offset_hz:
+        doppler = (np.zeros(paths.num_paths) if doppler is None else doppler) + front_end.config.carrier_offset_hz
     received = receive(paths, cycle, heading, radio, config, doppler)
     if config.estimator == "waveform":
-        return measure_waveform(received, radio, config, previous, rng=rng)
+        leakage = direct_gain(paths, cycle) if front_end is not None else 0.0
+        return measure_waveform(received, radio, config, previous, front_end, leakage, rng=rng)
     return measure_bound(received, radio, config, paths.num_paths, rng=rng)

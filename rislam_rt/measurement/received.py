@@ -67,6 +67,11 @@ def receive(
     return Received(path, paths.tau[cycle, path], arrival[path], gain, from_panel, radius, shift)
 
 
+def direct_gain(paths: Paths, cycle: int) -> complex:
+    """Gain of the direct path from Tx to Rx, nothing cancelled; 0 where it is hidden."""
+    return complex(np.sum(paths.gain[cycle, paths.kind == PathKind.LOS]))
+
+
 def _tx_leg_length(paths: Paths, cycle: int, path: Integers) -> Floats:
     """(N,) length [m] of the legs from Tx to landmark; 0 for leakage and wall returns, whose wave spreads from the Tx.
 

@@ -24,14 +24,15 @@ def num_tones(radio: RadioConfig, config: ReceiverConfig) -> int:
     return int(2 ** np.ceil(np.log2(needed)))
 
 
-def tones(received: Received, radio: RadioConfig, config: ReceiverConfig) -> Complexes:
-    """Noiseless tones (L, M) [sqrt(J)]."""
+def tones(received: Received, radio: RadioConfig, config: ReceiverConfig, elements: Floats | None = None) -> Complexes:
+    """Noiseless tones (L, M) [sqrt(J)]; `elements` (L, 3) are the true places in wavelengths, if not as drawn."""
     count = num_tones(radio, config)
     frequencies = subcarrier_frequencies(count, radio.bandwidth)
     scale = np.sqrt(radio.energy / count)
+    elements = radio.array.positions(1.0) if elements is None else elements
     if config.element_exact:
-        return scale * _element_exact(received, radio, frequencies)
-    antennas = np.exp(2j * np.pi * radio.array.positions(1.0) @ received.direction.T)
+        return scale * _element_exact(received, radio, frequencies, elements)
+    antennas = np.exp(2j * np.pi * elements @ received.direction.T)
     return scale * (antennas * received.gain) @ delay_response(received.tau, frequencies)
 
 
@@ -66,42 +67,38 @@ def add_noise(signal: Complexes, variance: float, *, rng: np.random.Generator) -
     return signal + np.sqrt(variance / 2.0) * (parts[0] + 1j * parts[1])
 
 
-def quantise(spectrum: Complexes, bits: int, radio: RadioConfig) -> Complexes:
-    """Tones (L, M) after converters of this many bits for each of real and imaginary part; 0 bits convert exactly.
+def convert(spectrum: Complexes, bits: int, radio: RadioConfig, clip_rms: float = 0.0) -> tuple[Complexes, float]:
+    """Tones (L, M) after converters of this many bits for each of real and imaginary part, 0 for steps without end.
 
-    The converters see samples in time, with the gain set so that the largest of all just fits.
+    The converters see samples in time. Full scale is the largest sample of all, or `clip_rms` times the root mean
+    square of a component; what lies above is cut off. Also returns the variance [J] that the steps add to a tone: a
+    sixth of the squared step, which the receiver knows.
     """
-    if not bits:
-        return spectrum
+    if not bits and not clip_rms:
+        return spectrum, 0.0
     samples = to_samples(spectrum, radio)
-    step = _converter_step(samples, bits)
-    return to_tones(_mid_rise(samples.real, step, bits) + 1j * _mid_rise(samples.imag, step, bits), radio)
-
-
-def converter_noise(spectrum: Complexes, bits: int, radio: RadioConfig) -> float:
-    """Variance [J] that the converters add to a tone: a sixth of the squared step, which the receiver knows."""
-    if not bits:
-        return 0.0
-    return _converter_step(to_samples(spectrum, radio), bits) ** 2 / 6.0 / radio.bandwidth
-
-
-def _converter_step(samples: Complexes, bits: int) -> float:
-    largest = max(float(np.abs(samples.real).max()), float(np.abs(samples.imag).max()), np.finfo(np.float64).tiny)
-    return 2.0 * largest / 2**bits
+    scale = max(float(np.abs(samples.real).max()), float(np.abs(samples.imag).max()), np.finfo(np.float64).tiny)
+    if clip_rms:
+        scale = clip_rms * float(np.sqrt(0.5 * np.mean(np.abs(samples) ** 2)))
+    step = 2.0 * scale / 2**bits if bits else 0.0
+    real, imag = (_mid_rise(np.clip(part, -scale, scale), step, bits) for part in (samples.real, samples.imag))
+    return to_tones(real + 1j * imag, radio), step**2 / 6.0 / radio.bandwidth
 
 
 def _mid_rise(value: Floats, step: float, bits: int) -> Floats:
+    """Values on the steps of a converter; as they are without one."""
+    if not bits:
+        return value
     level = np.clip(np.floor(value / step), -(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-    return (level + 0.5) * step
+    return np.asarray((level + 0.5) * step)
 
 
-def _element_exact(received: Received, radio: RadioConfig, frequencies: Floats) -> Complexes:
+def _element_exact(received: Received, radio: RadioConfig, frequencies: Floats, elements: Floats) -> Complexes:
     """Sum over paths of spherical waves, each element at its own distance from where the wave comes from.
 
     No plane-wave and no narrow-band approximation: the phase is `-2 pi (f_c + f) (delay at the element)`, and the part
     at the array's centre and the carrier is in the gain.
     """
-    elements = radio.array.positions(1.0)
     source = received.direction * (received.wave_radius / radio.wavelength)[:, None]
     excess = np.linalg.norm(source - elements[:, None], axis=-1) - np.linalg.norm(source, axis=-1)
     response = np.zeros((len(elements), len(frequencies)), dtype=np.complex128)

@@ -12,13 +12,14 @@ from rislam_rt.measurement.detect import build_grid
 from rislam_rt.measurement.doubt import crowding, luck, mirror_variance, unmirrored
 from rislam_rt.measurement.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.false_alarms import detection_threshold
+from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_swing, in_step
 from rislam_rt.measurement.identify import identify
 from rislam_rt.measurement.joint import LEAST_CERTAINTY
 from rislam_rt.measurement.parts import capped, into_disc
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.refine import amplitude_covariance
 from rislam_rt.measurement.sides import Found, panel_probability
-from rislam_rt.measurement.signal import add_noise, converter_noise, quantise, tones
+from rislam_rt.measurement.signal import num_tones, tones
 from rislam_rt.measurement.slot import split
 from rislam_rt.model import Measurement, PathTruth, RadioConfig
 
@@ -54,29 +55,42 @@ class Components(NamedTuple):
 
 
 def capture(
-    received: Received, radio: RadioConfig, config: ReceiverConfig, *, rng: np.random.Generator
+    received: Received,
+    radio: RadioConfig,
+    config: ReceiverConfig,
+    front_end: FrontEnd | None = None,
+    leakage: complex = 0.0,
+    *,
+    rng: np.random.Generator,
 ) -> list[Capture]:
     """Sound the channel: one capture, or with alternation the sum and the difference of two at half the energy each.
 
     Sum and difference of the two halves, over sqrt 2, hold the walls' and the panel's paths at the full energy and the
     noise of one sounding: splitting the slot costs nothing but a second code. What turns within the slot is in both.
+
+    Parameters
+    ----------
+    front_end
+        A real receiver; None for an ideal one.
+    leakage
+        Gain of the direct path before its cancellation: a real receiver's cancellation leaves something of it.
     """
     heard = split(received, config)
+    elements = None if front_end is None else radio.array.positions(1.0) + front_end.offset
+    swing = 1.0 if front_end is None else draw_swing(front_end.config, rng=rng)
+    clean = [tones(one, radio, config, elements) for one in heard]
+    direct = leakage * np.sqrt(radio.energy / num_tones(radio, config))
     if not config.alternation:
-        noisy = add_noise(tones(heard[0], radio, config), radio.noise_psd, rng=rng)
-        extra = converter_noise(noisy, config.converter_bits, radio)
-        return [Capture(quantise(noisy, config.converter_bits, radio), radio.noise_psd + extra, False)]
-    clean = [tones(one, radio, config) for one in heard]
-    halves, extra = [], 0.0
-    for sign in (1.0, -1.0):
-        noisy = add_noise(np.sqrt(0.5) * (clean[0] + sign * clean[1]), radio.noise_psd, rng=rng)
-        extra += 0.5 * converter_noise(noisy, config.converter_bits, radio)
-        halves.append(quantise(noisy, config.converter_bits, radio))
-    level = radio.noise_psd + extra
-    return [
-        Capture(np.sqrt(0.5) * (halves[0] + halves[1]), level, False),
-        Capture(np.sqrt(0.5) * (halves[0] - halves[1]), level, True),
-    ]
+        return [Capture(*digitise(clean[0], Sent(1.0, direct, swing), radio, config, front_end, rng=rng), False)]
+    sent = Sent(np.sqrt(0.5), np.sqrt(0.5) * direct, swing)
+    (one, noise), (other, more) = (
+        digitise(np.sqrt(0.5) * (clean[0] + sign * clean[1]), sent, radio, config, front_end, rng=rng)
+        for sign in (1.0, -1.0)
+    )
+    if front_end is not None and front_end.correction is not None:
+        other = in_step(other, one)
+    level = 0.5 * (noise + more)
+    return [Capture(np.sqrt(0.5) * (one + other), level, False), Capture(np.sqrt(0.5) * (one - other), level, True)]
 
 
 def find_components(
@@ -94,11 +108,14 @@ def measure_waveform(
     radio: RadioConfig,
     config: ReceiverConfig,
     previous: Measurement | None = None,
+    front_end: FrontEnd | None = None,
+    leakage: complex = 0.0,
     *,
     rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
     """Components estimated from the cycle's signal, and the paths that they most likely are."""
-    found = find_components(capture(received, radio, config, rng=rng), radio, config, previous)
+    captures = capture(received, radio, config, front_end, leakage, rng=rng)
+    found = find_components(captures, radio, config, previous)
     return to_measurement(found, radio, config), PathTruth(true_paths(found, received, radio, config))
 
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.measurement import measure
+from rislam_rt.measurement import FrontEnd, measure
 from rislam_rt.model import Measurement, Paths, PathTruth, RisCode, RisSpec, SlamEstimate, Trajectory
 from rislam_rt.pipeline.control import Link, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
@@ -42,6 +42,8 @@ class Room(NamedTuple):
     """What the panel does wrong; None without a panel."""
     first: int = 0
     """The cycle that the paths begin at; the trajectory is the whole one."""
+    front_end: FrontEnd | None = None
+    """What the receiver does wrong; None for an ideal one."""
 
     def at(self, cycle: int) -> Paths:
         """The paths of one cycle alone."""
@@ -120,7 +122,7 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
         paths = rephase(paths, applied, 1.0 if room.faults is None else room.faults.weight)
     measurement, truth = measure(
         paths, 0, float(room.trajectory.heading[cycle]), means.settings.radio, means.settings.receiver, agent.heard,
-        room.doppler[cycle - room.first], rng=rng.noise,
+        room.doppler[cycle - room.first], room.front_end, rng=rng.noise,
     )  # fmt: skip
     clock.append(perf_counter())
 

@@ -45,12 +45,11 @@ def read_sealed(file: Path) -> dict[str, Any]:
         It cannot be read, or is not as it was written.
     """
     try:
-        content = json.loads(file.read_bytes())
+        return check_seal(json.loads(file.read_bytes()), file)
     except OSError as error:
         raise ResultError(f"{file}: cannot be read ({error.strerror}); give another folder") from None
     except (ValueError, RecursionError):
         raise ResultError(f"{file}: not JSON, so damaged or not ours; give another folder") from None
-    return check_seal(content, file)
 
 
 def checksum(content: Any) -> str:

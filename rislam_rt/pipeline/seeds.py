@@ -18,6 +18,8 @@ class Seeds(NamedTuple):
     room: np.random.SeedSequence
     told: np.random.SeedSequence
     """Of the compass, and of how the body sways."""
+    hardware: np.random.SeedSequence
+    """Of the front end, and of the noise in its calibration."""
 
 
 def spawn_seeds(*, rng: np.random.Generator) -> Seeds:

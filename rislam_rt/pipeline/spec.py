@@ -7,12 +7,25 @@ import numpy as np
 from pydantic import AfterValidator, Field, create_model, model_validator
 
 from rislam_rt.design import DESIGNERS, DesignConfig
-from rislam_rt.measurement import ReceiverConfig, build_sensor, with_reference_snr
+from rislam_rt.errors import ConfigError
+from rislam_rt.measurement import HardwareConfig, ReceiverConfig, build_sensor, with_reference_snr
 from rislam_rt.model import RadioConfig, RxArray, SensorModel
 from rislam_rt.pipeline.mistold import ToldSection
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
-from rislam_rt.pipeline.section import Choices, Count, Decibel, Name, NotNegative, Positive, Probability, Section
+from rislam_rt.pipeline.section import (
+    Carrier,
+    Choices,
+    Count,
+    Decibel,
+    Name,
+    NotNegative,
+    Positive,
+    Probability,
+    Section,
+    Side,
+    Wide,
+)
 from rislam_rt.ris import PanelTolerance
 from rislam_rt.slam import SlamConfig
 from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
@@ -37,6 +50,9 @@ _ChannelSlam = _section("_ChannelSlam", ChannelSlamConfig, "Fields of `ChannelSl
 _Designers = _section("_Designers", DesignConfig, "Fields of `DesignConfig`.", without=("certify",))
 
 
+_Hardware = _section("_Hardware", HardwareConfig, "Fields of `HardwareConfig`.")
+
+
 class SlamSection(_Filter):  # type: ignore[misc, valid-type]
     """The filter's settings, SI units."""
 
@@ -53,6 +69,10 @@ class ReceiverSection(_Receiver):  # type: ignore[misc, valid-type]
     """The receiver's settings, SI units; its slot is `budget.measure_s`."""
 
 
+class HardwareSection(_Hardware):  # type: ignore[misc, valid-type]
+    """What the real front end does wrong (`receiver.estimator = "waveform"`); an ideal one by default."""
+
+
 def _check_channel(name: str) -> str:
     if name not in CHANNELS and not is_own(name):
         raise ValueError(f"give one of {', '.join(CHANNELS)}, or module:Class of your own")
@@ -67,9 +87,9 @@ ChannelName = Annotated[str, AfterValidator(_check_channel), Choices(CHANNELS)]
 class ArraySection(Section):
     """The Rx array."""
 
-    rows: Count = 4
+    rows: Side = 4
     """Antennas along the body's x axis, forward."""
-    cols: Count = 4
+    cols: Side = 4
     """Antennas along the body's y axis."""
     spacing_wavelengths: Positive = 0.5
     """Between neighbours, in wavelengths of the carrier."""
@@ -80,7 +100,7 @@ class ArraySection(Section):
 class RadioSection(Section):
     """The radio. The noise is given by what it does to the paper's sphere at 3 m, or by its density."""
 
-    carrier_ghz: Positive = 10.0
+    carrier_ghz: Carrier = 10.0
     """Carrier frequency."""
     bandwidth_ghz: Positive = 1.0
     """Of a flat band; delays are resolved to its inverse."""
@@ -158,9 +178,9 @@ class ControlSection(Section):
 class StartSection(Section):
     """What the agent is told of its start: the truth plus one draw of these errors."""
 
-    position_std_m: NotNegative = 0.01
+    position_std_m: Wide = 0.01
     """Of each coordinate of the start."""
-    velocity_std_m_s: NotNegative = 0.01
+    velocity_std_m_s: Wide = 0.01
     """Of each component of the first velocity."""
     heading_std_deg: NotNegative = 0.0
     """Where the heading is estimated."""
@@ -231,6 +251,7 @@ class PipelineSpec(Section):
     Also `module:function`, a designer or an estimator of one's own."""
     radio: RadioSection = RadioSection()
     receiver: ReceiverSection = ReceiverSection()
+    hardware: HardwareSection = HardwareSection()
     design: DesignSection = DesignSection()
     budget: BudgetSection = BudgetSection()
     control: ControlSection = ControlSection()
@@ -290,6 +311,8 @@ class Settings(NamedTuple):
     channel_slam: ChannelSlamConfig
     sensor: SensorModel
     """What the estimators are told of the receiver."""
+    hardware: HardwareConfig
+    """What the front end does wrong."""
 
 
 def build_settings(spec: PipelineSpec) -> Settings:
@@ -309,7 +332,17 @@ def build_settings(spec: PipelineSpec) -> Settings:
         BpSlamConfig(**spec.bp_slam.model_dump()),
         ChannelSlamConfig(**spec.channel_slam.model_dump()),
         build_sensor(radio, receiver),
+        _build_hardware(spec.hardware, receiver),
     )
+
+
+def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> HardwareConfig:
+    hardware = HardwareConfig(**section.model_dump())
+    if receiver.estimator != "waveform" and hardware != HardwareConfig():
+        raise ConfigError(
+            f"hardware: set, with receiver.estimator '{receiver.estimator}', which makes no signal; give 'waveform'"
+        )
+    return hardware
 
 
 def build_radio(section: RadioSection) -> RadioConfig:

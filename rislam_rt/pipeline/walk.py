@@ -6,11 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from rislam_rt.channel.doppler import doppler_shift
+from rislam_rt.measurement import FrontEnd
 from rislam_rt.model import Body, PathKind, Paths, Scene, SchemeResult
 from rislam_rt.pipeline.choose import build_designer
 from rislam_rt.pipeline.control import open_link
 from rislam_rt.pipeline.cycle import Agent, Cycle, Means, Rng, Room, run_cycle
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
+from rislam_rt.pipeline.front_end import prepare_front_end
 from rislam_rt.pipeline.record import gather
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, child
@@ -31,7 +33,8 @@ class Walk:
         self, name: str, scene: Scene, body: Body, spec: PipelineSpec, seeds: Seeds, estimator: Estimator | None = None
     ) -> None:
         settings, self.scheme, self.name, self.seeds = build_settings(spec), SCHEMES[name], name, seeds
-        self.motion = scene.agent
+        self.motion, self.body = scene.agent, body
+        self.front_end: FrontEnd | None = None
         panel = scene.ris.spec if scene.ris is not None and self.scheme.panel else None
         compass, self.sway = (child(seeds.told, number) for number in range(2))
         start = np.random.default_rng(seeds.start)
@@ -61,7 +64,10 @@ class Walk:
         spec, motion = self.means.spec, self.motion[first : first + paths.num_cycles]
         shift = doppler_shift(paths, motion, self.means.settings.radio.wavelength)
         heard = deceive(paths, motion, spec.told, rng=self.sway, since=float(self.motion.time[0]))
-        room = Room(heard, self.motion, shift, self.faults, first)
+        if first == 0:
+            build = np.random.default_rng(self.seeds.hardware)
+            self.front_end = prepare_front_end(heard, motion, self.body, self.means.settings, rng=build)
+        room = Room(heard, self.motion, shift, self.faults, first, self.front_end)
         cycles: list[Cycle] = []
         tell(self.name, first, len(self.motion))
         for cycle in range(first, last):

@@ -1,8 +1,10 @@
 """Every command on good and on bad input: exit codes, one line for each failure, nothing written."""
 
 import json
+import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -210,7 +212,8 @@ def test_an_own_room_is_called_after_its_folder(run, tmp_path):
     assert [path.name[:26] for path in (tmp_path / "runs").iterdir()] == ["trace_then_slam-my_room-7-"]
 
 
-def test_interrupted_run_goes_on(run, tmp_path, monkeypatch):
+@pytest.mark.parametrize("blow", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_run_goes_on(run, tmp_path, monkeypatch, blow):
     import rislam_rt.pipeline.run as module
 
     whole = module.run_scheme
@@ -219,13 +222,16 @@ def test_interrupted_run_goes_on(run, tmp_path, monkeypatch):
     def broken(name, *rest):
         seen.append(name)
         if name == "random" and seen.count("random") == 1:
-            raise KeyboardInterrupt
+            signal.raise_signal(blow)
         return whole(name, *rest)
 
     monkeypatch.setattr(module, "run_scheme", broken)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # it may be ignored in the background
     code, _, err = run("run", PIPELINE, *SHORT, "--no-report", "--jobs", 1)
+    signal.signal(signal.SIGINT, before)
     assert code == 130
-    assert "1 schemes kept" in err
+    assert err.splitlines()[-1] == "interrupted: 1 schemes kept; the same command goes on from there"
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     (folder,) = (tmp_path / "runs").iterdir()
     assert sorted(path.name for path in folder.iterdir()) == ["run.json", "scheme_optimized.nc"]
     assert run("report", folder)[0] == 2
@@ -342,3 +348,20 @@ def test_doctor_proves_the_tracer(run, tmp_path):
     assert code == 0
     assert json.loads((tmp_path / "doctor.json").read_text())["small_box"]["num_paths"] == 25
     assert "libLLVM" in out
+
+
+def test_a_signal_that_falls_into_a_destructor_is_not_lost():
+    from rislam_rt.cli.interrupts import interruptible
+
+    class Thing:
+        def __del__(self):
+            signal.raise_signal(signal.SIGTERM)
+
+    def work():
+        Thing()
+        time.sleep(5.0)
+
+    with interruptible() as heard, pytest.raises(KeyboardInterrupt):
+        work()
+    assert heard == [signal.SIGTERM, signal.SIGTERM]
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL

@@ -9,10 +9,9 @@ from rislam_rt.measurement.atoms import build_sounding
 from rislam_rt.measurement.received import receive
 from rislam_rt.measurement.signal import (
     add_noise,
-    converter_noise,
+    convert,
     num_tones,
     pulse_samples,
-    quantise,
     to_samples,
     to_tones,
     tones,
@@ -93,11 +92,12 @@ def test_noise_has_the_variance_asked_for_and_no_direction():
 def test_converters_add_the_noise_they_say(make_paths, make_gain, bits):
     paths = make_paths([(PathKind.PS, 4.0, UP, make_gain(20.0, RADIO))])
     noisy = add_noise(tones(received(paths), RADIO, CONFIG), RADIO.noise_psd, rng=np.random.default_rng(2))
-    error = quantise(noisy, bits, RADIO) - noisy
+    digital, variance = convert(noisy, bits, RADIO)
     # rounding errors are even over a step to the extent that noise moves them over many steps
-    assert np.mean(np.abs(error) ** 2) == pytest.approx(converter_noise(noisy, bits, RADIO), rel=0.1)
-    assert quantise(noisy, 0, RADIO) is noisy
-    assert converter_noise(noisy, 0, RADIO) == 0.0
+    assert np.mean(np.abs(digital - noisy) ** 2) == pytest.approx(variance, rel=0.1)
+    same, nothing = convert(noisy, 0, RADIO)
+    assert same is noisy
+    assert nothing == 0.0
 
 
 class TestElementExact:

@@ -7,9 +7,9 @@ import pytest
 
 from rislam_rt.design import DesignConfig
 from rislam_rt.errors import ConfigError
-from rislam_rt.measurement import ReceiverConfig, reference_gain
+from rislam_rt.measurement import HardwareConfig, ReceiverConfig, reference_gain
 from rislam_rt.pipeline import PipelineSpec, load_spec
-from rislam_rt.pipeline.spec import DesignSection, ReceiverSection, SlamSection, build_settings
+from rislam_rt.pipeline.spec import DesignSection, HardwareSection, ReceiverSection, SlamSection, build_settings
 from rislam_rt.slam import SlamConfig
 
 MINIMAL = 'name = "small"\n'
@@ -36,7 +36,8 @@ def test_defaults_are_those_of_the_records(write):
     ("section", "record", "without"),
     [
         (SlamSection, SlamConfig, set()),
-        (ReceiverSection, ReceiverConfig, set()),
+        (ReceiverSection, ReceiverConfig, {"slot"}),  # it is `budget.measure_s`
+        (HardwareSection, HardwareConfig, set()),
         (DesignSection, DesignConfig, {"certify"}),
     ],
 )

@@ -117,11 +117,20 @@ def test_page_needs_no_other_file(result, figures):
     assert "wall wall_x0" in page
 
 
-def test_names_from_files_cannot_break_the_page(result):
-    from dataclasses import replace
-
-    evil = replace(result, name="<script>alert(1)</script>")
-    assert "<script" not in build_page(evil, summarise(evil), {})
+def test_nothing_from_a_file_can_break_the_page(result):
+    evil = "<script>alert(1)</script>"
+    summary = summarise(result)
+    one = summary["schemes"].pop("random")
+    summary = {**summary, "seed": evil, "cycles": evil, "schemes": {evil: one, **summary["schemes"]}}
+    schemes = {evil: result.schemes["random"], "no_ris": result.schemes["no_ris"]}
+    broken = replace(
+        result, name=evil, seed=evil, schemes=schemes, scene=replace(result.scene, name=evil, digest=evil),
+        paths=replace(result.paths, source=evil), versions={evil: evil}, warnings=(evil,),
+    )  # fmt: skip
+    page = build_page(broken, summary, {})
+    assert "<script" not in page
+    # title and heading: run and room; version: name and number; the scheme: verdict, list, table; all else once
+    assert page.count("&lt;script&gt;") == 14
 
 
 def test_warnings_stand_on_the_page(result):

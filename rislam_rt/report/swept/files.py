@@ -12,6 +12,7 @@ from rislam_rt.pipeline.studies.swept import (
     Fig4bSpec,
     Fig4cSpec,
     Group,
+    RobustnessSpec,
     RoomsSpec,
     SweptSpec,
     group_rows,
@@ -23,6 +24,7 @@ from rislam_rt.report.swept.ablations import ablations_content, ablations_page, 
 from rislam_rt.report.swept.entries import csv_text, paragraph
 from rislam_rt.report.swept.fig4b import draw_fig4b, fig4b_content, fig4b_page
 from rislam_rt.report.swept.fig4c import draw_fig4c, fig4c_content, fig4c_page
+from rislam_rt.report.swept.robustness import draw_robustness, robustness_content, robustness_page
 from rislam_rt.report.swept.rooms import draw_rooms, rooms_content, rooms_page
 
 
@@ -69,6 +71,9 @@ def shape_of(groups: Sequence[Group], spec: SweptSpec) -> Shape:
     if isinstance(spec, AblationsSpec):
         content = ablations_content(groups, spec)
         return Shape(content, lambda: draw_ablations(content), lambda a, f: ablations_page(content, groups, a, f))
+    if isinstance(spec, RobustnessSpec):
+        content = robustness_content(groups, spec)
+        return Shape(content, lambda: draw_robustness(content), lambda a, f: robustness_page(content, groups, a, f))
     assert isinstance(spec, RoomsSpec)
     content = rooms_content(groups)
     return Shape(content, lambda: draw_rooms(content), lambda a, f: rooms_page(content, groups, a, f))

@@ -79,6 +79,55 @@ class Fig4cSpec(_OneRoom):
     """Elements along one side of a square panel."""
 
 
+class MismatchSection(Section):
+    """One quantity that is not as the belief is told, at several levels."""
+
+    name: Name
+    note: str = ""
+    """What is wrong."""
+    cure: str = ""
+    """What would take it away."""
+    key: str
+    """Dotted key of the main job that the levels set."""
+    levels: Annotated[list[float | int | str], Field(min_length=1)]
+    ordinary: float | int | str
+    """The level that ordinary equipment has; mismatches are ranked by it."""
+    source: str = ""
+    """Why that is ordinary."""
+    unit: str = ""
+    set: dict[str, Any] = Field(default={})
+    """Further values by dotted key, at every level."""
+
+    @model_validator(mode="after")
+    def _ordinary_is_a_level(self) -> "MismatchSection":
+        if self.ordinary not in self.levels:
+            raise ValueError(f"ordinary: {self.ordinary!r} received; give one of the levels")
+        return self
+
+    def variant(self, level: float | int | str) -> "VariantSection":
+        """Its settings at a level."""
+        values = {**self.set, self.key: level}
+        return VariantSection(name=f"{self.name}_{level}", group=self.name, note=self.note, set=values)
+
+
+class RobustnessSpec(_OneRoom):
+    """One quantity at a time that is not as the belief is told, all else right."""
+
+    kind: Literal["robustness"]
+    mismatches: Annotated[list[MismatchSection], Field(min_length=1)]
+
+    @property
+    def all_variants(self) -> list[VariantSection]:
+        """The reference, in which all is as it is told, and then every level of every mismatch."""
+        levels = [mismatch.variant(level) for mismatch in self.mismatches for level in mismatch.levels]
+        return [VariantSection(name="reference"), *levels]
+
+    @model_validator(mode="after")
+    def _each_once(self) -> "RobustnessSpec":
+        check_names(self.all_variants)
+        return self
+
+
 class RoomsSpec(SweptSpec):
     """All schemes in many rooms."""
 
@@ -124,6 +173,7 @@ SWEPT: dict[str, type[SweptSpec]] = {
     "fig4c": Fig4cSpec,
     "rooms": RoomsSpec,
     "ablations": AblationsSpec,
+    "robustness": RobustnessSpec,
 }
 """Swept studies by the `kind` of their file."""
 

@@ -10,7 +10,14 @@ from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions
 from rislam_rt.pipeline.studies.swept.cell import FUNCTION, cell_spec
-from rislam_rt.pipeline.studies.swept.spec import AblationsSpec, Fig4bSpec, Fig4cSpec, RoomsSpec, SweptSpec
+from rislam_rt.pipeline.studies.swept.spec import (
+    AblationsSpec,
+    Fig4bSpec,
+    Fig4cSpec,
+    RobustnessSpec,
+    RoomsSpec,
+    SweptSpec,
+)
 from rislam_rt.pipeline.sweeps import Axis, Sweep
 from rislam_rt.scene import load_scene
 
@@ -74,8 +81,8 @@ def _axes(spec: SweptSpec) -> tuple[Axis, ...]:
         return Axis("variant", tuple(case.name for case in spec.cases)), Axis(SNR, tuple(spec.snr_db))
     if isinstance(spec, Fig4cSpec):
         return (Axis("size", tuple(spec.sizes)),)
-    if isinstance(spec, AblationsSpec):
-        return (Axis("variant", tuple(variant.name for variant in spec.variants)),)
+    if isinstance(spec, AblationsSpec | RobustnessSpec):
+        return (Axis("variant", tuple(variant.name for variant in spec.all_variants)),)
     assert isinstance(spec, RoomsSpec)
     rooms = Axis("scene", tuple(spec.scenes))
     return (rooms, Axis("variant", tuple(variant.name for variant in spec.variants))) if spec.variants else (rooms,)

@@ -1,0 +1,163 @@
+"""Calibration of a front end on the direct path and the walls, from signals recorded while the agent moves.
+
+The direct path's delay and direction are known from the body's drawing: it gives every chain's gain and phase. Walls
+come from other directions, found by the estimator itself; what the antennas make of them gives the rest of the array's
+matrix, in which coupling and misplaced elements show. All other paths turn by many cycles while the agent moves: what
+stays is what the cancellation leaves of the leakage, and what turns with the mirrored band is the mixers'.
+Ghosts are kept out of the model as in the self-calibration of radio telescopes (Pearson and Readhead, Annu. Rev.
+Astron. Astrophys. 22, 1984): strong paths first, fainter ones as the array gets better known.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.measurement.atoms import Sounding, build_sounding, tone_response
+from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.detect import Grid, build_grid
+from rislam_rt.measurement.estimate import estimate_paths
+from rislam_rt.measurement.hardware import Correction, mirrored
+from rislam_rt.measurement.refine import fit_amplitudes
+from rislam_rt.measurement.signal import num_tones
+from rislam_rt.model import Body, RadioConfig
+
+FAINTEST = (0.3, 0.1, 0.03, 0.01, 0.003)
+"""Round by round, amplitude over that of the strongest path within `GHOST_CELLS` below which a path is taken for its
+ghost: the better the array is known, the fainter its ghosts."""
+GHOST_CELLS = 1.5
+"""An array's errors make ghosts at the delay of the path that they stem from, within so many cells."""
+LOUD = 100.0
+"""SNR over all antennas from which on a path serves (20 dB): its direction is known to a tenth of a beam."""
+MOST = 60
+"""Most paths of one cycle."""
+STRAY, LEAST_STRAY = 0.1, 1e-3
+"""Amplitude that an element is held beforehand to take from each other one, and the least that is reckoned with; in
+between it is as found in the last round."""
+
+
+class Known(NamedTuple):
+    """What calibration starts from."""
+
+    sounding: Sounding
+    grid: Grid
+    window: tuple[float, float]
+    direct: Floats
+    """(3,) delay of the direct path in cells, and its two cosines."""
+    noise: float
+    """N0 [J]."""
+
+
+def calibrate(
+    samples: Sequence[Complexes], body: Body, radio: RadioConfig, config: ReceiverConfig, *, swinging: bool = False
+) -> Correction:
+    """What to take out, from the samples (L, M) of several cycles at full energy.
+
+    Parameters
+    ----------
+    body
+        Where Tx and Rx sit: length and direction of the direct path.
+    swinging
+        Whether the gain changes from cycle to cycle; it is then measured on the direct path.
+    """
+    known = _known(body, radio, config)
+    antennas, tones = _antennas(known.sounding, known.direct[None]), _tones(known.sounding, known.direct[None])
+    direct = antennas @ tones.T / np.sqrt(known.sounding.num_samples)
+    heard = np.array(samples)
+    loudness = 0.0
+    if swinging:
+        level = np.abs(np.einsum("lm,tlm->t", direct.conj(), heard))
+        loudness = float(np.median(level))
+        heard = heard * (loudness / level)[:, None, None]
+    matrix = np.diag(_chains(heard.mean(axis=0), direct))
+    residue: Complexes = np.zeros_like(heard[0])
+    image = np.zeros(len(residue), dtype=np.complex128)
+    spread, stray = float(np.mean(np.abs(heard) ** 2)), STRAY
+    for faintest in FAINTEST:
+        plain, inverse = heard - image[:, None] * mirrored(heard) - residue, _inverse(matrix)
+        drawn = np.array([_as_drawn(inverse @ one, known, faintest) for one in plain])
+        matrix = _array_matrix(plain, drawn, matrix, spread, stray)
+        stray = max(float(np.sqrt(np.mean(np.abs(matrix - np.diag(np.diag(matrix))) ** 2))), LEAST_STRAY)
+        model = matrix @ drawn
+        image = _image(heard - residue - model, heard)
+        rest = heard - image[:, None] * mirrored(heard) - model
+        residue, spread = _standing(rest)
+    left = max(spread - known.noise, 0.0) / float(np.mean(np.abs(heard - residue) ** 2))
+    return Correction(_inverse(matrix), residue, image, direct, loudness, left)
+
+
+def _known(body: Body, radio: RadioConfig, config: ReceiverConfig) -> Known:
+    span = body.tx_offset - body.rx_offset
+    length = float(np.linalg.norm(span))
+    sounding = build_sounding(num_tones(radio, config), radio)
+    window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
+    direct = np.array([length / SPEED_OF_LIGHT * radio.bandwidth, *(span[:2] / length)])
+    return Known(sounding, build_grid(sounding, window), window, direct, radio.noise_psd)
+
+
+def _chains(mean: Complexes, direct: Complexes) -> Complexes:
+    """(L,) gain and phase of each chain, from the direct path in the mean samples; of mean one."""
+    chains = np.sum(mean * direct.conj(), axis=1)
+    return np.asarray(chains / np.mean(chains))
+
+
+def _as_drawn(samples: Complexes, known: Known, faintest: float) -> Complexes:
+    """What an array as drawn would hear (L, M) of the strong paths in samples of a corrected one, ghosts left out."""
+    scaled = samples / np.sqrt(known.noise)
+    found = estimate_paths(known.sounding, known.grid, scaled, LOUD, known.window, MOST).fit
+    kept = found.parameters[_paths(found.parameters[:, 0], np.abs(found.amplitude), faintest)]
+    fit = fit_amplitudes(known.sounding, kept, scaled)
+    arrival = _antennas(known.sounding, kept) * fit.amplitude * np.sqrt(known.noise)
+    return np.asarray(arrival @ _tones(known.sounding, kept).T)
+
+
+def _paths(delay: Floats, strength: Floats, faintest: float) -> Booleans:
+    """(P,) whether a path is not so much weaker than one of its delay that it may be its ghost."""
+    near = np.abs(delay[:, None] - delay) < GHOST_CELLS
+    return np.asarray(strength >= faintest * np.max(near * strength, axis=1, initial=0.0))
+
+
+def _antennas(sounding: Sounding, parameters: Floats) -> Complexes:
+    """(L, P) antenna vectors of paths (P, 3) as the array is drawn."""
+    x, y = (part.reshape(-1, 1) for part in np.meshgrid(sounding.row, sounding.col, indexing="ij"))
+    return np.asarray(np.exp(2j * np.pi * (x * parameters[:, 1] + y * parameters[:, 2])))
+
+
+def _tones(sounding: Sounding, parameters: Floats) -> Complexes:
+    """(M, P) responses over the band."""
+    return tone_response(sounding.frequency, parameters[:, 0])
+
+
+def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread: float, stray: float) -> Complexes:
+    """(L, L) that makes what the antennas heard of what they should have (T, L, M), by least squares.
+
+    It is held to the chains as known so far, and between elements to nothing with the deviation `stray`; `spread` is
+    the variance of a tone's misfit.
+    """
+    prior = spread / stray**2
+    left = np.einsum("tlm,tkm->lk", plain, drawn.conj()) + prior * np.diag(np.diag(matrix))
+    right = np.einsum("tlm,tkm->lk", drawn, drawn.conj()) + prior * np.eye(len(matrix))
+    return np.asarray(np.linalg.solve(right.T, left.T).T)
+
+
+def _standing(rest: Complexes) -> tuple[Complexes, float]:
+    """What of (T, L, M) stays (L, M), held to nothing as far as it may be chance, and the variance of what does not."""
+    mean = rest.mean(axis=0)
+    spread = float(np.mean(np.abs(rest - mean) ** 2)) * len(rest) / max(len(rest) - 1, 1)
+    power = float(np.mean(np.abs(mean) ** 2))
+    return mean * max(1.0 - spread / len(rest) / power, 0.0), spread
+
+
+def _inverse(matrix: Complexes) -> Complexes:
+    return np.asarray(np.linalg.inv(matrix))
+
+
+def _image(rest: Complexes, heard: Complexes) -> Complexes:
+    """(L,) share of the mirrored band in what is left; the direct path, which stays, says nothing of it.
+
+    At rest an image is the same as a chain's gain.
+    """
+    rest, other = (part - part.mean(axis=0) for part in (rest, mirrored(heard)))
+    return np.asarray(np.einsum("tlm,tlm->l", rest, other.conj()) / np.sum(np.abs(other) ** 2, axis=(0, 2)))

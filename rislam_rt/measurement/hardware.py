@@ -1,0 +1,221 @@
+"""What a real front end does to the signal: an array that is not as drawn, leakage left over, converters, oscillators.
+
+The chain of one capture, from the paths to the samples that the estimator gets: elements at other places than drawn;
+coupling between them; gain and phase of each receive chain; what is left of the leakage after its cancellation, random
+over band and antennas and the same in every cycle; phase noise; thermal noise; image of the quadrature mixers; gain
+control and clipping; quantisation.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import erfc
+
+from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.errors import ConfigError
+from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.signal import add_noise, convert, num_tones, to_samples, to_tones
+from rislam_rt.model import RadioConfig
+
+
+@dataclass(frozen=True, slots=True)
+class HardwareConfig:
+    """How far a front end strays, all 0: an ideal one. Amplitude ratios are linear: 0.01 is -40 dB."""
+
+    gain_std_db: float = 0.0
+    """Standard deviation of the gain of an element and its receive chain."""
+    phase_std_deg: float = 0.0
+    """Standard deviation of their phase."""
+    position_std_m: float = 0.0
+    """Standard deviation of an element's place along each axis."""
+    coupling: float = 0.0
+    """Amplitude that an element takes from its nearest neighbours; it falls with distance, and turns with it."""
+    leakage_residue: float = 0.0
+    """Amplitude of what the cancellation leaves, over that of the leakage before it; independent over tones and
+    antennas."""
+    iq_image: float = 0.0
+    """Amplitude of the image of the band in itself, of a phase of its own in every receive chain."""
+    phase_noise_deg: float = 0.0
+    """Root mean square of the phase of single samples, the same in all chains."""
+    phase_step_deg: float = 0.0
+    """Root mean square of the common phase of one code's signal against its twin's."""
+    carrier_offset_hz: float = 0.0
+    """Carrier of the Tx less that of the Rx: turns all paths within the slot."""
+    agc_std_db: float = 0.0
+    """Standard deviation of the gain from cycle to cycle, not reported."""
+    clip_rms: float = 0.0
+    """Full scale of the converters over the root mean square of real or imaginary part; 0: the largest sample fits."""
+    told: bool = False
+    """Whether the estimator reckons with the power of all this as with noise."""
+    calibration_cycles: int = 0
+    """Cycles at the start whose signals are recorded, to calibrate on the direct path and the walls; 0 for none."""
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if name not in ("told", "carrier_offset_hz") and not (np.isfinite(value) and value >= 0.0):
+                raise ConfigError(f"hardware.{name}: {value} received; give a number of 0 or more")
+        if not np.isfinite(self.carrier_offset_hz):
+            raise ConfigError(f"hardware.carrier_offset_hz: {self.carrier_offset_hz} received; give a finite number")
+        if self.coupling >= 0.2:
+            raise ConfigError(f"hardware.coupling: {self.coupling} received; give less than 0.2 (-14 dB)")
+
+    @property
+    def ideal(self) -> bool:
+        """Whether nothing of all this is there."""
+        return self == HardwareConfig(told=self.told, calibration_cycles=self.calibration_cycles)
+
+
+class Correction(NamedTuple):
+    """What calibration takes out of L M samples."""
+
+    matrix: Complexes
+    """(L, L) by which antennas are multiplied."""
+    residue: Complexes
+    """(L, M) that is taken off before [sqrt(J)], at the energy E."""
+    image: Complexes
+    """(L,) amplitude of the image that is taken off."""
+    direct: Complexes
+    """(L, M) signal of the direct path, of unit energy, that the gain control is measured on."""
+    loudness: float
+    """Its amplitude in the calibration [sqrt(J)], at the energy E; 0 leaves the gain as it is."""
+    left: float
+    """Share of the signal's power that the calibrated model leaves unexplained."""
+
+
+class FrontEnd(NamedTuple):
+    """One receiver as it was built."""
+
+    config: HardwareConfig
+    offset: Floats
+    """(L, 3) of elements from where they are drawn [wavelengths]."""
+    matrix: Complexes
+    """(L, L) coupling, gains and phases."""
+    residue: Complexes
+    """(L, M) left of a leakage of unit gain and unit energy a tone."""
+    image: Complexes
+    """(L,)."""
+    correction: Correction | None = None
+
+
+class Sent(NamedTuple):
+    """What a capture's energy and direct path are."""
+
+    unit: float
+    """Root of the share of the slot's energy that the capture has."""
+    leakage: complex
+    """Gain of the direct path before its cancellation, times the root of the capture's energy a tone [sqrt(J)]."""
+    swing: float = 1.0
+    """Of the gain control, in this cycle."""
+
+
+def build_front_end(
+    config: HardwareConfig, radio: RadioConfig, receiver: ReceiverConfig, *, rng: np.random.Generator
+) -> FrontEnd:
+    """Draw a receiver. Every fault has draws of its own, so that one more leaves the others as they are."""
+    array, count = radio.array, radio.array.num_antennas
+    offset = config.position_std_m / radio.wavelength * rng.standard_normal((count, 3))
+    loud = 10.0 ** (config.gain_std_db * rng.standard_normal(count) / 20.0)
+    chain = loud * np.exp(1j * np.radians(config.phase_std_deg) * rng.standard_normal(count))
+    turn = rng.uniform(-np.pi, np.pi)
+    residue = config.leakage_residue * _circular((count, num_tones(radio, receiver)), rng)
+    image = config.iq_image * np.exp(1j * rng.uniform(-np.pi, np.pi, count))
+    coupled = np.eye(count) + config.coupling * np.exp(1j * turn) * _neighbours(array.positions(1.0), array.spacing)
+    return FrontEnd(config, offset, chain[:, None] * coupled, residue, image)
+
+
+def digitise(
+    clean: Complexes, sent: Sent, radio: RadioConfig, receiver: ReceiverConfig, front_end: FrontEnd | None,
+    *, rng: np.random.Generator,
+) -> tuple[Complexes, float]:  # fmt: skip
+    """Samples (L, M) as tones, and the variance a tone that the estimator reckons with, from noiseless tones."""
+    if front_end is None:
+        samples, extra = convert(add_noise(clean, radio.noise_psd, rng=rng), receiver.converter_bits, radio)
+        return samples, radio.noise_psd + extra
+    config, leakage = front_end.config, sent.leakage
+    heard = front_end.matrix @ clean + leakage * front_end.residue
+    noisy = add_noise(_shaken(heard, config, radio, rng), radio.noise_psd, rng=rng)
+    mixed = sent.swing * (noisy + front_end.image[:, None] * mirrored(noisy))
+    samples, extra = convert(mixed, receiver.converter_bits, radio, config.clip_rms)
+    level = radio.noise_psd + extra
+    if config.told:
+        power = max(float(np.mean(np.abs(samples) ** 2)) - level, 0.0)
+        level += power * _distortion(front_end, radio) + _residue_power(front_end, leakage)
+    if front_end.correction is not None:
+        samples = correct(samples, sent.unit, front_end.correction)
+    return samples, level
+
+
+def correct(samples: Complexes, unit: float, correction: Correction) -> Complexes:
+    """Samples with residue, image, the array's errors and the gain control taken out; `unit` is the root of the energy
+    a tone over that of a whole sounding."""
+    plain = samples - correction.image[:, None] * mirrored(samples)
+    if correction.loudness:
+        direct = abs(np.vdot(correction.direct, plain))
+        plain = plain * (unit * correction.loudness / max(direct, np.finfo(np.float64).tiny))
+    return np.asarray(correction.matrix @ (plain - unit * correction.residue))
+
+
+def draw_swing(config: HardwareConfig, *, rng: np.random.Generator) -> float:
+    """Gain of the gain control in one cycle, an amplitude ratio."""
+    return float(10.0 ** (config.agc_std_db * rng.standard_normal() / 20.0)) if config.agc_std_db else 1.0
+
+
+def in_step(samples: Complexes, other: Complexes) -> Complexes:
+    """Samples (L, M) turned and scaled to fit the other's best, which share direct path and walls with them."""
+    return np.asarray(samples * (np.vdot(samples, other) / np.vdot(samples, samples)))
+
+
+def mirrored(spectrum: Complexes) -> Complexes:
+    """Conjugate tones (..., M) in reverse order: what a mixer's image adds to them."""
+    return np.conj(spectrum[..., ::-1])
+
+
+def _shaken(spectrum: Complexes, config: HardwareConfig, radio: RadioConfig, rng: np.random.Generator) -> Complexes:
+    """Tones after an oscillator whose phase trembles from sample to sample and steps from code to code."""
+    if config.phase_step_deg:
+        spectrum = spectrum * np.exp(1j * np.radians(config.phase_step_deg) * rng.standard_normal())
+    if not config.phase_noise_deg:
+        return spectrum
+    tremble = np.radians(config.phase_noise_deg) * rng.standard_normal(spectrum.shape[-1])
+    return to_tones(to_samples(spectrum, radio) * np.exp(1j * tremble), radio)
+
+
+def _neighbours(positions: Floats, spacing: float) -> Complexes:
+    """(L, L) coupling in units of that of the nearest neighbours: as one over the distance, with its phase."""
+    distance = np.linalg.norm(positions[:, None] - positions, axis=-1)
+    apart = np.where(distance > 0.0, distance, np.inf)
+    phase = np.exp(-2j * np.pi * (np.where(distance > 0.0, distance, spacing) - spacing))
+    return np.asarray(spacing / apart * phase)
+
+
+def _distortion(front_end: FrontEnd, radio: RadioConfig) -> float:
+    """Power of multiplicative faults over that of the signal, as their own tolerances say, or the calibration."""
+    config = front_end.config
+    trembling = np.radians(config.phase_noise_deg) ** 2 + _clipped(config.clip_rms)
+    if front_end.correction is not None:
+        return float(trembling + front_end.correction.left)
+    gain = (np.log(10.0) / 20.0 * config.gain_std_db) ** 2 + np.radians(config.phase_std_deg) ** 2
+    place = (2.0 * np.pi * config.position_std_m / radio.wavelength) ** 2
+    neighbours = np.abs(_neighbours(radio.array.positions(1.0), radio.array.spacing)) ** 2
+    return float(gain + place + config.coupling**2 * neighbours.sum(axis=1).mean() + config.iq_image**2 + trembling)
+
+
+def _residue_power(front_end: FrontEnd, leakage: complex) -> float:
+    if front_end.correction is not None:
+        return 0.0
+    return float(abs(leakage) ** 2 * front_end.config.leakage_residue**2)
+
+
+def _clipped(level: float) -> float:
+    """Share of the power of a normal signal that lies above `level` deviations, what is cut off squared; 0 for none."""
+    if not level:
+        return 0.0
+    tail = 0.5 * erfc(level / np.sqrt(2.0))
+    return float(2.0 * ((1.0 + level**2) * tail - level * np.exp(-0.5 * level**2) / np.sqrt(2.0 * np.pi)))
+
+
+def _circular(shape: tuple[int, ...], rng: np.random.Generator) -> Complexes:
+    parts = rng.standard_normal((2, *shape)) / np.sqrt(2.0)
+    return parts[0] + 1j * parts[1]
