@@ -13,8 +13,8 @@ from rislam_rt.report.swept.entries import NOTHING, paragraph, ratio, table_line
 
 SCORES = ("false", "panel", "landmarks", "components", "error_over_std", "left")
 HEARD, MORE_FALSE = 0.9, 2.0
-"""The panel still matters while it is heard in this share of the looks in which an ideal front end hears it, with at most
-so many more false components a cycle."""
+"""The panel still matters while it is heard in this share of the looks in which an ideal front end hears it, with at
+most so many more false components a cycle."""
 BUILT, TUNED = "#D55E00", "#0072B2"
 LAW = """One front end a seed is built with each fault, and looked at with the panel focused on the agent; then the same
 one calibrated on the first cycles (`hardware.calibration_cycles`), panel at rest. False: components a cycle that are no
@@ -68,13 +68,10 @@ def hardware_page(content: Mapping[str, Any], groups: Sequence[Group], about: Se
     """Markdown: what a laboratory must reach, the picture, all numbers."""
     lines = ["# Hardware: what a laboratory must reach for the panel to matter", "", *about, "", *paragraph(LAW), ""]
     ideal = content["entries"][0]
-    lines += [
-        f"Largest level at which the panel is heard in {100 * HEARD:.0f} % of the looks in which an ideal front end"
-    ]
-    lines += [
-        f"hears it ({_share(ideal['panel'])}), with at most {MORE_FALSE:g} more false components a cycle than there"
-    ]
-    lines += [f"({ratio(ideal['false'])}):", ""]
+    text = f"""Largest level at which the panel is heard in {100 * HEARD:.0f} % of the looks in which an ideal front end
+    hears it ({_share(ideal["panel"])}), with at most {MORE_FALSE:g} more false components a cycle than there
+    ({ratio(ideal["false"])}):"""
+    lines += [*paragraph(text), ""]
     head = ["fault", "as built", "calibrated", "levels tried"]
     rows = [_limit_row(content, name) for name in content["about"]]
     lines += [*table_lines(head, rows), ""]
@@ -118,9 +115,7 @@ def _matters(scores: Mapping[str, Any], ideal: Mapping[str, Any]) -> bool:
 def _limit_row(content: Mapping[str, Any], name: str) -> list[str]:
     fault, limits = content["about"][name], content["limits"][name]
     built, tuned = (
-        f"{limits[end]} {fault['unit']}".strip()
-        if limits[end] is not None
-        else f"below {fault['levels'][0]} {fault['unit']}"
+        f"{limits[end]} {fault['unit']}".strip() if limits[end] is not None else "none of those tried"
         for end in ("built", "calibrated")
     )
     return [f"`{name}`: {fault['note']}", built, tuned, ", ".join(map(str, fault["levels"])) + f" {fault['unit']}"]
