@@ -22,7 +22,7 @@ CLOCK = {
     "key": "told.clock_offset_ns",
     "levels": [0.1, 1.0],
     "ordinary": 1.0,
-    "cure": "the direct path",
+    "cure": "zero",
 }
 NOISE = {"name": "noise", "key": "told.noise_db", "levels": [3.0], "ordinary": 3.0}
 WORTH = {"reference": 1.0, "compass_1.0": 1.5, "compass_2.0": 9.0, "clock_0.1": 1.0, "clock_1.0": 3.0, "noise_3.0": 0.9}
