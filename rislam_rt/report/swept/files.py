@@ -101,6 +101,8 @@ def about_lines(groups: Sequence[Group], spec: SweptSpec, record: Mapping[str, A
     text = f"""{rooms}; paths by {source} with up to {config["depth"]} wall bounces, {cycles} of the trajectory,
     {spec.repetitions} seeds a point (seed {spec.seed}). Written by `rislam-rt run` from one pipeline, do not edit.
     {unfinished}"""
+    if _of_receiver(spec):
+        return paragraph(text)
     law = """For every seed the true motion is the scene's trajectory plus white acceleration, and the estimators
     are told its standard deviation; a start is told with one draw of its errors. All schemes of a seed share
     motion, paths, noise and start. RMSE is over the cycles, then over the seeds; intervals are 95 % bootstrap

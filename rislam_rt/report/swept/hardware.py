@@ -16,10 +16,11 @@ HEARD, MORE_FALSE = 0.9, 2.0
 """The panel still matters while it is heard in this share of the looks in which an ideal front end hears it, with at
 most so many more false components a cycle."""
 BUILT, TUNED = "#D55E00", "#0072B2"
-LAW = """One front end a seed is built with each fault, and looked at with the panel focused on the agent; then the same
-one calibrated on the first cycles (`hardware.calibration_cycles`), panel at rest. False: components a cycle that are no
-path. Panel: share of looks in which its direct path is reported. Errors: half width of 68 % of the cosine errors over
-the reported deviations, 1 if they are as reported."""
+LAW = """Of each run the receiver alone is looked at, at some places of its second half, with the panel focused on the
+agent. One front end a seed is built with each fault; then the same one is calibrated on the first cycles
+(`hardware.calibration_cycles`), panel at rest. False: components a cycle that are no path. Panel: share of looks in
+which its direct path is reported. Errors: half width of 68 % of the cosine errors over the reported deviations, 1 if
+they are as reported. What false components do to the agent: [receiver](receiver.md#real-hardware)."""
 
 
 def hardware_content(groups: Sequence[Group], spec: HardwareSpec) -> dict[str, Any]:
