@@ -1,8 +1,8 @@
 """Floor 5: localisation and mapping. The belief never reads truth: nothing here sees a channel or a scene."""
 
 from rislam_rt.slam.config import SlamConfig, StartPrior
-from rislam_rt.slam.filter import FilterState, Outcome, StepInfo, init, revisit, step
-from rislam_rt.slam.mapping import estimate, predict
+from rislam_rt.slam.estimator import estimate, init, predict, step
+from rislam_rt.slam.filter import FilterState, Outcome, StepInfo, revisit
 
 __all__ = [
     "FilterState",

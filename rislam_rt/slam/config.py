@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats, freeze
 from rislam_rt.errors import ConfigError
 from rislam_rt.slam.nested.config import ENGINES, WEIGHTINGS
 
-FILTERS = ("rao_blackwellised", "nested")
+FILTERS = ("rao_blackwellised", "nested", "window")
 """Filters with the same inputs and outputs."""
 CLASSIFIERS = ("amplitude", "geometric", "network")
 """Rules by which components are taken for wall returns."""

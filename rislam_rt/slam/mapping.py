@@ -62,9 +62,9 @@ def build_map(moments: Moments, book: Book) -> MapEstimate:
     points, images = book.points, book.images[book.image_hits >= IMAGE_HITS]
     # idents only grow, and rows keep their order
     parent, wall = np.searchsorted(book.ident, images[:, :2].T)
-    image, spread = _images(mean, covariance, book, parent, wall)
+    image, spread = images_in(mean, covariance, book.anchor, parent, wall)
     strength, ratio = np.exp(book.log_strength[0][points]), np.exp(book.ratio[wall])
-    normal, offset, std = _walls(mean, covariance, book)
+    normal, offset, std = wall_planes(mean, covariance, book.anchor, book.walls)
     known = (book.ratio_variance[book.walls] < RATIO_SPREAD**2) & (book.hits[book.walls] >= WALL_HITS)
     known &= np.sqrt(2.0) * std[:, 0] < MAX_LEAN
     return MapEstimate(
@@ -80,22 +80,23 @@ def build_map(moments: Moments, book: Book) -> MapEstimate:
     )
 
 
-def _walls(mean: Floats, covariance: Floats, book: Book) -> tuple[Floats, Floats, Floats]:
+def wall_planes(mean: Floats, covariance: Floats, anchor: Floats, rows: Integers) -> tuple[Floats, Floats, Floats]:
     """Normals (W, 3) away from the agent, offsets (W,), standard deviations (W, 2) of angle and offset at the foot."""
-    rows = book.walls
-    span = mean[rows] - book.anchor[rows]
+    span = mean[rows] - anchor[rows]
     length = np.sqrt(np.vecdot(span, span))
     normal = span / length[:, None]
-    offset = 0.5 * np.vecdot(normal, mean[rows] + book.anchor[rows])
+    offset = 0.5 * np.vecdot(normal, mean[rows] + anchor[rows])
     blocks = _blocks(covariance, rows)
     along = np.vecdot(normal, (blocks @ normal[..., None])[..., 0])
     across = np.maximum(np.trace(blocks, axis1=1, axis2=2) - along, 0.0) / 2.0
     return normal, offset, np.stack([np.sqrt(across) / length, 0.5 * np.sqrt(np.maximum(along, 0.0))], axis=-1)
 
 
-def _images(mean: Floats, covariance: Floats, book: Book, points: Integers, walls: Integers) -> tuple[Floats, Floats]:
+def images_in(
+    mean: Floats, covariance: Floats, anchors: Floats, points: Integers, walls: Integers
+) -> tuple[Floats, Floats]:
     """Mirror images (Q, 3) of points in walls, and their covariances (Q, 3, 3) from both."""
-    point, wall, anchor = mean[points], mean[walls], book.anchor[walls]
+    point, wall, anchor = mean[points], mean[walls], anchors[walls]
     span = wall - anchor
     square = np.vecdot(span, span)[:, None, None]
     image = reflect(point, wall, anchor)

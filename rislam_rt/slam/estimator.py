@@ -1,0 +1,42 @@
+"""The front door of localisation and mapping: the same four functions for every filter that `slam.filter` names."""
+
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel, SlamEstimate
+from rislam_rt.slam import filter as cycle
+from rislam_rt.slam import mapping, window
+from rislam_rt.slam.config import SlamConfig, StartPrior
+from rislam_rt.slam.filter import StepInfo
+
+
+def init(
+    start: StartPrior, body: Body, ris: RisSpec | None, sensor: SensorModel, config: SlamConfig,
+    *, rng: np.random.Generator,
+) -> Any:  # fmt: skip
+    """The start prior, and an empty map."""
+    begin = window.init if config.filter == "window" else cycle.init
+    return begin(start, body, ris, sensor, config, rng=rng)
+
+
+def step(
+    state: Any, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: SlamConfig,
+    *, rng: np.random.Generator,
+) -> tuple[Any, StepInfo]:  # fmt: skip
+    """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied."""
+    advance = window.step if isinstance(state, window.WindowState) else cycle.step
+    return advance(state, measurement, code, dt, heading, config, rng=rng)
+
+
+def predict(state: Any, dt: float, config: SlamConfig) -> SlamEstimate:
+    """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent."""
+    ahead = window.predict if isinstance(state, window.WindowState) else mapping.predict
+    return ahead(state, dt, config)
+
+
+def estimate(state: Any, config: SlamConfig) -> SlamEstimate:
+    """Mean and covariance of the pose, equally likely samples of it, and the map."""
+    if isinstance(state, window.WindowState):
+        return window.estimate(state, config)
+    return mapping.estimate(state, config)

@@ -1,0 +1,198 @@
+"""Tracks that are understood: their components are explained, by a new feature or by those that there are."""
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.returns import linearise
+from rislam_rt.slam.window import gauss, tracks
+from rislam_rt.slam.window.book import enter, idents
+from rislam_rt.slam.window.context import Context, resolve
+from rislam_rt.slam.window.digest import Digest, digest
+from rislam_rt.slam.window.expect import Clusters, Expected
+from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
+from rislam_rt.slam.window.gauss import HEAD
+from rislam_rt.slam.window.kinds import NEW, Verdict, judge, known_features, wanted
+from rislam_rt.slam.window.learn import seed
+from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.retract import behind, release
+
+NEAR = np.array([0.3, 0.15, 0.15])
+"""Gap in length [m] and cosines up to which a return of the map is weighed as a track's explanation."""
+MOST = 2
+"""Explanations of one track by the map that are weighed, the nearest."""
+STRIDE = 3
+"""Cycles between two examinations."""
+
+
+def births(context: Context, expected: Expected, groups: Clusters) -> Context:
+    """Every track whose time has come is weighed; the shortest of those that are clear enters."""
+    rows = tracks.due(context.tracks, context.cycle)
+    if not len(rows) or (context.cycle % STRIDE and context.cycle > 12):
+        return context
+    names = context.tracks.ident[rows]
+    ats = [((context.log.track == name) & ~context.log.explained).nonzero()[0] for name in names]
+    full = [place for place, at in enumerate(ats) if len(at) >= 5]
+    if not full:
+        return context
+    rows, ats = rows[full], [ats[place] for place in full]
+    mean, covariance = gauss.now(context.window)
+    known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.book, mean[:3])
+    histories = digest(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
+    told = explanations(context, rows, histories, expected, groups, mean, covariance)
+    first = _may_be_first(context, histories, mean)
+    verdicts, shares = judge(
+        histories, known, context.book, context.scene, [(row, value) for row, value, _ in told], first
+    )  # fmt: skip
+    gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
+    looked = context.tracks.looked.copy()
+    for (row, _, forms), share in zip(told, shares, strict=True):
+        if share > LEVELS.born:
+            context = _assign(context, ats[row], idents(context.book, forms), histories.scatter[row])
+            gone[rows[row]] = True
+    born = -1
+    for row, verdict in enumerate(verdicts):
+        if gone[rows[row]]:
+            continue
+        if born < 0 and wanted(verdict, float(histories.mean[0][row, 0])):
+            context, fine = _enter(context, ats[row], verdict, histories, row)
+            if fine:
+                born, gone[rows[row]] = row, True
+                continue
+        elif born >= 0 and wanted(verdict, float(histories.mean[0][row, 0])):
+            continue  # its turn comes in the next cycle, with the new feature known
+        looked[rows[row]] = context.tracks.hits[rows[row]]
+    more = len(context.tracks.ident) - len(gone)  # what was taken back for the new feature
+    looked, gone = np.append(looked, np.zeros(more, dtype=np.int64)), np.append(gone, np.zeros(more, dtype=np.bool_))
+    return context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
+
+
+def _may_be_first(context: Context, histories: Digest, mean: Floats) -> Booleans:
+    """(T,) tracks without anything shorter and brighter that could be one of two walls by itself.
+
+    Two walls shift the Tx by the sum of what each does: a single return of theirs comes from the same direction
+    (opposite walls), or is one leg of a right angle.
+    """
+    every, ray = context.tracks, histories.direction
+    length, shine = histories.mean[0][:, 0], histories.log_amplitude + np.log(histories.mean[0][:, 0])
+    old = every.hits >= 3
+    heading = float(context.heading[-1] + mean[6])
+    flat = every.mean[old, 1:, 0]
+    up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=1), 0.0))
+    cos, sin = np.cos(heading), np.sin(heading)
+    away = np.stack([cos * flat[:, 0] - sin * flat[:, 1], sin * flat[:, 0] + cos * flat[:, 1], up], axis=1)
+    reach = np.maximum(every.mean[old, 0, 0], 0.1)
+    bright = (every.log_amplitude[old] + np.log(reach))[None] > shine[:, None] - 0.3
+    walls = context.book.walls
+    if len(walls):
+        place, anchor = mean[HEAD:].reshape(-1, 3)[walls], context.book.anchor[walls]
+        span = place - anchor
+        normal = span / np.linalg.norm(span, axis=1)[:, None]
+        depth = np.vecdot(0.5 * (place + anchor) - mean[:3], normal)
+        away = np.concatenate([away, np.sign(depth)[:, None] * normal])
+        reach = np.concatenate([reach, 2.0 * np.abs(depth)])
+        bright = np.concatenate([bright, np.ones((len(ray), len(walls)), dtype=np.bool_)], axis=1)
+    along, share = ray @ away.T, reach / length[:, None]
+    leg = (np.abs(along - share) < LEG) | (along > 1.0 - 0.2 * LEG)
+    return np.asarray(~(leg & (share < 0.97) & bright).any(axis=1))
+
+
+LEG = 0.15
+"""Difference of cosines up to which one return may be a leg of another's right angle."""
+
+
+def explanations(
+    context: Context, rows: Integers, histories: Digest, expected: Expected, groups: Clusters, mean: Floats,
+    covariance: Floats,
+) -> list[tuple[int, float, Integers]]:  # fmt: skip
+    """(track, log evidence, forms (2, 5) of feature rows) of returns of the map: nothing is free in them."""
+    if not len(groups.leader):
+        return []
+    lead, mate, share = groups.leader, groups.partner, groups.share[:, None]
+    gap = np.where(mate[:, None] >= 0, expected.seen[mate] - expected.seen[lead], 0.0)
+    features = mean[HEAD:].reshape(-1, 3)
+    size = features.size
+    inside = covariance[HEAD:, HEAD:]
+    root = np.asarray(
+        np.linalg.cholesky(inside + 1e-9 * np.diag(np.diag(inside)) + 1e-14 * np.eye(size)), dtype=np.float64
+    )
+    found: list[tuple[int, float, Integers]] = []
+    for row, place in enumerate(rows):
+        off = np.abs(expected.seen[lead] + share * gap - context.tracks.mean[place, :, 0]) / NEAR
+        near = (off < 1.0).all(axis=1).nonzero()[0]
+        for column in near[np.argsort(off[near].sum(axis=1))][:MOST]:
+            forms = np.full((2, 5), UNKNOWN)
+            forms[0] = expected.forms[lead[column]]
+            if mate[column] >= 0:
+                forms[1] = expected.forms[mate[column]]
+            value = _explain(context, histories, row, forms, groups, int(column), gap[column], features, root)
+            found.append((row, value, forms))
+    return found
+
+
+def _explain(
+    context: Context, histories: Digest, row: int, forms: Integers, groups: Clusters, column: int, gap: Floats,
+    features: Floats, root: Floats,
+) -> float:  # fmt: skip
+    """Log evidence of one explanation."""
+    from rislam_rt.slam.returns import Poses
+
+    used = histories.weight[row, :, 0] > 0.0
+    poses = Poses(histories.tx[row, used], histories.rx[row, used], histories.heading[row, used])
+    parts = forms[forms[:, 0] != UNKNOWN]
+    linear = linearise(compile_forms(parts), features, context.book.anchor, poses)
+    weight = np.array([1.0 - groups.share[column], groups.share[column]])[: len(parts)]
+    weight = weight / weight.sum()
+    value = np.einsum("r,krj->kj", weight, linear.seen)
+    by_pose = np.einsum("r,krij->kij", weight, linear.by_pose) @ histories.doubt[row, used]
+    wide = linear.by_feature.reshape(*linear.seen.shape, features.size)
+    by_map = np.einsum("r,krij->kij", weight, wide) @ root
+    extra = groups.disturbance[column] + groups.share_variance[column] * gap**2
+    reported = histories.weight[row, used] ** -1.0
+    std = np.sqrt(reported**2 + extra)
+    jacobian = np.concatenate([by_pose, by_map], axis=-1) / std[..., None]
+    left = (histories.seen[row, used] - value) / std
+    flat, trust = jacobian.reshape(-1, jacobian.shape[-1]), np.ones(len(left))
+    for _ in range(2):
+        heavy = flat * np.repeat(trust, 3)[:, None]
+        normal = heavy.T @ flat + np.eye(flat.shape[1])
+        error = np.linalg.solve(normal, heavy.T @ left.ravel())
+        squared = np.sum((left - (flat @ error).reshape(-1, 3)) ** 2, axis=1)
+        trust = (LEVELS.tail + 3.0) / (LEVELS.tail + squared)
+    cost = (LEVELS.tail + 3.0) * np.log1p(squared / LEVELS.tail).sum() + error @ error
+    cost += 2.0 * np.log(std / reported).sum()
+    level = histories.log_amplitude[row] - groups.log_amplitude[column]
+    variance = groups.log_amplitude_std[column] ** 2 + LEVELS.fading**2
+    evidence = -0.5 * cost - 0.5 * np.linalg.slogdet(normal)[1] - 0.5 * level**2 / variance - 0.5 * np.log(variance)
+    return float(evidence)
+
+
+def _assign(context: Context, at: Integers, forms: Integers, scatter: Floats) -> Context:
+    """Rows of the log held to be forms (2, 5) of idents; they err by as much more as they scatter."""
+    log = context.log
+    form, share, extra = log.form.copy(), log.share.copy(), log.extra.copy()
+    form[at] = forms
+    share[at] = 0.5 if forms[1, 0] != UNKNOWN else 0.0
+    extra[at] = LEVELS.memory * log.std[at] ** 2 * (scatter**2 - 1.0)
+    return context._replace(log=log._replace(form=form, share=share, extra=extra))
+
+
+def _enter(context: Context, at: Integers, verdict: Verdict, histories: Digest, row: int) -> tuple[Context, bool]:
+    """The map with a new feature and its history, solved anew; as it was, if they do not agree."""
+    new = len(context.book.ident)
+    holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))
+    window = gauss.add_feature(context.window, verdict.place, holds)
+    book = enter(context.book, verdict.is_wall, histories.middle, len(at), 5.0)
+    forms = np.full((2, 5), UNKNOWN)
+    forms[0] = [new if part == NEW else part for part in verdict.form]
+    grown = _assign(context._replace(window=window, book=book), at, idents(book, forms), histories.scatter[row])
+    window, left = resolve(grown, 3)
+    if not np.isfinite(window.head).all():
+        return context, False
+    fresh = np.isin(left.row, at)
+    if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > 3.0 * LEVELS.fit:
+        return context, False
+    square = float(np.mean(histories.scatter[row] ** 2))
+    grown = grown._replace(window=window, sights=seed(context.sights, forms[:1], book, square))
+    if verdict.is_wall:
+        grown = release(grown, ~behind(grown, new))
+    return grown, True

@@ -1,0 +1,123 @@
+"""What is known of each feature besides its place: kind, existence, strength, and whether something hides it."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.identity import STRENGTHS, panel_probabilities, strength_moments
+from rislam_rt.slam.window.levels import LEVELS
+
+
+class Book(NamedTuple):
+    """F features."""
+
+    ident: Integers
+    """(F,) number for life; rows are in its order."""
+    is_wall: Booleans
+    """(F,)."""
+    anchor: Floats
+    """(F, 3) [m] the point whose mirror image a wall's three numbers are; unused for points."""
+    hits: Integers
+    """(F,) cycles with a measurement of it."""
+    log_odds: Floats
+    """(F,) of its existence."""
+    ratio: Floats
+    """(F,) log amplitude that a wall leaves of a path; 0 for points."""
+    ratio_variance: Floats
+    """(F,)."""
+    log_grid: Floats
+    """(F, G) log posterior of a point's strength (see `identity`)."""
+    log_ris: Floats
+    """(F,) log odds of panel against scatterer; minus infinity for walls."""
+    next_ident: int
+
+    @property
+    def points(self) -> Integers:
+        """Rows of the points."""
+        return (~self.is_wall).nonzero()[0]
+
+    @property
+    def walls(self) -> Integers:
+        """Rows of the walls."""
+        return self.is_wall.nonzero()[0]
+
+    @property
+    def ris_probability(self) -> Floats:
+        """(F,) 0 for walls."""
+        probability, points = np.zeros(len(self.ident)), self.points
+        probability[points] = panel_probabilities(self.log_ris[points])
+        return probability
+
+    @property
+    def panel(self) -> int:
+        """Row of the point held for the panel, -1 without one."""
+        probability = self.ris_probability
+        return int(np.argmax(probability)) if len(probability) and probability.max() > 0.5 else -1
+
+    @property
+    def log_strength(self) -> tuple[Floats, Floats]:
+        """Mean and standard deviation (F,) of the log strength."""
+        return strength_moments(self.log_grid)
+
+    def rows(self, idents: Integers) -> Integers:
+        """Rows of features by ident; negative ones (`TX`, `NONE`) stay as they are."""
+        place = np.searchsorted(self.ident, idents)
+        return np.where(idents < 0, idents, place)
+
+
+def empty_book() -> Book:
+    """Nothing known."""
+    none, count = np.zeros(0), np.zeros(0, dtype=np.int64)
+    return Book(
+        count, np.zeros(0, dtype=np.bool_), np.zeros((0, 3)), count, none, none, none,
+        np.zeros((0, len(STRENGTHS))), none, 0,
+    )  # fmt: skip
+
+
+def enter(book: Book, is_wall: bool, anchor: Floats, hits: int, log_odds: float) -> Book:
+    """The book with one more feature, in the last row."""
+    flat = STRENGTH_PRIOR[None]
+    return book._replace(
+        ident=np.append(book.ident, book.next_ident),
+        is_wall=np.append(book.is_wall, is_wall),
+        anchor=np.concatenate([book.anchor, anchor[None]]),
+        hits=np.append(book.hits, hits),
+        log_odds=np.append(book.log_odds, log_odds),
+        ratio=np.append(book.ratio, LEVELS.wall_ratio if is_wall else 0.0),
+        ratio_variance=np.append(book.ratio_variance, LEVELS.wall_ratio_std**2 if is_wall else 0.0),
+        log_grid=np.concatenate([book.log_grid, flat]),
+        log_ris=np.append(book.log_ris, -np.inf if is_wall else 0.0),
+        next_ident=book.next_ident + 1,
+    )
+
+
+def idents(book: Book, forms: Integers) -> Integers:
+    """Forms (..., 5) of feature rows as forms of idents."""
+    if not len(book.ident):
+        return forms
+    return np.where(forms >= 0, book.ident[np.maximum(forms, 0)], forms)
+
+
+def strike(book: Book, keep: Booleans) -> Book:
+    """The book without some of its features."""
+    fields: dict[str, Any] = {name: getattr(book, name)[keep] for name in book._fields if name != "next_ident"}
+    return book._replace(**fields)
+
+
+def learn_ratio(book: Book, wall: int, log_ratio: float) -> Book:
+    """A wall's log amplitude ratio after one more return over it."""
+    gain = book.ratio_variance[wall] / (book.ratio_variance[wall] + LEVELS.fading**2)
+    ratio, variance = book.ratio.copy(), book.ratio_variance.copy()
+    ratio[wall] += gain * (log_ratio - ratio[wall])
+    variance[wall] = max((1.0 - gain) * variance[wall], LEVELS.fading**2 / 10.0)
+    return book._replace(ratio=ratio, ratio_variance=variance)
+
+
+def _strength_prior() -> Floats:
+    log = -0.5 * ((STRENGTHS - np.log(LEVELS.strength)) / LEVELS.strength_std) ** 2
+    return np.asarray(log - np.logaddexp.reduce(log))
+
+
+STRENGTH_PRIOR = _strength_prior()
+"""(G,) log probability of a point's strength beforehand."""

@@ -1,0 +1,36 @@
+"""What births and deaths read and change."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.slam.window import gauss
+from rislam_rt.slam.window.book import Book
+from rislam_rt.slam.window.expect import Scene
+from rislam_rt.slam.window.gauss import Window
+from rislam_rt.slam.window.learn import Sights
+from rislam_rt.slam.window.log import Log, Residuals, renew
+from rislam_rt.slam.window.tracks import Tracks
+
+
+class Context(NamedTuple):
+    """The belief, the window's components, and the tracks among them."""
+
+    window: Window
+    book: Book
+    log: Log
+    tracks: Tracks
+    heading: Floats
+    scene: Scene
+    cycle: int
+    sights: Sights
+
+
+def resolve(context: Context, steps: int) -> tuple[Window, Residuals]:
+    """Gauss-Newton over the whole window."""
+    window, every = context.window, np.arange(context.window.num_poses)
+    for _ in range(steps):
+        window, left = renew(window, context.log, context.book, context.scene.body, context.heading, every)
+        window = gauss.weigh_holds(gauss.solve(window))
+    return window, left

@@ -1,0 +1,251 @@
+"""Which returns of the believed map should show now, where, how strong, and which of them come out as one."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec
+from rislam_rt.model.sensor import SensorModel
+from rislam_rt.ris import leg_response, panel_gain
+from rislam_rt.slam.identity import point_amplitude
+from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
+from rislam_rt.slam.window.book import Book
+from rislam_rt.slam.window.forms import enumerate_forms, forms_of, possible_legs
+from rislam_rt.slam.window.gauss import HEAD
+from rislam_rt.slam.window.levels import LEVELS
+
+LEVEL = 0.02
+"""Third direction cosine down to which returns are heard: those of upright walls arrive level."""
+FAINT = 0.5
+"""SNR below which a return is not looked for: it moves nothing in its cell by more than the noise does."""
+PANEL_STD = 0.7
+"""Spread of the panel's predicted log amplitude: its gain hangs on phases, hence on millimetres."""
+
+
+class Scene(NamedTuple):
+    """What the filter knows of the world beside its features."""
+
+    body: Body
+    radio: RadioConfig
+    sensor: SensorModel
+    ris: RisSpec | None
+    max_bounces: int
+    use_vt: bool
+
+
+class Expected(NamedTuple):
+    """R returns worth looking for, at the mean belief."""
+
+    forms: Integers
+    """(R, 5) feature rows."""
+    seen: Floats
+    """(R, 3) length [m] and two cosines."""
+    jacobian: Floats
+    """(R, 3, 7 + 3F) by the present: position, velocity, compass offset, features."""
+    log_amplitude: Floats
+    """(R,)."""
+    log_amplitude_std: Floats
+    """(R,)."""
+    bounces: Integers
+    """(R,)."""
+    detection: Floats
+    """(R,) probability that it shows, were nothing in its way and it alone."""
+
+
+def expect(
+    features: Floats, book: Book, poses: Poses, position: Floats, scene: Scene, code: RisCode | None
+) -> Expected:
+    """All forms that are possible at the mean belief, arrive from above, and may be detected."""
+    legs = enumerate_forms(tuple(book.points.tolist()), tuple(book.walls.tolist()), scene.max_bounces, True)
+    returns, bounces = legs.returns, legs.bounces
+    fine = possible_legs(returns.legs, features, book.anchor, poses)
+    rows = (fine[returns.tx] & fine[returns.rx]).nonzero()[0]
+    returns, bounces = compact(returns, rows), bounces[rows]
+    sight = observe(returns, features, book.anchor, poses)
+    level, spread = amplitudes(returns, features, book, sight.tx_length, sight.rx_length, poses, scene, code)
+    detection = detection_probability(level, spread, scene.sensor)
+    strong = scene.radio.integrated_snr(np.exp(level + spread)) > FAINT
+    audible = ((sight.up > -LEVEL) & strong).nonzero()[0]
+    returns = compact(returns, audible)
+    linear = linearise(returns, features, book.anchor, poses)
+    count = len(audible)
+    jacobian = np.zeros((count, 3, HEAD + 3 * len(features)))
+    jacobian[..., :3], jacobian[..., 6] = linear.by_pose, linear.by_heading(poses, position)
+    jacobian[..., HEAD:] = linear.by_feature.reshape(count, 3, features.size)
+    return Expected(
+        forms_of(returns), linear.seen, jacobian, level[audible], spread[audible], bounces[audible], detection[audible]
+    )
+
+
+def amplitudes(
+    returns: Returns, features: Floats, book: Book, tx_length: Floats, rx_length: Floats, poses: Poses, scene: Scene,
+    code: RisCode | None,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Log amplitude (R,) and its standard deviation (R,)."""
+    radio, legs = scene.radio, returns.legs
+    if not len(returns.tx):
+        return np.zeros(0), np.zeros(0)
+    none = legs[:, 1:] == NONE
+    left = np.where(none, 0.0, book.ratio[legs[:, 1:]]).sum(axis=1)
+    doubt = np.where(none, 0.0, book.ratio_variance[legs[:, 1:]]).sum(axis=1)
+    ratio, variance = left[returns.tx] + left[returns.rx], doubt[returns.tx] + doubt[returns.rx]
+    point = returns.point
+    moving = point == TX
+    strength, strength_std = book.log_strength
+    free = np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * rx_length)) + ratio
+    unit = point_amplitude(np.ones(()), np.maximum(tx_length, 1e-3), rx_length, radio)
+    level = np.where(moving, free, np.log(unit) + ratio + strength[point])
+    spread = np.sqrt(np.where(moving, 0.0, strength_std[point] ** 2) + variance + (0.3 * LEVELS.fading) ** 2)
+    panel = book.panel
+    if panel >= 0 and scene.ris is not None and code is not None:
+        rows = (point == panel).nonzero()[0]
+        gain = panel_gains(compact(returns, rows), features, book, poses, scene, code)
+        level[rows] = np.log(np.maximum(gain, 1e-30)) + ratio[rows]
+        spread[rows] = np.sqrt(PANEL_STD**2 + variance[rows])
+    return level, spread
+
+
+def panel_gains(returns: Returns, features: Floats, book: Book, poses: Poses, scene: Scene, code: RisCode) -> Floats:
+    """|gain| (R,) of the panel's returns with perfect walls."""
+    assert scene.ris is not None
+    radio, legs, center = scene.radio, returns.legs, features[returns.legs[:, 0]]
+    ends = []
+    for device, gain in ((poses.tx, radio.tx_gain), (poses.rx, radio.rx_gain)):
+        end = np.tile(device, (len(legs), 1))
+        for column in (2, 1):
+            rows = (legs[:, column] != NONE).nonzero()[0]
+            walls = legs[rows, column]
+            end[rows] = reflect(end[rows], features[walls], book.anchor[walls])
+        ends.append(leg_response(scene.ris, center, end, np.sqrt(gain), radio.wavelength))
+    return np.abs(panel_gain(ends[0][returns.tx], ends[1][returns.rx], code))
+
+
+def detection_probability(log_amplitude: Floats, spread: Floats, sensor: SensorModel) -> Floats:
+    """(R,) averaged over a log amplitude of that spread: three points carry its mean and variance."""
+    level = log_amplitude[..., None] + spread[..., None] * np.sqrt(3.0) * np.array([-1.0, 0.0, 1.0])
+    each = sensor.detection_probability(sensor.radio.integrated_snr(np.exp(np.minimum(level, 10.0))))
+    return np.asarray(each @ np.array([1.0, 4.0, 1.0]) / 6.0)
+
+
+class Clusters(NamedTuple):
+    """C components that R expected returns come out as: the strongest of each cell leads."""
+
+    leader: Integers
+    """(C,) rows of the returns."""
+    partner: Integers
+    """(C,) the strongest other in the cell, -1 for none."""
+    share: Floats
+    """(C,) of the partner in the place of the whole, before the amplitude is known: mean..."""
+    share_variance: Floats
+    """(C,) ...and variance."""
+    disturbance: Floats
+    """(C, 3) variance by what else is in the cell, or may be."""
+    log_amplitude: Floats
+    """(C,) of the whole."""
+    log_amplitude_std: Floats
+    """(C,)."""
+    by_itself: Floats
+    """(C,) probability that it comes out by itself: 1 for leaders, less for what a leader should take in."""
+
+
+def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | None = None) -> Clusters:
+    """From the strongest down, each return takes in all that is in its cell; neighbours on the cell's edge disturb."""
+    count = len(expected.seen)
+    place, strength = expected.seen / cell, expected.log_amplitude
+    gap = np.zeros((count, count))
+    for axis in place.T:
+        np.maximum(gap, np.abs(axis - axis[:, None]), out=gap)
+    np.fill_diagonal(gap, np.inf)
+    if sides is not None:
+        gap[sides[:, None] != sides] = np.inf
+    inside, around = gap < 1.0, gap < 1.15
+    taken, partner, by_itself = np.zeros(count, dtype=np.bool_), np.full(count, -1), np.ones(count)
+    crowded = np.flatnonzero(around.any(axis=1))
+    disturbance, power = np.zeros((count, 3)), np.exp(2.0 * strength)
+    total = power.copy()
+    for leader in crowded[np.argsort(-strength[crowded], kind="stable")]:
+        if taken[leader]:
+            continue
+        members = (inside[leader] & ~taken).nonzero()[0]
+        members = members[strength[members] <= strength[leader]]
+        taken[members] = True
+        by_itself[members] = np.maximum(1.0 - clear[leader], ALONE)
+        if len(members):
+            first = members[np.argmax(strength[members])]
+            partner[leader] = first
+            total[leader] += power[members].sum()
+        others = np.setdiff1d((around[leader] & (strength <= strength[leader])).nonzero()[0], [partner[leader]])
+        ratio = power[others] / power[leader] * clear[others]
+        disturbance[leader] = (0.5 * ratio[:, None] * (expected.seen[others] - expected.seen[leader]) ** 2).sum(axis=0)
+    leader = np.concatenate([(~taken).nonzero()[0], taken.nonzero()[0]])
+    mate = np.where(taken[leader], -1, partner[leader])
+    both = mate >= 0
+    ratio = np.where(both, np.exp(strength[mate] - strength[leader]), 0.0)
+    doubt = np.where(both, np.hypot(expected.log_amplitude_std[mate], expected.log_amplitude_std[leader]), 0.0)
+    twins = both & (expected.forms[leader] == reciprocal(expected.forms[mate])).all(axis=1)
+    doubt[twins] = TWIN_STD
+    # a ratio r leaves a mean share of 0 below one and 1 above, of variance r^2/2: averaged over the doubt about r
+    lean = _above(np.log(np.maximum(ratio, 1e-9)) / np.maximum(doubt, 1e-3))
+    share = np.where(both, lean, 0.0)
+    spread = np.where(
+        both,
+        np.minimum(0.5 * ratio**2, 0.25) + lean * (1.0 - lean) * np.exp(-np.abs(np.log(np.maximum(ratio, 1e-9)))),
+        0.0,
+    )
+    share[twins], spread[twins] = 0.5, TWIN_STD**2
+    fade = np.where(both, 0.7 * np.minimum(ratio, 1.0), 0.0)
+    return Clusters(
+        leader,
+        mate,
+        share,
+        spread,
+        disturbance[leader],
+        np.where(taken[leader], strength[leader], 0.5 * np.log(total[leader])),
+        np.hypot(expected.log_amplitude_std[leader], fade),
+        by_itself[leader],
+    )
+
+
+ALONE = 0.05
+"""Least probability that what lies in a stronger one's cell comes out by itself: cells have no sharp edge."""
+TWIN_STD = 0.03
+"""Relative difference of a return and its reciprocal in amplitude: a baseline of 0.1 m at some metres."""
+
+
+def reciprocal(forms: Integers) -> Integers:
+    """Forms (R, 5) with their legs exchanged."""
+    return forms[:, [0, 3, 4, 1, 2]]
+
+
+def _above(z: Floats) -> Floats:
+    return np.asarray(1.0 / (1.0 + np.exp(-1.7 * np.clip(z, -20.0, 20.0))))
+
+
+def conditioned_share(
+    clusters: Clusters, expected: Expected, row: Integers, log_amplitude: Floats, log_amplitude_std: Floats
+) -> tuple[Floats, Floats]:
+    """Mean and variance (A,) of the partner's share in clusters `row` (A,), given the amplitudes measured.
+
+    Two paths of amplitudes a, b with the sum A come out at the share `(A^2 + b^2 - a^2) / (2 A^2)` from the first to
+    the second: exact to first order in the gap, whatever the phase.
+    """
+    share, variance = clusters.share[row].copy(), clusters.share_variance[row].copy()
+    both = (clusters.partner[row] >= 0).nonzero()[0]
+    lead, mate = clusters.leader[row[both]], clusters.partner[row[both]]
+    whole = np.exp(2.0 * log_amplitude[both])
+    first, second = np.exp(2.0 * expected.log_amplitude[lead]), np.exp(2.0 * expected.log_amplitude[mate])
+    told = 0.5 * (whole + second - first) / whole
+    doubt = (first * expected.log_amplitude_std[lead]) ** 2 + (second * expected.log_amplitude_std[mate]) ** 2
+    doubt = doubt / whole**2 + (0.5 * (1.0 - 2.0 * told) * 2.0 * log_amplitude_std[both]) ** 2 + 1e-4
+    prior = variance[both]
+    twins = prior <= TWIN_STD**2
+    gain = np.where(twins, 0.0, prior / (prior + doubt))
+    share[both] = np.clip(share[both] + gain * (told - share[both]), 0.0, 1.0)
+    variance[both] = (1.0 - gain) * prior
+    return share, variance
+
+
+def heard_from(expected: Expected) -> Booleans:
+    """(R,) wall returns."""
+    return np.asarray(expected.forms[:, 0] == TX)

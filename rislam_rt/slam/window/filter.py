@@ -1,0 +1,285 @@
+"""One cycle of the window filter: predict, expect, associate, solve, learn, births and deaths."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel
+from rislam_rt.slam.config import SlamConfig, StartPrior
+from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los, stranger_density
+from rislam_rt.slam.tracks import Glance
+from rislam_rt.slam.window import gauss, motion, tracks
+from rislam_rt.slam.window.births import births
+from rislam_rt.slam.window.book import Book, empty_book, idents
+from rislam_rt.slam.window.context import Context
+from rislam_rt.slam.window.expect import Clusters, Expected, Scene, conditioned_share
+from rislam_rt.slam.window.gauss import Window
+from rislam_rt.slam.window.learn import Sights, learn, no_sights
+from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
+from rislam_rt.slam.window.look import Look, look
+from rislam_rt.slam.window.retract import condemned, release
+from rislam_rt.slam.window.tracks import Tracks
+
+REFRESH = 5
+"""Cycles between two re-linearisations of the whole window."""
+
+
+class WindowState(NamedTuple):
+    """All that the filter knows."""
+
+    cycle: int
+    config: SlamConfig
+    window: Window
+    book: Book
+    log: Log
+    tracks: Tracks
+    sights: Sights
+    gait: Floats
+    """(2, L) probabilities of the liveliness of the step before the window's first, across and upwards."""
+    level: Floats
+    """(2, L) of the last step's, filtered."""
+    heading: Floats
+    """(K,) [rad] that the compass told."""
+    shift: Floats
+    """(3,) [m] standard deviation of the start's position: what no measurement tells."""
+    scene: Scene
+    doubt: float
+    """Running log odds that the map explains nothing of what is heard."""
+
+
+def init(
+    start: StartPrior, body: Body, ris: RisSpec | None, sensor: SensorModel, config: SlamConfig,
+    *, rng: np.random.Generator,
+) -> WindowState:  # fmt: skip
+    """The start prior, and an empty map."""
+    axes, free = np.arange(3), np.array([1.0, 1.0, float(config.height == "estimated")])
+    compass = start.heading_std if config.heading == "estimated" else 0.0
+    std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [compass]])
+    window = gauss.begin(start.position, start.velocity, axes, std)
+    scene = Scene(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
+    gait = np.stack([motion.first_gait(config.sigma_a), motion.first_gait(0.0)])
+    return WindowState(
+        0, config, window, empty_book(), empty_log(), tracks.no_tracks(), no_sights(), gait, gait,
+        np.array([start.heading]), start.position_std * free, scene, 0.0,
+    )  # fmt: skip
+
+
+def step(
+    state: WindowState, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: SlamConfig,
+    *, rng: np.random.Generator,
+) -> tuple[WindowState, StepInfo]:  # fmt: skip
+    """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied."""
+    turn = heading - state.heading[-1]
+    state = _move(state, dt, heading)
+    scene, book = state.scene, state.book
+    glance = glance_of(measurement, scene.radio)
+    landmark = np.where(is_los(glance, scene.body), REMOVED, UNUSED)
+    order = np.lexsort(glance.seen.T[::-1])
+    free = order[landmark[order] == UNUSED]
+    glance = glance.take(free)
+
+    strangers = stranger_density(glance, scene.sensor, config.new_density)
+    state, view = _notice(state, heading, code, glance, strangers)
+    mean, poses, expected, groups = view.mean, view.poses, view.expected, view.groups
+    shows, scatter, row, pick = view.shows, view.scatter, view.row, view.pick
+    bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(LEVELS.stay))))
+
+    log = append(state.log, glance, state.cycle, state.cycle - state.window.num_poses + 1)
+    log = _explain(log, expected, groups, book, scatter, row, pick, len(glance.seen))
+    state = state._replace(log=log)
+    state, left, nis = _solve(state)
+    raw = np.zeros(len(row))
+    if len(row):
+        at = np.searchsorted(left.row, len(log.cycle) - len(glance.seen) + pick)
+        raw = np.mean(left.left[at] ** 2 * (1.0 + log.extra[left.row[at]] / log.std[left.row[at]] ** 2), axis=1)
+
+    taken = np.zeros(len(glance.seen), dtype=np.bool_)
+    taken[pick] = True
+    followed = _follow(state, mean, glance, (~taken).nonzero()[0], dt, turn, bend)
+    state = state._replace(tracks=followed.tracks, log=followed.log)
+    sights, book = learn(
+        state.sights, book, state.window, expected, groups, shows, row, pick, raw, glance, poses, scene, code
+    )
+    state = state._replace(sights=sights, book=book)
+    landmark[free[pick]] = _names(state.book, expected, groups, row)
+
+    context = Context(
+        state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle, state.sights
+    )  # fmt: skip
+    if state.cycle % REFRESH == 0 and len(book.ident):
+        gone = condemned(context.book, left, context.log, expected, gauss.now(context.window)[1])
+        context, fresh = release(context, ~gone), not gone.any()
+    else:
+        fresh = True
+    if fresh:
+        context = births(context, expected, groups)
+    state = state._replace(
+        window=context.window, book=context.book, log=context.log, tracks=context.tracks, sights=context.sights
+    )  # fmt: skip
+    outcome = _outcome(len(measurement), len(state.book.ident), state.doubt)
+    info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome)
+    return state._replace(cycle=state.cycle + 1), info
+
+
+def _move(state: WindowState, dt: float, heading: float) -> WindowState:
+    """The window with a new pose, without its oldest one when it is full."""
+    if dt <= 0.0 and state.cycle == 0:
+        return state._replace(heading=np.array([heading]))
+    window, gait, headings = state.window, state.gait, state.heading
+    while window.num_poses >= LEVELS.window:
+        gait = np.stack([smoothed[1][0] for smoothed in _liveliness(window, gait)])
+        window, headings = gauss.slide(window), headings[1:]
+    level = state.level @ motion.transition(LEVELS.stay)
+    window = gauss.extend(window, dt, motion.expected_precision(level)[[0, 0, 1]])
+    return state._replace(window=window, gait=gait, heading=np.append(headings, heading))
+
+
+START = ((4, 0.5), (10, 1.0))
+"""Steps that may have been livelier than thought, and standard deviation [m/s^2] of their accelerations then."""
+LOG_START = np.log(0.01)
+"""Log probability of a manoeuvre that nothing announced."""
+MISSED = 2.0
+"""Standard deviations by which fewer returns show than should, from which on a manoeuvre is looked for."""
+
+
+def _notice(
+    state: WindowState, heading: float, code: RisCode | None, glance: Glance, strangers: Floats
+) -> tuple[WindowState, Look]:
+    """What is seen, and the belief that explains it best: as it was, or with a manoeuvre in the last steps.
+
+    The score of the better one tells whether the map explains anything at all (`doubt`).
+    """
+
+    def view_of(window: Window) -> Look:
+        return look(window, state.book, state.sights, heading, state.scene, code, glance, strangers)
+
+    best, window = view_of(state.window), state.window
+    if best.surprise > MISSED and len(state.window.step):
+        for steps, liveliness in START:
+            precision = state.window.precision.copy()
+            precision[-steps:, :2] = np.minimum(precision[-steps:, :2], liveliness**-2.0)
+            trial = gauss.solve(state.window._replace(precision=precision))
+            view = view_of(trial)
+            if view.score + LOG_START > best.score:
+                best, window = view, trial
+    if not len(best.expected.seen) or not len(glance.seen):
+        return state._replace(window=window), best
+    doubt = np.clip(state.doubt - np.clip(best.score, -2.0, 2.0), 0.0, 2.0 * LOST)
+    return state._replace(window=window, doubt=float(doubt)), best
+
+
+LOST = 10.0
+"""Log odds against the map from which on the agent is lost: some cycles that strangers explain better."""
+GROUPS = (np.array([0, 1]), np.array([2]))
+"""Axes that are as lively as each other: an agent that turns does not climb."""
+
+
+def _liveliness(window: Window, gait: Floats) -> list[tuple[Floats, Floats]]:
+    """Posterior and filtered probabilities (K - 1, L) of each group's levels."""
+    size, free = len(window.head), len(window.axes)
+    count = len(window.accel)
+    block = window.covariance[size:, size:].reshape(count, free, count, free)[np.arange(count), :, np.arange(count)]
+    found = []
+    for group, before in zip(GROUPS, gait, strict=True):
+        inside = block[:, group[:, None], group]
+        like = motion.log_likelihood(window.accel[:, group], inside, window.precision[:, group[0]])
+        found.append(motion.smooth(before, like, LEVELS.stay))
+    return found
+
+
+def _explain(
+    log: Log,
+    expected: Expected,
+    groups: Clusters,
+    book: Book,
+    scatter: Floats,
+    row: Integers,
+    pick: Integers,
+    count: int,
+) -> Log:
+    """The log's last `count` components with what they were taken for."""
+    if not len(row):
+        return log
+    at = len(log.cycle) - count + pick
+    lead, mate = groups.leader[row], groups.partner[row]
+    share, variance = conditioned_share(groups, expected, row, log.log_amplitude[at], log.log_amplitude_std[at])
+    form, shares, extra = log.form.copy(), log.share.copy(), log.extra.copy()
+    form[at, 0] = idents(book, expected.forms[lead])
+    both = mate >= 0
+    form[at[both], 1] = idents(book, expected.forms[mate[both]])
+    gap = np.where(both[:, None], expected.seen[mate] - expected.seen[lead], 0.0)
+    shares[at], extra[at] = np.where(both, share, 0.0), groups.disturbance[row] + variance[:, None] * gap**2
+    extra[at] += LEVELS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
+    return log._replace(form=form, share=shares, extra=extra)
+
+
+def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
+    """The window after this cycle's components: two Gauss-Newton steps; the whole of it again now and then."""
+    window, log, book, body = state.window, state.log, state.book, state.scene.body
+    last = np.array([window.num_poses - 1])
+    window, found = renew(window, log, book, body, state.heading, last, even=True)
+    nis = float(np.sum(found.left**2))
+    window = gauss.solve(window)
+    slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else last
+    window, left = renew(window, log, book, body, state.heading, slots)
+    window = gauss.weigh_holds(gauss.solve(window))
+    return liven(state._replace(window=window)), left, nis
+
+
+def liven(state: WindowState) -> WindowState:
+    """The prior of every step's acceleration, by what the measurements say of its liveliness."""
+    window = state.window
+    if not len(window.accel):
+        return state
+    across, upwards = _liveliness(window, state.gait)
+    fresh = np.stack([motion.expected_precision(found[0]) for found in (across, across, upwards)], axis=1)
+    # all steps at once, each as if the others were settled: damped, or they would take turns
+    precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
+    level = np.stack([across[1][-1], upwards[1][-1]])
+    return state._replace(window=window._replace(precision=precision), level=level)
+
+
+DAMPING = 0.3
+"""Share of the new in each step's log precision."""
+
+
+class _Followed(NamedTuple):
+    tracks: Tracks
+    log: Log
+
+
+def _follow(
+    state: WindowState, mean: Floats, glance: Glance, free: Integers, dt: float, turn: float, bend: float
+) -> _Followed:
+    """Tracks extended, begun and ended by the components that nothing explains."""
+    speed = float(np.linalg.norm(mean[3:6]))
+    length = np.maximum(state.tracks.mean[:, 0, 0], 0.5) if len(state.tracks.ident) else np.ones(1)
+    drift = np.array([2.0 * bend + speed**2, 0.1, 0.1]) if len(length) else np.zeros(3)
+    found = tracks.advance(state.tracks, dt, turn, drift)
+    rows, picks = tracks.match(found, glance, free, state.cycle)
+    found = tracks.extend(found, rows, glance, picks, state.cycle)
+    spare = np.setdiff1d(free, picks)
+    reach = np.maximum(glance.seen[spare, 0], 0.5)
+    rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * (speed + 0.05)
+    found, fresh = tracks.start(found, glance, spare, rate, state.cycle)
+    base = len(state.log.cycle) - len(glance.seen)
+    track = state.log.track.copy()
+    track[base + picks], track[base + spare] = found.ident[rows], fresh
+    return _Followed(found.keep(tracks.alive(found, state.cycle)), state.log._replace(track=track))
+
+
+def _names(book: Book, expected: Expected, groups: Clusters, row: Integers) -> Integers:
+    """Ident of the feature that each of the clusters `row` (A,) speaks about first."""
+    forms = expected.forms[groups.leader[row]]
+    first = np.where(forms[:, 0] >= 0, forms[:, 0], forms[:, 3])
+    return book.ident[first] if len(row) else np.zeros(0, dtype=np.int64)
+
+
+def _outcome(heard: int, features: int, doubt: float) -> Outcome:
+    if not heard:
+        return Outcome.NO_MEASUREMENTS
+    if doubt > LOST:
+        return Outcome.DIVERGED
+    return Outcome.OK if features else Outcome.NO_LANDMARKS

@@ -1,0 +1,215 @@
+"""What a cycle teaches about the features themselves: strength, walls' losses, the panel, and what hides a path."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.information import amplitude_std
+from rislam_rt.model import RisCode
+from rislam_rt.slam.filter import SIDED
+from rislam_rt.slam.identity import (
+    TOLD,
+    add_evidence,
+    log_panel,
+    log_panel_missed,
+    log_scatterer,
+    log_scatterer_missed,
+    predicted_panel_gain,
+)
+from rislam_rt.slam.moments import even_draws, square_root
+from rislam_rt.slam.returns import NONE, TX, Poses
+from rislam_rt.slam.tracks import Glance
+from rislam_rt.slam.window.book import Book, learn_ratio
+from rislam_rt.slam.window.expect import Clusters, Expected, Scene
+from rislam_rt.slam.window.gauss import HEAD, Window
+from rislam_rt.slam.window.levels import LEVELS
+
+DRAWS = 16
+"""Places of the belief over which the panel's predicted gain is averaged."""
+CERTAIN = 30.0
+"""Log odds beyond which a point's identity is no longer in question."""
+
+
+class Sights(NamedTuple):
+    """V forms that were looked for, and whether something stands in the way of each."""
+
+    code: Integers
+    """(V,) forms by ident, packed, sorted."""
+    clear: Floats
+    """(V,) probability that nothing does."""
+    scatter: Floats
+    """(V,) running mean square of its residuals in reported deviations: what the map lacks in its cell."""
+
+
+def no_sights() -> Sights:
+    """Nothing looked for yet."""
+    return Sights(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+
+
+def pack(forms: Integers, book: Book) -> Integers:
+    """Forms (R, 5) of rows as one number each, by ident."""
+    known = np.where(forms >= 0, book.ident[np.maximum(forms, 0)], forms) if len(book.ident) else forms
+    code = np.zeros(len(forms), dtype=np.int64)
+    for column in known.T:
+        code = code * 4096 + column + 1
+    return code
+
+
+SCATTER_RATE = 0.1
+"""Share of the latest residual in its running mean square."""
+FIRST = np.array([0.8, 0.6, 0.4, 0.4, 0.4])
+"""Probability that nothing stands in the way of a path over so many walls, before it was looked for."""
+
+
+def recall(sights: Sights, expected: Expected, book: Book) -> tuple[Floats, Floats]:
+    """Probability (R,) that nothing stands in the way of each return now, and its scatter (R,)."""
+    first, scatter = FIRST[expected.bounces], np.full(len(expected.seen), LEVELS.crowd)
+    if len(sights.code):
+        code = pack(expected.forms, book)
+        place = np.minimum(np.searchsorted(sights.code, code), len(sights.code) - 1)
+        known = sights.code[place] == code
+        first, scatter = np.where(known, sights.clear[place], first), np.where(known, sights.scatter[place], scatter)
+    return np.asarray(first * (1.0 - LEVELS.blocked) + (1.0 - first) * LEVELS.cleared), scatter
+
+
+def seed(sights: Sights, forms: Integers, book: Book, scatter: float) -> Sights:
+    """A form that a new feature was found by: nothing hides it, and it scatters so much."""
+    code = np.append(sights.code, pack(forms, book))
+    order = np.argsort(code, kind="stable")
+    return Sights(
+        code[order], np.append(sights.clear, np.full(len(forms), 0.99))[order],
+        np.append(sights.scatter, np.full(len(forms), scatter))[order],
+    )  # fmt: skip
+
+
+def visible(expected: Expected, groups: Clusters, clear: Floats) -> Floats:
+    """(C,) probability that each cluster shows."""
+    return np.asarray(LEVELS.shown * (expected.detection * clear)[groups.leader] * groups.by_itself).clip(
+        1e-4, LEVELS.shown
+    )
+
+
+def learn(
+    sights: Sights, book: Book, window: Window, expected: Expected, groups: Clusters, shows: Floats, row: Integers,
+    pick: Integers, raw: Floats, glance: Glance, poses: Poses, scene: Scene, code: RisCode | None,
+) -> tuple[Sights, Book]:  # fmt: skip
+    """After clusters `row` (A,) were seen as components `pick` (A,) with residuals of mean square `raw` (A,)."""
+    if not len(expected.seen):
+        return sights, book
+    hit = np.zeros(len(groups.leader), dtype=np.bool_)
+    hit[row] = True
+    before, scatter = recall(sights, expected, book)
+    detection = LEVELS.shown * expected.detection
+    missed = before * (1.0 - detection) / (1.0 - before * detection)
+    after = before.copy()
+    told = hit | (groups.by_itself == 1.0)
+    after[groups.leader[told]] = np.where(hit, 0.995, missed[groups.leader])[told]
+    lead = groups.leader[row]
+    scatter[lead] += SCATTER_RATE * (np.minimum(raw, 30.0 * scatter[lead]) - scatter[lead])
+    alone = (groups.partner < 0) & (groups.by_itself == 1.0)
+    book = _existence(book, expected, groups, hit & alone, ~hit & alone, shows)
+    book = _strengths(book, window, expected, groups, row, pick, glance, poses, scene, code)
+    fresh = pack(expected.forms, book)
+    keep = ~np.isin(sights.code, fresh)
+    packed = np.concatenate([sights.code[keep], fresh])
+    order = np.argsort(packed, kind="stable")
+    cleared, scattered = np.concatenate([sights.clear[keep], after]), np.concatenate([sights.scatter[keep], scatter])
+    return Sights(packed[order], cleared[order], scattered[order]), book
+
+
+def _existence(book: Book, expected: Expected, groups: Clusters, hit: Floats, missed: Floats, shows: Floats) -> Book:
+    """Every feature by the returns that only it explains: those over the fewest other features."""
+    odds, hits = book.log_odds.copy(), book.hits.copy()
+    for where, tell in ((hit, 1.0), (missed, 0.0)):
+        rows = where.nonzero()[0]
+        forms, bounces = expected.forms[groups.leader[rows]], expected.bounces[groups.leader[rows]]
+        for form, bounce, show in zip(forms, bounces, shows[rows], strict=True):
+            names = [part for part in form if part >= 0]
+            direct = (form[0] >= 0 and bounce == 0) or (form[0] == TX and bounce == 1)
+            if tell:
+                for name in names:
+                    odds[name] = min(odds[name] + (1.0 if direct else 0.3), 12.0)
+                    hits[name] += 1
+            elif direct:
+                odds[names[0]] += np.log1p(-show)
+    return book._replace(log_odds=odds, hits=hits)
+
+
+def _strengths(
+    book: Book, window: Window, expected: Expected, groups: Clusters, row: Integers, pick: Integers, glance: Glance,
+    poses: Poses, scene: Scene, code: RisCode | None,
+) -> Book:  # fmt: skip
+    """Walls' losses and points' strengths from components that came out alone; silence speaks for the panel too."""
+    lead, alone = groups.leader[row], groups.partner[row] < 0
+    quiet = (groups.disturbance[row] < 0.25 * scene.sensor.cell_length**2).all(axis=1)
+    for place in (alone & quiet).nonzero()[0]:
+        form = expected.forms[lead[place]]
+        walls = [part for part in form[1:] if part != NONE]
+        if len(walls) == 1 and (form[0] == TX or expected.log_amplitude_std[lead[place]] < 0.5):
+            surplus = glance.log_amplitude[pick[place]] - expected.log_amplitude[lead[place]]
+            book = learn_ratio(book, int(walls[0]), float(np.clip(book.ratio[walls[0]] + surplus, -3.0, 0.1)))
+    direct = alone & (expected.bounces[lead] == 0)
+    told: list[tuple[int, float, float, float]] = [
+        (int(expected.forms[lead[i], 0]), float(np.exp(glance.log_amplitude[pick[i]])),
+         float(glance.amplitude_std[pick[i]]), float(glance.odds[pick[i]]))
+        for i in direct.nonzero()[0]
+    ]  # fmt: skip
+    if told:
+        book = _weigh(book, window, told, poses, scene, code)
+    if scene.ris is not None and code is not None:
+        seen = np.isin(np.arange(len(groups.leader)), row)
+        silent = ~seen & (groups.partner < 0) & (groups.by_itself == 1.0) & (expected.bounces[groups.leader] == 0)
+        points = expected.forms[groups.leader[silent], 0]
+        if len(points):
+            book = _weigh_silent(book, window, points, poses, scene, code)
+    return book
+
+
+def _weigh(
+    book: Book, window: Window, told: list[tuple[int, float, float, float]], poses: Poses, scene: Scene,
+    code: RisCode | None,
+) -> Book:  # fmt: skip
+    points = np.array([entry[0] for entry in told])
+    amplitude, std = np.array([entry[1] for entry in told]), np.array([entry[2] for entry in told])
+    side = np.array([entry[3] for entry in told])
+    place = window.features[points]
+    first, second = np.linalg.norm(place - poses.tx, axis=1), np.linalg.norm(place - poses.rx, axis=1)
+    scatterer = log_scatterer(amplitude, std, first, second, scene.radio)
+    panel = np.full(len(points), -np.inf)
+    if scene.ris is not None and code is not None:
+        panel = np.where(side < -SIDED, -np.inf, log_panel(amplitude, std, _gains(window, points, poses, scene, code)))
+    grid, log_ris = add_evidence(book.log_grid[points], book.log_ris[points], scatterer, panel)
+    log_ris += np.clip(side, 0.0, TOLD)
+    grids, every = book.log_grid.copy(), book.log_ris.copy()
+    grids[points] = grid
+    every[points] = np.clip(log_ris, -CERTAIN, CERTAIN) if scene.ris is not None else -np.inf
+    return book._replace(log_grid=grids, log_ris=every)
+
+
+def _weigh_silent(book: Book, window: Window, points: Integers, poses: Poses, scene: Scene, code: RisCode) -> Book:
+    """Silence of points that nothing hides: as likely for a scatterer as for the panel?"""
+    std = np.full(len(points), amplitude_std(scene.radio))
+    threshold = float(np.sqrt(2.0 * scene.sensor.threshold) * std[0])
+    place = window.features[points]
+    first, second = np.linalg.norm(place - poses.tx, axis=1), np.linalg.norm(place - poses.rx, axis=1)
+    each = log_scatterer_missed(std, first, second, scene.radio, threshold)
+    weight = np.exp(book.log_grid[points])
+    scatterer = np.sum(weight * np.exp(each), axis=1) / weight.sum(axis=1)
+    panel = np.exp(log_panel_missed(std, _gains(window, points, poses, scene, code), threshold))
+    # what is hidden is silent whatever it is: half of the silences, so that a long one decides nothing
+    surplus = np.log(0.5 + 0.5 * panel) - np.log(0.5 + 0.5 * scatterer)
+    every = book.log_ris.copy()
+    every[points] = np.clip(every[points] + surplus, -CERTAIN, CERTAIN)
+    return book._replace(log_ris=every)
+
+
+def _gains(window: Window, points: Integers, poses: Poses, scene: Scene, code: RisCode) -> Complexes:
+    """The panel's gain (P, S) if it were at each of the points, over places of the belief."""
+    assert scene.ris is not None
+    centers = []
+    for point in points:
+        at = slice(HEAD + 3 * int(point), HEAD + 3 * int(point) + 3)
+        root = square_root(window.covariance[at, at])
+        centers.append(window.head[at] + even_draws(DRAWS, root.shape[1]) @ root.T)
+    return predicted_panel_gain(scene.ris, code, np.array(centers), poses.tx, poses.rx, np.ones(1), scene.radio)

@@ -1,0 +1,62 @@
+"""Every constant of the window filter: a physical quantity or a stated level, with its source."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Levels(NamedTuple):
+    """SI units; probabilities are a cycle's unless said otherwise."""
+
+    window: int = 40
+    """Poses that are re-linearised: a batch over 40 cycles does what one over the run does."""
+    stay: float = 0.98
+    """Probability that a step's liveliness is that of the step before: an agent changes its gait every 5 s."""
+    tail: float = 4.0
+    """Degrees of freedom of Student's t, where the receiver tells no tails: neighbours that the map lacks."""
+    gate: float = 16.3
+    """Squared Mahalanobis distance of delay and cosines beyond which nothing associates (chi^2, 3 dof: 0.999)."""
+    wall_ratio: float = -0.6
+    """Mean log amplitude reflection of a wall: concrete to plasterboard at 10 GHz, ITU-R P.2040."""
+    wall_ratio_std: float = 0.5
+    """Its spread over building materials."""
+    fading: float = 0.3
+    """Spread of one amplitude about its law: angle of incidence, neighbours."""
+    strength: float = 0.15
+    """Median root of a scatterer's cross-section [m]: a sphere of 0.08 m radius."""
+    strength_std: float = 1.2
+    """Spread of its logarithm."""
+    lean: float = 0.01
+    """Standard deviation [rad] of an upright wall's lean: building tolerance, as level returns do not tell it."""
+    square: float = 0.7
+    """Share of upright walls that stand at right angles to another."""
+    upright: float = 0.9
+    """Share of upright or level surfaces among those that are seen level or from below."""
+    size: float = 15.0
+    """Radius [m] of the volume in which features are looked for."""
+    speed: float = 0.3
+    """Standard deviation [m/s] of an agent's speed: the prior of how fast an unknown path's length changes."""
+    born: float = 0.98
+    """Posterior probability of a kind from which on a feature enters the map."""
+    fit: float = 3.0
+    """Standard deviations of its cost above which a hypothesis does not fit at all."""
+    clutter: float = 0.016
+    """New or false components per metre of length, unit of each cosine, and e-fold of amplitude."""
+    crowd: float = 9.0
+    """Mean square of a residual in reported deviations beforehand: 1 + the SNR (9 dB) of what a cell holds besides."""
+    memory: float = 4.0
+    """Cycles over which the pull of such neighbours keeps its sign: phases turn once in half a wavelength of motion."""
+    blocked: float = 0.02
+    """Probability that in a cycle something comes to stand in the way of a path..."""
+    cleared: float = 0.05
+    """...and that it goes away again."""
+    shown: float = 0.95
+    """Probability that a path above the threshold with nothing in its way is reported by itself."""
+    against: float = 9.0
+    """Median squared residual (3 dof, half are below 2.4) from which on a feature's measurements contradict it."""
+    dead: float = 0.01
+    """Probability of existence below which a feature is taken back."""
+
+
+LEVELS = Levels()
+GATE_ROOT = float(np.sqrt(LEVELS.gate))

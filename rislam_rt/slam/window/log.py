@@ -1,0 +1,162 @@
+"""The components of the window's cycles, and what each is held to be; their quadratics on poses and features."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.model import Body
+from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.returns import linearise
+from rislam_rt.slam.tracks import Glance
+from rislam_rt.slam.window.book import Book
+from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
+from rislam_rt.slam.window.gauss import POSE, Quadratic, Window, poses
+from rislam_rt.slam.window.levels import LEVELS
+
+
+class Log(NamedTuple):
+    """N components, in the order of their cycles."""
+
+    cycle: Integers
+    """(N,)."""
+    seen: Floats
+    """(N, 3) length [m] and two cosines."""
+    std: Floats
+    """(N, 3)."""
+    log_amplitude: Floats
+    """(N,)."""
+    log_amplitude_std: Floats
+    """(N,)."""
+    side: Integers
+    """(N,) (see `tracks.Glance`)."""
+    track: Integers
+    """(N,) ident of the track that it belongs to, -1 for none."""
+    form: Integers
+    """(N, 2, 5) feature idents of the form that it is, and of the partner that it came out as one with; the base is
+    `UNKNOWN` where there is none."""
+    share: Floats
+    """(N,) of the partner in its place."""
+    extra: Floats
+    """(N, 3) variance beyond the reported one."""
+
+    def take(self, rows: Any) -> "Log":
+        """Only some of the components."""
+        return Log._make(field[rows] for field in self)
+
+    @property
+    def explained(self) -> Booleans:
+        """(N,) whether it is held to be a form."""
+        return np.asarray(self.form[:, 0, 0] != UNKNOWN)
+
+
+def empty_log() -> Log:
+    """No components."""
+    none, count = np.zeros(0), np.zeros(0, dtype=np.int64)
+    wide = np.zeros((0, 3))
+    return Log(count, wide, wide, none, none, count, count, np.zeros((0, 2, 5), dtype=np.int64), none, wide)
+
+
+def append(log: Log, glance: Glance, cycle: int, first: int) -> Log:
+    """The log with a cycle's components, unexplained as yet, and without those before cycle `first`."""
+    count, old = len(glance.seen), log.take(log.cycle >= first)
+    fresh = Log(
+        np.full(count, cycle), glance.seen, glance.std, glance.log_amplitude, glance.log_amplitude_std, glance.sides,
+        np.full(count, -1), np.full((count, 2, 5), UNKNOWN), np.zeros(count), np.zeros((count, 3)),
+    )  # fmt: skip
+    return Log(*(np.concatenate(pair) for pair in zip(old, fresh, strict=True)))
+
+
+class Residuals(NamedTuple):
+    """A components that are held to be forms."""
+
+    row: Integers
+    """(A,) in the log."""
+    slot: Integers
+    """(A,) pose of the window."""
+    left: Floats
+    """(A, 3) measured less predicted, in standard deviations."""
+    jacobian: Floats
+    """(A, 3, 4 + 3F) of the prediction by its pose and the features, likewise."""
+
+
+def residuals(log: Log, window: Window, book: Book, body: Body, heading: Floats, rows: Integers) -> Residuals:
+    """Of some explained rows of the log, at the present estimate; `heading` (K,) as the compass tells."""
+    first = int(log.cycle[-1]) - window.num_poses + 1
+    slot = log.cycle[rows] - first
+    used, back = np.unique(slot, return_inverse=True)
+    place = poses(window)[used]
+    ends = poses_of(place[:, :3], heading[used] + place[:, 3], body)
+    features = window.features
+    form = log.form[rows]
+    both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
+    every = np.concatenate([form[:, 0], form[both, 1]])
+    distinct, column = unique_forms(every)
+    returns = compile_forms(book.rows(distinct))
+    linear = linearise(returns, features, book.anchor, ends)
+    by_heading = linear.by_heading(ends, place[:, None, None, :3]) if window.prior.hessian[6, 6] < 1e11 else None
+    count, size = len(rows), POSE + features.size
+
+    def pick(at: Integers, which: Integers) -> tuple[Floats, Floats]:
+        jacobian = np.zeros((len(at), 3, size))
+        jacobian[..., :3] = linear.by_tx[at, which] + linear.by_rx[at, which]
+        if by_heading is not None:
+            jacobian[..., 3] = by_heading[at, which]
+        jacobian[..., POSE:] = linear.by_feature[at, which].reshape(len(at), 3, features.size)
+        return linear.seen[at, which], jacobian
+
+    seen, jacobian = pick(back, column[:count])
+    if len(both):
+        other, by_other = pick(back[both], column[count:])
+        share = log.share[rows[both]]
+        seen[both] += share[:, None] * (other - seen[both])
+        jacobian[both] += share[:, None, None] * (by_other - jacobian[both])
+    std = np.sqrt(log.std[rows] ** 2 + log.extra[rows])
+    return Residuals(rows, slot, (log.seen[rows] - seen) / std, jacobian / std[..., None])
+
+
+def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
+    """Distinct forms (U, 5), and which of them each (N, 5) is."""
+    base = int(forms.max(initial=0)) + 3
+    code = np.zeros(len(forms), dtype=np.int64)
+    for column in forms.T:
+        code = code * base + column + 1
+    _, first, place = np.unique(code, return_index=True, return_inverse=True)
+    return forms[first], place
+
+
+def trust(left: Floats) -> Floats:
+    """(A,) weight that Student's t gives residuals (A, 3)."""
+    return np.asarray((LEVELS.tail + 3.0) / (LEVELS.tail + np.vecdot(left, left)))
+
+
+def renew(
+    window: Window, log: Log, book: Book, body: Body, heading: Floats, slots: Integers, *, even: bool = False
+) -> tuple[Window, Residuals]:
+    """The quadratics of some slots, made at the present estimate; `even`: every component counts in full."""
+    first = int(log.cycle[-1]) - window.num_poses + 1 if len(log.cycle) else 0
+    wanted = np.zeros(window.num_poses, dtype=np.bool_)
+    wanted[slots] = True
+    rows = (log.explained & wanted[np.maximum(log.cycle - first, 0)]).nonzero()[0]
+    size, place = POSE + window.features.size, poses(window)
+    hessian, gradient, middle = (field.copy() for field in window.slots)
+    hessian[slots], gradient[slots] = 0.0, 0.0
+    middle[slots] = np.concatenate(
+        [place[slots], np.broadcast_to(window.features.ravel(), (len(slots), size - POSE))], 1
+    )
+    if not len(rows):
+        nothing = Residuals(rows, rows, np.zeros((0, 3)), np.zeros((0, 3, size)))
+        return window._replace(slots=Quadratic(hessian, gradient, middle)), nothing
+    found = residuals(log, window, book, body, heading, rows)
+    weight = np.ones(len(rows)) if even else trust(found.left)
+    start = np.searchsorted(found.slot, slots)
+    stop = np.searchsorted(found.slot, slots, side="right")
+    most = int((stop - start).max())
+    index = start[:, None] + np.arange(most)
+    inside = (index < stop[:, None]).astype(np.float64)
+    index = np.minimum(index, len(rows) - 1)
+    wide = found.jacobian[index].reshape(len(slots), 3 * most, size)
+    heavy = wide * np.repeat(weight[index] * inside, 3, axis=1)[..., None]
+    hessian[slots] = np.swapaxes(heavy, 1, 2) @ wide
+    gradient[slots] = -(np.swapaxes(heavy, 1, 2) @ found.left[index].reshape(len(slots), 3 * most, 1))[..., 0]
+    return window._replace(slots=Quadratic(hessian, gradient, middle)), found

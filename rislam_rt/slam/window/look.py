@@ -1,0 +1,96 @@
+"""What a belief makes of a cycle's components: what is expected, who is which, how well that explains it."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.model import RisCode
+from rislam_rt.slam.associate import Candidates, pair_costs
+from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.returns import Poses
+from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance
+from rislam_rt.slam.window import gauss
+from rislam_rt.slam.window.book import Book
+from rislam_rt.slam.window.expect import Clusters, Expected, Scene, cluster, expect
+from rislam_rt.slam.window.gauss import HEAD, Window
+from rislam_rt.slam.window.learn import Sights, recall, visible
+from rislam_rt.slam.window.levels import LEVELS
+
+
+class Look(NamedTuple):
+    """A cycle as a belief sees it."""
+
+    mean: Floats
+    """(7 + 3F,) of the present."""
+    poses: Poses
+    expected: Expected
+    groups: Clusters
+    shows: Floats
+    """(C,) probability that each cluster shows."""
+    scatter: Floats
+    """(R,) of each return."""
+    row: Integers
+    """(A,) clusters that were seen..."""
+    pick: Integers
+    """(A,) ...and the components that they were seen as."""
+    score: float
+    """Log likelihood of the cycle over that of strangers alone."""
+    surprise: float
+    """Standard deviations by which fewer of the returns that should show did."""
+
+
+def look(
+    window: Window, book: Book, sights: Sights, heading: float, scene: Scene, code: RisCode | None, glance: Glance,
+    strangers: Floats,
+) -> Look:  # fmt: skip
+    """Expect, cluster, associate."""
+    mean, covariance = gauss.now(window)
+    poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
+    expected = expect(mean[HEAD:].reshape(-1, 3), book, poses, mean[:3], scene, code)
+    sides = _sides(expected, book) if glance.side is not None else None
+    clear, scatter = recall(sights, expected, book)
+    groups = cluster(expected, scene.sensor.cell_length, clear, sides)
+    shows = visible(expected, groups, clear)
+    row, pick, gain = _associate(expected, groups, shows, scatter, covariance, glance, sides, strangers)
+    alone = groups.by_itself == 1.0
+    due, seen = shows[alone], np.isin(np.arange(len(shows)), row)[alone]
+    miss = float(np.log1p(-due[~seen]).sum())
+    surprise = (due.sum() - seen.sum()) / np.sqrt((due * (1.0 - due)).sum() + 0.25)
+    return Look(mean, poses, expected, groups, shows, scatter, row, pick, gain + miss, float(surprise))
+
+
+def _sides(expected: Expected, book: Book) -> Integers:
+    """(R,) which returns run over the panel."""
+    panel = book.panel
+    return np.where(expected.forms[:, 0] == panel, PANEL, OTHER) if panel >= 0 else np.full(len(expected.seen), UNTOLD)
+
+
+def _associate(
+    expected: Expected, groups: Clusters, shows: Floats, scatter: Floats, covariance: Floats, glance: Glance,
+    sides: Integers | None, strangers: Floats,
+) -> tuple[Integers, Integers, float]:  # fmt: skip
+    """Rows of the clusters that were seen, the components that they were seen as, and the log likelihood that is gained
+    over strangers: the best assignment."""
+    if not len(groups.leader) or not len(glance.seen):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), 0.0
+    lead, mate = groups.leader, groups.partner
+    share = groups.share[:, None]
+    gap = np.where(mate[:, None] >= 0, expected.seen[mate] - expected.seen[lead], 0.0)
+    seen = expected.seen[lead] + share * gap
+    jacobian = expected.jacobian[lead] + share[..., None] * (expected.jacobian[mate] - expected.jacobian[lead])
+    spread = (jacobian.reshape(-1, jacobian.shape[-1]) @ covariance).reshape(jacobian.shape)
+    spread = spread @ np.swapaxes(jacobian, 1, 2)
+    extra = groups.disturbance + groups.share_variance[:, None] * gap**2
+    extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(glance.std, axis=0) ** 2
+    spread[:, [0, 1, 2], [0, 1, 2]] += extra
+    odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))
+    side = np.full(len(lead), UNTOLD) if sides is None else sides[lead]
+    candidates = Candidates(seen, spread, groups.log_amplitude, np.hypot(groups.log_amplitude_std, 0.15), odds, side)
+    cost = pair_costs(candidates, glance, LEVELS.gate, strangers)
+    rows, columns = linear_sum_assignment(cost)
+    good = cost[rows, columns] < 0.0
+    # the cost counts what is missed: seen against missed, both against strangers
+    gain = -0.5 * float(cost[rows[good], columns[good]].sum()) + float(np.log1p(-shows[rows[good]]).sum())
+    return rows[good], columns[good], gain

@@ -1,0 +1,73 @@
+"""Motion that is learnt: how lively each step was, by a Markov chain over a ladder of accelerations.
+
+Each step's acceleration has a standard deviation from `LADDER`; the level stays with a probability and else jumps
+anywhere. What the measurements tell of a step's acceleration without its own prior (the cavity of expectation
+propagation, Minka 2001) gives each level a likelihood; forward-backward gives its posterior, and the expected precision
+is the step's prior in the next solution.
+"""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+
+LADDER = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0])
+"""Standard deviations [m/s^2] of a step's acceleration: from a rail car to a person who turns on the spot."""
+
+
+def first_gait(sigma_a: float) -> Floats:
+    """The level nearest to the acceleration told is the likeliest, one three times as far off a third as likely."""
+    nearest = int(np.argmin(np.abs(np.log(LADDER / max(sigma_a, LADDER[0])))))
+    weight = 3.0 ** -np.abs(np.arange(len(LADDER)) - nearest).astype(np.float64)
+    return np.asarray(weight / weight.sum())
+
+
+def transition(stay: float) -> Floats:
+    """(L, L): a step is as lively as the one before, or else more often a little different than much."""
+    count = len(LADDER)
+    gap = np.abs(np.arange(count)[:, None] - np.arange(count))
+    jump = np.where(gap > 0, 3.0**-gap, 0.0)
+    return stay * np.eye(count) + (1.0 - stay) * jump / jump.sum(axis=1, keepdims=True)
+
+
+def log_likelihood(accel: Floats, spread: Floats, precision: Floats) -> Floats:
+    """Log likelihood (K, L) of each level from posterior means (K, A), covariances (K, A, A) and prior precisions."""
+    axes = accel.shape[1]
+    inside = np.linalg.inv(spread)
+    cavity = inside - precision[:, None, None] * np.eye(axes)
+    pull = (inside @ accel[..., None])[..., 0]
+    # N(m; 0, C + s^2 I) through information: C^-1 = cavity may be singular
+    value, vector = np.linalg.eigh(0.5 * (cavity + np.swapaxes(cavity, 1, 2)))
+    value = np.maximum(value, 0.0)
+    along = (np.swapaxes(vector, 1, 2) @ pull[..., None])[..., 0]
+    variance = LADDER**2
+    total = 1.0 + value[:, None] * variance[:, None]
+    gain = (along**2)[:, None] * variance[:, None] / total
+    return np.asarray(0.5 * (gain - np.log(total)).sum(axis=-1))
+
+
+def smooth(before: Floats, log_like: Floats, stay: float) -> tuple[Floats, Floats]:
+    """Posterior probabilities (K, L) of the levels, and those filtered forward (K, L)."""
+    move = transition(stay)
+    like = np.exp(log_like - log_like.max(axis=1, keepdims=True))
+    count = len(like)
+    forward, back = np.empty(like.shape), np.ones(like.shape)
+    message = before
+    for row in range(count):
+        message = (message @ move) * like[row]
+        message = message / message.sum()
+        forward[row] = message
+    for row in range(count - 2, -1, -1):
+        message = move @ (like[row + 1] * back[row + 1])
+        back[row] = message / message.sum()
+    posterior = forward * back
+    return posterior / posterior.sum(axis=1, keepdims=True), forward
+
+
+def expected_precision(posterior: Floats) -> Floats:
+    """(...,) [s^4/m^2]."""
+    return np.asarray(posterior @ LADDER**-2.0)
+
+
+def expected_variance(posterior: Floats) -> Floats:
+    """(...,) [m^2/s^4]."""
+    return np.asarray(posterior @ LADDER**2)

@@ -1,0 +1,124 @@
+"""Taking back: features that the evidence has turned against leave, and their measurements are tracks again."""
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.slam.returns import NONE, TX
+from rislam_rt.slam.window import gauss
+from rislam_rt.slam.window.book import Book, strike
+from rislam_rt.slam.window.context import Context, resolve
+from rislam_rt.slam.window.expect import Expected
+from rislam_rt.slam.window.forms import UNKNOWN
+from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.log import Log, Residuals
+from rislam_rt.slam.window.tracks import Tracks
+
+RECENT = 5
+"""Cycles within which a form must have been seen for its measurements to go on as a track."""
+FEWEST = 15
+"""Measurements of a feature within the window from which on their residuals speak against it."""
+
+
+def release(context: Context, keep: Booleans) -> Context:
+    """The map without some features; what they explained is unexplained, and goes on as tracks."""
+    if keep.all():
+        return context
+    book, log = context.book, context.log
+    lost: Booleans = np.asarray(np.isin(log.form, book.ident[~keep]).any(axis=(1, 2)))
+    tracks, log = _resume(context.tracks, log, lost, context.cycle)
+    form = log.form.copy()
+    form[lost] = UNKNOWN
+    log = log._replace(form=form)
+    window, book = gauss.drop_features(context.window, keep), strike(book, keep)
+    context = context._replace(window=window, book=book, log=log, tracks=tracks)
+    return context._replace(window=resolve(context, 2)[0])
+
+
+def _resume(tracks: Tracks, log: Log, lost: Booleans, cycle: int) -> tuple[Tracks, Log]:
+    """One track for each form among the lost rows that was seen lately."""
+    forms, which = np.unique(log.form[:, 0], axis=0, return_inverse=True)
+    track = log.track.copy()
+    fresh: list[tuple[object, ...]] = []
+    ident = tracks.next_ident
+    for number in np.unique(which[lost]):
+        rows = (lost & (which == number)).nonzero()[0]
+        if len(rows) < 4 or log.cycle[rows[-1]] < cycle - RECENT or forms[number][0] == UNKNOWN:
+            continue
+        late = rows[-8:]
+        time = 0.1 * (log.cycle[late] - log.cycle[late[-1]])
+        design = np.stack([np.ones(len(late)), time], axis=1)
+        best, *_ = np.linalg.lstsq(design, log.seen[late], rcond=None)
+        spread = np.zeros((3, 2, 2))
+        spread[:, 0, 0], spread[:, 1, 1] = 4.0 * log.std[late[-1]] ** 2, (0.1 * np.array([1.0, 0.3, 0.3])) ** 2
+        track[rows] = ident
+        fresh.append((
+            ident, best.T, spread, log.log_amplitude[late[-1]], log.side[late[-1]], log.cycle[rows[0]],
+            log.cycle[late[-1]], len(rows), 0,
+        ))  # fmt: skip
+        ident += 1
+    if not fresh:
+        return tracks, log._replace(track=track)
+    columns = [np.array([entry[place] for entry in fresh]) for place in range(len(fresh[0]))]
+    joined = (np.concatenate(pair) for pair in zip(tracks[:-1], columns, strict=True))
+    return Tracks._make([*joined, ident]), log._replace(track=track)
+
+
+def condemned(book: Book, left: Residuals, log: Log, expected: Expected, covariance: Floats) -> Booleans:
+    """(F,) features to take back: that do not exist, that their measurements contradict, or that follow from others."""
+    gone = book.log_odds < np.log(LEVELS.dead / (1.0 - LEVELS.dead))
+    square = np.vecdot(left.left, left.left)
+    form = log.form[left.row, 0]
+    for row, ident in enumerate(book.ident):
+        own = form[:, 0] == ident if not book.is_wall[row] else (form[:, 1:] == ident).any(axis=1)
+        alone = own & ((form[:, 1:] != NONE).sum(axis=1) <= int(book.is_wall[row]))
+        if alone.sum() >= FEWEST and np.median(square[alone]) > LEVELS.against:
+            gone[row] = True
+    return np.asarray(gone | derived(book, expected, covariance))
+
+
+def derived(book: Book, expected: Expected, covariance: Floats) -> Booleans:
+    """(F,) young features whose own return is one that others throw as well, without anything free in it."""
+    found = np.zeros(len(book.ident), dtype=np.bool_)
+    forms = expected.forms
+    for row in (book.hits < 3 * LEVELS.window).nonzero()[0]:
+        own = [row, NONE, NONE, NONE, NONE] if not book.is_wall[row] else [TX, NONE, NONE, row, NONE]
+        place = (forms == own).all(axis=1).nonzero()[0]
+        if not len(place):
+            continue
+        others = ~(forms == row).any(axis=1)
+        # of two that may stand for each other the younger goes
+        elder = np.where(forms >= 0, forms, -1).max(axis=1) < row
+        rivals = (others & elder).nonzero()[0]
+        gap = expected.seen[rivals] - expected.seen[place[0]]
+        near = (np.abs(gap) < [0.15, 0.1, 0.1]).all(axis=1)
+        near &= np.abs(expected.log_amplitude[rivals] - expected.log_amplitude[place[0]]) < 1.5
+        for rival, off in zip(rivals[near], gap[near], strict=True):
+            slope = expected.jacobian[rival] - expected.jacobian[place[0]]
+            spread = slope @ covariance @ slope.T + np.diag([0.005, 0.005, 0.005]) ** 2
+            if off @ np.linalg.solve(spread, off) < 9.0:
+                found[row] = True
+    return found
+
+
+def behind(context: Context, wall: int) -> Booleans:
+    """(F,) features that the newest wall stands before: what was held for them may be its doing."""
+    book, features = context.book, context.window.features
+    middle = gauss.now(context.window)[0][:3]
+    anchor = book.anchor[wall]
+    span = features[wall] - anchor
+    normal = span / np.linalg.norm(span)
+    depth = (0.5 * (features[wall] + anchor) - middle) @ normal
+    sign = 1.0 if depth > 0 else -1.0
+    found = np.zeros(len(book.ident), dtype=np.bool_)
+    for row in range(len(book.ident)):
+        if row == wall:
+            continue
+        foot = features[row]
+        if book.is_wall[row]:
+            out = features[row] - book.anchor[row]
+            out = out / np.linalg.norm(out)
+            foot = middle + ((0.5 * (features[row] + book.anchor[row]) - middle) @ out) * out
+        at = slice(7 + 3 * row, 10 + 3 * row)
+        slack = 0.15 + 2.0 * float(np.sqrt(np.trace(context.window.covariance[at, at])))
+        found[row] = sign * ((foot - middle) @ normal) > abs(depth) + slack
+    return found

@@ -1,0 +1,118 @@
+"""Tracks: components that no form explains, followed from cycle to cycle until they are understood."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.associate import Candidates, pair_costs
+from rislam_rt.slam.tracks import Glance
+from rislam_rt.slam.window.levels import LEVELS
+
+WANDER = 1.0
+"""Spread of an unexplained path's log amplitude from cycle to cycle: a panel's code may change."""
+
+
+class Tracks(NamedTuple):
+    """T tracks, each a Kalman filter of constant rate in length and either cosine of the room's axes."""
+
+    ident: Integers
+    """(T,)."""
+    mean: Floats
+    """(T, 3, 2) value and rate."""
+    covariance: Floats
+    """(T, 3, 2, 2)."""
+    log_amplitude: Floats
+    """(T,) of the last measurement."""
+    side: Integers
+    """(T,)."""
+    born: Integers
+    """(T,) cycle of the first measurement."""
+    last: Integers
+    """(T,) cycle of the last one."""
+    hits: Integers
+    """(T,)."""
+    looked: Integers
+    """(T,) hits at the last examination."""
+    next_ident: int
+
+    def keep(self, rows: Booleans) -> "Tracks":
+        """Only some of the tracks."""
+        return Tracks._make([*(field[rows] for field in self[:-1]), self.next_ident])
+
+
+def no_tracks() -> Tracks:
+    """Nothing seen yet."""
+    none = np.zeros(0, dtype=np.int64)
+    return Tracks(none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none, 0)
+
+
+def advance(tracks: Tracks, dt: float, turn: float, bend: Floats) -> Tracks:
+    """Predict over `dt` [s] while the body turns by `turn` [rad]; `bend` (3,) is the drift of the rates a second."""
+    move = np.array([[1.0, dt], [0.0, 1.0]])
+    noise = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]]) * (bend**2)[:, None, None]
+    mean = tracks.mean @ move.T
+    cos, sin = np.cos(turn), np.sin(turn)
+    mean[:, 1], mean[:, 2] = cos * mean[:, 1] + sin * mean[:, 2], cos * mean[:, 2] - sin * mean[:, 1]
+    return tracks._replace(mean=mean, covariance=move @ tracks.covariance @ move.T + noise)
+
+
+def match(tracks: Tracks, glance: Glance, free: Integers, cycle: int) -> tuple[Integers, Integers]:
+    """Rows of tracks and the free components that continue them."""
+    count = len(tracks.ident)
+    if not count or not len(free):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    spread = np.zeros((count, 3, 3))
+    spread[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
+    share = (tracks.hits + 1.0) / (cycle - tracks.born + 2.0)
+    odds = np.log(share / (1.02 - share))
+    candidates = Candidates(
+        tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
+    )
+    cost = pair_costs(candidates, glance.take(free), LEVELS.gate, LEVELS.clutter)
+    rows, columns = linear_sum_assignment(cost)
+    good = cost[rows, columns] < 0.0
+    return rows[good], free[columns[good]]
+
+
+def extend(tracks: Tracks, rows: Integers, glance: Glance, picks: Integers, cycle: int) -> Tracks:
+    """Tracks `rows` (A,) updated by components `picks` (A,)."""
+    mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
+    prior, spread = mean[rows], covariance[rows]
+    gain = spread[..., 0] / (spread[..., 0, 0] + glance.std[picks] ** 2)[..., None]
+    mean[rows] = prior + gain * (glance.seen[picks] - prior[..., 0])[..., None]
+    covariance[rows] = spread - gain[..., :, None] * spread[..., None, 0, :]
+    level, last, hits = tracks.log_amplitude.copy(), tracks.last.copy(), tracks.hits.copy()
+    level[rows], last[rows] = glance.log_amplitude[picks], cycle
+    hits[rows] += 1
+    return tracks._replace(mean=mean, covariance=covariance, log_amplitude=level, last=last, hits=hits)
+
+
+def start(tracks: Tracks, glance: Glance, picks: Integers, rate: Floats, cycle: int) -> tuple[Tracks, Integers]:
+    """One new track for each of the components `picks` (A,), and their idents; `rate` (A, 3) is the rates' spread."""
+    count = len(picks)
+    ident = tracks.next_ident + np.arange(count)
+    covariance = np.zeros((count, 3, 2, 2))
+    covariance[..., 0, 0], covariance[..., 1, 1] = glance.std[picks] ** 2, rate**2
+    fresh = (
+        ident, np.stack([glance.seen[picks], np.zeros((count, 3))], axis=-1), covariance, glance.log_amplitude[picks],
+        glance.sides[picks], np.full(count, cycle), np.full(count, cycle), np.ones(count, dtype=np.int64),
+        np.zeros(count, dtype=np.int64),
+    )  # fmt: skip
+    joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))
+    return Tracks._make([*joined, tracks.next_ident + count]), ident
+
+
+def alive(tracks: Tracks, cycle: int) -> Booleans:
+    """(T,) not silent for longer than their past lets expect: 4 cycles, more for what comes and goes."""
+    share = (tracks.hits + 1.0) / (tracks.last - tracks.born + 3.0)
+    patience = np.where(tracks.hits >= 4, np.log(0.01) / np.log(np.clip(1.0 - share, 1e-6, 0.999)), 3.0)
+    return np.asarray(cycle - tracks.last <= np.clip(patience, 3.0, LEVELS.window))
+
+
+def due(tracks: Tracks, cycle: int) -> Integers:
+    """Tracks to examine: after 6 measurements, and whenever their number has grown by a half since."""
+    grown = tracks.hits >= np.maximum(6, np.minimum(3 * tracks.looked // 2, tracks.looked + LEVELS.window // 2))
+    rows = (grown & (cycle - tracks.last <= 1)).nonzero()[0]
+    return rows[np.argsort(tracks.mean[rows, 0, 0])]

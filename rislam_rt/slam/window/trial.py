@@ -1,0 +1,207 @@
+"""One Gauss-Newton fit for all hypotheses of all tracks at once, with its marginal likelihood.
+
+Known walls are affine maps here. What is sought is a wall `w` (as image of the agent's place), with the Tx's image
+`m = S_out R_w(S_in x + t_in) + t_out`, or a point `p`, seen by the Rx at `S_r p + t_r` and by the Tx at `S_t p + t_t`.
+What two unknown walls throw together is `m = S_in x + d`, the shift `d` being sought: opposite walls turn nothing, at
+right angles they turn by half a turn about their edge.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.returns import AXES
+from rislam_rt.slam.window.digest import Digest
+from rislam_rt.slam.window.levels import LEVELS
+
+STEPS = 4
+"""Gauss-Newton steps: the first guesses are within the linear range of the truth."""
+HOPELESS = 60.0
+"""Log likelihood behind the best hypothesis of a track from which on one is not followed."""
+RIDGE = 1e-3
+"""Information [1/m^2] that keeps blind directions finite: (30 m)^-2."""
+
+
+class Trials(NamedTuple):
+    """H hypotheses."""
+
+    track: Integers
+    """(H,) row of the digest."""
+    is_wall: Booleans
+    """(H,)."""
+    is_pair: Booleans
+    """(H,) two unknown walls."""
+    start: Floats
+    """(H, 3) first guess of what is sought."""
+    turn: Floats
+    """(H, 2, 3, 3) for a wall: S_in, S_out; for a point: S_t, S_r."""
+    shift: Floats
+    """(H, 2, 3) likewise."""
+    doubt: Floats
+    """(H, 2, 3, 3) square roots of the covariance with which the two maps move what they map (at about the start)."""
+
+
+class Fits(NamedTuple):
+    """H fitted hypotheses."""
+
+    place: Floats
+    """(H, 3)."""
+    covariance: Floats
+    """(H, 3, 3) with all else uncertain."""
+    held: Floats
+    """(H, 3, 3) with the poses held: what keeps the map from being linear in it."""
+    cost: Floats
+    """(H,) twice the negative log likelihood under Student's t, without its constants."""
+    log_evidence: Floats
+    """(H,) of a density 1 over the place, without the constants that hypotheses of a track share."""
+
+
+def try_all(trials: Trials, digest: Digest) -> Fits:
+    """Fit everything; hypotheses that fall hopelessly behind after one step keep what they had then."""
+    count = len(trials.track)
+    state = _State(trials.start.copy(), np.zeros((count, COMMON)), np.zeros((0,)))
+    active = np.arange(count)
+    cost, log_det = np.full(count, np.inf), np.zeros(count)
+    covariance, held = np.tile(AXES, (count, 1, 1)), np.tile(AXES, (count, 1, 1))
+    trust = np.ones((count, digest.seen.shape[1]))
+    place, error = state.place, state.error
+    for turn in range(STEPS + 1):
+        now = _equations(trials, digest, active, place[active], error[active], trust[active])
+        cost[active] = now.cost
+        if turn >= 2 or turn == STEPS:
+            inverse = np.linalg.inv(now.normal)
+            covariance[active] = inverse[:, COMMON:, COMMON:]
+            held[active] = np.linalg.inv(now.normal[:, COMMON:, COMMON:])
+            log_det[active] = np.linalg.slogdet(now.normal)[1]
+        if turn == STEPS:
+            break
+        trust[active] = now.trust
+        step = np.linalg.solve(now.normal, now.slope[..., None])[..., 0]
+        length = np.sqrt(np.vecdot(step[:, COMMON:], step[:, COMMON:]))[:, None]
+        short = np.minimum(1.0, 1.5 / np.maximum(length, 1e-12))
+        place[active] += short * step[:, COMMON:]
+        error[active] += short * step[:, :COMMON]
+        if turn == 1:
+            best = np.full(len(digest.seen), np.inf)
+            np.minimum.at(best, trials.track, cost)
+            active = (cost < best[trials.track] + 2.0 * HOPELESS).nonzero()[0]
+            lost = np.ones(count, dtype=np.bool_)
+            lost[active] = False
+            cost[lost] = np.inf
+    evidence = -0.5 * cost - 0.5 * log_det + 1.5 * np.log(2.0 * np.pi)
+    return Fits(place, covariance, held, cost, evidence)
+
+
+COMMON = 12
+"""Unknowns beside the place: errors of pose and velocity, and of the two maps."""
+
+
+class _State(NamedTuple):
+    place: Floats
+    error: Floats
+    unused: Floats
+
+
+class _Equations(NamedTuple):
+    normal: Floats
+    slope: Floats
+    cost: Floats
+    trust: Floats
+
+
+def _equations(
+    trials: Trials, digest: Digest, rows: Integers, place: Floats, error: Floats, trust: Floats
+) -> _Equations:
+    """Normal equations (H, 15, 15) of the rows, and their cost."""
+    track, wall, pair = trials.track[rows], trials.is_wall[rows], trials.is_pair[rows]
+    moving = wall | pair
+    tx, rx, heading = digest.tx[track], digest.rx[track], digest.heading[track]
+    turn, shift, doubt = trials.turn[rows], trials.shift[rows], trials.doubt[rows]
+    first, second = turn[:, 0], turn[:, 1]
+    # a point: fixed images; a wall: the image of the Tx, which moves
+    span = place - digest.middle
+    scaled = span / np.maximum(np.vecdot(span, span), 1e-9)[:, None]
+    inner = tx @ np.swapaxes(first, 1, 2) + shift[:, None, 0]
+    depth = np.vecdot(scaled[:, None], inner - 0.5 * (place + digest.middle)[:, None])
+    mirrored = inner - 2.0 * depth[..., None] * span[:, None]
+    base = np.where(wall[:, None, None], mirrored, place[:, None] + np.where(pair[:, None, None], inner, 0.0))
+    image = base @ np.swapaxes(second, 1, 2) + shift[:, None, 1]
+    by_wall = -2.0 * (
+        depth[..., None, None] * AXES + scaled[:, None, :, None] * (mirrored - place[:, None])[..., None, :]
+    )
+    by_place = second[:, None] @ np.where(wall[:, None, None, None], by_wall, AXES)
+    flip = AXES - 2.0 * span[:, :, None] * scaled[:, None, :]
+    by_tx = np.where(wall[:, None, None], second @ flip @ first, np.where(pair[:, None, None], first, 0.0))
+    to_rx = image - rx
+    reach = np.maximum(np.sqrt(np.vecdot(to_rx, to_rx)), 1e-6)
+    arrival = to_rx / reach[..., None]
+    cos, sin = np.cos(heading), np.sin(heading)
+    body = np.zeros((*heading.shape, 2, 3))
+    body[..., 0, 0], body[..., 0, 1], body[..., 1, 0], body[..., 1, 1] = cos, sin, -sin, cos
+    cosines = (body @ arrival[..., None])[..., 0]
+    by_image = np.empty((*heading.shape, 3, 3))
+    by_image[..., 0, :] = arrival
+    by_image[..., 1:, :] = (body - cosines[..., None] * arrival[..., None, :]) / reach[..., None, None]
+    # the point's leg to the Tx
+    far = place[:, None, :] @ np.swapaxes(first, 1, 2) + shift[:, None, 0]
+    to_tx = np.where(moving[:, None, None], 0.0, far - tx)
+    leg = np.sqrt(np.vecdot(to_tx, to_tx))
+    toward = to_tx / np.maximum(leg, 1e-6)[..., None]
+    seen = np.concatenate([(reach + leg)[..., None], cosines], axis=-1)
+    new = by_image @ by_place
+    new[..., 0, :] += toward @ first
+    pose = by_image @ (by_tx[:, None] - AXES)
+    pose[..., 0, :] -= toward
+    maps_out = by_image @ doubt[:, None, 1]
+    inside = np.where(wall[:, None, None], (second @ flip) @ doubt[:, 0], 0.0)
+    maps_in = by_image @ inside[:, None]
+    maps_in[..., 0, :] += (toward[..., None, :] @ doubt[:, None, 0])[..., 0, :]
+    wide = np.concatenate([pose @ digest.doubt[track], maps_in, maps_out, new], axis=-1)
+    weight = digest.weight[track]
+    wide *= weight[..., None]
+    left = (digest.seen[track] - seen) * weight - (wide[..., :COMMON] @ error[:, None, :, None])[..., 0]
+    squared = np.vecdot(left, left)
+    heavy = wide * trust[..., None, None]
+    size = wide.shape[-1]
+    flat, thick = wide.reshape(len(rows), -1, size), heavy.reshape(len(rows), -1, size)
+    normal = np.swapaxes(thick, 1, 2) @ flat
+    slope = (np.swapaxes(thick, 1, 2) @ left.reshape(len(rows), -1, 1))[..., 0]
+    common, own = np.arange(COMMON), np.arange(COMMON, size)
+    normal[:, common, common] += 1.0
+    normal[:, own, own] += RIDGE
+    slope[:, :COMMON] -= error
+    tail = LEVELS.tail
+    cost = (tail + 3.0) * np.log1p(squared / tail).sum(axis=1) + np.vecdot(error, error)
+    return _Equations(normal, slope, cost, (tail + 3.0) / (tail + squared))
+
+
+def smooth_paths(digest: Digest) -> tuple[Floats, Floats]:
+    """Log evidence (T,) and cost (T,) of paths of no kind: length and cosines that change smoothly.
+
+    Their first two derivatives are beforehand what the agent's own speed makes of things at rest or mirrored; the place
+    counts with a density 1 over length and cosines.
+    """
+    count = len(digest.seen)
+    reach = np.maximum(digest.mean[0][:, 0], 0.3)
+    speed = np.sqrt(2.0) * digest.speed
+    rate = speed * np.stack([np.ones(count), 1.0 / reach, 1.0 / reach], axis=1)
+    bend = speed**2 * np.stack([1.0 / reach, reach**-2.0, reach**-2.0], axis=1) + 0.1 * rate
+    time = digest.time - digest.time.mean(axis=1, keepdims=True)
+    rows = np.stack([np.ones(time.shape), time, 0.5 * time**2], axis=-1)[:, None]
+    tail = LEVELS.tail
+    trust = np.ones(time.shape)
+    value, weight = np.swapaxes(digest.seen, 1, 2), np.swapaxes(digest.weight, 1, 2)
+    spread = np.stack([rate, bend], axis=-1)
+    for _ in range(3):
+        heavy = rows * (weight**2 * trust[:, None])[..., None]
+        normal = np.swapaxes(heavy, 2, 3) @ rows
+        normal[..., 0, 0] += 1e-9
+        normal[..., [1, 2], [1, 2]] += spread**-2.0
+        best = np.linalg.solve(normal, np.swapaxes(heavy, 2, 3) @ value[..., None])[..., 0]
+        left = (value - (rows @ best[..., None])[..., 0]) * weight
+        squared = np.sum(left**2, axis=1)
+        trust = (tail + 3.0) / (tail + squared)
+    cost = (tail + 3.0) * np.log1p(squared / tail).sum(axis=1) + ((best[..., 1:] / spread) ** 2).sum(axis=(1, 2))
+    log_det = np.linalg.slogdet(normal)[1].sum(axis=1) + 2.0 * np.log(spread).sum(axis=(1, 2))
+    return -0.5 * cost - 0.5 * log_det + 1.5 * np.log(2.0 * np.pi), cost

@@ -1,0 +1,158 @@
+"""Hypotheses of a track: derivatives, and the marginal likelihood against brute-force quadrature."""
+
+import numpy as np
+
+from rislam_rt.model import Body
+from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.returns import AXES, NONE, TX, linearise, reflect
+from rislam_rt.slam.window import trial
+from rislam_rt.slam.window.digest import Digest, scatter_of
+from rislam_rt.slam.window.forms import compile_forms
+from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.trial import COMMON, Trials, smooth_paths, try_all
+
+
+def _digest(count, *, std=0.01, rng):
+    """A track seen from a way through a room; what is seen is filled in by the tests."""
+    time = np.linspace(-3.0, 0.0, count)
+    place = np.stack([0.3 * time, 0.2 * time + 0.05 * time**2, np.full(count, 1.0)], axis=1)
+    heading = 0.3 + 0.1 * time
+    ends = poses_of(place, heading, Body())
+    doubt = 1e-3 * rng.standard_normal((3, 6))
+    wide = doubt + time[:, None, None] * 1e-3 * rng.standard_normal((3, 6))
+    weight = np.full((1, count, 3), 1.0 / std)
+    return Digest(
+        np.zeros((1, count, 3)), weight, time[None], ends.tx[None], ends.rx[None], heading[None], wide[None],
+        np.zeros(1), np.ones((1, 3)), place[-1], 0.4,
+    )  # fmt: skip
+
+
+def _wall(middle):
+    normal = np.array([0.9, 0.3, 0.1]) / np.linalg.norm([0.9, 0.3, 0.1])
+    return middle + 2.0 * 2.5 * normal
+
+
+def _mirror(middle, wall):
+    span = wall - middle
+    turn = AXES - 2.0 * np.outer(span, span) / (span @ span)
+    return turn, reflect(np.zeros(3), wall, middle)
+
+
+def _trials(kind, digest, rng):
+    """One hypothesis of a kind: `wall`, `point`, `pair`."""
+    turn, shift = np.tile(AXES, (1, 2, 1, 1)), np.zeros((1, 2, 3))
+    known = _mirror(digest.middle, digest.middle + np.array([-3.0, 1.0, 0.5]))
+    if kind == "wall":
+        turn[0, 1], shift[0, 1] = known
+        start = _wall(digest.middle)
+    elif kind == "point":
+        turn[0, 0], shift[0, 0] = known
+        start = np.array([1.5, -1.0, 2.0])
+    else:
+        turn[0, 0] = np.diag([-1.0, -1.0, 1.0])
+        start = np.array([3.0, 2.0, 1.0])
+    doubt = 1e-3 * rng.standard_normal((1, 2, 3, 3))
+    if kind == "pair":
+        doubt[:] = 0.0
+    flags = np.array([kind == "wall"]), np.array([kind == "pair"])
+    return Trials(np.zeros(1, dtype=np.int64), *flags, start[None], turn, shift, doubt)
+
+
+def _left(trials, digest, place, error):
+    """Residuals of one hypothesis, through its cost's own slope: computed at `place` and `error`."""
+    rows = np.zeros(1, dtype=np.int64)
+    count = digest.seen.shape[1]
+    return trial._equations(trials, digest, rows, place[None], error[None], np.ones((1, count)))
+
+
+def test_slopes_are_those_of_the_cost():
+    rng = np.random.default_rng(1)
+    for kind in ("wall", "point", "pair"):
+        # measurements far off in metres and next to nothing in deviations: a slope, and tails that do not count
+        digest = _digest(6, rng=rng)._replace(weight=np.full((1, 6, 3), 1e-3))
+        trials = _trials(kind, digest, rng)
+        step, numeric, error = 1e-4, np.zeros(COMMON + 3), np.zeros(COMMON)
+        for axis in range(COMMON + 3):
+            change = step * np.eye(COMMON + 3)[axis]
+            high, low = (
+                _left(trials, digest, trials.start[0] + sign * change[COMMON:], sign * change[:COMMON]).cost[0]
+                for sign in (1.0, -1.0)
+            )
+            numeric[axis] = (high - low) / (2.0 * step)
+        found = _left(trials, digest, trials.start[0], error).slope[0]
+        # the cost is (4 + 3) log(1 + r^2 / 4): 7/4 of r^2 where residuals are small, and counts twice; ridge 1e-3 apart
+        np.testing.assert_allclose(found[COMMON:], -0.5 * numeric[COMMON:] * 4.0 / 7.0, rtol=1e-3, atol=1e-8)
+        np.testing.assert_allclose(found[:COMMON], -0.5 * numeric[:COMMON] * 4.0 / 7.0, rtol=1e-3, atol=1e-8)
+
+
+def test_the_kernel_sees_what_the_measurement_library_sees():
+    """Two ways to one prediction: affine maps here, legs over features there."""
+    rng = np.random.default_rng(2)
+    digest = _digest(5, rng=rng)
+    middle = digest.middle
+    poses = poses_of(0.5 * (digest.tx[0] + digest.rx[0]), digest.heading[0], Body())
+    known, new = middle + np.array([-3.0, 1.0, 0.5]), _wall(middle)
+    anchors = np.stack([middle, middle, middle])
+    for kind, form, start in (
+        ("wall", (TX, NONE, NONE, 1, 0), new),
+        ("point", (1, 0, NONE, NONE, NONE), np.array([1.5, -1.0, 2.0])),
+    ):
+        trials = _trials(kind, digest, rng)
+        features = np.stack([known, start, start + 1.0])
+        wanted = linearise(compile_forms(np.array([form])), features, anchors, poses).seen[:, 0]
+        found = digest._replace(seen=wanted[None], weight=np.ones(digest.weight.shape))
+        # at the very place the cost is that of residuals of zero
+        assert _left(trials, found, start, np.zeros(COMMON)).cost[0] < 1e-20
+
+
+def test_evidence_is_the_integral_of_the_likelihood():
+    rng = np.random.default_rng(7)
+    digest = _digest(8, std=0.02, rng=rng)
+    trials = _trials("point", digest, rng)
+    trials = trials._replace(turn=np.tile(AXES, (1, 2, 1, 1)), shift=np.zeros((1, 2, 3)), doubt=np.zeros((1, 2, 3, 3)))
+    digest = digest._replace(doubt=np.zeros(digest.doubt.shape))
+    truth = trials.start[0]
+    poses = poses_of(0.5 * (digest.tx[0] + digest.rx[0]), digest.heading[0], Body())
+    form = np.array([(0, NONE, NONE, NONE, NONE)])
+    exact = linearise(compile_forms(form), truth[None], np.zeros((1, 3)), poses).seen[:, 0]
+    digest = digest._replace(seen=(exact + 0.01 * rng.standard_normal(exact.shape))[None])
+    fits = try_all(trials._replace(start=truth[None] + 0.05), digest)
+    # quadrature over a cube of 6 deviations about the fit, in its own axes
+    value, vector = np.linalg.eigh(fits.held[0])
+    nodes = np.linspace(-6.0, 6.0, 41)
+    grid = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 3)
+    places = fits.place[0] + (grid * np.sqrt(value)) @ vector.T
+    every = Trials(
+        np.zeros(len(places), dtype=np.int64), np.zeros(len(places), dtype=bool), np.zeros(len(places), dtype=bool),
+        places, *(np.repeat(field, len(places), axis=0) for field in (trials.turn, trials.shift, trials.doubt)),
+    )  # fmt: skip
+    rows = np.arange(len(places))
+    cost = trial._equations(
+        every, digest, rows, places, np.zeros((len(places), COMMON)), np.ones((len(places), 8))
+    ).cost  # fmt: skip
+    cell = np.prod(np.sqrt(value)) * (nodes[1] - nodes[0]) ** 3
+    integral = np.logaddexp.reduce(-0.5 * cost) + np.log(cell)
+    # Student's tails are not a Gaussian: 8 points of 3 numbers leave a fifth of a unit, of some 14
+    assert abs(fits.log_evidence[0] - integral) < 0.25
+
+
+def test_a_smooth_path_fits_what_moves_smoothly():
+    rng = np.random.default_rng(8)
+    digest = _digest(8, std=0.01, rng=rng)
+    time = digest.time[0]
+    seen = np.stack([5.0 + 0.3 * time, 0.2 - 0.05 * time, 0.1 + 0.02 * time], axis=1)
+    _, smooth = smooth_paths(digest._replace(seen=seen[None]))
+    broken = seen.copy()
+    broken[4:, 0] += 0.5
+    _, rough = smooth_paths(digest._replace(seen=broken[None]))
+    assert smooth[0] < 5.0 < rough[0]
+
+
+def test_scatter_is_that_of_the_noise():
+    rng = np.random.default_rng(9)
+    time, std = 0.1 * np.arange(200), np.full((200, 3), 0.01)
+    for factor in (1.0, 5.0):
+        seen = 3.0 + 0.2 * time[:, None] + 0.003 * time[:, None] ** 2 + factor * 0.01 * rng.standard_normal((200, 3))
+        # of 200 measurements the deviation is known to 5 %; Student's weights take a little off
+        np.testing.assert_allclose(scatter_of(seen, std, time), max(factor, 1.0), rtol=0.2)
+    assert LEVELS.crowd > 1.0

@@ -1,0 +1,132 @@
+"""The window's Gaussian against a batch least squares of another making; what slides out is not lost."""
+
+import numpy as np
+import pytest
+
+from rislam_rt.slam.window import gauss, motion
+from rislam_rt.slam.window.gauss import HEAD, POSE, Holds, Quadratic
+
+DT, CYCLES, SIGMA_A = 0.1, 12, 0.5
+
+
+def _sighting(rng):
+    """A linear measurement of pose (4) and one feature (3): rows, value, and the weight of each row."""
+    rows = rng.standard_normal((3, POSE + 3))
+    rows[:, 3] = 0.0
+    return rows, rng.standard_normal(3), rng.uniform(1.0, 100.0, 3)
+
+
+def _filtered(sightings, start, std, keep):
+    """The window's answer, at most `keep` poses long."""
+    window = gauss.begin(start[:3], start[3:6], np.arange(3), std)
+    nothing = Holds(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), *(np.zeros(0) for _ in range(4)))
+    window = gauss.add_feature(window, np.ones(3), nothing, ridge=1.0)
+    for cycle, (rows, value, weight) in enumerate(sightings):
+        if cycle:
+            while window.num_poses >= keep:
+                window = gauss.slide(window)
+            window = gauss.extend(window, DT, np.full(3, SIGMA_A**-2.0))
+        hessian, gradient, middle = (field.copy() for field in window.slots)
+        spot = np.concatenate([gauss.poses(window)[-1], window.features[0]])
+        hessian[-1] = rows.T @ (weight[:, None] * rows)
+        gradient[-1], middle[-1] = rows.T @ (weight * (rows @ spot - value)), spot
+        window = gauss.solve(window._replace(slots=Quadratic(hessian, gradient, middle)))
+    return gauss.now(window)
+
+
+def _batch(sightings, start, std):
+    """All cycles at once, in positions, velocities and the feature, from the motion's own recursion."""
+    free = np.flatnonzero(std > 0.0)
+    count = len(sightings)
+    # unknowns: start's free numbers (of position and velocity), accelerations, feature
+    size = len(free) + 3 * (count - 1) + 3
+    position, velocity = np.zeros((3, size)), np.zeros((3, size))
+    offset_p, offset_v = start[:3].copy(), start[3:6].copy()
+    for column, axis in enumerate(free):
+        (position if axis < 3 else velocity)[axis % 3, column] = 1.0
+    feature = np.zeros((3, size))
+    feature[:, -3:] = np.eye(3)
+    rows = [np.diag(np.concatenate([1.0 / std[free], np.full(3 * (count - 1), 1.0 / SIGMA_A), np.ones(3)]))]
+    values = [np.concatenate([np.zeros(size - 3), np.ones(3)])]
+    for cycle, (design, value, weight) in enumerate(sightings):
+        if cycle:
+            at = len(free) + 3 * (cycle - 1)
+            push = np.zeros((3, size))
+            push[:, at : at + 3] = np.eye(3)
+            position = position + DT * velocity + 0.5 * DT**2 * push
+            offset_p = offset_p + DT * offset_v
+            velocity = velocity + DT * push
+        root = np.sqrt(weight)[:, None]
+        rows.append(root * (design[:, :3] @ position + design[:, 4:] @ feature))
+        values.append(np.sqrt(weight) * (value - design[:, :3] @ offset_p))
+    matrix, right = np.concatenate(rows), np.concatenate(values)
+    solution = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    covariance = np.linalg.inv(matrix.T @ matrix)
+    wide = np.concatenate([position, velocity, feature])
+    return wide @ solution + np.concatenate([offset_p, offset_v, np.zeros(3)]), wide @ covariance @ wide.T
+
+
+@pytest.mark.parametrize("keep", [20, 4])
+def test_a_linear_window_is_the_batch_and_loses_nothing_when_it_slides(keep):
+    rng = np.random.default_rng(3)
+    start, std = rng.standard_normal(7), np.array([1.0, 0.5, 0.8, 0.3, 0.2, 0.4, 0.0])
+    start[6] = 0.0
+    sightings = [_sighting(rng) for _ in range(CYCLES)]
+    mean, covariance = _filtered(sightings, start, std, keep)
+    wanted, spread = _batch(sightings, start, std)
+    place = np.array([0, 1, 2, 3, 4, 5, HEAD, HEAD + 1, HEAD + 2])
+    # what is held (the compass) is held to 1e-6, which moves the rest by less than that
+    np.testing.assert_allclose(mean[place], wanted, atol=1e-6)
+    np.testing.assert_allclose(covariance[np.ix_(place, place)], spread, atol=1e-7)
+
+
+def test_a_belief_about_a_wall_gives_way_to_what_contradicts_it():
+    rng = np.random.default_rng(4)
+    window = gauss.begin(np.zeros(3), np.zeros(3), np.arange(3), np.full(7, 1e-3))
+    hold = Holds(
+        np.zeros(1, dtype=np.int64), np.array([[0.0, 0.0, 1.0]]), np.zeros(1), np.full(1, 0.05),
+        np.array([np.log(9.0) + np.log(5.0)]), np.full(1, 0.5),
+    )  # fmt: skip
+    for truth, right in ((0.02, True), (0.6, False)):
+        held = gauss.add_feature(window, np.array([5.0, 0.0, truth]) + 0.1 * rng.standard_normal(3), hold)
+        hessian, gradient, middle = (field.copy() for field in held.slots)
+        hessian[0, POSE:, POSE:] = np.eye(3) / 0.03**2
+        middle[0, POSE:] = [5.0, 0.0, truth]
+        held = held._replace(slots=Quadratic(hessian, gradient, middle))
+        for _ in range(4):
+            held = gauss.weigh_holds(gauss.solve(held))
+        assert (held.holds.probability[0] > 0.9) == right
+        # where it does not hold, the measurement alone counts
+        if not right:
+            assert abs(held.features[0, 2] - truth) < 1e-3
+
+
+def test_levels_of_acceleration_are_those_of_all_sequences_weighed():
+    rng = np.random.default_rng(5)
+    log_like = rng.standard_normal((4, len(motion.LADDER)))
+    before = rng.dirichlet(np.ones(len(motion.LADDER)))
+    move = motion.transition(0.9)
+    total = np.zeros(log_like.shape)
+    for path in np.ndindex(*(4 * (len(motion.LADDER),))):
+        weight = sum(before * move[:, path[0]]) * np.exp(log_like[0, path[0]])
+        for step in range(1, 4):
+            weight *= move[path[step - 1], path[step]] * np.exp(log_like[step, path[step]])
+        for step in range(4):
+            total[step, path[step]] += weight
+    posterior, forward = motion.smooth(before, log_like, 0.9)
+    np.testing.assert_allclose(posterior, total / total.sum(axis=1, keepdims=True), rtol=1e-10)
+    np.testing.assert_allclose(forward[-1], posterior[-1], rtol=1e-10)
+
+
+def test_the_likelihood_of_a_level_is_that_of_the_measured_acceleration():
+    rng = np.random.default_rng(6)
+    root = rng.standard_normal((2, 2))
+    noise, seen, precision = root @ root.T + 0.01 * np.eye(2), rng.standard_normal(2), 3.0
+    posterior = np.linalg.inv(np.linalg.inv(noise) + precision * np.eye(2))
+    mean = posterior @ np.linalg.solve(noise, seen)
+    found = motion.log_likelihood(mean[None], posterior[None], np.array([precision]))[0]
+    wanted = []
+    for level in motion.LADDER:
+        spread = noise + level**2 * np.eye(2)
+        wanted.append(-0.5 * seen @ np.linalg.solve(spread, seen) - 0.5 * np.linalg.slogdet(spread)[1])
+    np.testing.assert_allclose(found - found[0], np.array(wanted) - wanted[0], atol=1e-8)
