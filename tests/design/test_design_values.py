@@ -5,10 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rislam_rt.design import DESIGNERS, DesignConfig, DesignProblem, direct_only, gain_curves, problem_from_belief
-from rislam_rt.design.search import beam_phases
+from rislam_rt.design import (
+    DESIGNERS,
+    DesignConfig,
+    DesignProblem,
+    build_objective,
+    direct_only,
+    gain_curves,
+    problem_from_arrays,
+    problem_from_belief,
+)
+from rislam_rt.design.coordinate import _first_changes, _rank_by_slope, _rank_by_value
+from rislam_rt.design.search import LOOK_ROUND, SETTLED, beam_phases, search_code, sweep_codes
 from rislam_rt.errors import ConfigError, GeometryError
 from rislam_rt.geometry.angles import unit
+from rislam_rt.model import RisCode, Suspect, empty_map
 
 POSITION = np.array([1.2, 2.1, 0.5])
 
@@ -98,3 +109,57 @@ def test_beams_cover_all_cosines_and_the_second_sweep_lies_between(count, spacin
     # each covers its share: the turn from element to element runs over what one beam of the row leaves of it
     bend = np.diff(phases, n=2, axis=-1) / (2.0 * np.pi)
     np.testing.assert_allclose(bend, max(share - 1.0 / count, 0.0) / count, atol=1e-12)
+
+
+def test_least_snr_of_arrays_becomes_a_power(radio):
+    problem = problem_from_arrays(np.ones((1, 2, 2)), np.zeros(0), np.ones((1, 2)), radio, 4, least_snr=10.0)
+    assert problem.least_power == pytest.approx(10.0 * radio.noise_psd / (radio.array.num_antennas * radio.energy))
+
+
+def test_static_gains_of_another_shape_are_refused(make_problem, rng):
+    with pytest.raises(GeometryError, match="static_gain"):
+        replace(make_problem(rng), static_gain=np.ones((2, 2)))
+
+
+def test_two_individuals_are_a_population():
+    assert DesignConfig(population=2, elite=0).population == 2
+    with pytest.raises(ConfigError):
+        DesignConfig(population=1, elite=0)
+
+
+def test_slope_and_value_agree_for_one_path(make_problem, rng):
+    """With one path the objective falls with its power alone: both name the same elements and the same steps."""
+    for _ in range(20):
+        objective = build_objective(direct_only(make_problem(rng, rows=3, cols=4)))
+        index = rng.integers(4, size=12)
+        weight = objective.table[index]
+        gain = objective.gains(weight)
+        now = float(objective.value(gain))
+        (by_slope, step), (by_value, exact) = (
+            rank(objective, weight, gain, now) for rank in (_rank_by_slope, _rank_by_value)
+        )
+        np.testing.assert_array_equal(by_slope, by_value)
+        np.testing.assert_array_equal(step[by_slope], exact[by_value])
+        better = [
+            element
+            for element in range(12)
+            if min(objective.of_index((index + shift * (np.arange(12) == element)) % 4) for shift in (1, 2, 3)) < now
+        ]
+        assert sorted(by_value) == better
+
+
+def test_changes_are_tried_in_powers_of_two():
+    index, change = np.array([0, 1, 2, 3, 0]), np.array([0, 1, 2, 0, 1])
+    trials = _first_changes(index, np.array([4, 0, 2, 1, 3]), change, 4)
+    expected = [[0, 1, 2, 3, 2], [1, 1, 2, 3, 2], [1, 3, 1, 3, 2], [1, 3, 1, 0, 2]]
+    np.testing.assert_array_equal(trials, expected)
+
+
+def test_a_settled_suspect_is_doubted_beam_by_beam(make_belief, make_spec, radio, rng):
+    """Every `LOOK_ROUND` codes the next beam of the sweep, round and round."""
+    spec, beams = make_spec(), sweep_codes(make_spec(), radio.wavelength)
+    belief = replace(make_belief(POSITION, rng), map=empty_map(), suspect=Suspect(np.array([3.0, 3.0, 3.0]), SETTLED))
+    last = RisCode(np.zeros((6, 6), dtype=np.int64), 4)
+    for turn in (1, 5, len(beams) + 3):
+        found = search_code(belief, spec, radio, turn * LOOK_ROUND, last)
+        np.testing.assert_array_equal(found.index, beams[turn % len(beams)])
