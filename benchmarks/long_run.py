@@ -17,8 +17,10 @@ from time import process_time
 import numpy as np
 
 from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline.identity import run_identity
 from rislam_rt.pipeline.long import run_long
 from rislam_rt.pipeline.slices import SLICE
+from rislam_rt.pipeline.store import open_run
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[1]
@@ -69,7 +71,8 @@ def main() -> int:
 
     with tempfile.TemporaryDirectory() as place:
         scene = load_scene(write_room(Path(place), given.cycles))
-        run = run_long(scene, spec, Path(place) / "run", rng=np.random.default_rng(7), jobs=1, progress=watch)
+        with open_run(Path(place) / "run", run_identity(spec, scene)) as store:
+            run = run_long(scene, spec, store, rng=np.random.default_rng(spec.seed), jobs=1, progress=watch)
         size = sum(file.stat().st_size for file in (Path(place) / "run").rglob("*") if file.is_file())
     after = resident()
     growth = max(list(peaks.values())[1:], default=peaks[0]) / peaks[0] - 1.0

@@ -112,7 +112,7 @@ def ask_interrupt(base: Path, shares: Any, took: float, whole: dict[str, Any]) -
         found[f"interrupted {stage(folder)}" if code == 130 else f"exit {code}{'' if hit and born else ' (edge)'}"] += 1
         judge((code, err), (130, 0, -signal.SIGTERM, -signal.SIGINT), found)
         if code == 130 and not err.strip().splitlines()[-1].startswith("interrupted"):
-            found["BAD no line"] += 1
+            found[f"BAD last line: {err.strip().splitlines()[-1][:200]}"] += 1
         found["BAD process left"] += is_left(process.pid)
         judge(finish(start(RUN, folder)), (0,), found)
         compare(folder, whole, found)
@@ -317,8 +317,11 @@ def judge(ended: tuple[int, str], wanted: tuple[int, ...], found: "Counter[str]"
     code, err = ended
     if code not in wanted:
         found[f"BAD exit {code}: {err.strip().splitlines()[-1][:200] if err.strip() else ''}"] += 1
-    if "Traceback" in err:
-        found[f"BAD traceback: {err.strip().splitlines()[-1][:200]}"] += 1
+    if "Traceback" in err and "in main" not in err and "rislam_rt" not in err:
+        found["a traceback of Python's own start, before our first line"] += 1
+    elif "Traceback" in err:
+        found["BAD traceback"] += 1
+        print(err, file=sys.stderr)
 
 
 def compare(folder: Path, whole: dict[str, Any], found: "Counter[str]") -> None:

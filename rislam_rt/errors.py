@@ -5,9 +5,12 @@ A message is one line: what was wrong, the value received, and what to do about 
 
 
 class RislamError(Exception):
-    """Any failure that this package raises on purpose; exit code 1."""
+    """Any failure that this package raises on purpose; exit code 1. Its text is one printable line."""
 
     exit_code = 1
+
+    def __str__(self) -> str:
+        return "".join(c if c.isprintable() else " " for c in super().__str__())
 
 
 class ConfigError(RislamError):

@@ -6,23 +6,27 @@ import sys
 
 def main() -> None:
     """Entry point of `rislam-rt`: run a command; a failure that was foreseen is one line and its exit code."""
-    # One thread: the matrices are small, and sums in one order give the same bits on every machine.
-    for library in ("OMP", "OPENBLAS", "MKL"):
-        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
-    from rislam_rt.cli.interrupts import EXIT_CODE, Interrupted, interruptible
-
     try:
-        with interruptible():
-            code = _run()
-    except Interrupted as told:
-        code = _say(str(told), EXIT_CODE)
+        import atexit
+
+        from rislam_rt.cli.interrupts import EXIT_CODE, Interrupted, end_quietly, interruptible
+
+        # One thread: the matrices are small, and sums in one order give the same bits on every machine.
+        for library in ("OMP", "OPENBLAS", "MKL"):
+            os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+        with interruptible() as heard:
+            try:
+                code = _run(heard)
+            except Interrupted as told:
+                code = _say(str(told), EXIT_CODE)
+        atexit.register(end_quietly)
     except KeyboardInterrupt:
-        code = _say("interrupted", EXIT_CODE)
+        code = _say("interrupted", 130)
     sys.exit(code)
 
 
-def _run() -> int:
-    """Run a command; its exit code."""
+def _run(heard: list[int]) -> int:
+    """Run a command; its exit code. `heard`: signals that came."""
     import typer
 
     from rislam_rt.cli.app import app
@@ -32,6 +36,8 @@ def _run() -> int:
     try:
         code = app(sys.argv[1:] or ["--help"], prog_name="rislam-rt", standalone_mode=False)
     except RislamError as error:
+        if heard:  # it reached the workers too, and the first to die was mourned
+            return _say("interrupted: what is done is kept; the same command goes on from there", EXIT_CODE)
         return _say(f"error: {error}", error.exit_code)
     except typer.Abort:
         return _say("interrupted", EXIT_CODE)

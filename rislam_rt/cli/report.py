@@ -13,13 +13,12 @@ def command(
     json: JsonFile = None,
 ) -> None:
     """Score a completed run again and draw its figures and page."""
-    from rislam_rt.pipeline.store import hold_run, read_run
-    from rislam_rt.pipeline.summary import summarise
+    from rislam_rt.pipeline.long import read_any
+    from rislam_rt.pipeline.store import hold_run
     from rislam_rt.report import write_report
     from rislam_rt.report.tables import print_summary
 
-    result = read_run(run)
-    summary = summarise(result)
+    summary, result = read_any(run)
     print_summary(summary)
     with hold_run(run):
         page = write_report(result, summary, run)

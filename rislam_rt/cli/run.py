@@ -93,7 +93,8 @@ def run_main_job(spec: "PipelineSpec", given: Given) -> None:
 
 def show_run(folder: Path, about: "Mapping[str, Any]", given: Given) -> None:
     """A completed run of these very settings, as it was written."""
-    from rislam_rt.pipeline.store import hold_run, is_left_locked, read_run, read_summary
+    from rislam_rt.pipeline.long import read_any
+    from rislam_rt.pipeline.store import hold_run, is_left_locked, read_summary
     from rislam_rt.report.page import PAGE, write_report
     from rislam_rt.report.tables import print_summary
 
@@ -105,7 +106,7 @@ def show_run(folder: Path, about: "Mapping[str, Any]", given: Given) -> None:
     if draw or is_left_locked(folder):  # a process died at the report, or is at it
         with hold_run(folder):
             if draw:
-                write_report(read_run(folder), summary, folder)
+                write_report(read_any(folder).shown, summary, folder)
     if given.page:
         typer.echo(f"report: {page}")
     typer.echo(f"run folder: {folder}")
@@ -121,6 +122,7 @@ def compute_run(spec: "PipelineSpec", room: "Scene", identity: "Identity", folde
     from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.pipeline import run_slam
+    from rislam_rt.pipeline.long import LongRun, is_long, run_long
     from rislam_rt.pipeline.store import open_run
     from rislam_rt.pipeline.summary import summarise
     from rislam_rt.report.tables import print_summary
@@ -131,17 +133,15 @@ def compute_run(spec: "PipelineSpec", room: "Scene", identity: "Identity", folde
             for name in store.spoiled:
                 typer.echo(f"warning: {folder}: scheme '{name}' is not as it was written; it runs again", err=True)
             try:
+                rng, jobs = np.random.default_rng(spec.seed), given.jobs or os.cpu_count() or 1
                 with show_progress() as progress:
-                    result = run_slam(
-                        room,
-                        spec,
-                        rng=np.random.default_rng(spec.seed),
-                        jobs=given.jobs or os.cpu_count() or 1,
-                        done=store,
-                        progress=progress,
-                    )
-                summary = summarise(result)
-                store.complete(result, summary)
+                    if is_long(room, spec):
+                        found = run_long(room, spec, store, rng=rng, jobs=jobs, progress=progress)
+                    else:
+                        result = run_slam(room, spec, rng=rng, jobs=jobs, done=store, progress=progress)
+                        found = LongRun(summarise(result), result)
+                        store.complete(result, found.summary)
+                summary, result = found
             finally:
                 kept = len(store)
             print_summary(summary)

@@ -16,9 +16,10 @@ def command(
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.report.room import draw_scene
     from rislam_rt.report.tables import print_scene
+    from rislam_rt.scene.names import safe_name
 
     opened = open_scene(scene)
     opened.warn()
     room = opened.scene
     print_scene(room)
-    typer.echo(f"picture: {draw_scene(room, out or Path(f'{room.name}.png'))}")
+    typer.echo(f"picture: {draw_scene(room, out or Path(f'{safe_name(room.name)}.png'))}")

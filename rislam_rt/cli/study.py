@@ -71,12 +71,13 @@ def run_gain_curves(spec: "Fig4aSpec", given: Given) -> None:
     from rislam_rt.pipeline.studies.spec import study_record
     from rislam_rt.report.fig4a import fig4a_table, verdict
     from rislam_rt.report.study import write_fig4a
+    from rislam_rt.scene.names import safe_name
 
     opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
     scene = opened.scene
     check_fig4a(scene, spec)
     record = study_record(spec, [scene])
-    folder = output_folder(given.out, f"{spec.name}-{scene.name}-{spec.seed}", record)
+    folder = output_folder(given.out, f"{spec.name}-{safe_name(scene.name)}-{spec.seed}", record)
     prepare_channel(spec.channel)
     opened.warn()
     with show_progress() as progress:

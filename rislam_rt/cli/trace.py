@@ -57,6 +57,7 @@ def command(
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.signals import load_signals_spec, signal_settings
     from rislam_rt.report.tables import path_table, print_paths
+    from rislam_rt.scene.names import safe_name
 
     if set_ and not signals:
         raise ConfigError(f"--set {set_[0][:60]}: settings are for --signals; add it, or leave them out")
@@ -65,7 +66,9 @@ def command(
     room = thinned(opened.scene, cycles, stride)
     prepare_channel(channel)
     if signals:
-        traced = trace_signals(room, channel, depth, set_ or (), out or Path(f"{room.name}-signals.nc"), opened.warn)
+        traced = trace_signals(
+            room, channel, depth, set_ or (), out or Path(f"{safe_name(room.name)}-signals.nc"), opened.warn
+        )
     else:
         opened.warn()
         traced = trace_paths(room, channel, depth, out)
@@ -88,10 +91,13 @@ def thinned(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
     from dataclasses import replace
 
     from rislam_rt.errors import ConfigError
+    from rislam_rt.pipeline.run import check_one_piece
 
     if cycles is not None and cycles > len(scene.agent):
         raise ConfigError(f"--cycles: {cycles} received; the scene has {len(scene.agent)}, give no more")
-    return replace(scene, agent=scene.agent[:cycles:stride])
+    agent = scene.agent[:cycles:stride]
+    check_one_piece(len(agent), "--cycles, --stride")
+    return replace(scene, agent=agent)
 
 
 def trace_paths(scene: "Scene", channel: str, depth: int, file: Path | None) -> Traced:

@@ -80,7 +80,7 @@ class Paths:
     landmarks: tuple[str, ...]
     ris: RisLegs | None = None
     source: str = ""
-    """How the set was found: `traced`, `traced, refined`, `image source`."""
+    """How the set was found: `traced`, `traced, refined` or `image source`, and among which wall sequences."""
 
     def __post_init__(self) -> None:
         cycles, paths = np.shape(self.valid)

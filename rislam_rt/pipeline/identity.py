@@ -12,6 +12,7 @@ from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import library_versions
 from rislam_rt.pipeline.seal import SCHEMA, checksum
 from rislam_rt.pipeline.spec import PipelineSpec
+from rislam_rt.scene.names import safe_name
 
 SHORT = 8
 """Digits of the hash in a folder's name; the marker inside has all of them."""
@@ -40,7 +41,7 @@ class Identity(NamedTuple):
     def folder(self) -> str:
         """`<pipeline>-<scene>-<seed>-<hash>`."""
         config = self.content["config"]
-        name = f"{config['name']}-{self.content['scene']['name']}-{config['seed']}"
+        name = f"{config['name']}-{safe_name(self.content['scene']['name'])}-{config['seed']}"
         return short_name(name, self.digest)
 
     def difference(self, other: Mapping[str, Any]) -> str:

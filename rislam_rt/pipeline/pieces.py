@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from rislam_rt.errors import StoreError
+from rislam_rt.pipeline.files import PREFIX, SUFFIX, refused
 
 
 def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
@@ -18,7 +18,7 @@ def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=".rislam-rt-", suffix=".tmp", dir=path.parent)
+        handle, name = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=path.parent)
         try:
             with os.fdopen(handle, "wb") as file:
                 for piece in pieces:
@@ -31,4 +31,4 @@ def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
             Path(name).unlink(missing_ok=True)
             raise
     except OSError as error:
-        raise StoreError(f"{path}: cannot be written ({error.strerror}); check permissions and free space") from None
+        raise refused(path, error) from None

@@ -35,6 +35,12 @@ LIBRARIES = ("numpy", "scipy", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-c
 """Libraries that numbers depend on; their versions go into every result."""
 
 
+IN_ONE_PIECE = 50_000
+"""Most cycles that are traced and held at once: 5 GB in the paper's room."""
+CYCLE_BYTES = 100_000
+"""Of a cycle while it is traced, in the paper's room with two bounces."""
+
+
 class Stage(NamedTuple):
     """What all schemes of a run share."""
 
@@ -74,10 +80,26 @@ def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
+    check_one_piece(spec.cycles or len(scene.agent), "'rislam-rt run' goes in slices")
     scene, body, seeds = set_scene(scene, spec, rng=rng)
     begin = perf_counter()
     paths = build_channel(spec.channel, scene, build_radio(spec.radio), spec.depth).paths(scene.agent)
     return Stage(scene, paths, body, seeds, perf_counter() - begin)
+
+
+def check_one_piece(cycles: int, way_out: str) -> None:
+    """Refuse more cycles than fit into the memory of a small machine at once.
+
+    Raises
+    ------
+    ConfigError
+        There are more than `IN_ONE_PIECE`.
+    """
+    if cycles > IN_ONE_PIECE:
+        raise ConfigError(
+            f"cycles: {cycles} in one piece received, some {cycles * CYCLE_BYTES / 1e9:.0f} GB; "
+            f"give at most {IN_ONE_PIECE} ({way_out})"
+        )
 
 
 def run_slam(

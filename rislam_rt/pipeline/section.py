@@ -12,6 +12,12 @@ NotNegative = Annotated[float, Field(ge=0.0, le=1e12, allow_inf_nan=False)]
 Real = Annotated[float, Field(ge=-1e12, le=1e12, allow_inf_nan=False)]
 Decibel = Annotated[float, Field(ge=-300.0, le=300.0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
+Side = Annotated[int, Field(ge=1, le=256)]
+"""Antennas along a side: every component takes time and memory for all of them."""
+Wide = Annotated[float, Field(ge=0.0, le=1e5)]
+"""A standard deviation: no scene is larger, and float64 tells no millimetres beside the square of more."""
+Carrier = Annotated[float, Field(ge=1e-3, le=3000.0)]
+"""[GHz] Radio waves end at 3000 GHz (ITU Radio Regulations, 1.5)."""
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 
 

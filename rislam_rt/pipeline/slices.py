@@ -13,14 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.errors import RislamError
+from rislam_rt.errors import ResultError
 from rislam_rt.model import Body, Paths, Scene, SchemeResult, Trajectory
 from rislam_rt.pipeline.dataset import (
+    check_dataset,
     dataset_to_paths,
     dataset_to_scheme,
     paths_to_dataset,
     read_dataset,
     scheme_to_dataset,
+    seal_dataset,
     write_dataset,
 )
 from rislam_rt.pipeline.join import join_paths, join_schemes, thinned_paths, thinned_scheme
@@ -55,9 +57,18 @@ def slice_file(folder: Path, number: int, name: str) -> Path:
 
 
 def run_slices(
-    name: str, scene: Scene, body: Body, spec: PipelineSpec, seeds: Seeds, folder: Path, tell: Progress
+    name: str,
+    scene: Scene,
+    body: Body,
+    spec: PipelineSpec,
+    seeds: Seeds,
+    folder: Path,
+    run: str,
+    tell: Progress,
 ) -> float:
     """Lead one scheme through all slices, each written to `folder` when it is done. Returns the seconds of tracing.
+
+    `run` is the run's identity, which every file carries.
 
     Raises
     ------
@@ -73,46 +84,51 @@ def run_slices(
         paths = channel.paths(scene.agent[first : min(last + walk.foresight, cycles)])
         seconds += perf_counter() - begin
         part = walk.lead(paths, first, last, tell)
-        file = slice_file(folder, number, PATHS_FILE)
-        if not file.is_file():  # another scheme's, and the same: whoever comes first writes it
-            own = paths if walk.foresight == 0 else thinned_paths(paths, np.arange(last - first))
-            write_dataset(paths_to_dataset(own, scene.agent[first:last]), file)
-        write_dataset(scheme_to_dataset(part), slice_file(folder, number, f"scheme_{name}.nc"))
+        own = paths if walk.foresight == 0 else thinned_paths(paths, np.arange(last - first))
+        for file, data in (
+            (slice_file(folder, number, PATHS_FILE), paths_to_dataset(own, scene.agent[first:last])),
+            (slice_file(folder, number, f"scheme_{name}.nc"), scheme_to_dataset(part)),
+        ):
+            write_dataset(seal_dataset(data, run=run, slice=str(number)), file)
     return seconds
 
 
-def is_complete(folder: Path, name: str, cycles: int) -> bool:
-    """Whether every slice of a scheme is there and can be read."""
-    try:
-        return all(
-            len(dataset_to_scheme(read_dataset(slice_file(folder, number, f"scheme_{name}.nc"))).position)
-            == last - first
-            and slice_file(folder, number, PATHS_FILE).is_file()
-            for number, (first, last) in enumerate(slice_bounds(cycles))
-        )
-    except (RislamError, KeyError):
-        return False
+def slice_files(name: str, cycles: int) -> list[str]:
+    """Names below the run's folder of all files that a scheme in slices leaves."""
+    count = len(slice_bounds(cycles))
+    return [
+        str(slice_file(Path(), number, file)) for number in range(count) for file in (PATHS_FILE, f"scheme_{name}.nc")
+    ]
 
 
-def read_parts(folder: Path, name: str, scene: Scene) -> Iterator[Part]:
+def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Part]:
     """The slices of a scheme in the order of time, one at a time.
 
     Raises
     ------
+    ResultError
+        A file is not as it was written, or of another run.
     StoreError
-        A file is missing or damaged.
+        A file is missing or cannot be read.
     """
     for number, (first, last) in enumerate(slice_bounds(len(scene.agent))):
-        paths = dataset_to_paths(read_dataset(slice_file(folder, number, PATHS_FILE)))
-        scheme = dataset_to_scheme(read_dataset(slice_file(folder, number, f"scheme_{name}.nc")))
-        yield Part(scene.agent[first:last], paths, scheme)
+        found = []
+        for what in (PATHS_FILE, f"scheme_{name}.nc"):
+            file = slice_file(folder, number, what)
+            data = read_dataset(file)
+            check_dataset(data, file, run=run, slice=str(number), cycles=last - first)
+            found.append(data)
+        scheme = dataset_to_scheme(found[1])
+        if scheme.scheme != name:
+            raise ResultError(f"{file}: holds scheme '{scheme.scheme[:40]}'; run again with another --out")
+        yield Part(scene.agent[first:last], dataset_to_paths(found[0]), scheme)
 
 
-def thin_scheme(folder: Path, name: str, scene: Scene) -> tuple[Trajectory, Paths, SchemeResult]:
+def thin_scheme(folder: Path, name: str, scene: Scene, run: str) -> tuple[Trajectory, Paths, SchemeResult]:
     """Every n-th cycle of a scheme, at most `SHOWN` in all, for figures."""
     stride = -(-len(scene.agent) // SHOWN)
     paths, schemes, at = [], [], 0
-    for part in read_parts(folder, name, scene):
+    for part in read_parts(folder, name, scene, run):
         rows = np.arange((-at) % stride, len(part.motion), stride)
         at += len(part.motion)
         if len(rows):

@@ -13,7 +13,19 @@ from rislam_rt.model import RadioConfig, RxArray, SensorModel
 from rislam_rt.pipeline.mistold import ToldSection
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
-from rislam_rt.pipeline.section import Choices, Count, Decibel, Name, NotNegative, Positive, Probability, Section
+from rislam_rt.pipeline.section import (
+    Carrier,
+    Choices,
+    Count,
+    Decibel,
+    Name,
+    NotNegative,
+    Positive,
+    Probability,
+    Section,
+    Side,
+    Wide,
+)
 from rislam_rt.ris import PanelTolerance
 from rislam_rt.slam import SlamConfig
 from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
@@ -75,9 +87,9 @@ ChannelName = Annotated[str, AfterValidator(_check_channel), Choices(CHANNELS)]
 class ArraySection(Section):
     """The Rx array."""
 
-    rows: Count = 4
+    rows: Side = 4
     """Antennas along the body's x axis, forward."""
-    cols: Count = 4
+    cols: Side = 4
     """Antennas along the body's y axis."""
     spacing_wavelengths: Positive = 0.5
     """Between neighbours, in wavelengths of the carrier."""
@@ -88,7 +100,7 @@ class ArraySection(Section):
 class RadioSection(Section):
     """The radio. The noise is given by what it does to the paper's sphere at 3 m, or by its density."""
 
-    carrier_ghz: Positive = 10.0
+    carrier_ghz: Carrier = 10.0
     """Carrier frequency."""
     bandwidth_ghz: Positive = 1.0
     """Of a flat band; delays are resolved to its inverse."""
@@ -166,9 +178,9 @@ class ControlSection(Section):
 class StartSection(Section):
     """What the agent is told of its start: the truth plus one draw of these errors."""
 
-    position_std_m: NotNegative = 0.01
+    position_std_m: Wide = 0.01
     """Of each coordinate of the start."""
-    velocity_std_m_s: NotNegative = 0.01
+    velocity_std_m_s: Wide = 0.01
     """Of each component of the first velocity."""
     heading_std_deg: NotNegative = 0.0
     """Where the heading is estimated."""
@@ -328,7 +340,7 @@ def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> Hardw
     hardware = HardwareConfig(**section.model_dump())
     if receiver.estimator != "waveform" and hardware != HardwareConfig():
         raise ConfigError(
-            f"hardware: set, with receiver.estimator '{receiver.estimator}', which makes no signal; give 'waveform'"
+            f"hardware: set, with receiver.estimator '{receiver.estimator}', which has no front end; give 'waveform'"
         )
     return hardware
 

@@ -7,7 +7,7 @@ where it was. One process at a time writes there.
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Iterable, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -121,6 +121,22 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         self.mark(DONE, told)
         return self.folder
 
+    def put(self, name: str, content: bytes) -> None:
+        """Write a file of the run."""
+        self._write(name, content)
+
+    def adopt(self, names: Iterable[str]) -> None:
+        """Count files that were written here already among the run's, and say so in the marker."""
+        self.files |= {name: file_digest(self.folder / name) for name in names}
+        self.mark(RUNNING)
+
+    def holds(self, names: Iterable[str]) -> bool:
+        """Whether files are there as they were written."""
+        try:
+            return all(name in self.files and file_digest(self.folder / name) == self.files[name] for name in names)
+        except ResultError:
+            return False
+
     def abandon(self) -> None:
         """Take the marker away if no scheme was completed."""
         if not self.files:
@@ -202,7 +218,7 @@ def hold_run(folder: Path) -> Iterator[None]:
         The disk refused.
     """
     with hold(folder, "run"):
-        remove_temporaries(folder / part for part in OWN_FOLDERS)
+        remove_temporaries([*(folder / part for part in OWN_FOLDERS), *folder.glob("slices/*")])
         yield
 
 
@@ -247,9 +263,14 @@ def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, by
     files = {"truth.tum": tum_bytes(motion.time, motion.position, motion.heading)}
     for name, scheme in result.schemes.items():
         files[f"estimate_{name}.tum"] = tum_bytes(motion.time, scheme.position, scheme.heading)
+    return files | record_files(result, result.scene, summary)
+
+
+def record_files(result: SlamResult, scene: Scene, summary: Mapping[str, Any]) -> dict[str, bytes]:
+    """Maps, configuration and summary of a result, and its room: name -> content."""
     maps = {name: map_table(scheme.map) for name, scheme in result.schemes.items()}
-    files |= {"map.json": _json(maps), "config.toml": toml_bytes(_without_none({**result.config}))}
-    files |= {f"scene/{name}": content for name, content in scene_files(result.scene).items()}
+    files = {"map.json": _json(maps), "config.toml": toml_bytes(_without_none({**result.config}))}
+    files |= {f"scene/{name}": content for name, content in scene_files(scene).items()}
     return files | {SUMMARY_FILE: _json(summary)}
 
 

@@ -4,6 +4,7 @@ import multiprocessing as mp
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, NamedTuple
@@ -74,6 +75,7 @@ def _start(work: Work, name: str, common: tuple[Any, ...]) -> Worker:
 def _deaf() -> Iterator[None]:
     """A process started in here hears no interrupt of the keyboard, which reaches the whole group, from its first
     instruction on; this one hears afterwards what came meanwhile."""
+    resource_tracker.ensure_running()  # first: starting it would unblock the signal
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -2,7 +2,7 @@
 
 import base64
 import html
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from rislam_rt.report.room import draw_above, draw_paths
 from rislam_rt.report.style import to_png
 from rislam_rt.report.tables import summary_rows
 from rislam_rt.report.timing import draw_timing
+from rislam_rt.report.verdict import judge_run
 
 PAGE = "report.html"
 
@@ -33,6 +34,8 @@ CAPTIONS = {
 }
 
 STYLE = """
+.verdict { font-size: 1.25rem; font-weight: 600; margin: 0.6rem 0; } .scroll { overflow-x: auto; }
+ul { margin: 0.3rem 0; padding-left: 1.2rem; }
 body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 1080px; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.5rem; margin-bottom: 0.2rem; } h2 { font-size: 1.1rem; margin-top: 2.2rem; }
 img { max-width: 100%; height: auto; } figure { margin: 1.5rem 0; }
@@ -96,6 +99,10 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
     rows = "".join(
         "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in summary_rows(summary)
     )
+    said = judge_run(result, summary)
+    sentences = "".join(
+        f"<li>{html.escape(text)}{_bullets(said.missing[name])}</li>" for name, text in said.schemes.items()
+    )
     figures = "".join(
         f'<figure><img alt="{html.escape(CAPTIONS[name])}" src="data:image/png;base64,'
         f'{base64.b64encode(picture).decode()}"><figcaption>{html.escape(CAPTIONS[name])}</figcaption></figure>'
@@ -104,18 +111,26 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
     warnings = "".join(f'<p class="note">Warning: {html.escape(line)}</p>\n' for line in result.warnings)
     versions = ", ".join(f"{name} {number}" for name, number in result.versions.items())
     return f"""<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title><style>{STYLE}</style></head><body>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{html.escape(title)}</title><style>{STYLE}</style></head><body>
 <h1>{html.escape(title)}</h1>
+<p class="verdict">{html.escape(said.headline)}</p>
+<ul>{sentences}</ul>
 <p class="note">{html.escape(about)}</p>
-{warnings}<h2>RMSE</h2>
-<table><tr><th></th>{head}</tr>{rows}</table>
+{warnings}{figures}
+<h2>RMSE</h2>
+<div class="scroll"><table><tr><th></th>{head}</tr>{rows}</table></div>
 <p class="note">Agent and landmarks: over the cycles (for a landmark, those in which the map holds it).
 Walls, at the end: distance of the estimated plane over the true surface, and the angle between them. The bound is the
 posterior bound of the same motion, codes and noise with landmarks and walls unknown. GOSPA is of the last map's points,
 cut off at 1 m.</p>
-{figures}
 <h2>To repeat it</h2>
 <p class="note">{html.escape(versions)}; scene SHA-256 {html.escape(result.scene.digest)}.
 The folder's <code>config.toml</code> and <code>scene/</code> hold everything.</p>
 </body></html>
 """
+
+
+def _bullets(lines: Sequence[str]) -> str:
+    return f"<ul>{''.join(f'<li>not found: {html.escape(line)}</li>' for line in lines)}</ul>" if lines else ""

@@ -1,6 +1,7 @@
 """One look for all figures: colours that colour-blind readers can tell apart (Okabe and Ito), sizes, file writing."""
 
 import io
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -71,10 +72,17 @@ def scheme_colour(name: str) -> str:
     return SCHEME.get(name, "#0072B2")
 
 
+def _save(figure: Figure, target: Any, **how: Any) -> None:
+    """A name in a script that the fonts lack is drawn as boxes; that is no warning's worth."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"Glyph \d+")
+        figure.savefig(target, **how)
+
+
 def to_png(figure: Figure) -> bytes:
     """A figure as PNG."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": ""})
+    _save(figure, buffer, format="png", dpi=DPI, metadata={"Software": ""})
     return buffer.getvalue()
 
 
@@ -92,6 +100,6 @@ def save_figure(figure: Figure, path: Path) -> Path:
     if kind not in ("png", "svg", "pdf"):
         raise ConfigError(f"{path}: no picture of that ending; give a name that ends in .png, .svg or .pdf")
     buffer = io.BytesIO()
-    figure.savefig(buffer, format=kind, dpi=DPI)
+    _save(figure, buffer, format=kind, dpi=DPI)
     write_atomic(path, buffer.getvalue())
     return path

@@ -87,6 +87,8 @@ def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> Non
     title = f"{name}: {refined.cycles} poses"
     table = Table("traced against analytic", "float32", "refined")
     contents = raw.as_dict(), refined.as_dict()
+    for side in ("traced", "analytic"):
+        table.add_row(f"{side}: searched", *(content["searched"][side].rpartition(", ")[2] for content in contents))
     for key in ("matched", "unexplained"):
         table.add_row(f"{key} paths", *(str(content[key]) for content in contents))
     for reason in sorted({reason for content in contents for reason in content["explained"]}):

@@ -111,7 +111,7 @@ class MeshReader:
 
         # A damaged file makes trimesh raise nearly anything and numpy warn; here every cause has the same answer.
         try:
-            with warnings.catch_warnings(), np.errstate(all="ignore"), _silence("trimesh"):
+            with warnings.catch_warnings(), np.errstate(all="ignore"), _silence():
                 warnings.simplefilter("ignore")
                 if self._key != (file_type, content):
                     self._loaded = trimesh.load_scene(io.BytesIO(content), file_type=file_type, process=False)
@@ -155,14 +155,14 @@ def _own_ply(content: bytes) -> Mesh | None:
 
 
 @contextmanager
-def _silence(name: str) -> Iterator[None]:
-    """A logger that says nothing, tracebacks of failures that have an answer here least of all."""
-    logger = logging.getLogger(name)
-    before, logger.disabled = logger.disabled, True
+def _silence() -> Iterator[None]:
+    """No library logs anything meanwhile, tracebacks of failures that have an answer here least of all."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
     try:
         yield
     finally:
-        logger.disabled = before
+        logging.disable(before)
 
 
 def _flatten(loaded: Any, node: str | None) -> Mesh:

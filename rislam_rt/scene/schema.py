@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.toml import parse_toml
 
-MAX_SCENE_BYTES = 1_000_000
+MAX_SCENE_BYTES = 4_000_000
 """A scene file is written by people; anything larger is another file by mistake."""
 SMALLEST = 1e-6
 """A micrometre, or a microsecond: light's wavelength, and the time of a code. Nothing that a radio sees is finer."""

@@ -16,6 +16,7 @@ from rislam_rt.errors import SceneError, StoreError
 from rislam_rt.model import Material, Scatterer, Scene, Trajectory
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
+from rislam_rt.scene.names import safe_name
 from rislam_rt.scene.solids import solid_mesh
 
 TRAJECTORY_FILE = "path.tum"
@@ -36,7 +37,7 @@ def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) ->
 
 def scene_files(scene: Scene) -> dict[str, bytes]:
     """A scene as files, name -> content: `scene.toml`, one PLY mesh a reflector, the agent's path unless straight."""
-    files = {f"meshes/{r.name}.ply": ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
+    files = {_mesh_file(r.name): ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
     for scatterer in scene.scatterers:
         if scatterer.shade is not None and not _has_own_shadow(scatterer):
             files[_shade_file(scatterer)] = ply_bytes(scatterer.shade.vertices, scatterer.shade.faces)
@@ -89,8 +90,9 @@ def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
     """Poses as TUM lines `timestamp x y z qx qy qz qw`; the quaternion is the heading about z."""
     lines = ["# timestamp x y z qx qy qz qw"]
     for t, point, angle in zip(time, position, heading, strict=True):
-        row = [t, *point, 0.0, 0.0, np.sin(angle / 2.0), np.cos(angle / 2.0)]
-        lines.append(" ".join(f"{value:.9g}" for value in row))
+        row = [*point, 0.0, 0.0, np.sin(angle / 2.0), np.cos(angle / 2.0)]
+        # times may count from the epoch: microseconds of them need 16 digits, positions none beyond a nanometre
+        lines.append(" ".join([f"{t:.16g}", *(f"{value:.9g}" for value in row)]))
     return ("\n".join(lines) + "\n").encode()
 
 
@@ -139,8 +141,7 @@ def _toml_key(key: str) -> str:
 def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
     table: dict[str, Any] = {"name": scene.name}
     table["reflector"] = [
-        {"name": r.name, "mesh": f"meshes/{r.name}.ply", "material": _material_table(r.material)}
-        for r in scene.reflectors
+        {"name": r.name, "mesh": _mesh_file(r.name), "material": _material_table(r.material)} for r in scene.reflectors
     ]
     table["scatterer"] = [_scatterer_table(scatterer) for scatterer in scene.scatterers]
     if scene.ris is not None:
@@ -181,7 +182,11 @@ def _has_own_shadow(scatterer: Scatterer) -> bool:
 
 
 def _shade_file(scatterer: Scatterer) -> str:
-    return f"meshes/{scatterer.name}.ply"
+    return _mesh_file(scatterer.name)
+
+
+def _mesh_file(name: str) -> str:
+    return f"meshes/{safe_name(name)}.ply"
 
 
 def _material_table(material: Material) -> dict[str, Any]:

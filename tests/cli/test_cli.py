@@ -4,6 +4,7 @@ import json
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -347,3 +348,20 @@ def test_doctor_proves_the_tracer(run, tmp_path):
     assert code == 0
     assert json.loads((tmp_path / "doctor.json").read_text())["small_box"]["num_paths"] == 25
     assert "libLLVM" in out
+
+
+def test_a_signal_that_falls_into_a_destructor_is_not_lost():
+    from rislam_rt.cli.interrupts import interruptible
+
+    class Thing:
+        def __del__(self):
+            signal.raise_signal(signal.SIGTERM)
+
+    def work():
+        Thing()
+        time.sleep(5.0)
+
+    with interruptible() as heard, pytest.raises(KeyboardInterrupt):
+        work()
+    assert heard == [signal.SIGTERM, signal.SIGTERM]
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL

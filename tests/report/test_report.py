@@ -122,15 +122,15 @@ def test_nothing_from_a_file_can_break_the_page(result):
     summary = summarise(result)
     one = summary["schemes"].pop("random")
     summary = {**summary, "seed": evil, "cycles": evil, "schemes": {evil: one, **summary["schemes"]}}
+    schemes = {evil: result.schemes["random"], "no_ris": result.schemes["no_ris"]}
     broken = replace(
-        result, name=evil, seed=evil, scene=replace(result.scene, name=evil, digest=evil),
+        result, name=evil, seed=evil, schemes=schemes, scene=replace(result.scene, name=evil, digest=evil),
         paths=replace(result.paths, source=evil), versions={evil: evil}, warnings=(evil,),
     )  # fmt: skip
     page = build_page(broken, summary, {})
     assert "<script" not in page
-    assert (
-        page.count("&lt;script&gt;") == 12
-    )  # title and heading: run and room; version: name and number; all else once
+    # title and heading: run and room; version: name and number; the scheme: verdict, list, table; all else once
+    assert page.count("&lt;script&gt;") == 14
 
 
 def test_warnings_stand_on_the_page(result):

@@ -83,7 +83,7 @@ def compare_paths(
         for cycle, path in np.argwhere(in_traced != in_analytic)
     ]
     cycle, path = np.nonzero(in_traced & in_analytic)
-    precision = Precision.of(scene, radio, single=traced.source == "traced")
+    precision = Precision.of(scene, radio, single=is_single(traced.source))
     scale = _scale(analytic, columns.identity, (cycle, columns.analytic[path], path), trajectory, precision)
     limits = precision.limits(analytic, cycle, columns.analytic[path], trajectory, scale)
     labels = tuple(certifier.label(identity) for identity in columns.identity)
@@ -162,7 +162,13 @@ def _report(
         aoa_error=angle_between(traced.arrival[at_traced], analytic.arrival[at_analytic]),
         limits=matched.limits,
         one_sided=tuple(one_sided),
+        searched={"traced": traced.source, "analytic": analytic.source},
     )
+
+
+def is_single(source: str) -> bool:
+    """Whether paths of this source hold the tracer's own float32 numbers."""
+    return source.startswith("traced") and "refined" not in source
 
 
 def _level_difference(a: Floats, b: Floats) -> Floats:

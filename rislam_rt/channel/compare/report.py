@@ -75,6 +75,8 @@ class PathReport:
     limits: Limits
     """Of `length_error`, `gain_error`, `phase_error`, `aod_error` and `aoa_error`."""
     one_sided: tuple[OneSided, ...]
+    searched: dict[str, str]
+    """By side: whose numbers, and among which wall sequences paths were looked for (`Paths.source`)."""
 
     def __post_init__(self) -> None:
         freeze(self, "kind", np.int64, (None,))
@@ -138,6 +140,7 @@ class PathReport:
         """Counts, largest errors and their distributions, for JSON."""
         return {
             "cycles": self.cycles,
+            "searched": self.searched,
             "matched": self.matched,
             "explained": self.explained,
             "unexplained": self.unexplained,

@@ -19,6 +19,8 @@ landmark, walls in the order of travel. Written by `rislam-rt` from one run; do 
 - *matched*: paths on both sides, counted per pose; *unexplained*: one-sided paths without a proof.
 - *explained*: one-sided paths with the proof recomputed from the geometry (`rislam_rt/channel/compare/certificate.py`);
   in brackets the weakest proof, the largest length or distance that any of them rests on.
+- both sides look among all wall sequences that the walls' sides allow, except where a room allows more than 2000 on the
+  analytic side (mirrored beams rule out the others) or 100 000 on the traced one (cones do); the JSON says which.
 - errors are the largest of all matched paths, in brackets the 99th percentile; the panel at one random code. *traced*
   rows are the tracer's own float32 numbers: the independent evidence, and the verdict. In *refined* rows the tracer
   decides which paths exist and what its materials do to the field; lengths and directions are recomputed in float64 on

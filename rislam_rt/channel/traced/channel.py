@@ -34,9 +34,9 @@ class TracedChannel:
         Largest number of wall bounces on a path, both legs together.
     refine
         Recompute the bounce points of what the tracer found in float64 on the walls' planes; `Paths.source` says
-        `traced, refined`. Without it the tracer's own float32 vertices stand, good to some
-        micrometres (a segment of a millimetre then has a direction of three digits, so reflection is computed on the
-        refined points in either case).
+        `traced, refined`, and which sequences were asked about. Without it the tracer's own float32 vertices stand,
+        good to some micrometres (a segment of a millimetre then has a direction of three digits, so reflection is
+        computed on the refined points in either case).
 
     antennas
         Patterns and polarisation of the agent's antennas; by default both are isotropic and vertical.
@@ -76,9 +76,10 @@ class TracedChannel:
             spared = number if number in self.stage.shades else -1
             for from_rx, device in ((False, tx), (True, rx)):
                 problems.append(Problem(device, point[None], heading, from_rx, False, behind, front, spared))
-        direct, *legs = self._trace(problems)
+        (direct, *legs), complete = self._trace(problems)
         tx_legs, rx_legs = legs[0::2], legs[1::2]
-        source = "traced, refined" if self.refine else "traced"
+        searched = "all wall sequences" if complete else "wall sequences in cones"
+        source = f"traced, refined, {searched}" if self.refine else f"traced, {searched}"
         return compose_paths(self.scene, self.radio, self.walls, self.depth, direct, tx_legs, rx_legs, source)
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
@@ -89,17 +90,19 @@ class TracedChannel:
         """Diffuse scattering and diffraction, if switched on: paths without an analytic twin, apart from `paths`."""
         return trace_extras(self.scene, self.radio, trajectory, config)
 
-    def _trace(self, problems: Sequence[Problem]) -> list[Legs]:
-        """Solve problems of one view of the room together, block by block."""
+    def _trace(self, problems: Sequence[Problem]) -> tuple[list[Legs], bool]:
+        """Solve problems of one view of the room together, block by block; also whether all sequences were asked."""
         legs: dict[int, Legs] = {}
+        complete = True
         for spared in dict.fromkeys(problem.spared for problem in problems):
             chosen = [number for number, problem in enumerate(problems) if problem.spared == spared]
             depth = self.depth if len(self.walls) else 0
-            batch = build_batch([problems[number] for number in chosen], self.walls, self._sides, depth)
+            batch = build_batch([problems[number] for number in chosen], self.stage, self._sides, depth)
+            complete &= batch.complete
             blocks = in_blocks(batch.candidates(self.stage), BLOCK_ROWS)
             found = join_found([self._solve(batch, rows, spared) for rows in blocks])
             legs |= dict(zip(chosen, batch.legs(found), strict=True))
-        return [legs[number] for number in range(len(problems))]
+        return [legs[number] for number in range(len(problems))], complete
 
     def _solve(self, batch: Batch, candidates: Rows, spared: int) -> Found:
         """Ask the tracer which candidates exist, and what their walls do to the signal."""

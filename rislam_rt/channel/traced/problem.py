@@ -1,6 +1,7 @@
 """What is asked of the tracer, and what becomes of its answers: legs between many devices and their far ends."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -80,6 +81,8 @@ class Batch(NamedTuple):
     """(N, 3) [m] of all problems."""
     far: Floats
     """(F, 3) [m] of all problems, for the tracer: lifted off host walls."""
+    complete: bool
+    """Whether the sequences are all that the walls' sides allow; else cones have ruled out some."""
 
     @property
     def all_sequences(self) -> Integers:
@@ -128,14 +131,20 @@ class Batch(NamedTuple):
         return result
 
 
-def build_batch(problems: Sequence[Problem], walls: Walls, sides: Integers, depth: int) -> Batch:
+def build_batch(problems: Sequence[Problem], stage: "Stage", sides: Integers, depth: int) -> Batch:
     """Enumerate the wall sequences of every problem up to `depth` bounces."""
-    sequences = []
+    from rislam_rt.channel.traced.cones import build_cones
+
+    walls, sequences, complete = stage.walls, [], True
     for problem in problems:
         device_side, far_side = (np.bitwise_or.reduce(point_sides(walls, p)) for p in (problem.device, problem.far))
-        sequences.append(possible_sequences(sides, device_side, far_side, depth, walls.beside(problem.host)))
+        cones = partial(build_cones, stage, problem.device, problem.far)
+        table, all_of_them = possible_sequences(sides, device_side, far_side, depth, walls.beside(problem.host), cones)
+        sequences.append(table)
+        complete &= all_of_them
     device = np.concatenate([problem.device for problem in problems])
-    return Batch(problems, sequences, device, np.concatenate([_lifted(problem, walls) for problem in problems]))
+    far = np.concatenate([_lifted(problem, walls) for problem in problems])
+    return Batch(problems, sequences, device, far, complete)
 
 
 def join_found(parts: list[Found]) -> Found:

@@ -1,10 +1,12 @@
 """Which wall sequences the tracer is asked about: all that the walls' places in the room leave possible.
 
 A reflection needs both its neighbours (a wall, or an end of the leg) on the same side of its plane. What that rules
-out is not asked; everything else is, for every position, so no path depends on where rays happen to be shot.
+out is not asked; everything else is, for every position, so no path depends on where rays happen to be shot. Where
+that would be too many, cones from both ends (`cones.py`) rule out more, and nothing that exists.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Protocol
 
 import numpy as np
 
@@ -19,8 +21,14 @@ FRONT, BACK = 1, 2
 NO_WALL = -1
 """Padding of sequences."""
 
+MANY = 100_000
+"""Up to so many wall sequences of one bounce count all are asked about at every position."""
+
+MOST_LOOKS = 2_000_000_000
+"""Largest number of wall sequences of one bounce count that are looked at: some minutes."""
+
 MOST_SEQUENCES = 10_000_000
-"""Largest number of wall sequences of one bounce count."""
+"""Largest number of wall sequences that may be left."""
 
 _BLOCK = 4_000_000
 """Largest number of entries of a temporary table."""
@@ -45,10 +53,29 @@ def point_sides(walls: Walls, points: Floats) -> Integers:
     return np.where(height > SURFACE_TOLERANCE, FRONT, np.where(height < -SURFACE_TOLERANCE, BACK, 0))
 
 
+class Narrowing(Protocol):
+    """What rules out sequences by where their ends are."""
+
+    def lead_on(self, walls: Integers) -> Booleans:
+        """Which sequences (N, d) the far ends leave possible."""
+        ...
+
+    def reach(self, walls: Integers) -> Booleans:
+        """Which sequences (N, d) both ends leave possible."""
+        ...
+
+
 def possible_sequences(
-    sides: Integers, device: Integers, far: Integers, depth: int, barred: Booleans | None = None
-) -> Integers:
+    sides: Integers,
+    device: Integers,
+    far: Integers,
+    depth: int,
+    barred: Booleans | None = None,
+    narrowing: Callable[[], Narrowing] | None = None,
+) -> tuple[Integers, bool]:
     """Wall sequences (S, depth) of up to `depth` bounces, from device to far end, padded with `NO_WALL`.
+
+    Also whether these are all that sides allow (else they have been narrowed).
 
     Parameters
     ----------
@@ -58,31 +85,52 @@ def possible_sequences(
         (W,) sides of every wall on which the ends ever are.
     barred
         (W,) walls that may not come last.
+    narrowing
+        Makes what rules out sequences, taken once there are more than `MANY` to rule out.
 
     Raises
     ------
     ConfigError
-        There are more than `MOST_SEQUENCES`.
+        There are more than `MOST_LOOKS` to look at, or more than `MOST_SEQUENCES` are left.
     """
     last = np.flatnonzero((far > 0) if barred is None else (far > 0) & ~barred)
     level, onward = last[:, None], far[last]
     found = [np.full((1, depth), NO_WALL)]
+    sieve: Narrowing | None = None
     for bounces in range(1, depth + 1):
-        complete = level[(device[level[:, 0]] & onward) > 0]
-        found.append(np.pad(complete, ((0, 0), (0, depth - bounces)), constant_values=NO_WALL))
-        if bounces < depth:
-            _check_growth(level, onward, sides, depth)
-            level, onward = _with_wall_before(level, onward, sides)
-    return np.concatenate(found)
+        blocks = [(level, onward)]
+        if bounces > 1:
+            count = _growth(level, onward, sides)
+            _check(count, MOST_LOOKS, sides, depth, "allow")
+            if sieve is None and count > MANY and narrowing is not None:
+                sieve = narrowing()
+            blocks = _with_wall_before(level, onward, sides)  # type: ignore[assignment]
+        levels = [(np.zeros((0, bounces), dtype=np.int64), np.zeros(0, dtype=np.int64))]
+        for longer, ahead in blocks:
+            if sieve is not None:
+                keep = sieve.lead_on(longer)
+                longer, ahead = longer[keep], ahead[keep]
+            if bounces < depth:
+                levels.append((longer, ahead))
+            complete = longer[(device[longer[:, 0]] & ahead) > 0]
+            complete = complete[sieve.reach(complete)] if sieve is not None and len(complete) else complete
+            found.append(np.pad(complete, ((0, 0), (0, depth - bounces)), constant_values=NO_WALL))
+            _check(sum(map(len, found)), MOST_SEQUENCES, sides, depth, "leave")
+        level, onward = (np.concatenate(part) for part in zip(*levels, strict=True))
+    return np.concatenate(found), sieve is None
 
 
-def _check_growth(level: Integers, onward: Integers, sides: Integers, depth: int) -> None:
-    """Refuse what would not end in an hour or fit the memory, before it is built."""
+def _growth(level: Integers, onward: Integers, sides: Integers) -> int:
+    """How many sequences one more wall makes of these."""
     walls, rows = np.unique(np.stack([level[:, 0], onward], axis=1), axis=0, return_counts=True)
-    count = sum(int(n) * int(((sides[wall] & side) > 0).sum()) for (wall, side), n in zip(walls, rows, strict=True))
-    if count > MOST_SEQUENCES:
+    return sum(int(n) * int(((sides[wall] & side) > 0).sum()) for (wall, side), n in zip(walls, rows, strict=True))
+
+
+def _check(count: int, most: int, sides: Integers, depth: int, verb: str) -> None:
+    """Refuse what would not end in an hour or fit the memory, before it is built."""
+    if count > most:
         raise ConfigError(
-            f"depth: {depth} received; {len(sides)} walls allow {count} sequences, more than {MOST_SEQUENCES}: "
+            f"depth: {depth} received; {len(sides)} walls {verb} {count} sequences, more than {most}: "
             "lower the depth, or merge the scene's small facets"
         )
 
@@ -93,15 +141,15 @@ def turned_round(sequences: Integers) -> Integers:
     return np.where(index >= 0, np.take_along_axis(sequences, np.maximum(index, 0), axis=1), NO_WALL)
 
 
-def _with_wall_before(level: Integers, onward: Integers, sides: Integers) -> tuple[Integers, Integers]:
-    """Put every possible wall in front of sequences (S, d); `onward` (S,) is where they go on their first wall."""
-    grown: list[Integers] = [np.zeros((0, level.shape[1] + 1), dtype=np.int64)]
+def _with_wall_before(level: Integers, onward: Integers, sides: Integers) -> Iterator[tuple[Integers, Integers]]:
+    """Put every possible wall in front of sequences (S, d), block by block.
+
+    `onward` (S,) is where they go on their first wall; the longer ones come with theirs.
+    """
     for rows in _blocks(len(level), len(sides)):
         first = level[rows, 0]
         row, wall = np.nonzero(((sides[first] & onward[rows, None]) > 0) & (sides[:, first].T > 0))
-        grown.append(np.concatenate([wall[:, None], level[rows][row]], axis=1))
-    longer = np.concatenate(grown)
-    return longer, sides[longer[:, 0], longer[:, 1]]
+        yield np.concatenate([wall[:, None], level[rows][row]], axis=1), sides[wall, first[row]]
 
 
 def _blocks(count: int, width: int) -> Iterator[slice]:

@@ -170,7 +170,7 @@ def test_compare_exits_1_for_a_gain_error_put_in(capsys, monkeypatch, tmp_path):
     def off(*arguments, **options):
         traced, analytic, trajectory = honest(*arguments, **options)
         return (
-            (worse(traced, "VT floor", 2, "gain", 1e-3) if traced.source == "traced" else traced),
+            (worse(traced, "VT floor", 2, "gain", 1e-3) if "refined" not in traced.source else traced),
             analytic,
             trajectory,
         )

@@ -34,11 +34,12 @@ def test_sides_of_a_box(rooms):
 def test_all_sequences_of_a_box(rooms, depth, count):
     walls = build_walls(rooms.paper())
     inner = point_sides(walls, np.array([[3.0, 3.0, 1.5]]))[0]
-    table = possible_sequences(wall_sides(walls), inner, inner, depth)
+    table, every = possible_sequences(wall_sides(walls), inner, inner, depth)
+    assert every
     assert table.shape == (count, depth)
     assert len(np.unique(table, axis=0)) == count
     if depth > 1:
-        hosted = possible_sequences(wall_sides(walls), inner, inner, depth, walls.beside(walls.host))
+        hosted, _ = possible_sequences(wall_sides(walls), inner, inner, depth, walls.beside(walls.host))
         assert walls.host not in turned_round(hosted)[:, 0]
         assert walls.host in hosted
 
@@ -71,7 +72,7 @@ def test_nothing_that_the_tracer_would_confirm_is_left_out(rooms, room, paired):
     assert len(exists) > 150
 
     ends = (np.bitwise_or.reduce(point_sides(channel.walls, points)) for points in (device, far))
-    table = possible_sequences(wall_sides(channel.walls), *ends, 2)
+    table, _ = possible_sequences(wall_sides(channel.walls), *ends, 2)
     asked = {
         (int(d), tuple(table[s]))
         for devices, chosen in sift_rows(channel.stage, table, device, far)
@@ -97,7 +98,7 @@ def test_rows_in_blocks():
 
 
 def test_too_many_sequences_are_refused_in_one_line(rooms, monkeypatch):
-    monkeypatch.setattr(sequences, "MOST_SEQUENCES", 20)
+    monkeypatch.setattr(sequences, "MOST_LOOKS", 20)
     channel = TracedChannel(rooms.paper(), RadioConfig(), 2)
     with pytest.raises(ConfigError, match="depth: 2 received; 6 walls allow 30 sequences"):
         channel.paths(rooms.at([1.3, 2.1, 0.8]))

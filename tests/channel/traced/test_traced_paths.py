@@ -86,7 +86,8 @@ def test_unrefined_paths_are_the_tracers_own_float32(rooms):
     scene = rooms.paper()
     trajectory = rooms.at([[1.3, 2.1, 0.8], [4.4, 0.9, 2.2]])
     refined, plain = (TracedChannel(scene, RADIO, 2, refine=refine).paths(trajectory) for refine in (True, False))
-    assert (refined.source, plain.source) == ("traced, refined", "traced")
+    searched = "all wall sequences"
+    assert (refined.source, plain.source) == (f"traced, refined, {searched}", f"traced, {searched}")
     np.testing.assert_array_equal(refined.valid, plain.valid)
     error = SPEED_OF_LIGHT * np.abs(refined.tau - plain.tau)[refined.valid]
     # Three segments of vertices at +-3 m about the room's centre, float32 spacing 2.4e-7, plus the panel's lift of 2e-6

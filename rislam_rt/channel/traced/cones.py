@@ -1,0 +1,125 @@
+"""Cones that rule out wall sequences by where both ends are: for rooms with too many walls to ask about all.
+
+Seen from the far end's image, whatever comes after a bounce lies in the cone over a ball about the wall. A next wall,
+or a device, outside all these cones is never met. Positions come in balls, so that one look serves all near each other;
+walls are balls too. It errs towards keeping: nothing that exists is ruled out.
+"""
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.traced.buffer import as_indices
+
+if TYPE_CHECKING:
+    from rislam_rt.channel.traced.stage import Stage
+
+NEAR = 0.02
+"""Side of the cells that positions are gathered in, as a share of the room's longest side."""
+
+
+class Ball(NamedTuple):
+    """A ball of positions in the tracer's frame."""
+
+    center: tuple[float, float, float]
+    radius: float
+
+
+class Cones(NamedTuple):
+    """Where the ends of the sequences are, in the walls of a stage."""
+
+    stage: "Stage"
+    far: list[Ball]
+    device: list[tuple[Ball, Ball]]
+    """Each device ball with its far ball."""
+
+    def lead_on(self, walls: Integers) -> Booleans:
+        """Whether for any far ball the first of walls (N, d) reaches into the cones over the others."""
+        keep = np.zeros(len(walls), dtype=np.bool_)
+        columns = _columns(walls)
+        target, size = _wall_ball(self.stage, columns[0])
+        for ball in self.far:
+            keep |= np.array(self._in_cones(columns[1:], ball, target, size), dtype=np.bool_)
+        return keep
+
+    def reach(self, walls: Integers) -> Booleans:
+        """Whether any device ball reaches into the cones of its far ball over walls (N, d)."""
+        keep = np.zeros(len(walls), dtype=np.bool_)
+        columns = _columns(walls)
+        for device, ball in self.device:
+            target = mi.Point3f(*(dr.opaque(mi.Float, x) for x in device.center))
+            keep |= np.array(self._in_cones(columns, ball, target, dr.opaque(mi.Float, device.radius)), dtype=np.bool_)
+        return keep
+
+    def _in_cones(self, columns: list[Any], far: Ball, target: Any, size: Any) -> Any:
+        """Whether a target ball meets the cones from a far ball over all the walls, the last being the first met."""
+        sieve = self.stage.sieve
+        image: Any = mi.Point3f(*(dr.opaque(mi.Float, x) for x in far.center))
+        radius = dr.opaque(mi.Float, far.radius)
+        passed: list[tuple[Any, Any]] = []
+        for wall in columns[::-1]:
+            normal, offset = dr.gather(mi.Vector3f, sieve.normal, wall), dr.gather(mi.Float, sieve.offset, wall)
+            passed = [(_mirrored(center, normal, offset), half) for center, half in passed]
+            passed.append(_wall_ball(self.stage, wall))
+            image = _mirrored(image, normal, offset)
+        keep = dr.full(mi.Bool, True, dr.width(columns[0]))
+        for center, half in passed:
+            keep &= _meets(target - image, center - image, size + sieve.margin, radius, half + sieve.margin)
+        return keep
+
+
+def build_cones(stage: "Stage", device: Floats, far: Floats) -> Cones:
+    """Gather positions (N, 3) and their far ends (N, 3), or the single one (1, 3), in balls."""
+    device, far = device - stage.origin, far - stage.origin
+    cell = NEAR * 2.0 * (stage.sieve.margin * 1e3 - 1.0)  # the margin is a thousandth of 1 m + half the longest side
+    _, group = np.unique(np.floor(device / cell), axis=0, return_inverse=True)
+    group = group.ravel()
+    members = [np.flatnonzero(group == g) for g in range(group.max(initial=-1) + 1)]
+    devices = [_ball(device[rows]) for rows in members]
+    if len(far) == 1:
+        only = _ball(far)
+        return Cones(stage, [only], [(ball, only) for ball in devices])
+    fars = [_ball(far[rows]) for rows in members]
+    return Cones(stage, fars, list(zip(devices, fars, strict=True)))
+
+
+def _ball(points: Floats) -> Ball:
+    """The ball about the middle of some points (N, 3)."""
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    x, y, z = middle.tolist()
+    return Ball((x, y, z), float(np.linalg.norm(points - middle, axis=-1).max()))
+
+
+def _columns(walls: Integers) -> list[Any]:
+    """Wall numbers for the tracer, column by column."""
+    columns = [as_indices(wall) for wall in walls.T]
+    dr.eval(columns)
+    return columns
+
+
+def _wall_ball(stage: "Stage", wall: Any) -> tuple[Any, Any]:
+    """Centre and radius of a ball about walls (N,)."""
+    half = dr.gather(mi.Vector3f, stage.sieve.half, wall)
+    return dr.gather(mi.Point3f, stage.sieve.center, wall), dr.norm(half)
+
+
+def _mirrored(point: Any, normal: Any, offset: Any) -> Any:
+    """Mirror images in planes."""
+    return point - 2.0 * (dr.dot(normal, point) - offset) * normal
+
+
+def _meets(target: Any, axis: Any, size: Any, source: Any, half: Any) -> Any:
+    """Whether rays from a ball about 0 of radius `source` through one at `axis` of radius `half` can meet a third.
+
+    A ray through both runs, at t times the way to the second, within `source (t - 1) + half t` of `t axis`. So the ball
+    of radius `size` at `target` is met only if `|target - t axis| <= a + b t` for some t >= 1, with a = size - source
+    and b = source + half: a quadratic inequality, its discriminant written without a difference of large numbers.
+    """
+    a, b = size - source, source + half
+    square = dr.squared_norm(axis) - b * b
+    room = dr.squared_norm(a * axis + b * target) - dr.squared_norm(dr.cross(target, axis))
+    later = dr.dot(target, axis) + a * b + dr.sqrt(dr.maximum(room, 0.0))
+    return (square <= 0.0) | ((room >= 0.0) & (later >= square * (1.0 - 1e-3)))

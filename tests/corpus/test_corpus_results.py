@@ -1,0 +1,86 @@
+"""The corpus of damaged results: files of a run are refused in one line, a sweep's cells are run again."""
+
+import shutil
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rislam_rt.errors import RislamError
+from rislam_rt.pipeline import load_spec, run_slam
+from rislam_rt.pipeline.identity import run_identity
+from rislam_rt.pipeline.store import open_run, read_run
+from rislam_rt.pipeline.summary import summarise
+from rislam_rt.pipeline.sweeps import Sweep, build_cells
+from rislam_rt.pipeline.sweeps.store import DONE, MISSING, read_row, write_cell
+from rislam_rt.pipeline.sweeps.work import Outcome
+from rislam_rt.scene import load_scene
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+CASES = tomllib.loads((HERE / "results.toml").read_text())["case"]
+CELLS = {
+    "cut": lambda data: data[: len(data) // 2],
+    "empty": lambda data: b"",
+    "no JSON": lambda data: b"[" + data,
+    "a list": lambda data: b"[]",
+    "a number": lambda data: b"1e308",
+    "nested too deeply": lambda data: b"[" * 100_000,
+    "no text": lambda data: b"\xff\xfe" + data,
+    "another value": lambda data: data.replace(b"0.125", b"0.126"),
+    "another state": lambda data: data.replace(b'"done"', b'"died"'),
+    "another seed": lambda data: data.replace(b'"repetition": 0', b'"repetition": 1'),
+    "another schema": lambda data: data.replace(b'"schema": 1', b'"schema": 2'),
+    "no checksum": lambda data: data.replace(b'"checksum"', b'"checksun"'),
+}
+"""What is done to a cell's file."""
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A completed run of five cycles."""
+    settings = ["channel=image_source", "cycles=5", "depth=0", 'schemes=["random"]']
+    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
+    room = load_scene(ROOT / "scenes" / "paper_room")
+    folder = tmp_path_factory.mktemp("sound") / "run"
+    with open_run(folder, run_identity(spec, room)) as store:
+        result = run_slam(room, spec, rng=np.random.default_rng(7), done=store)
+        store.complete(result, summarise(result))
+    assert read_run(folder).seed == 7
+    return folder
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda c: f"{c['file']}-{c.get('how') or c['new']!a}")
+def test_run(case: dict[str, str], sound: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(sound, tmp_path / "run"))
+    file = folder / case["file"]
+    data = bytearray(file.read_bytes())
+    how = case.get("how")
+    if how == "gone":
+        file.unlink()
+    elif how == "cut":
+        file.write_bytes(data[: len(data) // 2])
+    elif how == "flipped":
+        data[len(data) // 2] ^= 1
+        file.write_bytes(data)
+    else:
+        assert case["old"].encode() in data
+        file.write_bytes(data.replace(case["old"].encode(), case["new"].encode(), 1))
+    with pytest.raises(RislamError) as caught:
+        read_run(folder)
+    assert case["says"] in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize("what", CELLS)
+def test_cell(what: str, tmp_path: Path) -> None:
+    cell = build_cells(Sweep("math:hypot", base={"cycles": 3}))[0]
+    write_cell(tmp_path, cell, "math:hypot", Outcome({"rmse_m": 0.125}))
+    assert read_row(tmp_path, cell).state == DONE
+    file = next((tmp_path / "cells").iterdir())
+    data = file.read_bytes()
+    assert CELLS[what](data) != data
+    file.write_bytes(CELLS[what](data))
+    assert read_row(tmp_path, cell).state == MISSING
