@@ -45,6 +45,7 @@ CASES = {
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--places", type=int, default=12)
+    parser.add_argument("--quick", action="store_true", help="only what is fast")
     arguments = parser.parse_args()
     scene = load_scene("scenes/paper_room")
     agent = scene.agent
@@ -56,10 +57,18 @@ def main() -> None:
     print("milliseconds of processor time a cycle: mean and largest over the places; samples L M; components found")
     base = RadioConfig()
     for name, config in (
-        ("bound, cell", ReceiverConfig()),
-        ("bound, joint", ReceiverConfig(resolution="joint")),
+        ("bound, cell", ReceiverConfig(estimator="bound")),
+        ("bound, joint", ReceiverConfig(estimator="bound", resolution="joint")),
+        ("local", ReceiverConfig(estimator="local")),
+        ("local, alternation", ReceiverConfig(estimator="local", alternation=True)),
     ):
         print_times(name, times(lambda k, c=config: draw(paths, motion, k, base, c), arguments.places))
+    for snr in (0.0, 30.0):
+        config, radio = ReceiverConfig(estimator="local"), with_reference_snr(base, snr)
+        name = f"local, sphere at {snr:.0f} dB"
+        print_times(name, times(lambda k, r=radio, c=config: draw(paths, motion, k, r, c), arguments.places))
+    if arguments.quick:
+        return
     print_times("synthesis", times(lambda k: sound(paths, motion, k, base, WAVEFORM), arguments.places))
     for name, radio in CASES.items():
         print_case(f"waveform, {name}", paths, motion, radio, WAVEFORM)
@@ -107,7 +116,7 @@ def track_times(paths: Paths, motion: Trajectory, radio: RadioConfig) -> list[fl
 def print_case(name: str, paths: Paths, motion: Trajectory, radio: RadioConfig, config: ReceiverConfig) -> None:
     places = len(motion) // 2
     captures = [sound(paths, motion, cycle, radio, config) for cycle in range(2 * places)]
-    before = [to_measurement(find_components(one, radio, config), config) for one in captures[places:]]
+    before = [to_measurement(find_components(one, radio, config), radio, config) for one in captures[places:]]
     found = [len(find_components(one, radio, config).tau) for one in captures[:places]]
     spent = times(lambda k: find_components(captures[k], radio, config), places)
     print_times(name, spent, f"  {captures[0][0].samples.size:6d} samples, {np.mean(found):5.1f} components")

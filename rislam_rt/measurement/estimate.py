@@ -70,7 +70,7 @@ def estimate_paths(
     fit = fit_amplitudes(sounding, known[:most], samples)
     if len(known):
         fit = refine(sounding, fit, samples, steps=KNOWN_STEPS)
-        fit = _drop(sounding, fit, samples, threshold, window)
+        fit = drop(sounding, fit, samples, threshold, window)
     for _ in range(ROUNDS):
         room = min(BATCH, most - len(fit.parameters))
         fresh = pick_peaks(sounding, grid, fit.residual, threshold, window, room)
@@ -80,12 +80,12 @@ def estimate_paths(
         # From nothing, every round moves all paths; where most were known, only those that a new one touches.
         local = _touched(grown, len(fresh)) if len(known) else np.ones(len(grown.parameters), dtype=bool)
         grown = _refine_some(sounding, grown, samples, local)
-        grown = _drop(sounding, grown, samples, threshold, window)
+        grown = drop(sounding, grown, samples, threshold, window)
         if grown.cost >= fit.cost - threshold:
             break
         fit = grown
     fit = refine(sounding, fit, samples, steps=FINAL_STEPS)
-    fit = _prune(sounding, _drop(sounding, fit, samples, threshold, window), samples, threshold)
+    fit = prune(sounding, drop(sounding, fit, samples, threshold, window), samples, threshold)
     fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
     return Estimate(fit, accuracy(fit))
 
@@ -110,7 +110,7 @@ def _refine_some(sounding: Sounding, fit: Fit, samples: Complexes, chosen: Boole
     return fit_amplitudes(sounding, parameters, samples)
 
 
-def _drop(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float, window: tuple[float, float]) -> Fit:
+def drop(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float, window: tuple[float, float]) -> Fit:
     """Without the paths that left the window or the sky, and those whose loss alone costs less than the threshold."""
     keep = _inside(fit.parameters, window)
     if not keep.all():
@@ -119,7 +119,7 @@ def _drop(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float, wi
     return fit if keep.all() else fit_amplitudes(sounding, fit.parameters[keep], samples)
 
 
-def _prune(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float) -> Fit:
+def prune(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float) -> Fit:
     """Without the paths that their neighbours, refined, can stand in for.
 
     Noise alone lowers the cost by its highest peak when a path is added, so the threshold is the one of the search.

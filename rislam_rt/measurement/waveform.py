@@ -1,6 +1,6 @@
 """The waveform-driven receiver: makes the signal of a cycle, and finds the paths in it again."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from rislam_rt.measurement.atoms import build_sounding
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.detect import build_grid
 from rislam_rt.measurement.doubt import crowding, luck, mirror_variance, unmirrored
-from rislam_rt.measurement.estimate import NOTHING, Estimate, estimate_paths
+from rislam_rt.measurement.estimate import NOTHING, estimate_paths
 from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_swing, in_step
 from rislam_rt.measurement.identify import identify
@@ -52,6 +52,20 @@ class Components(NamedTuple):
     """(N,)."""
     in_difference: Booleans
     """(N,) whether it was found in the difference."""
+
+
+class Bounded(NamedTuple):
+    """P paths fitted to samples of unit noise, with their joint bound."""
+
+    parameters: Floats
+    """(P, 3) of (B tau, u, v)."""
+    amplitude: Complexes
+    deviation: Floats
+    """(P, 3)."""
+    amplitude_std: Floats
+    """(P,) of the complex amplitude, all else unknown."""
+    covariance: Any
+    """(P, P) of the complex amplitudes at known parameters."""
 
 
 def capture(
@@ -97,8 +111,12 @@ def find_components(
     captures: list[Capture], radio: RadioConfig, config: ReceiverConfig, previous: Measurement | None = None
 ) -> Components:
     """All components in the captures of one cycle; the search begins with those of the previous one, if given."""
-    found = [_find(one, radio, config, _known(one, radio, previous)) for one in captures]
-    joined = [np.concatenate(fields) for fields in zip(*found, strict=True)]
+    return by_delay([_find(one, radio, config, _known(one, radio, previous)) for one in captures])
+
+
+def by_delay(parts: list[Components]) -> Components:
+    """Components of several captures in the order of their delays."""
+    joined = [np.concatenate(fields) for fields in zip(*parts, strict=True)]
     order = np.argsort(joined[0])
     return Components._make(field[order] for field in joined)
 
@@ -162,13 +180,27 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
     """Components of one capture."""
     sounding = build_sounding(one.samples.shape[1], radio, element_exact=config.element_exact)
     window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
-    grid = build_grid(sounding, window)
     threshold = detection_threshold(radio, config)
     samples = one.samples / np.sqrt(one.noise_psd)
+    grid = build_grid(sounding, window)
     found = estimate_paths(sounding, grid, samples, threshold, window, config.max_components, known)
-    parameters, gain, deviation, amplitude_std = _resolved(found, radio)
+    bounded = Bounded(
+        found.fit.parameters,
+        found.fit.amplitude,
+        found.accuracy.parameters,
+        found.accuracy.amplitude,
+        amplitude_covariance(found.fit),
+    )
+    return reported(bounded, one, radio, config)
+
+
+def reported(found: Bounded, one: Capture, radio: RadioConfig, config: ReceiverConfig) -> Components:
+    """What is told apart of an estimate, with deviations that count what cannot be seen."""
+    window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
+    threshold = detection_threshold(radio, config)
+    parameters, gain, deviation, amplitude_std = _resolved(found, one.samples.size, radio)
     cosines = into_disc(unmirrored(parameters[:, 1:], radio))
-    variance = deviation**2 * luck(np.abs(gain) ** 2 * samples.size)[:, None]
+    variance = deviation**2 * luck(np.abs(gain) ** 2 * one.samples.size)[:, None]
     variance *= crowding(parameters, threshold, radio)
     mirrored = mirror_variance(cosines, np.sqrt(variance[:, 1:]), radio)
     scale = np.sqrt(one.noise_psd * one.samples.shape[1] / radio.energy)
@@ -183,27 +215,26 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
     )
 
 
-def _resolved(found: Estimate, radio: RadioConfig) -> tuple[Floats, Complexes, Floats, Floats]:
+def _resolved(found: Bounded, samples: int, radio: RadioConfig) -> tuple[Floats, Complexes, Floats, Floats]:
     """Parameters (N, 3), gains (N,), deviations (N, 3) and amplitude deviations (N,) of what can be told apart.
 
     Where the data ask for several paths but cannot share the amplitude out between them, they are reported as one, as
     wide as they lie apart.
     """
-    fit, bound = found.fit, found.accuracy
-    parameters, amplitude = fit.parameters, fit.amplitude
-    label = _groups(parameters, np.abs(amplitude) < LEAST_CERTAINTY * bound.amplitude, radio)
+    parameters, amplitude = found.parameters, found.amplitude
+    label = _groups(parameters, np.abs(amplitude) < LEAST_CERTAINTY * found.amplitude_std, radio)
     member = (label == np.unique(label)[:, None]).astype(np.float64)
     gain = member @ amplitude
-    spread = np.real(np.einsum("gi,ij,gj->g", member, amplitude_covariance(fit), member))
+    spread = np.real(np.sum((member @ found.covariance) * member, axis=1))
     single = member.sum(axis=1) == 1
     share = member * np.abs(amplitude)
     share /= share.sum(axis=1, keepdims=True)
     centre = share @ parameters
-    lone = measurement_std(np.abs(gain) ** 2 * fit.residual.size, radio)
+    lone = measurement_std(np.abs(gain) ** 2 * samples, radio)
     lone_std = np.column_stack([lone.tau * radio.bandwidth, lone.cosines])
     offset = np.where(member[..., None] > 0.0, np.abs(parameters - centre[:, None]), 0.0).max(axis=1, initial=0.0)
-    deviation = np.where(single[:, None], member @ bound.parameters, np.hypot(lone_std, offset))
-    variance = np.where(single, member @ bound.amplitude**2, spread)
+    deviation = np.where(single[:, None], member @ found.deviation, np.hypot(lone_std, offset))
+    variance = np.where(single, member @ found.amplitude_std**2, spread)
     sure = np.abs(gain) ** 2 > LEAST_CERTAINTY**2 * variance
     return centre[sure], gain[sure], deviation[sure], np.sqrt(variance[sure] / 2.0)
 

@@ -340,7 +340,7 @@ def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> Hardw
     hardware = HardwareConfig(**section.model_dump())
     if receiver.estimator != "waveform" and hardware != HardwareConfig():
         raise ConfigError(
-            f"hardware: set, with receiver.estimator '{receiver.estimator}', which makes no signal; give 'waveform'"
+            f"hardware: set, with receiver.estimator '{receiver.estimator}', which has no front end; give 'waveform'"
         )
     return hardware
 

@@ -115,6 +115,14 @@ def test_prior_of_a_cloud_and_of_its_covariance():
     np.testing.assert_allclose(half, prior_from_particles(cloud[cloud[:, 0] > 3.0]), rtol=1e-9)
 
 
+def test_priors_of_many_covariances_are_those_of_each():
+    root = np.random.default_rng(5).normal(size=(4, 2, 2))
+    covariance = 0.01 * root @ root.swapaxes(1, 2) + 1e-4 * np.eye(2)
+    np.testing.assert_allclose(prior_from_covariance(covariance), np.linalg.inv(covariance), rtol=1e-9)
+    skew = covariance + np.array([[0.0, 1e-3], [-1e-3, 0.0]])  # what is not symmetric in it plays no part
+    np.testing.assert_allclose(prior_from_covariance(skew), np.linalg.inv(covariance), rtol=1e-9)
+
+
 def test_a_collapsed_cloud_is_still_finite():
     prior = prior_from_particles(np.ones((10, 2)))
     np.testing.assert_allclose(prior, 1e8 * np.eye(2), rtol=1e-12, atol=1e-6)

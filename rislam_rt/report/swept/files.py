@@ -12,6 +12,7 @@ from rislam_rt.pipeline.studies.swept import (
     Fig4bSpec,
     Fig4cSpec,
     Group,
+    HardwareSpec,
     RobustnessSpec,
     RoomsSpec,
     SweptSpec,
@@ -24,6 +25,7 @@ from rislam_rt.report.swept.ablations import ablations_content, ablations_page, 
 from rislam_rt.report.swept.entries import csv_text, paragraph
 from rislam_rt.report.swept.fig4b import draw_fig4b, fig4b_content, fig4b_page
 from rislam_rt.report.swept.fig4c import draw_fig4c, fig4c_content, fig4c_page
+from rislam_rt.report.swept.hardware import draw_hardware, hardware_content, hardware_page
 from rislam_rt.report.swept.robustness import draw_robustness, robustness_content, robustness_page
 from rislam_rt.report.swept.rooms import draw_rooms, rooms_content, rooms_page
 
@@ -46,7 +48,7 @@ def write_swept(
     StoreError
         The disk refused.
     """
-    groups = [group for group in group_rows(rows) if group.schemes]
+    groups = [group for group in group_rows(rows) if group.schemes or (any(group.results) and _of_receiver(spec))]
     if not groups:
         return None
     shape = shape_of(groups, spec)
@@ -71,12 +73,20 @@ def shape_of(groups: Sequence[Group], spec: SweptSpec) -> Shape:
     if isinstance(spec, AblationsSpec):
         content = ablations_content(groups, spec)
         return Shape(content, lambda: draw_ablations(content), lambda a, f: ablations_page(content, groups, a, f))
+    if isinstance(spec, HardwareSpec):
+        content = hardware_content(groups, spec)
+        return Shape(content, lambda: draw_hardware(content), lambda a, f: hardware_page(content, groups, a, f))
     if isinstance(spec, RobustnessSpec):
         content = robustness_content(groups, spec)
         return Shape(content, lambda: draw_robustness(content), lambda a, f: robustness_page(content, groups, a, f))
     assert isinstance(spec, RoomsSpec)
     content = rooms_content(groups)
     return Shape(content, lambda: draw_rooms(content), lambda a, f: rooms_page(content, groups, a, f))
+
+
+def _of_receiver(spec: SweptSpec) -> bool:
+    """Whether the cells hold the receiver's scores, and no scheme's."""
+    return isinstance(spec, HardwareSpec)
 
 
 def about_lines(groups: Sequence[Group], spec: SweptSpec, record: Mapping[str, Any], wanted: int) -> list[str]:
@@ -91,6 +101,8 @@ def about_lines(groups: Sequence[Group], spec: SweptSpec, record: Mapping[str, A
     text = f"""{rooms}; paths by {source} with up to {config["depth"]} wall bounces, {cycles} of the trajectory,
     {spec.repetitions} seeds a point (seed {spec.seed}). Written by `rislam-rt run` from one pipeline, do not edit.
     {unfinished}"""
+    if _of_receiver(spec):
+        return paragraph(text)
     law = """For every seed the true motion is the scene's trajectory plus white acceleration, and the estimators
     are told its standard deviation; a start is told with one draw of its errors. All schemes of a seed share
     motion, paths, noise and start. RMSE is over the cycles, then over the seeds; intervals are 95 % bootstrap

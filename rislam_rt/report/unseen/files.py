@@ -14,7 +14,7 @@ from rislam_rt.pipeline.sweeps.store import csv_bytes
 from rislam_rt.report.style import to_png
 from rislam_rt.report.unseen.cards import Run, by_series, card, class_cards, cycle_times, read_runs
 from rislam_rt.report.unseen.figure import draw_unseen
-from rislam_rt.report.unseen.page import about_lines, unseen_page
+from rislam_rt.report.unseen.page import SHOWN, about_lines, unseen_page
 
 
 def write_unseen(
@@ -55,7 +55,14 @@ def unseen_content(runs: Mapping[str, Sequence[Run]], timings: Sequence[Mapping[
     """Plain data: a card a series, and one a class of it."""
     times = cycle_times(runs, timings)
     cards = {name: {**card(members), "cycle_ms": times[name]} for name, members in runs.items()}
-    return {"cards": cards, "classes": {name: class_cards(members) for name, members in runs.items()}}
+    classes = {name: [_brief(entry) for entry in class_cards(members)] for name, members in runs.items()}
+    return {"cards": cards, "classes": classes}
+
+
+def _brief(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """A class's card with what its table shows; numbers with six digits."""
+    kept = {name: value for name, value in entry.items() if name in SHOWN}
+    return {name: float(_six(value)) if isinstance(value, float) else value for name, value in kept.items()}
 
 
 def run_entries(runs: Mapping[str, Sequence[Run]]) -> list[dict[str, Any]]:

@@ -82,7 +82,21 @@ def about_lines(spec: UnseenSpec, record: Mapping[str, Any], tests: int, there: 
     `rislam-rt run pipelines/unseen.toml`, do not edit. Code `{record["code"]}`.{unfinished}"""
     count = f"""Test rooms (from {TEST} on) were run **{counted}**; every run of them is written into the ledger
     `pipelines/{spec.ledger}`."""
-    return [*paragraph(text), "", *paragraph(count)]
+    return [*paragraph(text), "", *paragraph(count), *_series(spec)]
+
+
+def _series(spec: UnseenSpec) -> list[str]:
+    """What each variant sets, and what all run."""
+    schemes = spec.run.get("schemes", [])
+    lines = [f"- all: schemes {', '.join(f'`{name}`' for name in schemes)} (without a panel, what needs none)"]
+    for variant in spec.variants:
+        settings = ", ".join(f"`{key} = {_toml(value)}`" for key, value in variant.set.items())
+        lines.append(f"- `{variant.name}`: {settings or 'the defaults'}{f'; {variant.note}' if variant.note else ''}")
+    return ["", *lines]
+
+
+def _toml(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value!r}"
 
 
 def _worst(runs: Mapping[str, Sequence[Run]]) -> list[str]:
@@ -198,3 +212,10 @@ COLUMNS: dict[str, Any] = {
     ),
 }  # fmt: skip
 """Scores of a class."""
+_SPREAD = ("ratio", "relative_rmse_m", "late_relative_rmse_m", "relative_ratio", "nees")
+_PLAIN = ("division", "class", "runs", "failed", "ghost_walls", "ghost_points")
+SHOWN = {
+    *_PLAIN, *_SPREAD, *(f"{name}_p95" for name in _SPREAD), "lost", "silent", "births_right", "walls_found",
+    "panel_found",
+}  # fmt: skip
+"""Names of what `COLUMNS` reads."""

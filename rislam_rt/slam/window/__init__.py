@@ -1,6 +1,6 @@
 """A filter over a window that is re-linearised: planes, points and the panel in one map."""
 
-from rislam_rt.slam.window.filter import WindowState, init, step
+from rislam_rt.slam.window.filter import WindowState, init, smoothed, step
 from rislam_rt.slam.window.mapping import estimate, predict
 
-__all__ = ["WindowState", "estimate", "init", "predict", "step"]
+__all__ = ["WindowState", "estimate", "init", "predict", "smoothed", "step"]

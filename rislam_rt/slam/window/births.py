@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.returns import linearise
 from rislam_rt.slam.window import gauss, tracks
 from rislam_rt.slam.window.book import enter, idents
@@ -11,7 +11,8 @@ from rislam_rt.slam.window.digest import Digest, digest
 from rislam_rt.slam.window.expect import Clusters, Expected
 from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.gauss import HEAD
-from rislam_rt.slam.window.kinds import NEW, Verdict, judge, known_features, wanted
+from rislam_rt.slam.window.guesses import BESIDE, known_features
+from rislam_rt.slam.window.kinds import NEW, Verdict, judge, wanted
 from rislam_rt.slam.window.learn import seed
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.retract import behind, release
@@ -39,9 +40,9 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.book, mean[:3])
     histories = digest(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
     told = explanations(context, rows, histories, expected, groups, mean, covariance)
-    first = _may_be_first(context, histories, mean)
+    lonely = _missing_legs(context, histories, mean)
     verdicts, shares = judge(
-        histories, known, context.book, context.scene, [(row, value) for row, value, _ in told], first
+        histories, known, context.book, context.scene, [(row, value) for row, value, _ in told], lonely
     )  # fmt: skip
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked = context.tracks.looked.copy()
@@ -66,11 +67,11 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     return context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
 
 
-def _may_be_first(context: Context, histories: Digest, mean: Floats) -> Booleans:
-    """(T,) tracks without anything shorter and brighter that could be one of two walls by itself.
+def _missing_legs(context: Context, histories: Digest, mean: Floats) -> Floats:
+    """(T,) log probability that of two walls that throw a track together so many single returns are not heard.
 
-    Two walls shift the Tx by the sum of what each does: a single return of theirs comes from the same direction
-    (opposite walls), or is one leg of a right angle.
+    Two walls shift the Tx by the sum of what each does: a single return of theirs comes along the same line (opposite
+    walls), or is one leg of a right angle; it is shorter and brighter. The floor's is never heard.
     """
     every, ray = context.tracks, histories.direction
     length, shine = histories.mean[0][:, 0], histories.log_amplitude + np.log(histories.mean[0][:, 0])
@@ -92,12 +93,15 @@ def _may_be_first(context: Context, histories: Digest, mean: Floats) -> Booleans
         reach = np.concatenate([reach, 2.0 * np.abs(depth)])
         bright = np.concatenate([bright, np.ones((len(ray), len(walls)), dtype=np.bool_)], axis=1)
     along, share = ray @ away.T, reach / length[:, None]
-    leg = (np.abs(along - share) < LEG) | (along > 1.0 - 0.2 * LEG)
-    return np.asarray(~(leg & (share < 0.97) & bright).any(axis=1))
+    leg = (np.abs(along - share) < LEG) | (np.abs(along) > 1.0 - LEG)
+    found = (leg & (share < 0.995) & bright).sum(axis=1)
+    return LOG_MISSING[np.minimum(found, 2)]
 
 
-LEG = 0.15
-"""Difference of cosines up to which one return may be a leg of another's right angle."""
+LEG = 0.04
+"""Difference of cosines up to which one return may be a leg of another's right angle, or lie along its line."""
+LOG_MISSING = np.log(np.array([0.02, 0.3, 1.0]))
+"""Log probability that none, one, both of the single returns of two walls are heard, where they are heard together."""
 
 
 def explanations(
@@ -137,7 +141,7 @@ def _explain(
     from rislam_rt.slam.returns import Poses
 
     used = histories.weight[row, :, 0] > 0.0
-    poses = Poses(histories.tx[row, used], histories.rx[row, used], histories.heading[row, used])
+    poses = Poses(histories.tx[row, used], histories.rx[row, used], np.zeros(int(used.sum())))
     parts = forms[forms[:, 0] != UNKNOWN]
     linear = linearise(compile_forms(parts), features, context.book.anchor, poses)
     weight = np.array([1.0 - groups.share[column], groups.share[column]])[: len(parts)]
@@ -166,12 +170,12 @@ def _explain(
     return float(evidence)
 
 
-def _assign(context: Context, at: Integers, forms: Integers, scatter: Floats) -> Context:
+def _assign(context: Context, at: Integers, forms: Integers, scatter: Floats, part: float = 0.5) -> Context:
     """Rows of the log held to be forms (2, 5) of idents; they err by as much more as they scatter."""
     log = context.log
     form, share, extra = log.form.copy(), log.share.copy(), log.extra.copy()
     form[at] = forms
-    share[at] = 0.5 if forms[1, 0] != UNKNOWN else 0.0
+    share[at] = part if forms[1, 0] != UNKNOWN else 0.0
     extra[at] = LEVELS.memory * log.std[at] ** 2 * (scatter**2 - 1.0)
     return context._replace(log=log._replace(form=form, share=share, extra=extra))
 
@@ -184,7 +188,11 @@ def _enter(context: Context, at: Integers, verdict: Verdict, histories: Digest, 
     book = enter(context.book, verdict.is_wall, histories.middle, len(at), 5.0)
     forms = np.full((2, 5), UNKNOWN)
     forms[0] = [new if part == NEW else part for part in verdict.form]
-    grown = _assign(context._replace(window=window, book=book), at, idents(book, forms), histories.scatter[row])
+    if verdict.kind == BESIDE:
+        forms[1] = [*forms[0][:4], verdict.known]
+    grown = context._replace(window=window, book=book)
+    share = min(max(verdict.share, 0.0), 1.0)
+    grown = _assign(grown, at, idents(book, forms), histories.scatter[row], share)
     window, left = resolve(grown, 3)
     if not np.isfinite(window.head).all():
         return context, False

@@ -25,7 +25,7 @@ class Digest(NamedTuple):
     """T tracks, B normal points each; where `weight` is 0 there is none."""
 
     seen: Floats
-    """(T, B, 3) length [m] and two cosines."""
+    """(T, B, 3) length [m] and two cosines, these in the room's axes."""
     weight: Floats
     """(T, B, 3) one over the standard deviation, 0 for padding."""
     time: Floats
@@ -34,8 +34,6 @@ class Digest(NamedTuple):
     """(T, B, 3) [m]."""
     rx: Floats
     """(T, B, 3) [m]."""
-    heading: Floats
-    """(T, B) [rad]."""
     doubt: Floats
     """(T, B, 3, 6) square root of the covariance of the poses' common errors of place and velocity."""
     log_amplitude: Floats
@@ -48,64 +46,64 @@ class Digest(NamedTuple):
     """[m/s] of the agent, and something for its doubt."""
 
     @property
-    def mean(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Averages: what is seen, Tx and Rx (T, 3), heading (T,)."""
+    def mean(self) -> tuple[Floats, Floats, Floats]:
+        """Averages: what is seen, Tx and Rx (T, 3)."""
         weight = self.weight[..., :1] ** 2
         weight = weight / weight.sum(axis=1, keepdims=True)
-        heading = np.arctan2(
-            (weight[..., 0] * np.sin(self.heading)).sum(axis=1), (weight[..., 0] * np.cos(self.heading)).sum(axis=1)
-        )
-        return (*((weight * field).sum(axis=1) for field in (self.seen, self.tx, self.rx)), heading)
+        seen, tx, rx = ((weight * field).sum(axis=1) for field in (self.seen, self.tx, self.rx))
+        return seen, tx, rx
 
     @property
     def direction(self) -> Floats:
         """(T, 3) mean directions of arrival in the room's axes."""
-        seen, _, _, heading = self.mean
-        flat = seen[:, 1:] / np.maximum(1.0, np.linalg.norm(seen[:, 1:], axis=1))[:, None]
+        flat = self.mean[0][:, 1:]
+        flat = flat / np.maximum(1.0, np.linalg.norm(flat, axis=1))[:, None]
         up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=1), 0.0))
-        cos, sin = np.cos(heading), np.sin(heading)
-        return np.stack([cos * flat[:, 0] - sin * flat[:, 1], sin * flat[:, 0] + cos * flat[:, 1], up], axis=1)
+        return np.concatenate([flat, up[:, None]], axis=1)
 
 
 def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: Floats, cycle: int) -> Digest:
     """The histories `rows` of T tracks (rows of the log each, in time)."""
     mean, covariance = now(window)
     place, time = poses(window), np.concatenate([[0.0], np.cumsum(window.step)])
-    first = cycle - window.num_poses + 1
-    count = len(rows)
-    seen, weight = np.zeros((count, POINTS, 3)), np.zeros((count, POINTS, 3))
-    lag, spot, turned = np.zeros((count, POINTS)), np.zeros((count, POINTS, 3)) + mean[:3], np.zeros((count, POINTS))
-    scatter = np.ones((count, 3))
-    level = np.zeros(count)
-    for row, at in enumerate(rows):
-        scatter[row] = scatter_of(log.seen[at], log.std[at], time[log.cycle[at] - first])
+    ends = poses_of(place[:, :3], heading + place[:, 3], body)
+    slots = [log.cycle[at] - (cycle - window.num_poses + 1) for at in rows]
+    seen = [_turned(log.seen[at], ends.heading[slot]) for at, slot in zip(rows, slots, strict=True)]
+    scatter = np.array([
+        scatter_of(track, log.std[at], time[slot]) for track, at, slot in zip(seen, rows, slots, strict=True)
+    ])  # fmt: skip
     # what the others show is what a short history has yet to show; it counts as much as four measurements
     crowd = max(LEVELS.crowd, float(np.mean(np.minimum(scatter, 10.0) ** 2)))
     number = np.array([len(at) for at in rows])[:, None]
     scatter = np.sqrt((4.0 * crowd + number * scatter**2) / (4.0 + number))
-    for row, at in enumerate(rows):
-        slot = log.cycle[at] - first
-        std = log.std[at] * scatter[row]
+    count = len(rows)
+    found = Digest(
+        np.zeros((count, POINTS, 3)), np.zeros((count, POINTS, 3)), np.zeros((count, POINTS)),
+        np.zeros((count, POINTS, 3)) + ends.tx[-1], np.zeros((count, POINTS, 3)) + ends.rx[-1],
+        np.zeros((count, POINTS, 3, 6)), np.array([log.log_amplitude[at].mean() for at in rows]), scatter,
+        mean[:3].copy(), float(np.linalg.norm(mean[3:6])) + 0.05,
+    )  # fmt: skip
+    for row, (at, slot) in enumerate(zip(rows, slots, strict=True)):
         bins = np.arange(len(at)) * min(POINTS, len(at)) // len(at)
         start = np.searchsorted(bins, np.arange(bins[-1] + 1))
-        inside = std**-2.0
-        total = np.add.reduceat(inside, start)
-        used = len(start)
-        number = np.diff(start, append=len(at)).astype(np.float64)
+        used, many = len(start), np.diff(start, append=len(at)).astype(np.float64)[:, None]
         alone = max(len(at) / TOGETHER, 1.0) / used  # how many of a point's errors are its own
-        seen[row, :used] = np.add.reduceat(inside * log.seen[at], start) / total
-        own = np.add.reduceat(log.std[at] ** 2, start) / number[:, None]
-        weight[row, :used] = (own / number[:, None] + own * (scatter[row] ** 2 - 1.0) / alone) ** -0.5
-        lag[row, :used] = np.add.reduceat(time[slot] - time[-1], start) / number
-        spot[row, :used] = np.add.reduceat(place[slot, :3], start) / number[:, None]
-        turned[row, :used] = np.add.reduceat(np.unwrap(heading[slot] + place[slot, 3]), start) / number
-        level[row] = log.log_amplitude[at].mean()
+        inside = log.std[at] ** -2.0
+        own = np.add.reduceat(log.std[at] ** 2, start) / many
+        found.seen[row, :used] = np.add.reduceat(inside * seen[row], start) / np.add.reduceat(inside, start)
+        found.weight[row, :used] = (own / many + own * (scatter[row] ** 2 - 1.0) / alone) ** -0.5
+        found.time[row, :used] = np.add.reduceat(time[slot] - time[-1], start) / many[:, 0]
+        found.tx[row, :used] = np.add.reduceat(ends.tx[slot], start) / many
+        found.rx[row, :used] = np.add.reduceat(ends.rx[slot], start) / many
     scale = np.maximum(np.diag(covariance)[:6], 1e-14)
     root = np.linalg.cholesky(covariance[:6, :6] + np.diag(1e-6 * scale + 1e-14))
-    doubt = np.asarray(root[:3] + lag[..., None, None] * root[3:6], dtype=np.float64)
-    ends = poses_of(spot, turned, body)
-    speed = float(np.linalg.norm(mean[3:6])) + 0.05
-    return Digest(seen, weight, lag, ends.tx, ends.rx, turned, doubt, level, scatter, mean[:3].copy(), speed)
+    return found._replace(doubt=np.asarray(root[:3] + found.time[..., None, None] * root[3:6], dtype=np.float64))
+
+
+def _turned(seen: Floats, heading: Floats) -> Floats:
+    """Lengths and cosines (K, 3) with the cosines in the room's axes: a body that turns does not bend the history."""
+    cos, sin = np.cos(heading), np.sin(heading)
+    return np.stack([seen[:, 0], cos * seen[:, 1] - sin * seen[:, 2], sin * seen[:, 1] + cos * seen[:, 2]], axis=1)
 
 
 def scatter_of(seen: Floats, std: Floats, time: Floats) -> Floats:

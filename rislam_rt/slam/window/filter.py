@@ -18,7 +18,7 @@ from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.learn import Sights, learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
-from rislam_rt.slam.window.look import Look, look
+from rislam_rt.slam.window.look import Look, echoes, look
 from rislam_rt.slam.window.retract import condemned, release
 from rislam_rt.slam.window.tracks import Tracks
 
@@ -47,6 +47,8 @@ class WindowState(NamedTuple):
     scene: Scene
     doubt: float
     """Running log odds that the map explains nothing of what is heard."""
+    passed: Floats
+    """(P, 3) [m] positions that left the window, each with the hindsight of its whole length."""
 
 
 def init(
@@ -62,7 +64,7 @@ def init(
     gait = np.stack([motion.first_gait(config.sigma_a), motion.first_gait(0.0)])
     return WindowState(
         0, config, window, empty_book(), empty_log(), tracks.no_tracks(), no_sights(), gait, gait,
-        np.array([start.heading]), start.position_std * free, scene, 0.0,
+        np.array([start.heading]), start.position_std * free, scene, 0.0, np.zeros((0, 3)),
     )  # fmt: skip
 
 
@@ -78,6 +80,7 @@ def step(
     landmark = np.where(is_los(glance, scene.body), REMOVED, UNUSED)
     order = np.lexsort(glance.seen.T[::-1])
     free = order[landmark[order] == UNUSED]
+    free = free[~echoes(glance.take(free), scene.sensor.cell_length)]
     glance = glance.take(free)
 
     strangers = stranger_density(glance, scene.sensor, config.new_density)
@@ -127,21 +130,28 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     """The window with a new pose, without its oldest one when it is full."""
     if dt <= 0.0 and state.cycle == 0:
         return state._replace(heading=np.array([heading]))
-    window, gait, headings = state.window, state.gait, state.heading
+    window, gait, headings, passed = state.window, state.gait, state.heading, state.passed
     while window.num_poses >= LEVELS.window:
         gait = np.stack([smoothed[1][0] for smoothed in _liveliness(window, gait)])
+        passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = gauss.slide(window), headings[1:]
     level = state.level @ motion.transition(LEVELS.stay)
     window = gauss.extend(window, dt, motion.expected_precision(level)[[0, 0, 1]])
-    return state._replace(window=window, gait=gait, heading=np.append(headings, heading))
+    return state._replace(window=window, gait=gait, heading=np.append(headings, heading), passed=passed)
 
 
-START = ((4, 0.5), (10, 1.0))
+def smoothed(state: WindowState) -> Floats:
+    """(K, 3) [m] positions of all cycles with hindsight: of the window's length, less for the last ones."""
+    return np.concatenate([state.passed, gauss.poses(state.window)[:, :3]])
+
+
+START = ((3, 0.5), (10, 1.0))
 """Steps that may have been livelier than thought, and standard deviation [m/s^2] of their accelerations then."""
 LOG_START = np.log(0.01)
 """Log probability of a manoeuvre that nothing announced."""
-MISSED = 2.0
-"""Standard deviations by which fewer returns show than should, from which on a manoeuvre is looked for."""
+MISSED, STRAINED = 1.5, 1.5
+"""Standard deviations by which fewer returns show than should, and mean square of their innovations, from which on a
+manoeuvre is looked for."""
 
 
 def _notice(
@@ -156,7 +166,7 @@ def _notice(
         return look(window, state.book, state.sights, heading, state.scene, code, glance, strangers)
 
     best, window = view_of(state.window), state.window
-    if best.surprise > MISSED and len(state.window.step):
+    if (best.surprise > MISSED or best.strain > STRAINED) and len(state.window.step):
         for steps, liveliness in START:
             precision = state.window.precision.copy()
             precision[-steps:, :2] = np.minimum(precision[-steps:, :2], liveliness**-2.0)

@@ -4,27 +4,32 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats
 from rislam_rt.slam.identity import point_amplitude
-from rislam_rt.slam.moments import square_root
-from rislam_rt.slam.returns import AXES, NONE, TX, reflect
+from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.digest import Digest
 from rislam_rt.slam.window.expect import Scene
 from rislam_rt.slam.window.gauss import Holds, no_holds
+from rislam_rt.slam.window.guesses import (
+    BESIDE,
+    KNOWN_WALL,
+    LEVEL_TURN,
+    OVER_SAME,
+    OVER_TX,
+    POINT,
+    TWO_WALLS,
+    WALL,
+    WALL_KNOWN,
+    Hypotheses,
+    Known,
+    hypotheses,
+)
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.trial import Fits, Trials, smooth_paths, try_all
+from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
 
-KINDS = (
-    "wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same",
-    "two walls",
-)  # fmt: skip
-"""Names of the kinds, by their number."""
-WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS = range(len(KINDS))
-LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05]))
+LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15]))
 """Log prior of each kind; over known walls, of all walls together."""
-LOG_LONELY = np.log(0.05)
-"""Log probability that what two walls throw is heard, and neither of their single returns: the floor, or hidden."""
 LOG_NONE = np.log(0.05)
 """Of a path of no kind here: over walls that the map lacks."""
 LOG_VOLUME = float(np.log(4.0 / 3.0 * np.pi * LEVELS.size**3))
@@ -33,29 +38,6 @@ BEHIND = -4.0
 things: the walls of a room that is not convex end somewhere."""
 DEPTH = 0.15
 """Distance [m] beyond a wall from which on a thing is behind it, and not on it."""
-
-
-class Known(NamedTuple):
-    """Features of the map as affine maps and places; walls as images of the agent's present place."""
-
-    place: Floats
-    """(F, 3)."""
-    root: Floats
-    """(F, 3, 3) square roots of their covariances."""
-    turn: Floats
-    """(F, 3, 3) reflection of each wall; the identity for points."""
-    shift: Floats
-    """(F, 3)."""
-
-
-class Hypotheses(NamedTuple):
-    """H hypotheses for T tracks."""
-
-    kind: Integers
-    """(H,)."""
-    known: Integers
-    """(H,) row of the known wall, -1 for none."""
-    trials: Trials
 
 
 class Verdict(NamedTuple):
@@ -72,6 +54,8 @@ class Verdict(NamedTuple):
     """(3, 3), the poses held."""
     holds: Holds
     """What may be held of it beforehand; its row is 0."""
+    share: float
+    """Of the edge with the known wall in its place, where it comes out as one with that."""
     misfit: float
     """Standard deviations by which it costs more than noise makes it."""
 
@@ -84,7 +68,7 @@ class Verdict(NamedTuple):
     @property
     def is_wall(self) -> bool:
         """Whether the new feature is one."""
-        return self.kind in (WALL, KNOWN_WALL, WALL_KNOWN)
+        return self.kind in (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE)
 
 
 NEW = -5
@@ -95,131 +79,33 @@ _TEMPLATES = (
     (TX, NONE, NONE, NEW, NONE), (TX, NONE, NONE, KNOWN, NEW), (TX, NONE, NONE, NEW, KNOWN),
     (NEW, NONE, NONE, NONE, NONE), (NEW, NONE, NONE, KNOWN, NONE), (NEW, KNOWN, NONE, NONE, NONE),
     (NEW, KNOWN, NONE, KNOWN, NONE), (TX, NONE, NONE, NONE, NONE),
+    (TX, NONE, NONE, NEW, NONE),
 )  # fmt: skip
 """Form of each kind."""
 
 
-def known_features(mean: Floats, covariance: Floats, book: Book, middle: Floats) -> Known:
-    """The map's features (F, 3), walls as images of `middle`, with their covariances (3F, 3F) block by block."""
-    place, count = mean.copy(), len(mean)
-    blocks = covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
-    turn, shift = np.tile(AXES, (count, 1, 1)), np.zeros((count, 3))
-    walls = book.walls
-    if len(walls):
-        wall, anchor = place[walls], book.anchor[walls]
-        blocks[walls] = (slope := by_wall(middle, wall, anchor)) @ blocks[walls] @ np.swapaxes(slope, 1, 2)
-        place[walls] = reflect(np.broadcast_to(middle, wall.shape), wall, anchor)
-        span = place[walls] - middle
-        square = np.vecdot(span, span)[:, None]
-        turn[walls] = AXES - 2.0 * span[:, :, None] * (span / square)[:, None, :]
-        shift[walls] = span * (np.vecdot(span, place[walls] + middle)[:, None] / square)
-    roots = np.zeros((count, 3, 3))
-    for row in range(count):
-        root = square_root(blocks[row])
-        roots[row, :, : root.shape[1]] = root
-    return Known(place, roots, turn, shift)
-
-
-def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
-    """Derivatives (..., 3, 3) of the mirror images of points (..., 3) by the walls (..., 3)."""
-    span = wall - anchor
-    scaled = span / np.vecdot(span, span)[..., None]
-    depth = np.vecdot(scaled, point - 0.5 * (wall + anchor))[..., None]
-    mirrored = point - 2.0 * depth * span
-    return np.asarray(-2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]))
-
-
-def hypotheses(digest: Digest, known: Known, book: Book) -> Hypotheses:
-    """Every kind for every track, with its first guess."""
-    count, walls = len(digest.seen), book.walls
-    seen, tx, rx, _ = digest.mean
-    ray, length = digest.direction, seen[:, 0]
-    middle, image = digest.middle, rx + length[:, None] * digest.direction
-    kinds, knowns, tracks, starts, turns, shifts, doubts = [], [], [], [], [], [], []
-    plain = (AXES, np.zeros(3), np.zeros((3, 3)))
-    every = np.arange(count)
-
-    def add(kind: int, wall: int, start: Floats, first: int, second: int, at: tuple[Floats, Floats]) -> None:
-        kinds.append(np.full(count, kind))
-        knowns.append(np.full(count, wall))
-        tracks.append(every)
-        starts.append(start)
-        parts = []
-        for row, spot in ((first, at[0]), (second, at[1])):
-            if row < 0:
-                parts.append(tuple(np.broadcast_to(part, (count, *part.shape)) for part in plain))
-            else:
-                slope = by_wall(spot, known.place[row], middle)
-                parts.append((
-                    np.broadcast_to(known.turn[row], (count, 3, 3)), np.broadcast_to(known.shift[row], (count, 3)),
-                    slope @ known.root[row],
-                ))  # fmt: skip
-        turns.append(np.stack([part[0] for part in parts], axis=1))
-        shifts.append(np.stack([part[1] for part in parts], axis=1))
-        doubts.append(np.stack([part[2] for part in parts], axis=1))
-
-    anchor = np.broadcast_to(middle, image.shape)
-    direct = place_on_ray(ray, length, tx, rx)
-    add(WALL, NONE, reflect(anchor, image, tx), NONE, NONE, (tx, tx))
-    add(POINT, NONE, direct, NONE, NONE, (tx, tx))
-    for wall in walls.tolist():
-        turn, shift = known.turn[wall], known.shift[wall]
-        tx_image, behind = tx @ turn.T + shift, image @ turn.T + shift
-        add(KNOWN_WALL, wall, reflect(anchor, image, tx_image), wall, NONE, (tx, tx))
-        add(WALL_KNOWN, wall, reflect(anchor, behind, tx), NONE, wall, (tx, behind))
-        apparent = place_on_ray(ray, length, tx_image, rx)
-        mirrored, same = apparent @ turn.T + shift, direct @ turn.T + shift
-        add(OVER_RX, wall, mirrored, NONE, wall, (tx, mirrored))
-        add(OVER_TX, wall, apparent, wall, NONE, (apparent, tx))
-        add(OVER_SAME, wall, same, wall, wall, (same, same))
-    for pair in _pairs(ray):
-        turned = (pair @ tx[..., None])[..., 0]
-        add(TWO_WALLS, NONE, image - turned, NONE, NONE, (tx, tx))
-        turns[-1] = np.stack([pair, np.broadcast_to(AXES, (count, 3, 3))], axis=1)
-    kind = np.concatenate(kinds)
-    trials = Trials(
-        np.concatenate(tracks), kind <= WALL_KNOWN, kind == TWO_WALLS, np.concatenate(starts), np.concatenate(turns),
-        np.concatenate(shifts), np.concatenate(doubts),
-    )  # fmt: skip
-    return Hypotheses(kind, np.concatenate(knowns), trials)
-
-
-def _pairs(ray: Floats) -> list[Floats]:
-    """What two walls do to the Tx: opposite ones, two upright ones, an upright and a level one: (T, 3, 3) each."""
-    count = len(ray)
-    corner = np.broadcast_to(np.diag([-1.0, -1.0, 1.0]), (count, 3, 3))
-    edge = np.stack([-ray[:, 1], ray[:, 0], np.zeros(count)], axis=1)
-    edge = edge / np.maximum(np.linalg.norm(edge, axis=1), 1e-6)[:, None]
-    return [np.broadcast_to(AXES, (count, 3, 3)), corner, 2.0 * edge[:, :, None] * edge[:, None, :] - AXES]
-
-
-def place_on_ray(ray: Floats, length: Floats, tx: Floats, rx: Floats) -> Floats:
-    """Points (..., 3) on rays (..., 3) from Rx whose way from (mirrored) Tx positions (..., 3) has that length."""
-    base = tx - rx
-    reach = (length**2 - np.vecdot(base, base)) / np.maximum(2.0 * (length - np.vecdot(base, ray)), 1e-3)
-    return np.asarray(rx + np.maximum(reach, 0.05)[..., None] * ray)
-
-
 def judge(
-    digest: Digest, known: Known, book: Book, scene: Scene, explained: list[tuple[int, float]], first: Booleans
+    digest: Digest, known: Known, book: Book, scene: Scene, explained: list[tuple[int, float]], lonely: Floats
 ) -> tuple[list[Verdict], Floats]:
     """Verdicts of T tracks, and the posterior (E,) of each of the explanations (track, log evidence) by the map.
 
-    `first` (T,): nothing shorter and brighter is there.
+    `lonely` (T,) is the log probability that two walls throw so few single returns beside it.
     """
     table = hypotheses(digest, known, book)
     fits = try_all(table.trials, digest)
     track = table.trials.track
     rivals = np.where(table.known >= 0, np.log(max(len(book.walls), 1)), 0.0)
     evidence = fits.log_evidence - LOG_VOLUME - np.where(table.trials.is_wall | table.trials.is_pair, np.log(8.0), 0.0)
-    evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair & first[track], LOG_LONELY, 0.0)
+    evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair, lonely[track], 0.0)
     evidence += _amplitudes(table, fits, digest, book, scene) + _opacity(table, fits, digest, known, book)
+    evidence += np.where(table.kind == WALL, _alone(digest, known, book, scene)[track], 0.0)
     gain = _upright(table, fits, digest, known, book)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
     none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LOG_VOLUME + LOG_NONE
+    evidence += _shared(table, fits, evidence, none, explained)
     verdicts, shares = [], np.zeros(len(explained))
     for row in range(len(digest.seen)):
         own = (track == row).nonzero()[0]
@@ -230,7 +116,7 @@ def judge(
         best = int(np.argmax(weight[: 1 + len(own)]))
         probability = float(np.exp(weight[best] - total))
         if best == 0:
-            verdicts.append(Verdict(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0))
+            verdicts.append(Verdict(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0))
             continue
         at = own[best - 1]
         count = int((digest.weight[row, :, 0] > 0.0).sum())
@@ -239,12 +125,67 @@ def judge(
             Verdict(
                 int(table.kind[at]), probability, int(table.known[at]), fits.place[at], fits.held[at],
                 beliefs(fits.place[at], digest, known, book) if table.trials.is_wall[at] else no_holds(),
-                float(misfit),
+                float(fits.share[at]), float(misfit),
             )
         )  # fmt: skip
     return verdicts, shares
 
 
+def _alone(digest: Digest, known: Known, book: Book, scene: Scene) -> Floats:
+    """(T,) log probability that a wall's return comes out by itself, where its edge with a level wall is so near."""
+    length, found = digest.mean[0][:, 0], np.zeros(len(digest.seen))
+    for wall in book.walls[np.abs(known.turn[book.walls, 2, 2]) > LEVEL_TURN]:
+        rise = float(np.linalg.norm(known.place[wall] - digest.middle))
+        found = np.where(np.hypot(length, rise) - length < scene.sensor.cell_length[0], LOG_ALONE, found)
+    return found
+
+
+LOG_ALONE = np.log(0.1)
+"""Log probability that two of one cell come out as one of them alone: the other is hidden."""
+
+
+def _shared(
+    table: Hypotheses, fits: Fits, evidence: Floats, none: Floats, explained: list[tuple[int, float]]
+) -> Floats:
+    """Gain (H,) of hypotheses whose new feature other tracks ask for as well: shared planes and points decide.
+
+    A second track that the same feature explains has nothing free left: instead of a density over the volume it counts
+    that of one place given the other, against all else that it may be.
+    """
+    track, count = table.trials.track, len(none)
+    total = none.copy()
+    np.logaddexp.at(total, track, evidence)
+    for row, value in explained:
+        total[row] = np.logaddexp(total[row], value)
+    best = np.full(count, -np.inf)
+    np.maximum.at(best, track, evidence)
+    good = np.flatnonzero(np.isfinite(evidence) & (evidence > best[track] - ASIDE) & ~table.trials.is_pair)
+    wall = table.trials.is_wall[good]
+    same = (wall[:, None] == wall) & (track[good][:, None] != track[good])
+    off = fits.place[good][:, None] - fits.place[good]
+    same &= (np.abs(off) < NEARBY).all(axis=-1)
+    gain = np.zeros(len(evidence))
+    first, second = same.nonzero()
+    if not len(first):
+        return gain
+    spread = fits.covariance[good[first]] + fits.covariance[good[second]]
+    gap = off[first, second]
+    log_place = -0.5 * np.vecdot(gap, np.linalg.solve(spread, gap[..., None])[..., 0])
+    log_place -= 0.5 * np.linalg.slogdet(spread)[1] + 1.5 * np.log(2.0 * np.pi)
+    log_place += LOG_VOLUME + np.where(wall[first], np.log(8.0), 0.0)
+    other = track[good[second]]
+    odds = np.full((len(good), count), -np.inf)
+    np.logaddexp.at(odds, (first, other), evidence[good[second]] + log_place - total[other])
+    gain[good] = np.minimum(np.logaddexp(0.0, odds), MOST_SHARED).sum(axis=1)
+    return gain
+
+
+ASIDE = 10.0
+"""Log evidence behind a track's best from which on a hypothesis does not speak for others."""
+NEARBY = 2.0
+"""Distance [m] beyond which two places are not compared."""
+MOST_SHARED = 4.0
+"""Log odds that one more track may add, so that no chance coincidence decides alone."""
 COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(4 + 3) log(1 + chi^2 / 4)` for chi^2 with 3 degrees of freedom."""
 
@@ -254,7 +195,7 @@ def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: Book, scene
     radio, track = scene.radio, table.trials.track
     level, seen, rx = digest.log_amplitude[track], digest.mean[0][track], digest.mean[2][track]
     free = np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * seen[:, 0]))
-    has = table.known >= 0
+    has = (table.known >= 0) & (table.kind != BESIDE)
     ratio = np.where(has, book.ratio[table.known], 0.0) if len(book.ident) else np.zeros(len(track))
     variance = np.where(has, book.ratio_variance[table.known], 0.0) if len(book.ident) else np.zeros(len(track))
     mirror = free + ratio + LEVELS.wall_ratio

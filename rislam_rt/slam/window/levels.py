@@ -36,7 +36,7 @@ class Levels(NamedTuple):
     """Radius [m] of the volume in which features are looked for."""
     speed: float = 0.3
     """Standard deviation [m/s] of an agent's speed: the prior of how fast an unknown path's length changes."""
-    born: float = 0.98
+    born: float = 0.95
     """Posterior probability of a kind from which on a feature enters the map."""
     fit: float = 3.0
     """Standard deviations of its cost above which a hypothesis does not fit at all."""

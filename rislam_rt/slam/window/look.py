@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
-from rislam_rt.slam.associate import Candidates, pair_costs
+from rislam_rt.slam.associate import Candidates, pair_costs, squared_distance
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.returns import Poses
 from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance
@@ -39,6 +39,27 @@ class Look(NamedTuple):
     """Log likelihood of the cycle over that of strangers alone."""
     surprise: float
     """Standard deviations by which fewer of the returns that should show did."""
+    strain: float
+    """Mean square of the innovations, normalised: about 1 when all is well."""
+
+
+def echoes(glance: Glance, cell: Floats) -> Booleans:
+    """(M,) components that are others over again: what motion within the slot leaves of a strong one in the difference
+    of two alternated codes.
+
+    Two paths of one cell come out as one; a second component there comes from the difference, and if it did not run
+    over the panel it is the stronger one.
+    """
+    found = np.zeros(len(glance.log_amplitude), dtype=np.bool_)
+    if glance.panel_odds is None:
+        return found
+    inside = (np.abs(glance.seen[:, None] - glance.seen) < cell).all(axis=-1)
+    stronger = glance.log_amplitude > glance.log_amplitude[:, None] + FAR_STRONGER
+    return np.asarray((inside & stronger).any(axis=1) & (glance.odds < 0.0))
+
+
+FAR_STRONGER = 1.0
+"""Log amplitude by which a component's echo is weaker: a turn of a fifth of a radian leaves a tenth."""
 
 
 def look(
@@ -53,12 +74,12 @@ def look(
     clear, scatter = recall(sights, expected, book)
     groups = cluster(expected, scene.sensor.cell_length, clear, sides)
     shows = visible(expected, groups, clear)
-    row, pick, gain = _associate(expected, groups, shows, scatter, covariance, glance, sides, strangers)
+    row, pick, gain, strain = _associate(expected, groups, shows, scatter, covariance, glance, sides, strangers)
     alone = groups.by_itself == 1.0
     due, seen = shows[alone], np.isin(np.arange(len(shows)), row)[alone]
     miss = float(np.log1p(-due[~seen]).sum())
     surprise = (due.sum() - seen.sum()) / np.sqrt((due * (1.0 - due)).sum() + 0.25)
-    return Look(mean, poses, expected, groups, shows, scatter, row, pick, gain + miss, float(surprise))
+    return Look(mean, poses, expected, groups, shows, scatter, row, pick, gain + miss, float(surprise), strain)
 
 
 def _sides(expected: Expected, book: Book) -> Integers:
@@ -70,11 +91,11 @@ def _sides(expected: Expected, book: Book) -> Integers:
 def _associate(
     expected: Expected, groups: Clusters, shows: Floats, scatter: Floats, covariance: Floats, glance: Glance,
     sides: Integers | None, strangers: Floats,
-) -> tuple[Integers, Integers, float]:  # fmt: skip
-    """Rows of the clusters that were seen, the components that they were seen as, and the log likelihood that is gained
-    over strangers: the best assignment."""
+) -> tuple[Integers, Integers, float, float]:  # fmt: skip
+    """Rows of the clusters that were seen, the components that they were seen as, the log likelihood gained over
+    strangers, and the strain: the best assignment."""
     if not len(groups.leader) or not len(glance.seen):
-        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), 0.0
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), 0.0, 1.0
     lead, mate = groups.leader, groups.partner
     share = groups.share[:, None]
     gap = np.where(mate[:, None] >= 0, expected.seen[mate] - expected.seen[lead], 0.0)
@@ -93,4 +114,8 @@ def _associate(
     good = cost[rows, columns] < 0.0
     # the cost counts what is missed: seen against missed, both against strangers
     gain = -0.5 * float(cost[rows[good], columns[good]].sum()) + float(np.log1p(-shows[rows[good]]).sum())
-    return rows[good], columns[good], gain
+    rows, columns = rows[good], columns[good]
+    noise = np.zeros((len(rows), 3, 3))
+    noise[:, [0, 1, 2], [0, 1, 2]] = glance.std[columns] ** 2
+    distance, _ = squared_distance(glance.seen[columns] - seen[rows], spread[rows] + noise)
+    return rows, columns, gain, float(distance.mean() / 3.0) if len(rows) else 1.0

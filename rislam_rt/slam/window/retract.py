@@ -111,8 +111,8 @@ def behind(context: Context, wall: int) -> Booleans:
     sign = 1.0 if depth > 0 else -1.0
     found = np.zeros(len(book.ident), dtype=np.bool_)
     for row in range(len(book.ident)):
-        if row == wall:
-            continue
+        if row == wall or book.hits[row] > 2 * LEVELS.window:
+            continue  # what has stood for long stands: rooms that are not convex have walls before walls
         foot = features[row]
         if book.is_wall[row]:
             out = features[row] - book.anchor[row]

@@ -40,6 +40,10 @@ class Trials(NamedTuple):
     """(H, 2, 3) likewise."""
     doubt: Floats
     """(H, 2, 3, 3) square roots of the covariance with which the two maps move what they map (at about the start)."""
+    mixed: Booleans
+    """(H,) whether it comes out as one with what a known wall makes of it (`beyond`), at an unknown share between."""
+    beyond: Floats
+    """(H, 3, 4) turn and shift of that wall."""
 
 
 class Fits(NamedTuple):
@@ -53,6 +57,8 @@ class Fits(NamedTuple):
     """(H, 3, 3) with the poses held: what keeps the map from being linear in it."""
     cost: Floats
     """(H,) twice the negative log likelihood under Student's t, without its constants."""
+    share: Floats
+    """(H,) of what a known wall makes of it, where the two come out as one."""
     log_evidence: Floats
     """(H,) of a density 1 over the place, without the constants that hypotheses of a track share."""
 
@@ -90,11 +96,16 @@ def try_all(trials: Trials, digest: Digest) -> Fits:
             lost[active] = False
             cost[lost] = np.inf
     evidence = -0.5 * cost - 0.5 * log_det + 1.5 * np.log(2.0 * np.pi)
-    return Fits(place, covariance, held, cost, evidence)
+    share = np.where(trials.mixed, SHARE + SHARE_STD * error[:, -1], 0.0)
+    # a component lies between the two that it is made of
+    evidence -= 20.0 * (np.maximum(-share, 0.0) + np.maximum(share - 1.0, 0.0))
+    return Fits(place, covariance, held, cost, share, evidence)
 
 
-COMMON = 12
-"""Unknowns beside the place: errors of pose and velocity, and of the two maps."""
+COMMON = 13
+"""Unknowns beside the place: errors of pose and velocity, of the two maps, and of the share."""
+SHARE, SHARE_STD = 0.35, 0.35
+"""Share of the weaker of two in the place of both: amplitudes a wall's loss apart, and a phase that hardly turns."""
 
 
 class _State(NamedTuple):
@@ -116,7 +127,7 @@ def _equations(
     """Normal equations (H, 15, 15) of the rows, and their cost."""
     track, wall, pair = trials.track[rows], trials.is_wall[rows], trials.is_pair[rows]
     moving = wall | pair
-    tx, rx, heading = digest.tx[track], digest.rx[track], digest.heading[track]
+    tx, rx = digest.tx[track], digest.rx[track]
     turn, shift, doubt = trials.turn[rows], trials.shift[rows], trials.doubt[rows]
     first, second = turn[:, 0], turn[:, 1]
     # a point: fixed images; a wall: the image of the Tx, which moves
@@ -136,13 +147,8 @@ def _equations(
     to_rx = image - rx
     reach = np.maximum(np.sqrt(np.vecdot(to_rx, to_rx)), 1e-6)
     arrival = to_rx / reach[..., None]
-    cos, sin = np.cos(heading), np.sin(heading)
-    body = np.zeros((*heading.shape, 2, 3))
-    body[..., 0, 0], body[..., 0, 1], body[..., 1, 0], body[..., 1, 1] = cos, sin, -sin, cos
-    cosines = (body @ arrival[..., None])[..., 0]
-    by_image = np.empty((*heading.shape, 3, 3))
-    by_image[..., 0, :] = arrival
-    by_image[..., 1:, :] = (body - cosines[..., None] * arrival[..., None, :]) / reach[..., None, None]
+    cosines = arrival[..., :2]
+    by_image = _by_image(arrival, reach)
     # the point's leg to the Tx
     far = place[:, None, :] @ np.swapaxes(first, 1, 2) + shift[:, None, 0]
     to_tx = np.where(moving[:, None, None], 0.0, far - tx)
@@ -157,10 +163,12 @@ def _equations(
     inside = np.where(wall[:, None, None], (second @ flip) @ doubt[:, 0], 0.0)
     maps_in = by_image @ inside[:, None]
     maps_in[..., 0, :] += (toward[..., None, :] @ doubt[:, None, 0])[..., 0, :]
-    wide = np.concatenate([pose @ digest.doubt[track], maps_in, maps_out, new], axis=-1)
+    split = _mix(trials, rows, rx, image, error, (by_place, by_tx), (seen, new, pose))
+    wide = np.concatenate([pose @ digest.doubt[track], maps_in, maps_out, split, new], axis=-1)
     weight = digest.weight[track]
     wide *= weight[..., None]
-    left = (digest.seen[track] - seen) * weight - (wide[..., :COMMON] @ error[:, None, :, None])[..., 0]
+    # the share stands in the prediction itself, the other errors are linear
+    left = (digest.seen[track] - seen) * weight - (wide[..., : COMMON - 1] @ error[:, None, :-1, None])[..., 0]
     squared = np.vecdot(left, left)
     heavy = wide * trust[..., None, None]
     size = wide.shape[-1]
@@ -174,6 +182,41 @@ def _equations(
     tail = LEVELS.tail
     cost = (tail + 3.0) * np.log1p(squared / tail).sum(axis=1) + np.vecdot(error, error)
     return _Equations(normal, slope, cost, (tail + 3.0) / (tail + squared))
+
+
+def _mix(
+    trials: Trials, rows: Integers, rx: Floats, image: Floats, error: Floats, slopes: tuple[Floats, Floats],
+    seen: tuple[Floats, Floats, Floats],
+) -> Floats:  # fmt: skip
+    """What is seen, and its slopes by place and pose, moved towards what a known wall makes of it; the slope
+    (H, B, 3, 1) by the share's error. `seen` is changed in place."""
+    (by_place, by_tx), (value, new, pose) = slopes, seen
+    split = np.zeros((*value.shape, 1))
+    both = trials.mixed[rows].nonzero()[0]
+    if not len(both):
+        return split
+    mirror = trials.beyond[rows[both]]
+    out = image[both] @ np.swapaxes(mirror[..., :3], 1, 2) + mirror[:, None, :, 3] - rx[both]
+    length = np.sqrt(np.vecdot(out, out))
+    ray = out / length[..., None]
+    gap = np.concatenate([length[..., None], ray[..., :2]], axis=-1) - value[both]
+    share = (SHARE + SHARE_STD * error[both, -1])[:, None, None]
+    value[both] += share * gap
+    split[both] = SHARE_STD * gap[..., None]
+    across = _by_image(ray, length)
+    turned = across @ mirror[:, None, :, :3]
+    by_new, by_agent = turned @ by_place[both], turned @ by_tx[both][:, None] - across
+    new[both] += share[..., None] * (by_new - new[both])
+    pose[both] += share[..., None] * (by_agent - pose[both])
+    return split
+
+
+def _by_image(arrival: Floats, reach: Floats) -> Floats:
+    """Derivatives (..., 3, 3) of length and cosines by the place from which a ray comes."""
+    found = np.empty((*reach.shape, 3, 3))
+    found[..., 0, :] = arrival
+    found[..., 1:, :] = (AXES[:2] - arrival[..., :2, None] * arrival[..., None, :]) / reach[..., None, None]
+    return found
 
 
 def smooth_paths(digest: Digest) -> tuple[Floats, Floats]:

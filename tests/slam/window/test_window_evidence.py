@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
-from rislam_rt.slam.returns import AXES, NONE, TX, linearise, reflect
+from rislam_rt.slam.returns import AXES, NONE, TX, Poses, linearise, reflect
 from rislam_rt.slam.window import trial
 from rislam_rt.slam.window.digest import Digest, scatter_of
 from rislam_rt.slam.window.forms import compile_forms
@@ -16,13 +16,12 @@ def _digest(count, *, std=0.01, rng):
     """A track seen from a way through a room; what is seen is filled in by the tests."""
     time = np.linspace(-3.0, 0.0, count)
     place = np.stack([0.3 * time, 0.2 * time + 0.05 * time**2, np.full(count, 1.0)], axis=1)
-    heading = 0.3 + 0.1 * time
-    ends = poses_of(place, heading, Body())
+    ends = poses_of(place, 0.3 + 0.1 * time, Body())
     doubt = 1e-3 * rng.standard_normal((3, 6))
     wide = doubt + time[:, None, None] * 1e-3 * rng.standard_normal((3, 6))
     weight = np.full((1, count, 3), 1.0 / std)
     return Digest(
-        np.zeros((1, count, 3)), weight, time[None], ends.tx[None], ends.rx[None], heading[None], wide[None],
+        np.zeros((1, count, 3)), weight, time[None], ends.tx[None], ends.rx[None], wide[None],
         np.zeros(1), np.ones((1, 3)), place[-1], 0.4,
     )  # fmt: skip
 
@@ -39,10 +38,12 @@ def _mirror(middle, wall):
 
 
 def _trials(kind, digest, rng):
-    """One hypothesis of a kind: `wall`, `point`, `pair`."""
+    """One hypothesis of a kind: `wall`, `point`, `pair`, `edge` (a wall beside its edge with a known one)."""
     turn, shift = np.tile(AXES, (1, 2, 1, 1)), np.zeros((1, 2, 3))
     known = _mirror(digest.middle, digest.middle + np.array([-3.0, 1.0, 0.5]))
-    if kind == "wall":
+    if kind == "edge":
+        start = _wall(digest.middle)
+    elif kind == "wall":
         turn[0, 1], shift[0, 1] = known
         start = _wall(digest.middle)
     elif kind == "point":
@@ -54,8 +55,11 @@ def _trials(kind, digest, rng):
     doubt = 1e-3 * rng.standard_normal((1, 2, 3, 3))
     if kind == "pair":
         doubt[:] = 0.0
-    flags = np.array([kind == "wall"]), np.array([kind == "pair"])
-    return Trials(np.zeros(1, dtype=np.int64), *flags, start[None], turn, shift, doubt)
+    flags = np.array([kind in ("wall", "edge")]), np.array([kind == "pair"])
+    mixed = np.array([kind == "edge"])
+    beyond = np.zeros((1, 3, 4))
+    beyond[0, :, :3], beyond[0, :, 3] = _mirror(digest.middle, digest.middle + np.array([0.2, 0.0, 3.0]))
+    return Trials(np.zeros(1, dtype=np.int64), *flags, start[None], turn, shift, doubt, mixed, beyond)
 
 
 def _left(trials, digest, place, error):
@@ -67,7 +71,7 @@ def _left(trials, digest, place, error):
 
 def test_slopes_are_those_of_the_cost():
     rng = np.random.default_rng(1)
-    for kind in ("wall", "point", "pair"):
+    for kind in ("wall", "point", "pair", "edge"):
         # measurements far off in metres and next to nothing in deviations: a slope, and tails that do not count
         digest = _digest(6, rng=rng)._replace(weight=np.full((1, 6, 3), 1e-3))
         trials = _trials(kind, digest, rng)
@@ -90,7 +94,7 @@ def test_the_kernel_sees_what_the_measurement_library_sees():
     rng = np.random.default_rng(2)
     digest = _digest(5, rng=rng)
     middle = digest.middle
-    poses = poses_of(0.5 * (digest.tx[0] + digest.rx[0]), digest.heading[0], Body())
+    poses = Poses(digest.tx[0], digest.rx[0], np.zeros(digest.tx.shape[1]))  # cosines in the room's axes
     known, new = middle + np.array([-3.0, 1.0, 0.5]), _wall(middle)
     anchors = np.stack([middle, middle, middle])
     for kind, form, start in (
@@ -112,7 +116,7 @@ def test_evidence_is_the_integral_of_the_likelihood():
     trials = trials._replace(turn=np.tile(AXES, (1, 2, 1, 1)), shift=np.zeros((1, 2, 3)), doubt=np.zeros((1, 2, 3, 3)))
     digest = digest._replace(doubt=np.zeros(digest.doubt.shape))
     truth = trials.start[0]
-    poses = poses_of(0.5 * (digest.tx[0] + digest.rx[0]), digest.heading[0], Body())
+    poses = Poses(digest.tx[0], digest.rx[0], np.zeros(digest.tx.shape[1]))  # cosines in the room's axes
     form = np.array([(0, NONE, NONE, NONE, NONE)])
     exact = linearise(compile_forms(form), truth[None], np.zeros((1, 3)), poses).seen[:, 0]
     digest = digest._replace(seen=(exact + 0.01 * rng.standard_normal(exact.shape))[None])
@@ -124,7 +128,7 @@ def test_evidence_is_the_integral_of_the_likelihood():
     places = fits.place[0] + (grid * np.sqrt(value)) @ vector.T
     every = Trials(
         np.zeros(len(places), dtype=np.int64), np.zeros(len(places), dtype=bool), np.zeros(len(places), dtype=bool),
-        places, *(np.repeat(field, len(places), axis=0) for field in (trials.turn, trials.shift, trials.doubt)),
+        places, *(np.repeat(field, len(places), axis=0) for field in trials[4:]),
     )  # fmt: skip
     rows = np.arange(len(places))
     cost = trial._equations(

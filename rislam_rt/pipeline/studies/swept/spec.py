@@ -128,6 +128,39 @@ class RobustnessSpec(_OneRoom):
         return self
 
 
+class HardwareSpec(_OneRoom):
+    """What faults of the front end do to the receiver, one at a time, before and after calibration."""
+
+    kind: Literal["hardware"]
+    """Which study the file is."""
+    places: Annotated[int, Field(ge=1, le=1000)] = 4
+    """Cycles that are looked at, evenly over the last half of the run, panel focused on the agent."""
+    calibration_cycles: Annotated[int, Field(ge=2, le=1000)] = 12
+    """Of the variants with calibration."""
+    faults: Annotated[list[MismatchSection], Field(min_length=1)]
+    """One setting of `[hardware]` each, or several at a time."""
+
+    @property
+    def all_variants(self) -> list[VariantSection]:
+        """An ideal front end, and every level of every fault, as built and calibrated."""
+        variants = [VariantSection(name="reference")]
+        for fault in self.faults:
+            for level in fault.levels:
+                one = fault.variant(level)
+                more = {**one.set, "hardware.calibration_cycles": self.calibration_cycles}
+                variants += [one, VariantSection(name=f"{one.name}{CALIBRATED}", group=one.group, set=more)]
+        return variants
+
+    @model_validator(mode="after")
+    def _each_once(self) -> "HardwareSpec":
+        check_names(self.all_variants)
+        return self
+
+
+CALIBRATED = "_calibrated"
+"""End of the name of a variant with calibration."""
+
+
 class RoomsSpec(SweptSpec):
     """All schemes in many rooms."""
 
@@ -174,6 +207,7 @@ SWEPT: dict[str, type[SweptSpec]] = {
     "rooms": RoomsSpec,
     "ablations": AblationsSpec,
     "robustness": RobustnessSpec,
+    "hardware": HardwareSpec,
 }
 """Swept studies by the `kind` of their file."""
 

@@ -14,6 +14,7 @@ from rislam_rt.pipeline.studies.swept.spec import (
     AblationsSpec,
     Fig4bSpec,
     Fig4cSpec,
+    HardwareSpec,
     RobustnessSpec,
     RoomsSpec,
     SweptSpec,
@@ -21,6 +22,8 @@ from rislam_rt.pipeline.studies.swept.spec import (
 from rislam_rt.pipeline.sweeps import Axis, Sweep
 from rislam_rt.scene import load_scene
 
+RECEIVER = "rislam_rt.pipeline.studies.swept.receiver:run_cell"
+"""Of a cell that looks at the receiver alone."""
 SNR = "run.radio.reference_snr_db"
 """Axis of Fig. 4(b)."""
 
@@ -54,8 +57,11 @@ def build_sweep(spec: SweptSpec, pipeline: Path, scene: Path | None = None) -> S
     variants = {variant.name: dict(variant.set) for variant in spec.all_variants}
     local = {"beside": os.path.abspath(beside), "variants": variants}
     keys = tuple(axis.key for axis in axes)
+    function = FUNCTION
+    if isinstance(spec, HardwareSpec):
+        base["places"], function = spec.places, RECEIVER
     return Sweep(
-        FUNCTION, axes, base, spec.repetitions, spec.seed, keys, local, _depends(pipeline, local), spec.name
+        function, axes, base, spec.repetitions, spec.seed, keys, local, _depends(pipeline, local), spec.name
     )  # fmt: skip
 
 
@@ -81,7 +87,7 @@ def _axes(spec: SweptSpec) -> tuple[Axis, ...]:
         return Axis("variant", tuple(case.name for case in spec.cases)), Axis(SNR, tuple(spec.snr_db))
     if isinstance(spec, Fig4cSpec):
         return (Axis("size", tuple(spec.sizes)),)
-    if isinstance(spec, AblationsSpec | RobustnessSpec):
+    if isinstance(spec, AblationsSpec | RobustnessSpec | HardwareSpec):
         return (Axis("variant", tuple(variant.name for variant in spec.all_variants)),)
     assert isinstance(spec, RoomsSpec)
     rooms = Axis("scene", tuple(spec.scenes))

@@ -1,0 +1,160 @@
+"""Every hypothesis that a track is tried against, with its first guess; walls of the map as affine maps."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.slam.moments import square_root
+from rislam_rt.slam.returns import AXES, NONE, reflect
+from rislam_rt.slam.window.book import Book
+from rislam_rt.slam.window.digest import Digest
+from rislam_rt.slam.window.trial import Trials
+
+KINDS = (
+    "wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same",
+    "two walls", "wall beside its edge",
+)  # fmt: skip
+"""Names of the kinds, by their number."""
+WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS, BESIDE = range(len(KINDS))
+
+
+class Known(NamedTuple):
+    """Features of the map as affine maps and places; walls as images of the agent's present place."""
+
+    place: Floats
+    """(F, 3)."""
+    root: Floats
+    """(F, 3, 3) square roots of their covariances."""
+    turn: Floats
+    """(F, 3, 3) reflection of each wall; the identity for points."""
+    shift: Floats
+    """(F, 3)."""
+
+
+class Hypotheses(NamedTuple):
+    """H hypotheses for T tracks."""
+
+    kind: Integers
+    """(H,)."""
+    known: Integers
+    """(H,) row of the known wall, -1 for none."""
+    trials: Trials
+
+
+def known_features(mean: Floats, covariance: Floats, book: Book, middle: Floats) -> Known:
+    """The map's features (F, 3), walls as images of `middle`, with their covariances (3F, 3F) block by block."""
+    place, count = mean.copy(), len(mean)
+    blocks = covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
+    turn, shift = np.tile(AXES, (count, 1, 1)), np.zeros((count, 3))
+    walls = book.walls
+    if len(walls):
+        wall, anchor = place[walls], book.anchor[walls]
+        blocks[walls] = (slope := by_wall(middle, wall, anchor)) @ blocks[walls] @ np.swapaxes(slope, 1, 2)
+        place[walls] = reflect(np.broadcast_to(middle, wall.shape), wall, anchor)
+        span = place[walls] - middle
+        square = np.vecdot(span, span)[:, None]
+        turn[walls] = AXES - 2.0 * span[:, :, None] * (span / square)[:, None, :]
+        shift[walls] = span * (np.vecdot(span, place[walls] + middle)[:, None] / square)
+    roots = np.zeros((count, 3, 3))
+    for row in range(count):
+        root = square_root(blocks[row])
+        roots[row, :, : root.shape[1]] = root
+    return Known(place, roots, turn, shift)
+
+
+def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
+    """Derivatives (..., 3, 3) of the mirror images of points (..., 3) by the walls (..., 3)."""
+    span = wall - anchor
+    scaled = span / np.vecdot(span, span)[..., None]
+    depth = np.vecdot(scaled, point - 0.5 * (wall + anchor))[..., None]
+    mirrored = point - 2.0 * depth * span
+    return np.asarray(-2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]))
+
+
+def hypotheses(digest: Digest, known: Known, book: Book) -> Hypotheses:
+    """Every kind for every track, with its first guess."""
+    count, walls = len(digest.seen), book.walls
+    seen, tx, rx = digest.mean
+    ray, length = digest.direction, seen[:, 0]
+    middle, image = digest.middle, rx + length[:, None] * digest.direction
+    kinds, knowns, tracks, starts, turns, shifts, doubts = [], [], [], [], [], [], []
+    plain = (AXES, np.zeros(3), np.zeros((3, 3)))
+    every = np.arange(count)
+
+    def add(kind: int, wall: int, start: Floats, first: int, second: int, at: tuple[Floats, Floats]) -> None:
+        kinds.append(np.full(count, kind))
+        knowns.append(np.full(count, wall))
+        tracks.append(every)
+        starts.append(start)
+        parts = []
+        for row, spot in ((first, at[0]), (second, at[1])):
+            if row < 0:
+                parts.append(tuple(np.broadcast_to(part, (count, *part.shape)) for part in plain))
+            else:
+                slope = by_wall(spot, known.place[row], middle)
+                parts.append((
+                    np.broadcast_to(known.turn[row], (count, 3, 3)), np.broadcast_to(known.shift[row], (count, 3)),
+                    slope @ known.root[row],
+                ))  # fmt: skip
+        turns.append(np.stack([part[0] for part in parts], axis=1))
+        shifts.append(np.stack([part[1] for part in parts], axis=1))
+        doubts.append(np.stack([part[2] for part in parts], axis=1))
+
+    anchor = np.broadcast_to(middle, image.shape)
+    direct = place_on_ray(ray, length, tx, rx)
+    add(WALL, NONE, reflect(anchor, image, tx), NONE, NONE, (tx, tx))
+    add(POINT, NONE, direct, NONE, NONE, (tx, tx))
+    for wall in walls.tolist():
+        turn, shift = known.turn[wall], known.shift[wall]
+        tx_image, behind = tx @ turn.T + shift, image @ turn.T + shift
+        add(KNOWN_WALL, wall, reflect(anchor, image, tx_image), wall, NONE, (tx, tx))
+        add(WALL_KNOWN, wall, reflect(anchor, behind, tx), NONE, wall, (tx, behind))
+        apparent = place_on_ray(ray, length, tx_image, rx)
+        mirrored, same = apparent @ turn.T + shift, direct @ turn.T + shift
+        add(OVER_RX, wall, mirrored, NONE, wall, (tx, mirrored))
+        add(OVER_TX, wall, apparent, wall, NONE, (apparent, tx))
+        add(OVER_SAME, wall, same, wall, wall, (same, same))
+        if abs(turn[2, 2]) > LEVEL_TURN:
+            upright = reflect(anchor, image, tx)
+            upright[:, 2] = middle[2]  # what lies higher comes of the edge
+            add(BESIDE, wall, upright, NONE, NONE, (tx, tx))
+    for pair in _pairs(ray):
+        turned = (pair @ tx[..., None])[..., 0]
+        add(TWO_WALLS, NONE, image - turned, NONE, NONE, (tx, tx))
+        turns[-1] = np.stack([pair, np.broadcast_to(AXES, (count, 3, 3))], axis=1)
+    kind, walled = np.concatenate(kinds), np.concatenate(knowns)
+    trials = Trials(
+        np.concatenate(tracks), (kind <= WALL_KNOWN) | (kind == BESIDE), kind == TWO_WALLS, np.concatenate(starts),
+        np.concatenate(turns), np.concatenate(shifts), np.concatenate(doubts), kind == BESIDE,
+        _beyond(kind, walled, known),
+    )  # fmt: skip
+    return Hypotheses(kind, walled, trials)
+
+
+def _beyond(kind: Integers, walled: Integers, known: Known) -> Floats:
+    """(H, 3, 4) turn and shift of the known walls beside whose edges walls are sought; zero elsewhere."""
+    found, rows = np.zeros((len(kind), 3, 4)), (kind == BESIDE).nonzero()[0]
+    if len(rows):
+        found[rows, :, :3], found[rows, :, 3] = known.turn[walled[rows]], known.shift[walled[rows]]
+    return found
+
+
+LEVEL_TURN = 0.9
+"""Part of a reflection's vertical axis that it turns over, from which on its wall is level."""
+
+
+def _pairs(ray: Floats) -> list[Floats]:
+    """What two walls do to the Tx: opposite ones, two upright ones, an upright and a level one: (T, 3, 3) each."""
+    count = len(ray)
+    corner = np.broadcast_to(np.diag([-1.0, -1.0, 1.0]), (count, 3, 3))
+    edge = np.stack([-ray[:, 1], ray[:, 0], np.zeros(count)], axis=1)
+    edge = edge / np.maximum(np.linalg.norm(edge, axis=1), 1e-6)[:, None]
+    return [np.broadcast_to(AXES, (count, 3, 3)), corner, 2.0 * edge[:, :, None] * edge[:, None, :] - AXES]
+
+
+def place_on_ray(ray: Floats, length: Floats, tx: Floats, rx: Floats) -> Floats:
+    """Points (..., 3) on rays (..., 3) from Rx whose way from (mirrored) Tx positions (..., 3) has that length."""
+    base = tx - rx
+    reach = (length**2 - np.vecdot(base, base)) / np.maximum(2.0 * (length - np.vecdot(base, ray)), 1e-3)
+    return np.asarray(rx + np.maximum(reach, 0.05)[..., None] * ray)
