@@ -174,12 +174,12 @@ class OwnChannel:
         expect(f"'{self.name}': paths", found, Paths)
         if found.num_cycles != len(trajectory):
             raise ConfigError(f"'{self.name}': paths of {found.num_cycles} cycles returned for {len(trajectory)}")
-        return found  # type: ignore[no-any-return]
+        return found
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
         """The same paths under another code."""
         with at_work(self.name):
-            return self.inner.respond(paths, code)  # type: ignore[no-any-return]
+            return self.inner.respond(paths, code)
 
 
 @cache
