@@ -13,7 +13,7 @@ READY := $(VENV)/.ready
 .DELETE_ON_ERROR:
 
 demo: $(READY)
-	@$(BIN)/rislam-rt run pipelines/trace_then_slam.toml --scene scenes/paper_room
+	@$(BIN)/rislam-rt run pipelines/demo.toml
 
 test: $(READY)
 	@$(BIN)/python -m pytest -n 2

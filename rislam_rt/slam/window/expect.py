@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec
 from rislam_rt.model.sensor import SensorModel
 from rislam_rt.ris import leg_response, panel_gain
@@ -244,8 +244,3 @@ def conditioned_share(
     share[both] = np.clip(share[both] + gain * (told - share[both]), 0.0, 1.0)
     variance[both] = (1.0 - gain) * prior
     return share, variance
-
-
-def heard_from(expected: Expected) -> Booleans:
-    """(R,) wall returns."""
-    return np.asarray(expected.forms[:, 0] == TX)

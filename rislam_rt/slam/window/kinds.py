@@ -98,7 +98,7 @@ def judge(
     evidence = fits.log_evidence - LOG_VOLUME - np.where(table.trials.is_wall | table.trials.is_pair, np.log(8.0), 0.0)
     evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair, lonely[track], 0.0)
     evidence += _amplitudes(table, fits, digest, book, scene) + _opacity(table, fits, digest, known, book)
-    evidence += np.where(table.kind == WALL, _alone(digest, known, book, scene)[track], 0.0)
+    evidence += _beside(table, digest, known, book, scene)
     gain = _upright(table, fits, digest, known, book)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
     smooth, _ = smooth_paths(digest)
@@ -131,17 +131,26 @@ def judge(
     return verdicts, shares
 
 
-def _alone(digest: Digest, known: Known, book: Book, scene: Scene) -> Floats:
-    """(T,) log probability that a wall's return comes out by itself, where its edge with a level wall is so near."""
-    length, found = digest.mean[0][:, 0], np.zeros(len(digest.seen))
+def _beside(table: Hypotheses, digest: Digest, known: Known, book: Book, scene: Scene) -> Floats:
+    """(H,) log probability that a wall's return comes out by itself, or as one with its edge at a level wall.
+
+    It hangs on how far apart the two would be.
+    """
+    track, found = table.trials.track, np.zeros(len(table.kind))
+    length, cell = digest.mean[0][track, 0], float(scene.sensor.cell_length[0])
     for wall in book.walls[np.abs(known.turn[book.walls, 2, 2]) > LEVEL_TURN]:
         rise = float(np.linalg.norm(known.place[wall] - digest.middle))
-        found = np.where(np.hypot(length, rise) - length < scene.sensor.cell_length[0], LOG_ALONE, found)
+        gap = np.hypot(length, rise) - length
+        found += np.where((table.kind == WALL) & (gap < CLOSE * cell), LOG_ALONE, 0.0)
+        found += np.where((table.kind == BESIDE) & (table.known == wall) & (gap > cell), LOG_APART, 0.0)
     return found
 
 
-LOG_ALONE = np.log(0.1)
-"""Log probability that two of one cell come out as one of them alone: the other is hidden."""
+CLOSE = 0.8
+"""Gap in cells below which two paths come out as one beyond doubt."""
+LOG_ALONE, LOG_APART = np.log(0.1), np.log(1e-4)
+"""Log probability that two of one cell come out as one of them alone (the other is hidden), and that two that lie apart
+come out as one."""
 
 
 def _shared(

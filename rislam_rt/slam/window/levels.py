@@ -2,8 +2,6 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
 
 class Levels(NamedTuple):
     """SI units; probabilities are a cycle's unless said otherwise."""
@@ -34,8 +32,6 @@ class Levels(NamedTuple):
     """Share of upright or level surfaces among those that are seen level or from below."""
     size: float = 15.0
     """Radius [m] of the volume in which features are looked for."""
-    speed: float = 0.3
-    """Standard deviation [m/s] of an agent's speed: the prior of how fast an unknown path's length changes."""
     born: float = 0.95
     """Posterior probability of a kind from which on a feature enters the map."""
     fit: float = 3.0
@@ -59,4 +55,3 @@ class Levels(NamedTuple):
 
 
 LEVELS = Levels()
-GATE_ROOT = float(np.sqrt(LEVELS.gate))

@@ -66,12 +66,11 @@ class Fits(NamedTuple):
 def try_all(trials: Trials, digest: Digest) -> Fits:
     """Fit everything; hypotheses that fall hopelessly behind after one step keep what they had then."""
     count = len(trials.track)
-    state = _State(trials.start.copy(), np.zeros((count, COMMON)), np.zeros((0,)))
     active = np.arange(count)
     cost, log_det = np.full(count, np.inf), np.zeros(count)
     covariance, held = np.tile(AXES, (count, 1, 1)), np.tile(AXES, (count, 1, 1))
     trust = np.ones((count, digest.seen.shape[1]))
-    place, error = state.place, state.error
+    place, error = trials.start.copy(), np.zeros((count, COMMON))
     for turn in range(STEPS + 1):
         now = _equations(trials, digest, active, place[active], error[active], trust[active])
         cost[active] = now.cost
@@ -106,12 +105,6 @@ COMMON = 13
 """Unknowns beside the place: errors of pose and velocity, of the two maps, and of the share."""
 SHARE, SHARE_STD = 0.35, 0.35
 """Share of the weaker of two in the place of both: amplitudes a wall's loss apart, and a phase that hardly turns."""
-
-
-class _State(NamedTuple):
-    place: Floats
-    error: Floats
-    unused: Floats
 
 
 class _Equations(NamedTuple):
