@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rislam_rt
-from rislam_rt.cli.slam import command
+from rislam_rt.cli.slam import _new_folder, command
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
@@ -182,3 +182,11 @@ def test_the_noise_of_the_command_line_goes_before_the_snr_of_the_file() -> None
     assert build_radio(spec.radio).noise_psd == 3.5e-11
     with pytest.raises(ConfigError, match="not both"):
         load_spec(find_pipeline("trace_then_slam"), ["radio.noise_psd=3.5e-11", "radio.reference_snr_db=3"])
+
+
+def test_a_folder_by_another_name_is_not_written_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "map.json").write_text("mine")
+    monkeypatch.chdir(tmp_path)
+    for folder in ("missing/..", "x" * 300):
+        with pytest.raises(ConfigError, match="--out"):
+            _new_folder(Path(folder))
