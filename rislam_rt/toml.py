@@ -7,6 +7,10 @@ from typing import Any
 MAX_LEVELS = 100
 """Tables within tables that a dotted key may name; the time that a longer one takes grows with its square."""
 
+MAX_DIGITS = 100
+"""Of a whole number to another base than ten, where Python sets no limit when it reads and one when it prints."""
+
+_LONG_NUMBER = re.compile(r"0[xob][0-9A-Fa-f_]{" + str(MAX_DIGITS + 1) + "}")
 _LONG_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+)""" + f"{{{MAX_LEVELS}}}")
 
 
@@ -18,6 +22,8 @@ def parse_toml(text: str) -> dict[str, Any]:
     ValueError
         It is not TOML, or is nested too deeply; the message says where.
     """
+    if _LONG_NUMBER.search(text) is not None:
+        raise ValueError(f"a number of more than {MAX_DIGITS} digits; TOML has whole numbers of 64 bits")
     long_key = _LONG_KEY.search(text)
     if long_key is not None:
         line = text.count("\n", 0, long_key.start()) + 1

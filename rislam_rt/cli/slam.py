@@ -122,7 +122,12 @@ def _true_positions(file: Path, cycles: int) -> "Floats":
 def _new_folder(folder: Path) -> Path:
     from rislam_rt.errors import ConfigError
 
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    try:
+        place = folder.resolve()  # `x/..` is there though `x` is not
+        taken = place.exists() and (not place.is_dir() or any(place.iterdir()))
+    except OSError as error:
+        raise ConfigError(f"--out {str(folder)[:80]}: cannot be used ({error.strerror}); give another folder") from None
+    if taken:
         raise ConfigError(f"--out {folder}: exists and is not empty; give a new folder")
     return folder
 

@@ -7,11 +7,17 @@ import numpy as np
 
 from rislam_rt import slam
 from rislam_rt.arrays import Integers
+from rislam_rt.errors import ConfigError, expect
 from rislam_rt.information.landmarks import Unknown
-from rislam_rt.model import Measurement, RisCode, SlamEstimate
-from rislam_rt.pipeline.own_methods import load_own
+from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel, SlamEstimate
+from rislam_rt.pipeline.own_methods import at_work, load_own
 from rislam_rt.pipeline.spec import Settings
+from rislam_rt.slam import StartPrior
 from rislam_rt.slam.schemes import bp_slam, channel_slam
+
+FARTHEST = 1e12
+"""[m] Largest coordinate that a filter of one's own may give: as the largest number of a pipeline file; scores, which
+square it, stay finite."""
 
 
 class Estimator(NamedTuple):
@@ -41,24 +47,39 @@ def own_estimator(name: str) -> Estimator:
     """An estimator of one's own (`OwnEstimator`) behind the functions of all others."""
     own = load_own(name)
 
-    def predict(state: Any, ahead: float, config: Any) -> SlamEstimate:
-        found: SlamEstimate = own.predict(state, ahead) if hasattr(own, "predict") else own.estimate(state)
+    def checked(found: SlamEstimate, what: str) -> SlamEstimate:
+        expect(f"'{name}': {what}", found, SlamEstimate)
+        far = float(np.abs(found.position).max())
+        if far > FARTHEST:
+            raise ConfigError(f"'{name}': {what}: a position of {far:g} m returned; give one up to {FARTHEST:g} m")
         return found
+
+    def init(start: StartPrior, body: Body, panel: RisSpec | None, sensor: SensorModel, config: Any,
+             *, rng: np.random.Generator) -> Any:  # fmt: skip
+        with at_work(name):
+            return own.init(start, body, panel, sensor, rng=rng)
+
+    def estimate(state: Any, config: Any = None) -> SlamEstimate:
+        with at_work(name):
+            found: SlamEstimate = own.estimate(state)
+        return checked(found, "estimate")
+
+    def predict(state: Any, ahead: float, config: Any) -> SlamEstimate:
+        if not hasattr(own, "predict"):
+            return estimate(state)
+        with at_work(name):
+            found: SlamEstimate = own.predict(state, ahead)
+        return checked(found, "predict")
 
     def step(
         state: Any, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: Any,
         *, rng: np.random.Generator,
     ) -> tuple[Any, Outcomes]:  # fmt: skip
-        state = own.step(state, measurement, code, dt, heading, rng=rng)
+        with at_work(name):
+            state = own.step(state, measurement, code, dt, heading, rng=rng)
         return state, Outcomes(np.full(len(measurement), -1))
 
-    return Estimator(
-        lambda start, body, panel, sensor, config, *, rng: own.init(start, body, panel, sensor, rng=rng),
-        predict,
-        step,
-        lambda state, config: own.estimate(state),
-        lambda settings: None,
-    )
+    return Estimator(init, predict, step, estimate, lambda settings: None)
 
 
 class Estimators(dict[str, Estimator]):

@@ -15,7 +15,7 @@ TEMPORARY = re.compile(r"\.rislam-rt-[a-z0-9_]{8}\.tmp")
 
 
 def write_atomic(path: Path, content: bytes) -> None:
-    """Write under a temporary name beside `path`, flush to the disk, rename.
+    """Write under a temporary name beside `path`, flush to the disk, rename; what is no file (a device) is written to.
 
     Raises
     ------
@@ -23,6 +23,10 @@ def write_atomic(path: Path, content: bytes) -> None:
         The disk refused.
     """
     try:
+        if _is_device(path):
+            with os.fdopen(os.open(path, os.O_WRONLY | os.O_APPEND), "wb") as device:
+                device.write(content)
+            return
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=path.parent)
         try:
@@ -37,6 +41,11 @@ def write_atomic(path: Path, content: bytes) -> None:
             raise
     except OSError as error:
         raise refused(path, error) from None
+
+
+def _is_device(path: Path) -> bool:
+    """Whether a path is a device, a pipe or a standard stream, which a file must not take the place of."""
+    return path.exists() and not path.is_dir() and (not path.is_file() or path.parent == Path("/dev"))
 
 
 def remove_temporaries(folders: Iterable[Path]) -> None:

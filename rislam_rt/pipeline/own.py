@@ -102,6 +102,9 @@ def inputs_of(
     if not np.isfinite(time).all() or (np.diff(time) < 0.0).any():
         raise ConfigError(f"{place}: time_s: not in order; sort the rows by time")
     cycles, cycle = np.unique(time, return_inverse=True)
+    for name in ("delay_s", "heading_rad"):
+        if np.isinf(columns.get(name, 0.0)).any():
+            raise ConfigError(f"{place}: {name}: infinite; give a number, or leave the field empty")
     heard = np.isfinite(columns["delay_s"])
     filled = _filled({name: column[heard] for name, column in columns.items()}, radio, place)
     probability = filled.get("panel_probability")
@@ -112,6 +115,8 @@ def inputs_of(
         measurements.append(Measurement(**parts, from_panel=None if probability is None else probability[rows]))
     first = np.searchsorted(cycle, np.arange(len(cycles)))
     heading = columns.get("heading_rad", np.zeros(len(time)))[first]
+    if not np.isfinite(heading).all():
+        raise ConfigError(f"{place}: heading_rad: empty in cycle {int(np.argmin(np.isfinite(heading)))}; fill it")
     if "heading_rad" in columns:  # the compass shows the first heading, too
         start = replace(start, heading=float(heading[0]))
     nothing = (None,) * len(cycles)
@@ -139,7 +144,8 @@ def checked(inputs: Inputs, place: str) -> Inputs:
         reach = np.abs(one.cosines).max(initial=0.0)
         if reach > 1.0:
             raise ConfigError(f"{where}: cosine of {reach:g} received; give direction cosines from -1 to 1, not angles")
-        for name, value in (("tau_std", one.tau_std), ("cosines_std", one.cosines_std), ("amplitude", one.amplitude)):
+        for name in ("tau_std", "cosines_std", "amplitude", "amplitude_std"):
+            value = getattr(one, name)
             if not (np.isfinite(value) & (value > 0.0)).all():
                 raise ConfigError(f"{where}: {name} of {value.min():g} received; give positive, finite numbers")
         if (one.tau_std < FINEST_STD).any():
@@ -174,6 +180,10 @@ def _check_names(columns: Mapping[str, Floats], place: str) -> None:
     ):
         if not any(name in columns for name in needed):
             raise ConfigError(f"{place}: {' or '.join(needed)}: column missing; add it")
+        if len(needed) == 2 and all(name in columns for name in needed):
+            raise ConfigError(f"{place}: {' and '.join(needed)}: columns that say the same; leave one out")
+    if ("cos_x" in columns) != ("cos_y" in columns):
+        raise ConfigError(f"{place}: a cosine beside an angle; give cos_x and cos_y, or theta_r_rad and phi_r_rad")
     lengths = {len(column) for column in columns.values()}
     if len(lengths) > 1:
         raise ConfigError(f"{place}: columns of different lengths ({sorted(lengths)}); give a row a component")
@@ -185,9 +195,11 @@ def _filled(columns: Mapping[str, Floats], radio: RadioConfig, place: str) -> di
     """The parts of measurements, what is left out worked out from the SNR."""
     if "amplitude" in columns:
         amplitude = columns["amplitude"]
-        snr = radio.integrated_snr(amplitude)
+        with np.errstate(over="ignore"):
+            snr = radio.integrated_snr(amplitude)
     else:
-        snr = np.power(10.0, columns["snr_db"] / 10.0)
+        with np.errstate(over="ignore"):  # infinity is refused below
+            snr = np.power(10.0, columns["snr_db"] / 10.0)
         amplitude = np.sqrt(snr * radio.noise_psd / (radio.array.num_antennas * radio.energy))
     if "cos_x" in columns and "cos_y" in columns:
         cosines = np.stack([columns["cos_x"], columns["cos_y"]], axis=-1)
@@ -195,6 +207,11 @@ def _filled(columns: Mapping[str, Floats], radio: RadioConfig, place: str) -> di
         theta, phi = columns["theta_r_rad"], columns["phi_r_rad"]
         if (np.abs(theta) > np.pi).any() or (np.abs(phi) > 2.0 * np.pi).any():
             raise ConfigError(f"{place}: theta_r_rad, phi_r_rad: beyond a full turn; give radians, not degrees")
+        if (theta < 0.0).any() or (theta > 0.5 * np.pi).any():
+            raise ConfigError(
+                f"{place}: theta_r_rad: outside 0 to pi/2; a zenith angle of rays from above, which a planar array "
+                "cannot tell from their mirror images below: leave others out"
+            )
         cosines = np.sin(theta)[:, None] * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
     bound = measurement_std(snr, radio)
     std = np.stack(
@@ -214,7 +231,9 @@ def _filled(columns: Mapping[str, Floats], radio: RadioConfig, place: str) -> di
                 f"{place}: {name}: not a finite number in row {int(np.argwhere(~np.isfinite(value))[0][0])}"
             )
     if "panel_probability" in columns:
-        found["panel_probability"] = np.clip(columns["panel_probability"], 0.0, 1.0)
+        found["panel_probability"] = probability = columns["panel_probability"]
+        if not ((probability >= 0.0) & (probability <= 1.0)).all():
+            raise ConfigError(f"{place}: panel_probability: not from 0 to 1, or empty; mend the column")
     return found
 
 
@@ -222,13 +241,17 @@ def _read_csv(file: Path) -> dict[str, list[float]]:
     """Columns by name; an empty field is NaN."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as lines:
-            rows = list(csv.DictReader(lines))
+            reader = csv.DictReader(lines)
+            names = [name.strip() for name in reader.fieldnames or ()]
+            rows = list(reader)
     except FileNotFoundError:
         raise ConfigError(f"{file}: no such file; give a CSV or NetCDF file of measurements") from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ConfigError(f"{file}: cannot be read ({str(error)[:80]}); give a CSV file in UTF-8") from None
     if not rows:
         raise ConfigError(f"{file}: no rows; give a header and a row a component")
+    if len(set(names)) < len(names):
+        raise ConfigError(f"{file}: line 1: a column is there twice; leave one out")
     table: dict[str, list[float]] = {}
     for number, row in enumerate(rows, start=2):
         for name, text in row.items():

@@ -7,7 +7,9 @@ A name is `module:attribute`, as `mine:my_designer` for a function in `mine.py`,
 import hashlib
 import inspect
 import re
-from collections.abc import Iterable
+import traceback
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -17,8 +19,19 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rislam_rt.errors import ConfigError
-from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec, SensorModel, SlamEstimate
+from rislam_rt.errors import ConfigError, RislamError, expect
+from rislam_rt.model import (
+    Body,
+    Measurement,
+    Paths,
+    RadioConfig,
+    RisCode,
+    RisSpec,
+    Scene,
+    SensorModel,
+    SlamEstimate,
+    Trajectory,
+)
 from rislam_rt.slam import StartPrior
 
 GROUPS = ("rislam_rt.schemes", "rislam_rt.designers", "rislam_rt.estimators", "rislam_rt.channels")
@@ -77,12 +90,32 @@ def load_own(name: str) -> Any:
     except ModuleNotFoundError as error:
         what = f"no module '{place}'" if error.name == place else f"module '{place}' needs '{error.name}'"
         raise ConfigError(f"'{name}': {what}; put {place}.py beside the pipeline file, or install it") from None
-    except Exception as error:  # a user's file may raise anything while it is read
+    except (Exception, SystemExit) as error:  # a user's file may raise anything while it is read
         raise ConfigError(f"'{name}': {place} cannot be loaded ({type(error).__name__}: {error}); mend it") from None
     if not hasattr(module, attribute):
         raise ConfigError(f"'{name}': module '{place}' has no '{attribute}'; mend either name")
-    found = getattr(module, attribute)
-    return found() if inspect.isclass(found) and hasattr(found, "step") else found
+    return _made(name, getattr(module, attribute))
+
+
+@contextmanager
+def at_work(name: str) -> Iterator[None]:
+    """Around a call of a method of one's own: whatever it raises becomes one line that says where.
+
+    Raises
+    ------
+    ConfigError
+        It raised.
+    """
+    try:
+        yield
+    except RislamError:
+        raise
+    except (Exception, SystemExit) as error:  # a user's method may raise anything
+        frames = traceback.extract_tb(error.__traceback__)
+        own = [frame for frame in frames if frame.filename == _file(load_own(name))]
+        where = f" in line {own[-1].lineno} of {own[-1].filename}" if own else ""
+        cause = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+        raise ConfigError(f"'{name}': raised {cause}{where}; mend it") from error
 
 
 def is_own(name: str) -> bool:
@@ -95,8 +128,7 @@ def own_digests(names: Iterable[str]) -> dict[str, str]:
     found = {}
     for name in sorted(set(names)):
         if is_own(name):
-            thing = load_own(name)
-            file = inspect.getsourcefile(thing if inspect.isroutine(thing) or inspect.isclass(thing) else type(thing))
+            file = _file(load_own(name))
             found[name] = hashlib.sha256(Path(file).read_bytes()).hexdigest() if file else ""
     return found
 
@@ -111,13 +143,43 @@ def own_code(
     ConfigError
         It returned something else than levels of the panel.
     """
-    levels = np.asarray(load_own(name)(belief, panel, radio, rng=rng))
+    with at_work(name):
+        levels = np.asarray(load_own(name)(belief, panel, radio, rng=rng))
     wanted = f"give whole numbers ({panel.rows}, {panel.cols}) from 0 to {panel.levels - 1}"
     if levels.shape != (panel.rows, panel.cols) or levels.dtype.kind not in "iu":
         raise ConfigError(f"'{name}': {levels.dtype} of shape {levels.shape} returned; {wanted}")
     if levels.min() < 0 or levels.max() >= panel.levels:
         raise ConfigError(f"'{name}': levels {levels.min()} to {levels.max()} returned; {wanted}")
     return RisCode(levels.astype(np.int64), panel.levels)
+
+
+class OwnChannel:
+    """A channel of one's own behind the protocol of all others, asked for paths of the trajectory's cycles."""
+
+    def __init__(self, name: str, scene: Scene, radio: RadioConfig, depth: int) -> None:
+        self.name, self.scene, self.radio, self.depth = name, scene, radio, depth
+        with at_work(name):
+            self.inner = load_own(name)(scene, radio, depth)
+
+    def paths(self, trajectory: Trajectory) -> Paths:
+        """Every path of every cycle, with the panel at level 0.
+
+        Raises
+        ------
+        ConfigError
+            The channel raised, or gave something else.
+        """
+        with at_work(self.name):
+            found = self.inner.paths(trajectory)
+        expect(f"'{self.name}': paths", found, Paths)
+        if found.num_cycles != len(trajectory):
+            raise ConfigError(f"'{self.name}': paths of {found.num_cycles} cycles returned for {len(trajectory)}")
+        return found
+
+    def respond(self, paths: Paths, code: RisCode) -> Paths:
+        """The same paths under another code."""
+        with at_work(self.name):
+            return self.inner.respond(paths, code)
 
 
 @cache
@@ -129,5 +191,34 @@ def _entry_point(name: str) -> Any:
     entry = _offered().get(name)
     if entry is None:
         raise ConfigError(f"'{name}': no such method; give a built-in name, or module:attribute, as mine:my_designer")
-    found = entry.load()
-    return found() if inspect.isclass(found) and hasattr(found, "step") else found
+    try:
+        found = entry.load()
+    except (Exception, SystemExit) as error:  # as a user's file
+        raise ConfigError(f"'{name}': cannot be loaded ({type(error).__name__}: {error}); mend it") from None
+    return _made(name, found)
+
+
+def _made(name: str, found: Any) -> Any:
+    """What a name stands for, ready for use: an estimator made, a function or a class of a channel as it is."""
+    if not hasattr(found, "step"):
+        if callable(found) or hasattr(found, "estimator"):
+            return found
+        raise ConfigError(f"'{name}': {type(found).__name__} received; give a function, a filter or a channel's class")
+    lacks = [part for part in ("init", "estimate") if not hasattr(found, part)]
+    if lacks:
+        raise ConfigError(f"'{name}': has 'step' and no '{lacks[0]}'; a filter has init, step and estimate")
+    if not inspect.isclass(found):
+        return found
+    try:
+        return found()
+    except (Exception, SystemExit) as error:
+        raise ConfigError(
+            f"'{name}': cannot be made ({type(error).__name__}: {error}); it takes no arguments"
+        ) from None
+
+
+def _file(thing: Any) -> str | None:
+    """The source file of a method of one's own; None if it has none."""
+    with suppress(TypeError):  # built into Python
+        return inspect.getsourcefile(thing if inspect.isroutine(thing) or inspect.isclass(thing) else type(thing))
+    return None

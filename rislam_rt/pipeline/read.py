@@ -16,6 +16,8 @@ from rislam_rt.toml import MAX_LEVELS, parse_toml
 MAX_BYTES = 1_000_000
 """A pipeline file is written by people; anything larger is another file by mistake."""
 
+EITHER = (("radio", "reference_snr_db", "noise_psd"),)
+"""Section, and the keys in it of which one alone may be given."""
 
 Spec = TypeVar("Spec", bound=BaseModel)
 
@@ -53,6 +55,7 @@ def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
     path = Path(path)
     content = _read_toml(path)
     changed = tuple(_override(content, setting) for setting in overrides)
+    _make_way(content, changed)
     return Table(path, content, changed, content.pop("sweep", None))
 
 
@@ -125,6 +128,15 @@ def _override(table: dict[str, Any], setting: str) -> str:
             raise ConfigError(f"--set {setting[:80]!r}: '{part}' is not a section; mend the key")
     table[parts[-1]] = _value(text.strip())
     return ".".join(parts)
+
+
+def _make_way(table: dict[str, Any], changed: Sequence[str]) -> None:
+    """Of two keys that exclude each other, the file's goes where the command line set the other."""
+    for section, *keys in EITHER:
+        given = [key for key in keys if f"{section}.{key}" in changed]
+        if len(given) == 1:
+            for key in set(keys) - set(given):
+                table[section].pop(key, None)
 
 
 def _value(text: str) -> Any:

@@ -17,7 +17,7 @@ from rislam_rt.pipeline.change import change_room
 from rislam_rt.pipeline.control import check_control
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.motion import draw_motion
-from rislam_rt.pipeline.own_methods import load_own
+from rislam_rt.pipeline.own_methods import OwnChannel
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
 from rislam_rt.pipeline.spec import PipelineSpec, build_radio
@@ -217,8 +217,7 @@ def build_channel(kind: str, scene: Scene, radio: RadioConfig, depth: int) -> Ch
 
         return TracedChannel(scene, radio, depth)
     if kind != "image_source":
-        own: Channel = load_own(kind)(scene, radio, depth)
-        return own
+        return OwnChannel(kind, scene, radio, depth)
     from rislam_rt.channel.image_source import ImageSourceChannel
 
     return ImageSourceChannel(scene, radio, depth)

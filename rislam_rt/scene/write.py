@@ -60,7 +60,11 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
         The disk refused.
     """
     folder = Path(folder)
-    if folder.exists() and not overwrite:
+    try:
+        there = folder.exists() or folder.resolve().exists()  # `x/..` is there though `x` is not
+    except OSError as error:
+        raise SceneError(f"{str(folder)[:80]}: cannot be used ({error.strerror}); give another folder") from None
+    if there and not overwrite:
         raise SceneError(f"{folder}: exists already; give a folder that does not exist yet")
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import rislam_rt
-from rislam_rt.cli.slam import command
+from rislam_rt.cli.slam import _new_folder, command
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
-from rislam_rt.pipeline.own import inputs_of, localise
+from rislam_rt.pipeline.own import inputs_of, localise, read_inputs
 from rislam_rt.pipeline.spec import PipelineSpec, build_radio
 from rislam_rt.pipeline.studies.unseen import Inputs, Recorder
 from rislam_rt.scene.write import tum_bytes
@@ -133,6 +133,13 @@ def test_a_cycle_in_which_nothing_is_heard_counts(table: Table, spec: PipelineSp
         ("delay_s", 1e-9 + 1j, "complex numbers received"),
         ("cos_x", "north", "not numbers"),
         ("speed", 1.0, "unknown column"),
+        ("amplitude_std", 0.0, "amplitude_std of 0 received"),
+        ("delay_s", np.inf, "delay_s: infinite"),
+        ("heading_rad", np.nan, "heading_rad: empty in cycle 0"),
+        ("panel_probability", 7.0, "not from 0 to 1"),
+        ("panel_probability", np.nan, "not from 0 to 1"),
+        ("snr_db", 30.0, "columns that say the same"),
+        ("phi_r_rad", 0.1, "columns that say the same"),
     ],
 )
 def test_a_wrong_unit_or_range_is_one_line(
@@ -148,3 +155,38 @@ def test_a_missing_column_is_named(table: Table, spec: PipelineSpec) -> None:
     del table["amplitude"]
     with pytest.raises(ConfigError, match="amplitude or snr_db: column missing"):
         inputs_of(table, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
+
+
+def test_a_cosine_goes_with_a_cosine(table: Table, spec: PipelineSpec) -> None:
+    table["phi_r_rad"] = table.pop("cos_y")
+    with pytest.raises(ConfigError, match="a cosine beside an angle"):
+        inputs_of(table, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
+
+
+def test_a_ray_from_below_is_not_taken_for_its_mirror_image(table: Table, spec: PipelineSpec) -> None:
+    del table["cos_x"], table["cos_y"]
+    table["theta_r_rad"], table["phi_r_rad"] = ([value] * len(table["time_s"]) for value in (3.0, 0.2))
+    with pytest.raises(ConfigError, match="outside 0 to pi/2"):
+        inputs_of(table, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
+
+
+def test_a_column_given_twice_is_refused(tmp_path: Path, spec: PipelineSpec) -> None:
+    file = tmp_path / "twice.csv"
+    file.write_text("time_s,delay_s,delay_s,cos_x,cos_y,snr_db\n0,6e-9,9e-9,0.1,0.1,30\n")
+    with pytest.raises(ConfigError, match="a column is there twice"):
+        read_inputs(file, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
+
+
+def test_the_noise_of_the_command_line_goes_before_the_snr_of_the_file() -> None:
+    spec = load_spec(find_pipeline("trace_then_slam"), ["radio.noise_psd=3.5e-11"])
+    assert build_radio(spec.radio).noise_psd == 3.5e-11
+    with pytest.raises(ConfigError, match="not both"):
+        load_spec(find_pipeline("trace_then_slam"), ["radio.noise_psd=3.5e-11", "radio.reference_snr_db=3"])
+
+
+def test_a_folder_by_another_name_is_not_written_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "map.json").write_text("mine")
+    monkeypatch.chdir(tmp_path)
+    for folder in ("missing/..", "x" * 300):
+        with pytest.raises(ConfigError, match="--out"):
+            _new_folder(Path(folder))

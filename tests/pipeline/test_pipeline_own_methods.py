@@ -17,6 +17,49 @@ from rislam_rt.pipeline.sweeps import Effort, run_sweep
 from rislam_rt.pipeline.sweeps.slam import slam_sweep
 from rislam_rt.shipped import find_pipeline
 
+FAULTS = """
+import sys
+number = 3
+
+def raises(belief, panel, radio, *, rng):
+    raise ValueError("first line\\nsecond line")
+
+def leaves(belief, panel, radio, *, rng):
+    sys.exit(0)
+
+def takes_nothing():
+    return 0
+
+def ragged(belief, panel, radio, *, rng):
+    return [[1, 2], [3]]
+
+class WantsArguments:
+    def __init__(self, argument): ...
+    def init(self): ...
+    def step(self): ...
+    def estimate(self): ...
+
+class StepAlone:
+    def step(self): ...
+
+class Nothing:
+    def init(self, *given, **named): ...
+    def step(self, *given, **named): ...
+    def estimate(self, state): ...
+
+class Away(Nothing):
+    def init(self, start, body, panel, sensor, *, rng):
+        return body
+    def estimate(self, state):
+        return pose_estimate(np.full(3, 1e200), np.zeros(3), 0.0, np.eye(6), state)
+
+class NoPaths:
+    def __init__(self, scene, radio, depth): ...
+    def paths(self, trajectory): ...
+
+class NoChannel: ...
+"""
+"""Methods at fault, beside the how-to's examples."""
 PAGE = (Path(__file__).parents[2] / "docs" / "own_methods.md").read_text()
 FILES = [block for block in re.findall(r"```python\n(.*?)```", PAGE, re.S) if block.startswith("# mine.py")]
 QUICK = ["cycles=8", "channel=image_source", "depth=1", "radio.reference_snr_db=30"]
@@ -27,7 +70,7 @@ def mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The how-to's three examples in one file, where Python finds it."""
     assert len(FILES) == 3
     file = tmp_path / "mine.py"
-    file.write_text("\n".join(FILES) + "\n\ndef bad(belief, panel, radio, *, rng):\n    return [1.5]\n")
+    file.write_text("\n".join(FILES) + "\n\ndef bad(belief, panel, radio, *, rng):\n    return [1.5]\n" + FAULTS)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "mine", raising=False)
     load_own.cache_clear()
@@ -104,9 +147,45 @@ def test_the_file_is_part_of_the_identity(mine: Path) -> None:
         ('["mine:nobody"]', "module 'mine' has no 'nobody'"),
         ('["nowhere:f"]', "put nowhere.py beside the pipeline file"),
         ('["mine:bad"]', r"give whole numbers \(6, 6\) from 0 to 3"),
+        ('["mine:raises"]', "raised ValueError: first line second line in line [0-9]+ of .*mine.py; mend it"),
+        ('["mine:leaves"]', "raised SystemExit: 0"),
+        ('["mine:takes_nothing"]', "raised TypeError: takes_nothing"),
+        ('["mine:ragged"]', "raised ValueError: setting an array element"),
+        ('["mine:number"]', "int received; give a function"),
+        ('["os:path"]', "module received; give a function"),
+        ('["math:sin"]', "raised TypeError"),
+        ('["mine:WantsArguments"]', "cannot be made"),
+        ('["mine:StepAlone"]', "has 'step' and no 'init'"),
+        ('["mine:Nothing"]', "estimate: NoneType received; give a SlamEstimate"),
+        ('["mine:Away"]', "estimate: a position of 1e[+]200 m"),
     ],
 )
 def test_what_is_wrong_is_one_line(schemes: str, said: str) -> None:
     with pytest.raises(ConfigError, match=said) as raised:
         run(schemes)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.usefixtures("mine")
+@pytest.mark.parametrize(
+    ("channel", "said"),
+    [
+        ("mine:NoPaths", "paths: NoneType received; give a Paths"),
+        ("mine:NoChannel", "raised TypeError: NoChannel"),
+        ("mine:number", "int received"),
+    ],
+)
+def test_what_is_wrong_with_a_channel_is_one_line(channel: str, said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        run('["no_ris"]', f"channel={channel}")
+
+
+def test_a_file_that_ends_the_program_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "script_of_mine.py").write_text("import sys\nsys.exit(0)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ConfigError, match="script_of_mine cannot be loaded"):
+        run('["script_of_mine:f"]')
+
+
+def test_what_python_has_built_in_has_no_digest() -> None:
+    assert own_digests(["math:sin"]) == {"math:sin": ""}

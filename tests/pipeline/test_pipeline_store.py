@@ -24,6 +24,7 @@ from rislam_rt.pipeline.dataset import (
     seal_dataset,
     write_dataset,
 )
+from rislam_rt.pipeline.files import write_atomic
 from rislam_rt.pipeline.identity import code_digest, run_identity
 from rislam_rt.pipeline.lock import hold
 from rislam_rt.pipeline.seal import file_digest, seal
@@ -286,3 +287,15 @@ def test_the_lock_of_a_dead_process_is_taken_over(tmp_path):
 def test_unwritable_place_is_a_store_error(identity):
     with pytest.raises(StoreError, match="cannot be written"), open_run(Path("/proc/nowhere/run"), identity):
         pass
+
+
+def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        write_atomic(pipe, b"content")
+        assert os.read(reader, 100) == b"content"
+    finally:
+        os.close(reader)
+    assert pipe.is_fifo()

@@ -97,3 +97,13 @@ def test_cross_section_apart_from_the_sphere_is_kept(tmp_path: Path) -> None:
         room = replace(scene, scatterers=(changed,))
         again = load_scene(write_scene(room, tmp_path / str(changed.radius)))
         assert (again.scatterers[0].rcs, again.scatterers[0].radius) == (0.02, changed.radius)
+
+
+def test_a_folder_by_another_name_is_not_written_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "scene.toml").write_text("mine")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SceneError, match="exists already"):
+        new_scene("paper_room", Path("missing") / "..")
+    assert (tmp_path / "scene.toml").read_text() == "mine"
+    with pytest.raises(SceneError, match="too long"):
+        new_scene("paper_room", "x" * 300)
