@@ -95,8 +95,8 @@ def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
     lines = ["# timestamp x y z qx qy qz qw"]
     for t, point, angle in zip(time, position, heading, strict=True):
         row = [*point, 0.0, 0.0, np.sin(angle / 2.0), np.cos(angle / 2.0)]
-        # times may count from the epoch: microseconds of them need 16 digits, positions none beyond a nanometre
-        lines.append(" ".join([f"{t:.16g}", *(f"{value:.9g}" for value in row)]))
+        # times may count from the epoch: all digits down to a nanosecond; nine digits of a place are a nanometre
+        lines.append(" ".join([repr(round(float(t), 9)).removesuffix(".0"), *(f"{value:.9g}" for value in row)]))
     return ("\n".join(lines) + "\n").encode()
 
 

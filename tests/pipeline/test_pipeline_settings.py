@@ -37,7 +37,7 @@ def test_no_setting_is_left_out() -> None:
     ("key", "default", "allowed", "unit"),
     [
         ("depth", 2, "at least 0, at most 4", ""),
-        ("radio.carrier_ghz", 10.0, "above 0, at most 1e+12", "GHz"),
+        ("radio.carrier_ghz", 10.0, "at least 0.001, at most 3000", "GHz"),
         ("channel", "traced", "one of traced, image_source", ""),
         # What follows is checked by the records themselves; their ranges are found by trying.
         ("receiver.converter_bits", 0, "at least 0, at most 32", ""),

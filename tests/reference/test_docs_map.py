@@ -19,7 +19,11 @@ def test_name_exists(name):
         assert hasattr(importlib.import_module(module), attribute)
 
 
+MADE_WITH_THE_SITE = ("reference/settings.md", "reference/cli.md")
+"""Pages that `docs/generated_pages.py` writes; `tests/docs` builds the site."""
+
+
 def test_every_link_of_the_docs_leads_somewhere():
     for page in [*ROOT.glob("docs/*.md"), ROOT / "README.md"]:
         for link in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
-            assert (page.parent / link).exists(), f"{page.name}: {link}"
+            assert link in MADE_WITH_THE_SITE or (page.parent / link).exists(), f"{page.name}: {link}"

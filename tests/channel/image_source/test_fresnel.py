@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.image_source.fresnel import (
-    ITU_MATERIALS,
     polarisation_basis,
     relative_permittivity,
     slab_coefficients,
@@ -17,6 +16,7 @@ from rislam_rt.channel.image_source.fresnel import (
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.angles import direction_from_angles
 from rislam_rt.model import Material, PathKind, RadioConfig
+from rislam_rt.model.itu import ITU_MATERIALS
 
 CARRIER = 10e9
 materials_at_10_ghz = sorted(n for n, rows in ITU_MATERIALS.items() if any(r[0] <= 10.0 <= r[1] for r in rows))

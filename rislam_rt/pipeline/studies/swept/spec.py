@@ -114,7 +114,9 @@ class RobustnessSpec(_OneRoom):
     """One quantity at a time that is not as the belief is told, all else right."""
 
     kind: Literal["robustness"]
+    """Which study the file is."""
     mismatches: Annotated[list[MismatchSection], Field(min_length=1)]
+    """One quantity that the belief is told each, and how wrong it is."""
 
     @property
     def all_variants(self) -> list[VariantSection]:
