@@ -2,6 +2,7 @@
 # make test   build .venv, run the tests
 # make check  linter and type checker
 # make docs   build the site of the documentation under site/
+# make newest run the tests with the newest allowed version of every dependency, in .venv-newest
 # make lock   resolve the dependencies anew
 # make clean  remove .venv and caches (results under runs/ stay)
 
@@ -9,7 +10,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test check docs lock clean
+.PHONY: demo test check docs newest lock clean
 .DELETE_ON_ERROR:
 
 demo: $(READY)
@@ -41,11 +42,16 @@ $(READY): requirements.lock pyproject.toml
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@
 
+newest: $(READY)
+	@$(BIN)/python -m venv .venv-newest
+	@.venv-newest/bin/python -m pip install --quiet --disable-pip-version-check --upgrade --upgrade-strategy eager -e '.[dev]'
+	@.venv-newest/bin/python -m pytest -n 2
+
 lock:
 	@uv pip compile --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 --extra dev \
 	  --quiet --output-file requirements.lock pyproject.toml
 	@! grep -n '://' requirements.lock
 
 clean:
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	rm -rf $(VENV) .venv-newest build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
