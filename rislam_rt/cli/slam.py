@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from rislam_rt.pipeline.studies.unseen import Answers, Inputs
     from rislam_rt.slam import StartPrior
 
+FARTHEST = 1e5
+"""Largest coordinate [m], as in a scene."""
+
 
 def command(
     measurements: Annotated[
@@ -98,7 +101,7 @@ def _triple(option: str, text: str) -> "Floats":
         values = np.array([float(part) for part in text.split(",")])
     except ValueError:
         values = np.zeros(0)
-    if values.shape != (3,) or not np.isfinite(values).all():
+    if values.shape != (3,) or not (np.abs(values) <= FARTHEST).all():
         raise ConfigError(f"{option}: '{text[:60]}' received; give three numbers, e.g. {option} 0.5,0.7,0.5")
     return values
 

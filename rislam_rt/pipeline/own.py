@@ -117,6 +117,10 @@ def inputs_of(
     heading = columns.get("heading_rad", np.zeros(len(time)))[first]
     if not np.isfinite(heading).all():
         raise ConfigError(f"{place}: heading_rad: empty in cycle {int(np.argmin(np.isfinite(heading)))}; fill it")
+    if np.abs(heading).max() > 2.0 * np.pi:
+        raise ConfigError(
+            f"{place}: heading_rad: {np.abs(heading).max():g} is more than a turn; give radians, not degrees"
+        )
     if "heading_rad" in columns:  # the compass shows the first heading, too
         start = replace(start, heading=float(heading[0]))
     nothing = (None,) * len(cycles)

@@ -133,6 +133,7 @@ def test_a_cycle_in_which_nothing_is_heard_counts(table: Table, spec: PipelineSp
         ("delay_s", 1e-9 + 1j, "complex numbers received"),
         ("cos_x", "north", "not numbers"),
         ("speed", 1.0, "unknown column"),
+        ("heading_rad", 45.0, "radians, not degrees"),
         ("amplitude_std", 0.0, "amplitude_std of 0 received"),
         ("delay_s", np.inf, "delay_s: infinite"),
         ("heading_rad", np.nan, "heading_rad: empty in cycle 0"),
