@@ -1,5 +1,6 @@
 # make demo   build .venv, run the paper's room end to end, write the report
 # make test   build .venv, run the tests
+# make slow   run the proofs that take many seconds each
 # make check  linter and type checker
 # make docs   build the site of the documentation under site/
 # make newest run the tests with the newest allowed version of every dependency, in .venv-newest
@@ -10,14 +11,17 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test check docs newest lock clean
+.PHONY: demo test slow check docs newest lock clean
 .DELETE_ON_ERROR:
 
 demo: $(READY)
 	@$(BIN)/rislam-rt run pipelines/demo.toml
 
 test: $(READY)
-	@$(BIN)/python -m pytest -n 2
+	@$(BIN)/python -m pytest -n 2 --dist worksteal
+
+slow: $(READY)
+	@$(BIN)/python -m pytest -n 2 -m slow
 
 check: $(READY)
 	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy

@@ -14,6 +14,7 @@ RADIO = RadioConfig()
 WAVEFORM = ReceiverConfig(estimator="waveform")
 
 
+@pytest.mark.slow
 def test_errors_of_faint_paths_are_as_reported(make_paths, make_gain):
     """At 11 dB only lucky draws pass a threshold of 10 dB: the bound at the measured amplitude would be too small."""
     paths = make_paths([(PathKind.PS, 4.0, (0.3, -0.2, 0.9), make_gain(11.0, RADIO, 0.4))])

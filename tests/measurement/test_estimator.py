@@ -82,7 +82,7 @@ class TestAlgebra:
         np.testing.assert_allclose(np.sqrt(variance) / unit, amplitude, rtol=1e-2)
 
 
-@pytest.mark.parametrize("snr_db", [15.0, 40.0])
+@pytest.mark.parametrize("snr_db", [15.0, pytest.param(40.0, marks=pytest.mark.slow)])
 def test_lone_path_reaches_the_bound(make_paths, make_gain, snr_db):
     paths = make_paths([(PathKind.PS, 4.0, UP, make_gain(snr_db, RADIO, 0.4))])
     times = 150

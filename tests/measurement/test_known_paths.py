@@ -1,6 +1,7 @@
 """A search that begins with the last cycle's components finds what one from nothing finds."""
 
 import numpy as np
+import pytest
 
 from rislam_rt.measurement import ReceiverConfig, measure
 from rislam_rt.model import Measurement, PathKind, RadioConfig
@@ -44,6 +45,7 @@ def test_paths_that_are_gone_are_let_go(make_paths, make_gain):
     assert truth.path.tolist() == [0]
 
 
+@pytest.mark.slow
 def test_wrong_memories_are_no_detections(make_paths):
     rng = np.random.default_rng(6)
     count = 0

@@ -47,6 +47,7 @@ def test_motion_stays_inside_and_keeps_heading_and_height(room):
         np.testing.assert_allclose(moved, 0.5 * (motion.velocity[1:] + motion.velocity[:-1]), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_too_much_acceleration_for_the_room_is_refused(room):
     with pytest.raises(ConfigError, match="sigma_a_m_s2: 1000 received"):
         draw_motion(room, 1000.0, rng=np.random.default_rng(0))

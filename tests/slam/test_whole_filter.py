@@ -93,7 +93,7 @@ def normal() -> tuple[Heard, Course]:
     return heard, go(heard)
 
 
-@pytest.mark.parametrize("receiver", ["clear", "normal"])
+@pytest.mark.parametrize("receiver", [pytest.param("clear", marks=pytest.mark.slow), "normal"])
 def test_finds_sphere_and_panel(receiver: str, request: pytest.FixtureRequest) -> None:
     """Points of the map within five of their own standard deviations, and 0.02 m for what the model leaves out.
 

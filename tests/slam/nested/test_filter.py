@@ -78,6 +78,7 @@ def against_kalman(seed: int) -> tuple[Floats, Floats, Floats, int]:
     return (found.mean[rows] - mean) / std, 1.0 + np.diag(apart), apart, renewals
 
 
+@pytest.mark.slow
 def test_equals_a_kalman_filter_where_that_is_exact() -> None:
     """Linear and Gaussian: offsets from agent to two landmarks, all axes alike; several walks and draws.
 
@@ -226,6 +227,7 @@ def test_estimated_heading_is_filtered() -> None:
     assert found.covariance[6, 6] == pytest.approx(10 * CYCLE * config.turn_std**2, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_pose_errors_are_as_large_as_the_filter_says() -> None:
     """Known associations, truth drawn from the model: mean NEES of 5 seeds inside its 99 % interval.
 
