@@ -124,6 +124,7 @@ def test_halves_that_turn_against_each_other_are_brought_in_step():
     np.testing.assert_allclose(in_step(one * 1.3 * np.exp(0.4j), one), one, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_calibration_finds_the_chains_and_what_the_leakage_left(stage):
     """After it, what is left of chains a tenth and 6 degrees off is a tenth of that, and of the residue a fifth."""
     config = HardwareConfig(gain_std_db=0.8, phase_std_deg=6.0, leakage_residue=0.01)

@@ -72,6 +72,7 @@ def test_error_relative_to_the_start_is_millimetres_and_told(run):
     assert 0.01 < np.mean(nees) < 4.0
 
 
+@pytest.mark.slow
 def test_start_error_stays_in_the_covariance(run):
     found, _, _ = run
     # nothing that is measured tells where the start was
