@@ -8,10 +8,10 @@ import numpy as np
 
 from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade
+from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade, join_panels
 from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.containers import too_many_faces
-from rislam_rt.scene.findings import Fault, Finding, raise_errors
+from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, read_inside
 from rislam_rt.scene.motion import build_motion
 from rislam_rt.scene.schema import (
@@ -100,18 +100,20 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
             scatterers.append(_scatterer(scatterer, shelf))
         except Fault as fault:
             findings.append(fault.at(str(file), f"scatterer[{number}].mesh ({scatterer.name})"))
-    panel = None
-    try:
-        panel = _panel(spec.ris) if spec.ris else None
-    except Fault as fault:
-        findings.append(fault.at(str(file), "ris.up"))
+    panels = []
+    for number, sheet in enumerate(spec.ris):
+        try:
+            panels.append(_panel(sheet))
+        except Fault as fault:
+            findings.append(fault.at(str(file), f"{panel_key(number, len(spec.ris))}.up"))
     try:
         agent, shelf.contents["trajectory"] = build_motion(spec.agent, file.parent)
     except Fault as fault:
         findings.append(fault.at(str(file), "agent"))
     if findings:
         return Draft(str(file), None, findings)
-    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), panel, agent, _digest(content, shelf.contents))
+    ris = join_panels(tuple(panels))
+    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, _digest(content, shelf.contents))
     return Draft(str(file), scene, [])
 
 
