@@ -149,9 +149,15 @@ def _z_up(mesh: Mesh) -> Mesh:
 
 
 def _material(section: MaterialSection) -> Material:
-    if section.itu is None or section.thickness_m is None:
-        return Material(section.reflection, section.itu)
-    return Material(section.reflection, section.itu, section.thickness_m)
+    given = {} if section.thickness_m is None else {"thickness": section.thickness_m}
+    return Material(
+        section.reflection,
+        section.itu,
+        permittivity=section.permittivity,
+        conductivity=section.conductivity_s_m or 0.0,
+        scattering=section.scattering,
+        **given,
+    )
 
 
 def _scatterer(section: ScattererSection, shelf: Shelf) -> Scatterer:

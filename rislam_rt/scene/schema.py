@@ -28,8 +28,9 @@ Name = Annotated[
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 ItuMaterial = Literal[
-    "brick", "ceiling_board", "chipboard", "concrete", "floorboard", "glass", "marble", "medium_dry_ground", "metal",
-    "plasterboard", "plywood", "very_dry_ground", "wet_ground", "wood",
+    "asphalt_concrete", "brick", "carpet_tile", "ceiling_board", "chipboard", "clear_acrylic", "concrete", "floorboard",
+    "glass", "marble", "medium_dry_ground", "metal", "plasterboard", "plywood", "very_dry_ground", "vinyl_tile",
+    "wet_ground", "wood",
 ]  # fmt: skip
 
 
@@ -40,18 +41,27 @@ class Section(BaseModel):
 
 
 class MaterialSection(Section):
-    """Either `reflection` (the same at every angle) or `itu`, a slab of an ITU-R P.2040 material."""
+    """One of `reflection` (the same at every angle), `itu`, a slab of an ITU-R P.2040 material, and `permittivity`
+    (relative, with `conductivity_s_m`), a slab of one's own. `scattering` takes a share from the mirrored ray.
+    """
 
     reflection: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
     itu: ItuMaterial | None = None
+    permittivity: Annotated[float, Field(ge=1.0, le=1e6, allow_inf_nan=False)] | None = None
+    conductivity_s_m: Annotated[float, Field(ge=0.0, le=1e9, allow_inf_nan=False)] | None = None
     thickness_m: Length | None = None
+    scattering: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
 
     @model_validator(mode="after")
     def _one_kind(self) -> "MaterialSection":
-        if (self.reflection is None) == (self.itu is None):
-            raise ValueError("give either 'reflection' or 'itu'")
-        if self.itu is None and self.thickness_m is not None:
-            raise ValueError("'thickness_m' has a meaning with 'itu' only")
+        if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity)) != 1:
+            raise ValueError("give one of 'reflection', 'itu' and 'permittivity'")
+        if self.reflection is not None and self.thickness_m is not None:
+            raise ValueError("'thickness_m' has a meaning with 'itu' or 'permittivity' only")
+        if self.permittivity is None and self.conductivity_s_m is not None:
+            raise ValueError("'conductivity_s_m' has a meaning with 'permittivity' only")
+        if self.permittivity == 1.0 and not self.conductivity_s_m:
+            raise ValueError("a permittivity of 1 without 'conductivity_s_m' is air; give more of either, or no mesh")
         return self
 
 

@@ -194,9 +194,13 @@ def _mesh_file(name: str) -> str:
 
 
 def _material_table(material: Material) -> dict[str, Any]:
-    if material.itu is None:
-        return {"reflection": material.reflection}
-    return {"itu": material.itu, "thickness_m": material.thickness}
+    rough = {"scattering": material.scattering} if material.scattering > 0.0 else {}
+    if material.reflection is not None:
+        return {"reflection": material.reflection} | rough
+    if material.itu is not None:
+        return {"itu": material.itu, "thickness_m": material.thickness} | rough
+    own = {"permittivity": material.permittivity, "conductivity_s_m": material.conductivity}
+    return own | {"thickness_m": material.thickness} | rough
 
 
 def _agent_table(agent: Trajectory) -> dict[str, Any]:
