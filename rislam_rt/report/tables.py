@@ -168,7 +168,7 @@ def print_scene(scene: Scene) -> None:
     table = Table("what", "name", "where \\[m]")
     for reflector in scene.reflectors:
         material = reflector.material
-        kind = f"R = {material.reflection:g}" if material.reflection is not None else f"{material.itu}"
+        kind = material.words
         table.add_row("reflector", reflector.name, f"{len(reflector.faces)} triangles, {kind}")
     for scatterer in scene.scatterers:
         table.add_row("scatterer", scatterer.name, f"{_point(scatterer.position)}, {scatterer.rcs:.3g} m2")

@@ -28,9 +28,13 @@ Name = Annotated[
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 ItuMaterial = Literal[
-    "brick", "ceiling_board", "chipboard", "concrete", "floorboard", "glass", "marble", "medium_dry_ground", "metal",
-    "plasterboard", "plywood", "very_dry_ground", "wet_ground", "wood",
+    "asphalt_concrete", "brick", "carpet_tile", "ceiling_board", "chipboard", "clear_acrylic", "concrete", "floorboard",
+    "glass", "marble", "medium_dry_ground", "metal", "plasterboard", "plywood", "very_dry_ground", "vinyl_tile",
+    "wet_ground", "wood",
 ]  # fmt: skip
+
+
+Units = Literal["mm", "cm", "m", "in"]
 
 
 class Section(BaseModel):
@@ -40,31 +44,64 @@ class Section(BaseModel):
 
 
 class MaterialSection(Section):
-    """Either `reflection` (the same at every angle) or `itu`, a slab of an ITU-R P.2040 material."""
+    """One of `reflection` (the same at every angle), `itu`, a slab of an ITU-R P.2040 material, and `permittivity`
+    (relative, with `conductivity_s_m`), a slab of one's own. `scattering` takes a share from the mirrored ray.
+    """
 
     reflection: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
     itu: ItuMaterial | None = None
+    permittivity: Annotated[float, Field(ge=1.0, le=1e6, allow_inf_nan=False)] | None = None
+    conductivity_s_m: Annotated[float, Field(ge=0.0, le=1e9, allow_inf_nan=False)] | None = None
     thickness_m: Length | None = None
+    scattering: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
 
     @model_validator(mode="after")
     def _one_kind(self) -> "MaterialSection":
-        if (self.reflection is None) == (self.itu is None):
-            raise ValueError("give either 'reflection' or 'itu'")
-        if self.itu is None and self.thickness_m is not None:
-            raise ValueError("'thickness_m' has a meaning with 'itu' only")
+        if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity)) != 1:
+            raise ValueError("give one of 'reflection', 'itu' and 'permittivity'")
+        if self.reflection is not None and self.thickness_m is not None:
+            raise ValueError("'thickness_m' has a meaning with 'itu' or 'permittivity' only")
+        if self.permittivity is None and self.conductivity_s_m is not None:
+            raise ValueError("'conductivity_s_m' has a meaning with 'permittivity' only")
+        if self.permittivity == 1.0 and not self.conductivity_s_m:
+            raise ValueError("a permittivity of 1 without 'conductivity_s_m' is air; give more of either, or no mesh")
         return self
 
 
 class ReflectorSection(Section):
     """A smooth mesh. `mesh = "room.glb#node"` takes one named node of a GLB file, with its transform applied.
 
-    `up_axis = "y"` turns a file whose y axis points up (as glTF's standard says) into the room's frame with z up.
+    `up_axis = "y"` turns a file whose y axis points up (as glTF's standard says) into the room's frame with z up,
+    `units` and `origin` are those of `[meshes]`, for this mesh alone.
     """
 
     name: Name
     mesh: str
     material: MaterialSection
-    up_axis: Literal["y", "z"] = "z"
+    up_axis: Literal["y", "z"] | None = None
+    units: Units | None = None
+    origin: Vector | None = None
+
+
+class ShadeSection(Section):
+    """A mesh that hides what lies behind it and reflects nothing: clutter too small or too round to be a mirror."""
+
+    name: Name
+    mesh: str
+    up_axis: Literal["y", "z"] | None = None
+    units: Units | None = None
+    origin: Vector | None = None
+
+
+class MeshesSection(Section):
+    """How the mesh files of the scene lie, unless a mesh says otherwise."""
+
+    up: Literal["y", "z"] = "z"
+    """The axis of the file that points up."""
+    units: Units = "m"
+    """What a unit of the file is."""
+    origin: Vector = [0.0, 0.0, 0.0]
+    """[m] The point, z up, that becomes the room's zero."""
 
 
 class ScattererSection(Section):
@@ -84,7 +121,9 @@ class ScattererSection(Section):
     axis: Vector | None = None
     shadow: bool = False
     mesh: str | None = None
-    up_axis: Literal["y", "z"] = "z"
+    up_axis: Literal["y", "z"] | None = None
+    units: Units | None = None
+    origin: Vector | None = None
 
     @model_validator(mode="after")
     def _one_size(self) -> "ScattererSection":
@@ -155,6 +194,8 @@ class SceneSpec(Section):
     name: Name
     reflector: Annotated[list[ReflectorSection], Field(min_length=1, max_length=10_000)]
     scatterer: list[ScattererSection] = []
+    shade: Annotated[list[ShadeSection], Field(max_length=10_000)] = []
+    meshes: MeshesSection = MeshesSection()
     ris: RisSection | None = None
     agent: AgentSection
     limits: LimitsSection = LimitsSection()
@@ -239,8 +280,8 @@ def _remark(item: Any) -> str:
 
 
 def _known_keys() -> list[str]:
-    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, RisSection, AgentSection,
-                LimitsSection)  # fmt: skip
+    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, ShadeSection, MeshesSection,
+                RisSection, AgentSection, LimitsSection)  # fmt: skip
     return [key for section in sections for key in section.model_fields]
 
 

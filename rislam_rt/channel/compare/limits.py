@@ -21,7 +21,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.cross_section import cross_section
-from rislam_rt.channel.image_source.fresnel import relative_permittivity, slab_coefficients
+from rislam_rt.channel.image_source.fresnel import slab_coefficients, slab_permittivity
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit
@@ -181,11 +181,11 @@ def coherent_scale(
 
 def with_mirrors(scene: Scene) -> Scene | None:
     """The scene with perfect mirrors in place of its slabs, or nothing if it has none."""
-    if all(reflector.material.itu is None for reflector in scene.reflectors):
+    if not any(reflector.material.is_slab for reflector in scene.reflectors):
         return None
     mirror = Material(reflection=1.0)
     return replace(
-        scene, reflectors=tuple(replace(r, material=mirror) if r.material.itu else r for r in scene.reflectors)
+        scene, reflectors=tuple(replace(r, material=mirror) if r.material.is_slab else r for r in scene.reflectors)
     )
 
 
@@ -259,10 +259,10 @@ def field_error(material: Material, carrier: float) -> float:
     are the measure, at the worst angle and polarisation. The root's imaginary part besides comes from `|z| - Re z`,
     which cancels in a slab of little loss: the root is off by `u |z| / (2 Im sqrt(z))`, at most by sqrt(u |z|).
     """
-    if material.itu is None:
+    if not material.is_slab:
         return FIELD_STEPS * SINGLE
     cosine, step = np.linspace(1e-3, 1.0, 4001), 1e-6
-    permittivity = relative_permittivity(material.itu, carrier)
+    permittivity = slab_permittivity(material, carrier)
 
     def slope(by_depth: float, by_permittivity: float) -> Floats:
         sides = [
@@ -278,7 +278,8 @@ def field_error(material: Material, carrier: float) -> float:
 
     z = permittivity - (1.0 - cosine**2)
     root = np.sqrt(z)
-    off = np.minimum(np.abs(z) / (2.0 * np.abs(root.imag)), np.sqrt(np.abs(z) / SINGLE))
+    loss = np.maximum(np.abs(root.imag), np.finfo(np.float64).tiny)
+    off = np.minimum(np.abs(z) / (2.0 * loss), np.sqrt(np.abs(z) / SINGLE))
     steps = SLAB_STEPS + 2.0 * np.abs(root) * off / abs(permittivity)
     worst = (slope(step, 0.0) * SLAB_STEPS + slope(0.0, step) * steps).max()
     return float((FIELD_STEPS + SLAB_STEPS + worst) * SINGLE)
