@@ -50,7 +50,9 @@ def command(
     ] = None,
     deepmimo: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Write a scenario of DeepMIMO v4, one scene a cycle: a new folder, lower case."),
+        typer.Option(
+            metavar="DIR", help="Write a scenario of DeepMIMO v4, one scene a cycle: a new folder, lower case."
+        ),
     ] = None,
     json: JsonFile = None,
 ) -> None:

@@ -30,13 +30,14 @@ NO_FLAGS = (
     "terrain_scattering",
 )
 NO_SCATTERING = (
-    "scattering_coefficient",
     "cross_polarization_coefficient",
     "roughness",
     "vertical_attenuation",
     "horizontal_attenuation",
 )
 """Settings that the format wants and that have no meaning here: paths are specular or run over a point."""
+METAL = 1e7
+"""[S/m] of a metal in ITU-R P.2040."""
 PER_PATH = ("power", "phase", "delay", "aod_az", "aod_el", "aoa_az", "aoa_el", "inter", "inter_pos")
 
 
@@ -132,7 +133,11 @@ def _parameters(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> d
             "ray_casting_range_el": 180.0,
             "gps_bbox": [0.0, 0.0, 0.0, 0.0],
             "synthetic_array": True,
-            "raw_params": {"scene": scene.name, "time_s": scene.agent.time.tolist(), "landmarks": list(paths.landmarks)},
+            "raw_params": {
+                "scene": scene.name,
+                "time_s": scene.agent.time.tolist(),
+                "landmarks": list(paths.landmarks),
+            },
         },
         "txrx_sets": {
             f"txrx_set_{number}": {
@@ -173,24 +178,32 @@ def _distinct(scene: Scene) -> list[Material]:
 
 
 def _materials(scene: Scene, radio: RadioConfig) -> list[dict[str, Any]]:
-    """Permittivity and conductivity [S/m] at the carrier. A constant coefficient has none: it is written as the
-    permittivity of the half-space that reflects so at normal incidence, and a coefficient of 1 as a metal."""
-    found = []
-    for number, one in enumerate(_distinct(scene)):
-        table: dict[str, Any] = {"id": number, "thickness": one.thickness, "scattering_model": "none"}
-        table |= dict.fromkeys(NO_SCATTERING, 0.0)
-        if one.itu is not None:
-            a, b, c, d = itu_parameters(one.itu, radio.carrier)
-            ghz = radio.carrier / 1e9
-            table |= {"name": one.itu, "permittivity": a * ghz**b, "conductivity": c * ghz**d}
-            table |= {"itu_a": a, "itu_b": b, "itu_c": c, "itu_d": d}
-        else:
-            strength = float(one.reflection or 0.0)
-            metal = strength > 0.999
-            square = 1.0 if metal else ((1.0 + strength) / (1.0 - strength)) ** 2
-            table |= {"name": f"reflection {strength:g}", "permittivity": square, "conductivity": 1e7 if metal else 0.0}
-        found.append(table)
-    return found
+    return [
+        {"id": number, "name": one.words, "thickness": one.thickness}
+        | dict.fromkeys(NO_SCATTERING, 0.0)
+        | {"scattering_model": "lambertian" if one.scattering else "none", "scattering_coefficient": one.scattering}
+        | _electric(one, radio.carrier)
+        for number, one in enumerate(_distinct(scene))
+    ]
+
+
+def _electric(material: Material, carrier: float) -> dict[str, float]:
+    """Permittivity and conductivity [S/m] at the carrier [Hz].
+
+    A constant coefficient has neither: it is written as the half-space that reflects so at normal incidence, and a
+    coefficient of 1 as a metal.
+    """
+    if material.itu is not None:
+        a, b, c, d = itu_parameters(material.itu, carrier)
+        ghz = carrier / 1e9
+        constants = {"itu_a": a, "itu_b": b, "itu_c": c, "itu_d": d}
+        return {"permittivity": a * ghz**b, "conductivity": c * ghz**d, **constants}
+    if material.reflection is None:
+        return {"permittivity": float(material.permittivity or 1.0), "conductivity": material.conductivity}
+    if material.reflection == 1.0:
+        return {"permittivity": 1.0, "conductivity": METAL}
+    index = (1.0 + material.reflection) / (1.0 - material.reflection)
+    return {"permittivity": index**2, "conductivity": 0.0}
 
 
 def _room_files(scene: Scene, radio: RadioConfig) -> dict[str, bytes]:

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import to_rgb
 
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import SetupError
@@ -12,10 +13,12 @@ from rislam_rt.report.style import scheme_colour
 
 TIMELINE = "time"
 TWO_SIGMA = 2.0
+GREY = (90, 90, 90)
+"""Of what is true."""
 
 
 def recording_bytes(result: SlamResult, identity: str) -> bytes:
-    """The content of an `.rrd` file, metres and seconds; the same run gives the same recording.
+    """The content of an `.rrd` file, metres and seconds.
 
     Parameters
     ----------
@@ -44,12 +47,9 @@ def recording_bytes(result: SlamResult, identity: str) -> bytes:
             error = float(np.linalg.norm(scheme.position[cycle] - result.scene.agent.position[cycle]))
             stream.log(f"error/{name}", rerun.Scalars(error))
     for name, scheme in result.schemes.items():
-        way = rerun.LineStrips3D([scheme.position], colors=[scheme_colour(name)])
+        way = rerun.LineStrips3D([scheme.position], colors=[_colour(name)])
         stream.log(f"{name}/way", way, static=True)
     return bytes(sink.read() or b"")
-
-
-GREY = (90, 90, 90)
 
 
 def _log_room(rerun: Any, stream: Any, scene: Scene) -> None:
@@ -68,7 +68,7 @@ def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: 
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0
     place = scheme.position[cycle]
-    colour = scheme_colour(name)
+    colour = _colour(name)
     stream.log(f"{name}/agent", rerun.Points3D([place], radii=0.03, colors=[colour]))
     ellipsoid = rerun.Ellipsoids3D(
         centers=[place],
@@ -81,6 +81,10 @@ def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: 
     labels = [f"{scheme.ident[i]}" + (" panel" if scheme.ris_probability[cycle, i] > 0.5 else "") for i in held]
     points = rerun.Points3D(scheme.landmark_position[cycle, held], labels=labels, radii=0.04, colors=[colour])
     stream.log(f"{name}/landmarks", points)
+
+
+def _colour(scheme: str) -> tuple[int, ...]:
+    return tuple(round(255 * part) for part in to_rgb(scheme_colour(scheme)))
 
 
 def _quaternion(rotation: Any) -> Any:
