@@ -13,7 +13,7 @@ from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.containers import too_many_faces
 from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
 from rislam_rt.scene.lying import UNITS, place_mesh
-from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, read_inside
+from rislam_rt.scene.meshes import MAX_COORDINATE, MAX_MESH_BYTES, Mesh, MeshReader, read_inside
 from rislam_rt.scene.motion import build_motion
 from rislam_rt.scene.schema import (
     LimitsSection,
@@ -138,13 +138,14 @@ class Shelf:
         if name not in self.contents:
             self.contents[name] = read_inside(self.folder, name, MAX_MESH_BYTES)
         most = self.limits.faces
-        mesh = self.reader.parse(self.contents[name], name, node or None, most, self.limits.nodes)
+        up, unit = section.up_axis or self.lying.up, UNITS[section.units or self.lying.units]
+        reach = MAX_COORDINATE / unit
+        mesh = self.reader.parse(self.contents[name], name, node or None, most, self.limits.nodes, reach)
         self.faces += len(mesh.faces)
         if self.faces > most:
             raise too_many_faces(self.faces, most)
-        up, units = section.up_axis or self.lying.up, section.units or self.lying.units
         origin = self.lying.origin if section.origin is None else section.origin
-        return place_mesh(mesh, up, UNITS[units], np.array(origin))
+        return place_mesh(mesh, up, unit, np.array(origin))
 
 
 def _reflector(section: ReflectorSection, shelf: Shelf) -> Reflector:
