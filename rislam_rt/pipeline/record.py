@@ -19,12 +19,16 @@ def gather(scheme: str, cycles: Sequence[Cycle], levels: int) -> SchemeResult:
     held = np.zeros((len(cycles), len(ident)), dtype=np.bool_)
     landmark = np.zeros((len(cycles), len(ident), 3))
     ris_probability = np.zeros((len(cycles), len(ident)))
+    several = any(m.panel is not None for m in maps)
+    panel = np.zeros(held.shape, dtype=np.int64) if several else None
     for row, m in enumerate(maps):
         column = np.searchsorted(ident, m.ident)
         held[row, column], landmark[row, column] = True, m.position
         image = np.flatnonzero(m.parent >= 0)
         parent[column[image]] = m.ident[m.parent[image]]
         ris_probability[row, column] = m.ris_probability
+        if panel is not None and m.panel is not None:  # an empty map has none
+            panel[row, column] = m.panel
     return SchemeResult(
         scheme=scheme,
         position=np.array([estimate.position for estimate in estimates]),
@@ -46,6 +50,7 @@ def gather(scheme: str, cycles: Sequence[Cycle], levels: int) -> SchemeResult:
         info=_diagnostics([cycle.info for cycle in cycles]),
         outcome=tuple(str(cycle.info.outcome) for cycle in cycles),
         map=maps[-1],
+        panel=panel,
     )
 
 

@@ -10,7 +10,7 @@ MAX_STEP = 1e6
 
 
 def lone_panel(ris: DataSheet | None) -> RisSpec | None:
-    """The data sheet, for a filter that knows one panel.
+    """The data sheet, for the window filter, which knows one panel.
 
     Raises
     ------
@@ -18,7 +18,9 @@ def lone_panel(ris: DataSheet | None) -> RisSpec | None:
         There are several panels.
     """
     if isinstance(ris, RisSpecs):
-        raise ConfigError(f"slam: {len(ris.panels)} panels in the room, and this filter knows one; take another room")
+        raise ConfigError(
+            f"slam: {len(ris.panels)} panels in the room, and the window filter knows one; take slam.filter = 'default'"
+        )
     return ris
 
 
