@@ -168,7 +168,7 @@ def examine(
             continue
         birth = Birth(
             verdict, scene.anchor, slots, history.seen, history.std, tracks.log_grid[row], tracks.log_ris[row]
-        )  # fmt: skip
+        )
         return int(row), tracks._replace(moving=moving), birth
     return -1, tracks._replace(moving=moving), None
 
@@ -329,12 +329,10 @@ def _images(history: History, scene: Scene) -> list[Verdict]:
 
 def _sources(book: Book, side: int) -> Integers:
     """Points whose paths are on one side: those that may be the panel, or may be none."""
-    points = book.points
+    points, held = book.points, book.holders
     if side == UNTOLD:
         return points
-    if side >= PANEL:
-        return points[points == book.holders[side - PANEL]]
-    return points[~np.isin(points, book.holders)]
+    return points[points == held[side - PANEL]] if side >= PANEL else points[~np.isin(points, held)]
 
 
 def _one_cell(wall: Floats, parent: Floats, scene: Scene, history: History, cells: float) -> bool:

@@ -19,7 +19,8 @@ def lone_panel(ris: DataSheet | None) -> RisSpec | None:
     """
     if isinstance(ris, RisSpecs):
         raise ConfigError(
-            f"slam: {len(ris.panels)} panels in the room, and the window filter knows one; take slam.filter = 'default'"
+            f"slam.filter: 'window' received, which knows one panel, in a room of {len(ris.panels)}; "
+            "give 'rao_blackwellised'"
         )
     return ris
 
