@@ -42,7 +42,7 @@ def read_material(bsdf: Element) -> Coat:
     plain, kind = name.removeprefix("mat-"), bsdf.get("type", "")
     values = {e.get("name", ""): e for e in children(bsdf, "float", "integer", "string")}
     notes = tuple(f"bsdf '{one_line(name)[:40]}': {key} is not carried over" for key in LEFT_OUT if key in values)
-    if kind == ABSORBER:
+    if kind == ABSORBER or (kind == "radio-material" and _is_air(values)):
         return Coat(None, ())
     rough = _number(values, "scattering_coefficient", 0.0)
     thickness = _number(values, "thickness", DEFAULT_THICKNESS)
@@ -62,14 +62,15 @@ def read_material(bsdf: Element) -> Coat:
 
 
 def material_element(material: Material | None, name: str) -> Element:
-    """A `<bsdf>` that Sionna reads: its own ITU slab, a slab of given permittivity, or an absorber for None.
+    """A `<bsdf>` that Sionna reads: its own ITU slab, a slab of given permittivity, or air for None.
 
     A constant R has no counterpart that Sionna's `load_scene` knows. What comes nearest is the face of a thick and
     slightly lossy body that has |R| at normal incidence, `permittivity = ((1 + R) / (1 - R))^2`; elsewhere it follows
-    Fresnel.
+    Fresnel. What only hides is a slab of air, which Sionna's rays do not pass unless refraction is on: in Sionna RT
+    2.2.0 no frequency can be set where there is an `absorber-radio-material`.
     """
     if material is None:
-        return Element("bsdf", {"type": ABSORBER, "id": name})
+        return Element("bsdf", {"type": "radio-material", "id": name})
     if material.reflection is not None:
         index = (1.0 + material.reflection) / max(1.0 - material.reflection, 1e-3)
         material = Material(
@@ -88,6 +89,10 @@ def material_element(material: Material | None, name: str) -> Element:
     if material.scattering > 0.0:
         SubElement(bsdf, "float", {"name": "scattering_coefficient", "value": repr(float(material.scattering))})
     return bsdf
+
+
+def _is_air(values: dict[str, Element]) -> bool:
+    return (_number(values, "relative_permittivity", 1.0), _number(values, "conductivity", 0.0)) == (1.0, 0.0)
 
 
 def _number(values: dict[str, Element], name: str, default: float) -> float:

@@ -36,7 +36,7 @@ class XmlPart:
     mesh: Mesh
     """In the room's frame [m]."""
     material: Material | None
-    """None for an absorber."""
+    """None where it only hides: an absorber, or a slab of air."""
 
 
 @dataclass(slots=True)

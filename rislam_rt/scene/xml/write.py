@@ -77,7 +77,9 @@ def left_behind(scene: Scene) -> list[str]:
             f"the constant R of {few}: as a body with that |R| at normal incidence, and Fresnel's law elsewhere"
         )
     if scene.scatterers:
-        notes.append(f"{len(scene.scatterers)} scatterers (their shades are absorbers, which hide their centres too)")
+        notes.append(
+            f"{len(scene.scatterers)} scatterers (where they cast a shadow: a shape of air, which hides their centre too)"
+        )
     if scene.ris is not None:
         notes.append(f"the panel '{scene.ris.name}'")
     return [*notes, "the agent's motion, and Tx and Rx on it"]
@@ -86,5 +88,5 @@ def left_behind(scene: Scene) -> list[str]:
 def _word(material: Material | None) -> str:
     """What a material is called in the file. Sionna reads names that begin with `itu` in a way of its own."""
     if material is None:
-        return "absorber"
+        return "air"
     return material.itu if material.itu else ("constant" if material.reflection is not None else "slab")
