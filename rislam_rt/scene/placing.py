@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene.check.probe import ray_hits, sphere_directions
 from rislam_rt.scene.findings import Fault
@@ -26,8 +26,9 @@ SPEED, CYCLE, CYCLES = 0.1, 0.1, 600
 def suggest_agent(triangles: Floats) -> dict[str, Any]:
     """The `[agent]` table of a scene file for a room of triangles (T, 3, 3) [m].
 
-    It starts above a floor, where the mean of the free ways in all directions is largest (the street and not the house
-    behind it, the hall and not the cupboard), and goes straight along the longest free line through that place.
+    It starts above a floor, where the mean of the free ways in all directions is largest (the hall and not the
+    cupboard), in the open if there is ground under the sky (the street and not the house behind it), and goes straight
+    along the longest free line through that place.
 
     Raises
     ------
@@ -35,12 +36,13 @@ def suggest_agent(triangles: Floats) -> dict[str, Any]:
         No place keeps clear of the surfaces, or the agent would stand still.
     """
     box = np.stack([triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))])
-    places = _places(triangles, box)
+    places, is_open = _places(triangles, box)
     clear = distance_to_triangles(places, triangles) if len(places) else np.zeros(0)
     keep = min(CLEAR, float(clear.max(initial=0.0)) / 2.0)
     if keep < LEAST_CLEAR:
         raise Fault("no free place for the agent found", "give a room with a floor, in metres")
-    places = places[clear > keep]
+    good = clear > keep
+    places = places[good & is_open] if (good & is_open).any() else places[good]
     rays = sphere_directions(NUM_RAYS)
     place = places[int(np.argmax([free_ways(place, rays, triangles, box).mean() for place in places]))]
     turn = np.arange(NUM_WAYS) * np.pi / NUM_WAYS + 0.1  # along no wall of a room that is parallel to the axes
@@ -61,12 +63,14 @@ def free_ways(place: Floats, directions: Floats, triangles: Floats, box: Floats)
     return np.where(hit < 0, leaves, np.minimum(leaves, height / np.where(slope != 0.0, slope, 1.0)))
 
 
-def _places(triangles: Floats, box: Floats) -> Floats:
-    """Places (N, 3) [m] spread over the plan, at hand's height above the lowest surface there with headroom."""
+def _places(triangles: Floats, box: Floats) -> tuple[Floats, Booleans]:
+    """Places (N, 3) [m] spread over the plan, at hand's height above the lowest surface there with headroom, and which
+    of them have nothing above (N,).
+    """
     count = NUM_PLACES if len(triangles) < MANY_FACES else NUM_PLACES // 5
     k = np.arange(count) + 0.5
     share = np.stack([k / count, (k * 0.5 * (np.sqrt(5.0) - 1.0)) % 1.0], axis=-1)  # Fibonacci lattice
-    found = []
+    found, sky = [], []
     for plan in box[0, :2] + share * (box[1] - box[0])[:2]:
         levels = _levels(plan, triangles)
         roofs = np.append(levels[1:], max(box[1, 2], levels[-1] + 1e-9 if len(levels) else 0.0))
@@ -74,7 +78,8 @@ def _places(triangles: Floats, box: Floats) -> Floats:
         if len(levels):
             floor = int(np.argmax(free >= HEADROOM)) if (free >= HEADROOM).any() else int(np.argmax(free))
             found.append([*plan, levels[floor] + min(CARRIED, 0.5 * free[floor])])
-    return np.array(found).reshape(-1, 3)
+            sky.append(floor == len(levels) - 1)
+    return np.array(found).reshape(-1, 3), np.array(sky, dtype=np.bool_)
 
 
 def _levels(plan: Floats, triangles: Floats) -> Floats:

@@ -121,7 +121,8 @@ def _solve(
     vertices = np.array(paths.vertices, dtype=np.float64).reshape(depth, *tau.shape, 3)
     found = []
     for far, p in np.argwhere(tau >= 0.0):
-        met = [(int(o), int(t)) for e, o, t in zip(events[:, far, p], objects[:, far, p], primitives[:, far, p]) if e]
+        steps = np.flatnonzero(events[:, far, p])
+        met = [(int(objects[step, far, p]), int(primitives[step, far, p])) for step in steps]
         if all(thing in number_of for thing, _ in met):  # what only hides reflects nothing
             sequence = tuple(int(walls.wall_of_triangle[number_of[thing] + t]) for thing, t in met)
             row = Row(cycle, sequence, float(tau[far, p]), complex(field[far, p]), vertices[:, far, p])
@@ -134,16 +135,15 @@ def _legs(rows: list[Row], device: Floats, far: Floats, depth: int, radio: Radio
     first = {(row.cycle, row.walls): row for row in reversed(rows)}
     columns = sorted({walls for _, walls in first}, key=lambda walls: (len(walls), walls))
     table = np.full((len(columns), depth), -1)
-    for column, walls in enumerate(columns):
-        table[column, : len(walls)] = walls
+    for number, walls in enumerate(columns):
+        table[number, : len(walls)] = walls
     cycle = np.array([row.cycle for row in first.values()], dtype=np.int64)
     column = np.array([columns.index(row.walls) for row in first.values()], dtype=np.int64)
-    vertices = np.array([row.vertices for row in first.values()]).reshape(-1, depth, 3)
     length = np.array([row.tau for row in first.values()]) * SPEED_OF_LIGHT
     field: Complexes = np.array([row.field for row in first.values()], dtype=np.complex128)
-    course = traced_course(
-        table[column], device[cycle], far[cycle], np.where((table[column] >= 0)[..., None], vertices, 0.0)
-    )
+    vertices = np.array([row.vertices for row in first.values()]).reshape(-1, depth, 3)
+    vertices = np.where((table[column] >= 0)[..., None], vertices, 0.0)
+    course = traced_course(table[column], device[cycle], far[cycle], vertices)
     place, shape = (cycle, column), (len(device), len(columns))
 
     def dense(part: Any) -> Any:

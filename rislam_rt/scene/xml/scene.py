@@ -9,7 +9,8 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.model import Body, Material, Reflector, Scene, Shade, Trajectory
-from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.check import find_errors
+from rislam_rt.scene.findings import Fault, raise_errors
 from rislam_rt.scene.load import SCENE_FILE, load_scene
 from rislam_rt.scene.meshes import MAX_FACES
 from rislam_rt.scene.motion import straight_motion
@@ -41,6 +42,7 @@ def new_from_xml(
     """
     path = find_xml(source)
     scene, notes = scene_of_xml(path, room_name(Path(folder), path.stem), within)
+    raise_errors(list(find_errors(scene, str(path))))
     write_scene(scene, folder, overwrite=overwrite)
     return notes
 

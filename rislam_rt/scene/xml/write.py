@@ -77,11 +77,8 @@ def left_behind(scene: Scene) -> list[str]:
             f"the constant R of {few}: as a body with that |R| at normal incidence, and Fresnel's law elsewhere"
         )
     if scene.scatterers:
-        notes.append(
-            f"{len(scene.scatterers)} scatterers (where they cast a shadow: a shape of air, which hides their centre too)"
-        )
-    if scene.ris is not None:
-        notes.append(f"the panel '{scene.ris.name}'")
+        notes.append(f"{len(scene.scatterers)} scatterers (of shadows: a shape of air, which hides their centre too)")
+    notes += [f"the panel '{panel.name}'" for panel in scene.panels]
     return [*notes, "the agent's motion, and Tx and Rx on it"]
 
 
