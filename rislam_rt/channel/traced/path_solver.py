@@ -21,9 +21,6 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import TraceError
 from rislam_rt.model import Paths, RadioConfig, Scene, Trajectory
 
-SAMPLES = 100_000
-"""Rays shot from every device; a room of a few dozen faces needs a few hundred."""
-
 
 class Row(NamedTuple):
     """One leg of one cycle as Sionna has it."""
@@ -38,12 +35,12 @@ class Row(NamedTuple):
 
 
 def solve_file(
-    file: str | Path, scene: Scene, radio: RadioConfig, trajectory: Trajectory, depth: int, samples: int = SAMPLES
+    file: str | Path, scene: Scene, radio: RadioConfig, trajectory: Trajectory, depth: int, samples: int
 ) -> Paths:
     """All paths that Sionna's `PathSolver` finds in a scene file of `scene`, for `compare_paths`.
 
-    A scatterer is a receiver to both of the agent's ends, and its paths are those legs joined. The panel is left out:
-    it lies on its host's face, where Sionna's rays do not start.
+    `samples` rays are shot from every device. A scatterer is a receiver to both of the agent's ends, and its paths are
+    those legs joined. The panel is left out: it lies on its host's face, where Sionna's rays do not start.
 
     Raises
     ------

@@ -36,7 +36,7 @@ def test_sionna_finds_our_paths_in_our_file(tmp_path):
     """LOS, VT, PS and VS of a room of four ITU materials, all that have no segment below Sionna's limit of 1 cm."""
     trip = round_trip(as_written("itu_room", tmp_path / "out"), tmp_path / "out" / "scene.xml", poses=2)
     assert trip.passed
-    assert trip.report.matched > 200
+    assert trip.report.matched >= 200
     assert set(trip.report.explained) <= {"short segment"}
     assert {int(kind) for kind in trip.report.kind} == {0, 1, 2, 3}
 
