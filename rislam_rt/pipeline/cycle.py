@@ -85,6 +85,8 @@ class Cycle(NamedTuple):
     sent: RisCode | None
     applied: RisCode | None
     seconds: tuple[float, float, float, float]
+    believed: RisCode | None = None
+    """What the agent holds to be applied."""
 
 
 class Designer(Protocol):
@@ -136,7 +138,7 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
     optimise, communicate, acquire, localise = np.diff(clock)
     outcome = Cycle(
         belief, info, reported, truth, paths.gain[0], sent, applied,
-        (optimise, communicate + air, acquire, localise),
+        (optimise, communicate + air, acquire, localise), believed,
     )  # fmt: skip
     return Agent(state, link, measurement), outcome
 
