@@ -60,9 +60,11 @@ class Shade:
     """(V, 3) [m]."""
     faces: Any
     """(F, 3) indices into `vertices`."""
+    name: str = ""
+    """What it is called where it stands alone; one of a scatterer has the scatterer's name."""
 
     def __post_init__(self) -> None:
-        _freeze_mesh(self, "shade")
+        _freeze_mesh(self, f"shade '{self.name}'" if self.name else "shade")
 
     @property
     def triangles(self) -> Floats:
@@ -118,6 +120,8 @@ class Scene:
     agent: Trajectory
     digest: str = ""
     """SHA-256 over the scene file and its meshes; empty for a scene built in memory."""
+    shades: tuple[Shade, ...] = ()
+    """What hides and is neither wall nor landmark: clutter too small or too round to reflect like a plane."""
 
     def __repr__(self) -> str:
         size = " x ".join(f"{length:.3g}" for length in self.bounds[1] - self.bounds[0])

@@ -12,15 +12,18 @@ from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec,
 from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.containers import too_many_faces
 from rislam_rt.scene.findings import Fault, Finding, raise_errors
+from rislam_rt.scene.lying import UNITS, place_mesh
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, read_inside
 from rislam_rt.scene.motion import build_motion
 from rislam_rt.scene.schema import (
     LimitsSection,
     MaterialSection,
+    MeshesSection,
     ReflectorSection,
     RisSection,
     ScattererSection,
     SceneSpec,
+    ShadeSection,
     read_spec,
 )
 from rislam_rt.scene.solids import solid_mesh
@@ -87,7 +90,7 @@ def scene_file(path: str | Path) -> Path:
 
 def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
     """Read what a specification names and put the scene together."""
-    shelf, findings = Shelf(file.parent, spec.limits), []
+    shelf, findings = Shelf(file.parent, spec.limits, spec.meshes), []
     reflectors = []
     for number, section in enumerate(spec.reflector):
         try:
@@ -100,6 +103,13 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
             scatterers.append(_scatterer(scatterer, shelf))
         except Fault as fault:
             findings.append(fault.at(str(file), f"scatterer[{number}].mesh ({scatterer.name})"))
+    shades = []
+    for number, shade in enumerate(spec.shade):
+        try:
+            mesh = shelf.mesh(shade.mesh, shade)
+            shades.append(Shade(mesh.vertices, mesh.faces, shade.name))
+        except Fault as fault:
+            findings.append(fault.at(str(file), f"shade[{number}].mesh ({shade.name})"))
     panel = None
     try:
         panel = _panel(spec.ris) if spec.ris else None
@@ -111,21 +121,22 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
         findings.append(fault.at(str(file), "agent"))
     if findings:
         return Draft(str(file), None, findings)
-    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), panel, agent, _digest(content, shelf.contents))
+    digest = _digest(content, shelf.contents)
+    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), panel, agent, digest, tuple(shades))
     return Draft(str(file), scene, [])
 
 
 class Shelf:
     """The mesh files of a scene: each is read once and kept for the digest, and together they have so many faces."""
 
-    def __init__(self, folder: Path, limits: LimitsSection) -> None:
-        self.folder, self.limits = folder, limits
+    def __init__(self, folder: Path, limits: LimitsSection, lying: MeshesSection) -> None:
+        self.folder, self.limits, self.lying = folder, limits, lying
         self.contents: dict[str, bytes] = {}
         self.reader = MeshReader()
         self.faces = 0
 
-    def mesh(self, place: str, up_axis: str) -> Mesh:
-        """The mesh `file` or `file#node`."""
+    def mesh(self, place: str, section: ReflectorSection | ScattererSection | ShadeSection) -> Mesh:
+        """The mesh `file` or `file#node`, placed as its section says, or else all meshes of the scene."""
         name, _, node = place.partition("#")
         if name not in self.contents:
             self.contents[name] = read_inside(self.folder, name, MAX_MESH_BYTES)
@@ -134,18 +145,14 @@ class Shelf:
         self.faces += len(mesh.faces)
         if self.faces > most:
             raise too_many_faces(self.faces, most)
-        return _z_up(mesh) if up_axis == "y" else mesh
+        up, units = section.up_axis or self.lying.up, section.units or self.lying.units
+        origin = self.lying.origin if section.origin is None else section.origin
+        return place_mesh(mesh, up, UNITS[units], np.array(origin))
 
 
 def _reflector(section: ReflectorSection, shelf: Shelf) -> Reflector:
-    mesh = shelf.mesh(section.mesh, section.up_axis)
+    mesh = shelf.mesh(section.mesh, section)
     return Reflector(section.name, mesh.vertices, mesh.faces, _material(section.material))
-
-
-def _z_up(mesh: Mesh) -> Mesh:
-    """A quarter turn about x that brings the file's y axis up."""
-    x, y, z = mesh.vertices.T
-    return Mesh(np.stack([x, -z, y], axis=-1), mesh.faces)
 
 
 def _material(section: MaterialSection) -> Material:
@@ -168,7 +175,7 @@ def _scatterer(section: ScattererSection, shelf: Shelf) -> Scatterer:
         rcs = np.pi * (radius or 0.0) ** 2
     mesh = None
     if section.mesh is not None:
-        mesh = shelf.mesh(section.mesh, section.up_axis)
+        mesh = shelf.mesh(section.mesh, section)
     elif section.shadow:
         mesh = solid_mesh(position, radius or 0.0, height, axis)
     shade = None if mesh is None else Shade(mesh.vertices, mesh.faces)

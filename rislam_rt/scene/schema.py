@@ -33,6 +33,9 @@ ItuMaterial = Literal[
 ]  # fmt: skip
 
 
+Units = Literal["mm", "cm", "m", "in"]
+
+
 class Section(BaseModel):
     """A table of the scene file: no conversions, no unknown keys."""
 
@@ -58,13 +61,37 @@ class MaterialSection(Section):
 class ReflectorSection(Section):
     """A smooth mesh. `mesh = "room.glb#node"` takes one named node of a GLB file, with its transform applied.
 
-    `up_axis = "y"` turns a file whose y axis points up (as glTF's standard says) into the room's frame with z up.
+    `up_axis = "y"` turns a file whose y axis points up (as glTF's standard says) into the room's frame with z up,
+    `units` and `origin` are those of `[meshes]`, for this mesh alone.
     """
 
     name: Name
     mesh: str
     material: MaterialSection
-    up_axis: Literal["y", "z"] = "z"
+    up_axis: Literal["y", "z"] | None = None
+    units: Units | None = None
+    origin: Vector | None = None
+
+
+class ShadeSection(Section):
+    """A mesh that hides what lies behind it and reflects nothing: clutter too small or too round to be a mirror."""
+
+    name: Name
+    mesh: str
+    up_axis: Literal["y", "z"] | None = None
+    units: Units | None = None
+    origin: Vector | None = None
+
+
+class MeshesSection(Section):
+    """How the mesh files of the scene lie, unless a mesh says otherwise."""
+
+    up: Literal["y", "z"] = "z"
+    """The axis of the file that points up."""
+    units: Units = "m"
+    """What a unit of the file is."""
+    origin: Vector = [0.0, 0.0, 0.0]
+    """[m] The point, z up, that becomes the room's zero."""
 
 
 class ScattererSection(Section):
@@ -84,7 +111,9 @@ class ScattererSection(Section):
     axis: Vector | None = None
     shadow: bool = False
     mesh: str | None = None
-    up_axis: Literal["y", "z"] = "z"
+    up_axis: Literal["y", "z"] | None = None
+    units: Units | None = None
+    origin: Vector | None = None
 
     @model_validator(mode="after")
     def _one_size(self) -> "ScattererSection":
@@ -155,6 +184,8 @@ class SceneSpec(Section):
     name: Name
     reflector: Annotated[list[ReflectorSection], Field(min_length=1, max_length=10_000)]
     scatterer: list[ScattererSection] = []
+    shade: Annotated[list[ShadeSection], Field(max_length=10_000)] = []
+    meshes: MeshesSection = MeshesSection()
     ris: RisSection | None = None
     agent: AgentSection
     limits: LimitsSection = LimitsSection()
@@ -239,8 +270,8 @@ def _remark(item: Any) -> str:
 
 
 def _known_keys() -> list[str]:
-    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, RisSection, AgentSection,
-                LimitsSection)  # fmt: skip
+    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, ShadeSection, MeshesSection,
+                RisSection, AgentSection, LimitsSection)  # fmt: skip
     return [key for section in sections for key in section.model_fields]
 
 

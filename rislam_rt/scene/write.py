@@ -41,6 +41,8 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
     for scatterer in scene.scatterers:
         if scatterer.shade is not None and not _has_own_shadow(scatterer):
             files[_shade_file(scatterer)] = ply_bytes(scatterer.shade.vertices, scatterer.shade.faces)
+    for shade in scene.shades:
+        files[_mesh_file(shade.name)] = ply_bytes(shade.vertices, shade.faces)
     agent = _agent_table(scene.agent)
     if "trajectory" in agent:
         files[TRAJECTORY_FILE] = tum_bytes(scene.agent.time, scene.agent.position, scene.agent.heading)
@@ -148,6 +150,7 @@ def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
         {"name": r.name, "mesh": _mesh_file(r.name), "material": _material_table(r.material)} for r in scene.reflectors
     ]
     table["scatterer"] = [_scatterer_table(scatterer) for scatterer in scene.scatterers]
+    table["shade"] = [{"name": shade.name, "mesh": _mesh_file(shade.name)} for shade in scene.shades]
     if scene.ris is not None:
         spec = scene.ris.spec
         table["ris"] = {"name": scene.ris.name, "center": scene.ris.center.tolist()}

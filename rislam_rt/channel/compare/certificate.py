@@ -7,6 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.facets import Facets, build_facets
+from rislam_rt.channel.shades import ALONE
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit
@@ -230,13 +231,14 @@ class Certifier:
         return found + self._unshaded(leg, number)
 
     def _unshaded(self, leg: Leg, number: int) -> list[Condition]:
-        """No scatterer's shade stands across segment `number`; the far end's own does not hide it."""
+        """No shade stands across segment `number`; the far end's own does not hide it."""
         shades, found = self.facets.shades, []
         for shade, landmark in enumerate(shades.landmark):
-            if number == len(leg.walls) and np.array_equal(leg.points[-1], self.scene.landmark_positions[landmark]):
+            last = number == len(leg.walls) and landmark != ALONE
+            if last and np.array_equal(leg.points[-1], self.scene.landmark_positions[landmark]):
                 continue
             margin = shades.margin(leg.points[number], leg.points[number + 1], shade)
-            text = f"shade of {self.scene.landmarks[landmark]}, {abs(margin):.2e} m {'in' if margin < 0 else 'out'}side"
+            text = f"shade of {shades.names[shade]}, {abs(margin):.2e} m {'in' if margin < 0 else 'out'}side"
             found.append(Condition("occluded", text, margin, float(leg.shift[number])))
         return found
 

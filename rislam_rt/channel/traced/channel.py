@@ -2,8 +2,11 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.shades import ALONE
 from rislam_rt.channel.traced.antennas import Antennas
 from rislam_rt.channel.traced.course import refined_course, traced_course
 from rislam_rt.channel.traced.extras import ExtraConfig, ExtraPaths, trace_extras
@@ -63,6 +66,8 @@ class TracedChannel:
         self.walls = build_walls(scene)
         self._sides = wall_sides(self.walls)
         shades = {n: s.shade.triangles for n, s in enumerate(scene.scatterers) if s.shade is not None}
+        if scene.shades:
+            shades[ALONE] = np.concatenate([shade.triangles for shade in scene.shades])
         self.stage = build_stage(self.walls, radio.carrier, room_center(scene), shades)
 
     def paths(self, trajectory: Trajectory) -> Paths:

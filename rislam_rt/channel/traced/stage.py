@@ -9,6 +9,7 @@ import numpy as np
 import sionna.rt as rt
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.shades import ALONE
 from rislam_rt.channel.traced.material import ConstantReflection
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
@@ -108,7 +109,7 @@ def build_stage(walls: Walls, carrier: float, origin: Floats, shades: Mapping[in
     Parameters
     ----------
     shades
-        Triangles (T, 3, 3) [m] of what hides and reflects nothing, by the number of its scatterer.
+        Triangles (T, 3, 3) [m] of what hides and reflects nothing, by the number of its scatterer, or `ALONE`.
 
     Raises
     ------
@@ -135,7 +136,8 @@ def build_stage(walls: Walls, carrier: float, origin: Floats, shades: Mapping[in
     except ValueError as error:
         raise SceneError(f"material: {error}; give an ITU material that is specified at {carrier:g} Hz") from None
     ids = np.array([int(o.object_id) for o in objects], dtype=np.int64)
-    views = {number: _part([*objects, *(o for n, o in dark.items() if n != number)]) for number in dark}
+    removable = [number for number in dark if number != ALONE]  # the others are nobody's own
+    views = {number: _part([*objects, *(o for n, o in dark.items() if n != number)]) for number in removable}
     alone = {number: _part([shade]) for number, shade in dark.items()}
     views = {NO_SHADE: scene.mi_scene} | views
     return _numbered(scene, origin, walls, ids, members, (radio_materials, material_of_wall), views, alone)
