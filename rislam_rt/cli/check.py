@@ -75,9 +75,10 @@ def _advise(folder: Path, settings: "Records", picture: Path | None) -> dict[str
     from rislam_rt.pipeline.advise.advice import advise
     from rislam_rt.pipeline.advise.coverage import panel_coverage
     from rislam_rt.report.advice import draw_coverage, print_advice
-    from rislam_rt.scene import load_scene
+    from rislam_rt.scene.load import read_draft
 
-    scene = load_scene(folder)
+    scene = read_draft(folder).scene
+    assert scene is not None  # it has been checked
     advice = advise(scene, settings, rng=np.random.default_rng(SEED))
     print_advice(advice)
     if picture is not None:

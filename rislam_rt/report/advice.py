@@ -30,7 +30,8 @@ def print_advice(advice: Advice) -> None:
         cells = (_cell(link, at) for at in link.three)
         table.add_row(link.landmark, link.code or "any", *cells, f"{link.share:.0%}", _why(link))
     if advice.links:
-        console.print(f"SNR of the strongest path over the threshold of {advice.threshold_db:.1f} dB [dB]", style="bold", markup=False)
+        title = f"SNR of the strongest path over the threshold of {advice.threshold_db:.1f} dB [dB]"
+        console.print(title, style="bold", markup=False)
         console.print(table)
     for line in advice.remedies:
         console.print(line, markup=False, soft_wrap=True)

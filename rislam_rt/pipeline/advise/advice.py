@@ -39,7 +39,7 @@ def advise(scene: Scene, settings: Settings, *, rng: np.random.Generator) -> Adv
     looked = survey(scene, settings)
     links = link_budget(looked, rng=rng)
     threshold = 10.0 * float(np.log10(settings.sensor.threshold))
-    return Advice(links, remedies(looked, links), trace_cost(scene, settings.radio), threshold)
+    return Advice(links, remedies(looked, links), trace_cost(scene, settings.radio, len(looked.paths.walls)), threshold)
 
 
 def _finite(margin: float) -> float | None:

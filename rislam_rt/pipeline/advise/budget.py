@@ -15,10 +15,9 @@ from rislam_rt.pipeline.spec import Settings
 
 PLACES = 15
 """Places along the way, evenly; the first, the middle and the last are the budget's three columns."""
-DEPTH = 1
-"""Wall bounces: more make a path weaker, and hardly ever the strongest."""
-MANY_WALLS = 400
-"""From so many walls on straight paths alone are looked at: the check is to take seconds."""
+DEPTHS = ((500, 2), (2000, 1))
+"""Up to so many triangles, paths of so many wall bounces are looked at, and of more triangles the straight ones alone:
+the check is to take seconds. More bounces are seldom the strongest; they cover weaker paths."""
 NOTHING_DB = -400.0
 """SNR over the threshold [dB] where there is no path."""
 
@@ -56,6 +55,8 @@ class Survey(NamedTuple):
     """With the places for its trajectory."""
     paths: Paths
     settings: Settings
+    depth: int
+    """Wall bounces of the paths that were looked for."""
 
 
 def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
@@ -63,19 +64,19 @@ def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
     rows = np.unique(np.linspace(0, len(scene.agent) - 1, places).round().astype(np.int64))
     scene = replace(scene, agent=at_rows(scene.agent, rows))
     faces = sum(len(reflector.faces) for reflector in scene.reflectors)
-    channel = ImageSourceChannel(scene, settings.radio, DEPTH if faces <= 2 * MANY_WALLS else 0)
-    return Survey(scene, channel.paths(scene.agent), settings)
+    channel = ImageSourceChannel(scene, settings.radio, next((depth for most, depth in DEPTHS if faces <= most), 0))
+    return Survey(scene, channel.paths(scene.agent), settings, channel.depth)
 
 
 def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[Link]:
     """A link for each scatterer, and one for each kind of codes of each panel. `rng` draws the random codes."""
-    scene, paths, settings = looked
+    scene, paths, settings = looked.scene, looked.paths, looked.settings
     reasons = build_reasons(scene, paths, settings)
     if scene.ris is None:
         return [_link(name, "", [_all_places(paths, looked)], reasons, n) for n, name in enumerate(scene.landmarks)]
     links: list[Link] = []
-    for codes in codes_of(paths, scene.ris.spec, settings.radio.wavelength, rng=rng):
-        heard = [_all_places(under(paths, scene.ris.spec, index), looked) for index in codes.index]
+    for codes in codes_of(paths, scene.ris.spec, settings.radio, rng=rng):
+        heard = [_all_places(under(paths, scene.ris.spec, levels), looked) for levels in codes.levels]
         if codes.name == "aimed":
             links += [_link(s.name, "", heard, reasons, n) for n, s in enumerate(scene.scatterers)]
         links.append(_link(scene.ris.name, codes.name, heard, reasons, len(scene.scatterers)))
@@ -84,7 +85,9 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[Link]:
 
 def at_rows(motion: Trajectory, rows: Integers) -> Trajectory:
     """The cycles of these rows."""
-    return Trajectory(motion.time[rows], motion.position[rows], motion.velocity[rows], motion.heading[rows], motion.body)
+    return Trajectory(
+        motion.time[rows], motion.position[rows], motion.velocity[rows], motion.heading[rows], motion.body
+    )
 
 
 def _all_places(paths: Paths, looked: Survey) -> list[Heard]:

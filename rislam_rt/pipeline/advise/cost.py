@@ -1,4 +1,4 @@
-"""What tracing a room will cost: wall sequences and paths at one, two and three bounces, and seconds at measured rates."""
+"""What tracing a room will cost: wall sequences, paths, and seconds at measured rates, at one to three bounces."""
 
 from typing import NamedTuple
 
@@ -14,6 +14,8 @@ START_SECONDS, PATH_SECONDS, SEQUENCE_SECONDS = 0.15, 1.5e-6, 2.5e-8
 """Processor time of the traced channel: of any trace, of a path in a cycle, and of a wall sequence that is sieved in a
 cycle. Measured on six rooms that come with the package (600 cycles, one core of a 2026 server): `benchmarks/adviser.py
 --cost` sets them beside new ones. The tracer's import comes on top, and so does the filter."""
+MANY_WALLS = 2000
+"""More walls are not looked at here: the check is to take seconds."""
 COUNTED = 300_000
 """Up to so many sequences of one leg are looked at here; the tracer takes about as many one by one, and narrows more of
 them down by cones, at a cost that these rates do not tell."""
@@ -32,21 +34,20 @@ class Cost(NamedTuple):
     """Processor time, or None likewise."""
 
 
-def trace_cost(scene: Scene, radio: RadioConfig) -> list[Cost]:
-    """The cost at each of `DEPTHS`."""
+def trace_cost(scene: Scene, radio: RadioConfig, walls: int) -> list[Cost]:
+    """The cost at each of `DEPTHS` in a scene of so many walls."""
     middle = at_rows(scene.agent, np.array([len(scene.agent) // 2]))
     legs = 1 + 2 * len(scene.landmarks)
     costs: list[Cost] = []
     for depth in DEPTHS:
-        channel = ImageSourceChannel(scene, radio, depth)
-        count = len(channel.walls)
-        most = sum(count * max(count - 1, 0) ** (bounces - 1) for bounces in range(1, depth + 1))
-        if most > COUNTED:
-            costs.append(Cost(depth, count, legs * most, None, None))
+        most = sum(walls * max(walls - 1, 0) ** (bounces - 1) for bounces in range(1, depth + 1))
+        if most > COUNTED or walls > MANY_WALLS:
+            costs.append(Cost(depth, walls, legs * most, None, None))
             continue
+        channel = ImageSourceChannel(scene, radio, depth)
         asked, paths = _asked(channel, depth), int(channel.paths(middle).valid.sum())
         seconds = START_SECONDS + len(scene.agent) * (PATH_SECONDS * paths + SEQUENCE_SECONDS * asked)
-        costs.append(Cost(depth, count, asked, paths, seconds))
+        costs.append(Cost(depth, walls, asked, paths, seconds))
     return costs
 
 

@@ -66,7 +66,7 @@ def _direct_margin(scene: Scene, points: Floats, settings: Settings) -> Floats:
     )
     alone = replace(scene, scatterers=tuple(s for s in scene.scatterers if s.shade is not None), agent=still)
     paths = ImageSourceChannel(alone, settings.radio, 0).paths(still)
-    paths = under(paths, scene.ris.spec, aimed_codes(paths, scene.ris.spec))
+    paths = under(paths, scene.ris.spec, aimed_codes(paths, scene.ris.spec, settings.radio))
     margin = np.full(count, np.nan)
     for path in np.flatnonzero(paths.kind == PathKind.RIS):
         heard = paths.valid[:, path]

@@ -35,25 +35,26 @@ def hear(paths: Paths, cycle: int, heading: float, settings: Settings) -> Heard:
     count = len(paths.landmarks)
     missed, strongest, covered = np.ones(count), np.zeros(count), np.full(count, -1)
     for capture in split(received, settings.receiver):
-        loud = audible(capture, radio.integrated_snr(capture.gain) > NEGLIGIBLE * sensor.threshold)
-        snr = radio.integrated_snr(loud.gain)
+        snr, owner = radio.integrated_snr(capture.gain), paths.landmark[capture.path]
+        loud = audible(capture, snr > NEGLIGIBLE * sensor.threshold)
         parts = merge(loud, sensor) if settings.receiver.merge else single(loud)
         inside = (parts.tau >= sensor.window[0]) & (parts.tau <= sensor.window[1])
         chance = sensor.detection_probability(radio.integrated_snr(parts.gain)) * inside
-        owner = paths.landmark[parts.path]
-        np.multiply.at(missed, owner[owner >= 0], 1.0 - chance[owner >= 0])
+        of_part = paths.landmark[parts.path]
+        np.multiply.at(missed, of_part[of_part >= 0], 1.0 - chance[of_part >= 0])
         for landmark in range(count):
-            own = np.flatnonzero(paths.landmark[loud.path] == landmark)
+            own = np.flatnonzero(owner == landmark)
             row = int(own[np.argmax(snr[own])]) if len(own) else -1
             if row >= 0 and snr[row] > strongest[landmark]:
                 strongest[landmark] = snr[row]
-                covered[landmark] = _cover(loud, row, parts, sensor)
+                covered[landmark] = _cover(loud, int(capture.path[row]), parts, sensor)
     return Heard(1.0 - missed, strongest, covered)
 
 
-def _cover(loud: Received, row: int, parts: Parts, sensor: SensorModel) -> int:
-    """The strongest path that a path is joined to and that leads its component; -1 if it leads one itself."""
-    if loud.path[row] in parts.path:
+def _cover(loud: Received, path: int, parts: Parts, sensor: SensorModel) -> int:
+    """The strongest path that a path is joined to and that leads its component; -1 if it leads one, or is not loud."""
+    row = np.flatnonzero(loud.path == path)
+    if path in parts.path or not len(row):
         return -1
     leaders = np.flatnonzero(np.isin(loud.path, parts.path))
     points = np.column_stack([loud.tau, loud.direction[:, :2]])

@@ -36,9 +36,9 @@ class Reasons(NamedTuple):
         own = (self.paths.landmark == number) & self.paths.valid[place]
         if hider and weak:
             return f"shaded by '{hider}'"
-        if own.any() and self.settings.radio.array.pattern == "upper":
-            if (self.paths.arrival[place, own, 2] < -HORIZON_MARGIN).all():
-                return "below the array, which hears from above only"
+        upper = self.settings.radio.array.pattern == "upper"
+        if own.any() and upper and (self.paths.arrival[place, own, 2] < -HORIZON_MARGIN).all():
+            return "below the array, which hears from above only"
         if not weak and covered >= 0:
             return f"not to be told from {self.paths.label(covered)}"
         if not own.any():

@@ -41,13 +41,13 @@ def lack_db(link: Link) -> float | None:
 
 
 def enough_elements(looked: Survey, panel: RisPanel, lack: float) -> RisSpec | None:
-    """The smallest square panel (or grown alike, if it is not square) whose direct path under the best code is above the
-    threshold at the median place that sees it; None if none up to `LARGEST` is.
+    """The smallest panel, grown alike along both sides, whose direct path under the best code is above the threshold at
+    the median place that sees it; None if none of up to `LARGEST` elements a side is. `lack` [dB]: where to begin.
     """
     spec, seen = panel.spec, _direct_places(looked)
     if not len(seen):
         return None
-    scale = 10.0 ** (max(lack, 0.0) / 40.0) * 0.9  # the amplitude grows with the number of elements, a square of the side
+    scale = 10.0 ** (max(lack, 0.0) / 40.0) * 0.9  # the amplitude goes with the sides' product
     while True:
         rows, cols = (max(count, int(np.ceil(count * scale))) for count in (spec.rows, spec.cols))
         if max(rows, cols) > LARGEST:
@@ -70,8 +70,8 @@ def _what_helps(looked: Survey, link: Link) -> str:
     if lack:
         parts += _larger(looked, link, lack)
         point = scene.landmark_positions[scene.landmarks.index(link.landmark)]
-        far = np.linalg.norm(scene.agent.position - point, axis=1)
-        parts.append(f"or a way within {float(np.median(far)) * 10.0 ** (-lack / 40.0):.1f} m (now {np.median(far):.1f} m)")
+        far = float(np.median(np.linalg.norm(scene.agent.position - point, axis=1)))
+        parts.append(f"or a way within {far * 10.0 ** (-lack / 40.0):.1f} m (now {far:.1f} m)")
     return "; ".join(parts)
 
 
@@ -84,8 +84,10 @@ def _larger(looked: Survey, link: Link, lack: float) -> Iterator[str]:
     spec = scene.ris.spec
     grown = enough_elements(looked, scene.ris, lack)
     now = f"(now {spec.rows} x {spec.cols})"
-    yield f"or a panel of {grown.rows} x {grown.cols} elements {now}" if grown else (
-        f"no panel of up to {LARGEST} elements a side would do {now}"
+    yield (
+        f"or a panel of {grown.rows} x {grown.cols} elements {now}"
+        if grown
+        else (f"no panel of up to {LARGEST} elements a side would do {now}")
     )
 
 

@@ -1,7 +1,7 @@
-"""Scene check, the units' part: numbers that are too large by the factor between two units, said whatever else is wrong.
+"""Scene check, the units' part: numbers too large by the factor between two units, said whatever else is wrong.
 
-It looks at the scene file as a plain table and at whatever meshes could be read, so that a missing key or a start outside
-the room does not hide that the room was drawn in millimetres.
+It looks at the scene file as a plain table and at whatever meshes could be read, so that a missing key or a start
+outside the room does not hide that the room was drawn in millimetres.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,11 +11,12 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Finding
+from rislam_rt.scene.lying import UNITS
 
-LENGTHS = (("millimetres", 1e-3), ("centimetres", 1e-2), ("inches", 0.0254), ("feet", 0.3048))
-"""Units that rooms are drawn in, and how many metres they have."""
+NAMES = {"millimetres": "mm", "centimetres": "cm", "inches": "in"}
+"""Units that rooms are drawn in, and their names in a scene file."""
 LARGEST_ROOM, SMALLEST_ROOM = 300.0, 1.0
-"""[m] Longest side of the largest hall, and of the smallest box that an agent could move in, that are taken for meant."""
+"""[m] Longest side of the largest hall, and of the smallest box that an agent could move in, taken for meant."""
 USUAL_ROOM = (2.0, 100.0)
 """[m] Range of the longest side of rooms, to tell which unit was meant."""
 FAR = 3.0
@@ -30,6 +31,9 @@ LIMITS = (
     (("agent", "rx_offset_m"), 2.0, "m", "millimetres", 1e-3),
 )
 """Key, the largest value that is meant indoors, its unit, and what the number would be a usual one in."""
+
+SPEED_FIELD = "agent.velocity"
+"""What the check of the motion itself looks at too, of a scene that has no errors."""
 
 
 def unit_warnings(file: str, table: Mapping[str, Any], bounds: Floats | None) -> Iterator[Finding]:
@@ -51,7 +55,7 @@ def unit_warnings(file: str, table: Mapping[str, Any], bounds: Floats | None) ->
         return
     room = _room_unit(bounds)
     if room is not None:
-        yield Finding("warning", file, "reflector", *room)
+        yield Finding("warning", file, "meshes.units", *room)
         return  # points in metres lie outside a room in millimetres, or in its corner
     for path in (("agent", "start"), ("ris", "center"), ("scatterer", "position")):
         for field, point in _points(table, path):
@@ -63,10 +67,12 @@ def _room_unit(bounds: Floats) -> tuple[str, str] | None:
     size = bounds[1] - bounds[0]
     longest, words = float(size.max()), " x ".join(f"{side:.3g}" for side in size)
     if longest > LARGEST_ROOM:
-        for unit, factor in LENGTHS:
+        for unit, name in NAMES.items():
+            factor = UNITS[name]
             if USUAL_ROOM[0] <= longest * factor <= USUAL_ROOM[1]:
                 meant = " x ".join(f"{side * factor:.3g}" for side in size)
-                return f"the room is {words} m; in {unit} it would be {meant} m", f"scale the meshes by {factor:g}"
+                mend = f'say units = "{name}" in the table [meshes]'
+                return f"the room is {words} m; in {unit} it would be {meant} m", mend
         return f"the room is {words} m", "give metres"
     if longest < SMALLEST_ROOM:
         return f"the room is {words} m", "give metres; a drawing in kilometres or to a scale has to be enlarged"
@@ -78,7 +84,8 @@ def _far_point(file: str, field: str, point: Floats, bounds: Floats) -> Iterator
     away = np.maximum(np.maximum(bounds[0] - point, point - bounds[1]), 0.0).max()
     if away <= FAR * size:
         return
-    for unit, factor in LENGTHS:
+    for unit, name in NAMES.items():
+        factor = UNITS[name]
         meant = point * factor
         if (meant >= bounds[0]).all() and (meant <= bounds[1]).all():
             message = f"{point.tolist()} is far outside the room; in {unit} it would be {np.round(meant, 6).tolist()} m"
