@@ -5,11 +5,12 @@
 
 For every landmark the share of the cycles in which the adviser expects a component of it, beside the share in which the
 run's receiver reported one (true identities, scoring only). Aimed codes are those of the scheme `genie` with the exact
-designer, which knows the truth; random codes those of `random`. The last column is `optimized`, whose agent has
-to find the panel first. Random rooms are development ones (`rislam-rt new --seed`); seed 1.
+designer, which knows the truth; random codes those of `random`. Then `optimized`, whose agent has to find the panel
+first; and the panel that the adviser proposes instead of one that is too weak, tried in a run of `genie`. Random rooms are development ones (`rislam-rt new --seed`); seed 1.
 """
 
 import argparse
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,7 @@ import numpy as np
 
 import rislam_rt
 from rislam_rt.model import Scene, SchemeResult, SlamResult
-from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline import PipelineSpec, load_spec
 from rislam_rt.pipeline.advise.advice import Advice, advise
 from rislam_rt.pipeline.advise.cost import trace_cost
 from rislam_rt.pipeline.advise.remedies import HEARD, SELDOM
@@ -63,8 +64,10 @@ def main() -> None:
 def compare_hearing() -> None:
     """What was foretold of each landmark, and what a run heard."""
     rows: list[Row] = []
-    print("| room, SNR | landmark | codes | margin [dB] | foretold | heard | same word | `optimized` found it |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    print(
+        "| room, SNR | landmark | codes | margin [dB] | foretold | heard | same word | `optimized` found it | larger |"
+    )
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for name, snr in ROOMS:
         scene = draw_room(int(name)).scene if name.isdigit() else rislam_rt.load_scene(name)
         scene = replace(scene, agent=scene.agent[:CYCLES])
@@ -79,7 +82,8 @@ def compare_hearing() -> None:
             same = "yes" if word(row.foretold) == word(row.heard) else "**no**"
             print(
                 f"| {name}, {snr:g} dB | {row.landmark} | {row.codes} | {row.margin_db:+.1f} | {row.foretold:.0%} | "
-                f"{row.heard:.0%} | {same} | {found} |", flush=True,
+                f"{row.heard:.0%} | {same} | {found} | "
+                f"{larger_words(scene, spec, advice, row)} |", flush=True,
             )  # fmt: skip
         for line in advice.remedies:
             print(f"<!-- {name}: {line} -->")
@@ -117,6 +121,19 @@ def found_words(scene: Scene, result: SlamResult, row: Row) -> str:
     at = panel_found_at(result, result.schemes["optimized"])
     share = heard_share(scene, result, result.schemes["optimized"], row.landmark)
     return f"{'no' if at is None else f'after {at:.1f} s'}, heard {share:.0%}"
+
+
+def larger_words(scene: Scene, spec: PipelineSpec, advice: Advice, row: Row) -> str:
+    """What a run hears of the panel that the adviser proposes instead, if it proposes one."""
+    line = next((one for one in advice.remedies if one.startswith(f"{row.landmark}: ")), "")
+    size = re.search(r"or a panel of (\d+) x (\d+) elements", line)
+    if row.codes != "aimed" or size is None:
+        return ""
+    room = spec.room.model_copy(update={"panel_rows": int(size[1]), "panel_cols": int(size[2])})
+    larger = spec.model_copy(update={"room": room, "schemes": ["genie"]})
+    result = rislam_rt.run_slam(scene, larger, rng=np.random.default_rng(SEED))
+    share = heard_share(scene, result, result.schemes["genie"], row.landmark)
+    return f"{size[1]} x {size[2]}: heard {share:.0%}"
 
 
 def word(share: float) -> str:

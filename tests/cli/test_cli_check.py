@@ -31,7 +31,7 @@ def test_a_panel_that_cannot_be_heard_is_said_so_with_the_mend(check, tmp_path):
     code, out, _ = check(*arguments)
     assert code == 0
     line = next(line for line in out.splitlines() if line.startswith("ris: "))
-    assert "dB lack at the median place" in line
+    assert "dB lack where it is too weak" in line
     assert "or a panel of" in line
     assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
     advice = json.loads((tmp_path / "c.json").read_text())["advice"]

@@ -10,6 +10,7 @@ from rislam_rt.model import Paths, Scene
 from rislam_rt.pipeline.spec import Settings
 from rislam_rt.scene.check.probe import crossings
 
+WEAK = "too weak"
 CLEARANCE = 1e-6
 """Share of a line of sight left out at the landmark's end, where a panel lies on its own wall."""
 
@@ -43,7 +44,7 @@ class Reasons(NamedTuple):
             return f"not to be told from {self.paths.label(covered)}"
         if not own.any():
             return "no path"
-        return "too weak" if weak else ""
+        return WEAK if weak else ""
 
     def _hider(self, point: Floats, place: int, number: int) -> str:
         """Name of what stands in the straight way between a landmark and either end; empty if nothing does."""

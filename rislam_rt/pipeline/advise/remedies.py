@@ -1,14 +1,16 @@
 """What would help a landmark that is not heard: a larger panel or scatterer, less noise, a nearer way."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.design import exact_code
-from rislam_rt.model import PathKind, RisPanel, RisSpec
-from rislam_rt.pipeline.advise.budget import NOTHING_DB, Link, Survey
+from rislam_rt.model import RisPanel, RisSpec
+from rislam_rt.pipeline.advise.budget import Link, Survey
+from rislam_rt.pipeline.advise.reasons import WEAK
 from rislam_rt.ris import leg_response
 
 HEARD, SELDOM = 0.5, 0.05
@@ -29,50 +31,58 @@ def remedies(looked: Survey, links: Sequence[Link]) -> list[str]:
     lines = []
     for link in links:
         if link.code in ("", "aimed") and link.share < HEARD:
-            lines.append(f"{link.landmark}: {verdict(link)} ({link.share:.0%} of the way): {_what_helps(looked, link)}")
+            lines.append(
+                f"{link.landmark}: {verdict(link)} (on {link.share:.0%} of the way): {_what_helps(looked, link)}"
+            )
     lines += [line for link in links if link.code == "swept" for line in _on_search(link, links)]
     return lines
 
 
-def lack_db(link: Link) -> float | None:
-    """By how much the median place with a path lacks SNR [dB]; 0 if it does not, None without any path."""
-    there = link.margin_db[link.margin_db > NOTHING_DB]
-    return max(0.0, -float(np.median(there))) if len(there) else None
+def weak_places(link: Link) -> Integers:
+    """Places at which a path comes in that is only too weak."""
+    return np.array([place for place, reason in enumerate(link.reason) if reason == WEAK], dtype=np.int64)
 
 
-def enough_elements(looked: Survey, panel: RisPanel, lack: float) -> RisSpec | None:
+def lack_db(link: Link) -> float:
+    """By how much SNR lacks [dB] at the median of the places where it is all that lacks; 0 if there are none."""
+    weak = weak_places(link)
+    return -float(np.median(link.margin_db[weak])) if len(weak) else 0.0
+
+
+def enough_elements(looked: Survey, panel: RisPanel, link: Link) -> RisSpec | None:
     """The smallest panel, grown alike along both sides, whose direct path under the best code is above the threshold at
-    the median place that sees it; None if none of up to `LARGEST` elements a side is. `lack` [dB]: where to begin.
+    the median of the places where it is too weak; None if none of up to `LARGEST` elements a side is.
     """
-    spec, seen = panel.spec, _direct_places(looked)
-    if not len(seen):
-        return None
-    scale = 10.0 ** (max(lack, 0.0) / 40.0) * 0.9  # the amplitude goes with the sides' product
+    spec, weak = panel.spec, weak_places(link)
+    scale = 10.0 ** (lack_db(link) / 40.0) * 0.9  # the amplitude goes with the sides' product
     while True:
         rows, cols = (max(count, int(np.ceil(count * scale))) for count in (spec.rows, spec.cols))
         if max(rows, cols) > LARGEST:
             return None
         grown = replace(spec, rows=rows, cols=cols)
-        if float(np.median(_margins(looked, panel, grown)[seen])) >= 0.0:
+        if float(np.median(_margins(looked, panel, grown)[weak])) >= 0.0:
             return grown
         scale *= GROWTH
 
 
 def _what_helps(looked: Survey, link: Link) -> str:
     scene, lack = looked.scene, lack_db(link)
-    why = _main_reason(link)
-    if lack is None or (lack == 0.0 and why):
-        return f"{why}; {_way_round(why)}"
-    parts = [f"{lack:.1f} dB lack at the median place"] if lack > 0.0 else []
-    if why and why != "too weak":
-        parts.append(why)
-    parts.append(f"{lack:.1f} dB less noise would do (radio.reference_snr_db)" if lack else _way_round(why))
+    parts = list(_why_where(link))
     if lack:
+        parts.append(f"{lack:.1f} dB lack where it is too weak: as much less noise (radio.reference_snr_db) would do")
         parts += _larger(looked, link, lack)
         point = scene.landmark_positions[scene.landmarks.index(link.landmark)]
-        far = float(np.median(np.linalg.norm(scene.agent.position - point, axis=1)))
-        parts.append(f"or a way within {far * 10.0 ** (-lack / 40.0):.1f} m (now {far:.1f} m)")
+        weak = scene.agent.position[weak_places(link)]
+        far = float(np.median(np.linalg.norm(weak - point, axis=1)))
+        parts.append(f"or a way within {far * 10.0 ** (-lack / 40.0):.1f} m (there it is {far:.1f} m away)")
     return "; ".join(parts)
+
+
+def _why_where(link: Link) -> Iterator[str]:
+    """Each reason with the share of the way on which it holds, the commonest first, and the way round it."""
+    for reason, count in Counter(reason for reason in link.reason if reason).most_common():
+        share = f"{reason} on {count / len(link.reason):.0%} of it"
+        yield share if reason == WEAK else f"{share} ({_way_round(reason)})"
 
 
 def _larger(looked: Survey, link: Link, lack: float) -> Iterator[str]:
@@ -82,7 +92,7 @@ def _larger(looked: Survey, link: Link, lack: float) -> Iterator[str]:
         return
     assert scene.ris is not None
     spec = scene.ris.spec
-    grown = enough_elements(looked, scene.ris, lack)
+    grown = enough_elements(looked, scene.ris, link)
     now = f"(now {spec.rows} x {spec.cols})"
     yield (
         f"or a panel of {grown.rows} x {grown.cols} elements {now}"
@@ -101,12 +111,6 @@ def _on_search(link: Link, links: Sequence[Link]) -> Iterator[str]:
         )
 
 
-def _main_reason(link: Link) -> str:
-    """The reason given most often."""
-    said = [reason for reason in link.reason if reason]
-    return max(said, key=said.count) if said else ""
-
-
 def _way_round(why: str) -> str:
     if "behind the panel" in why:
         return "turn the panel, or lead the way before it"
@@ -116,13 +120,7 @@ def _way_round(why: str) -> str:
         return "raise it, lower the agent, or take radio.array.pattern = 'isotropic'"
     if "told from" in why:
         return "more bandwidth or antennas, or receiver.alternation for a panel"
-    return "lead the way nearer"
-
-
-def _direct_places(looked: Survey) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
-    """Places at which the panel's direct path comes in."""
-    direct = looked.paths.kind == PathKind.RIS
-    return np.flatnonzero(looked.paths.valid[:, direct].any(axis=1))
+    return "lead the way to where it is seen"
 
 
 def _margins(looked: Survey, panel: RisPanel, spec: RisSpec) -> Floats:
