@@ -6,7 +6,8 @@
 For every landmark the share of the cycles in which the adviser expects a component of it, beside the share in which the
 run's receiver reported one (true identities, scoring only). Aimed codes are those of the scheme `genie` with the exact
 designer, which knows the truth; random codes those of `random`. Then `optimized`, whose agent has to find the panel
-first; and the panel that the adviser proposes instead of one that is too weak, tried in a run of `genie`. Random rooms are development ones (`rislam-rt new --seed`); seed 1.
+first; and the panel that the adviser proposes instead of one that is too weak, tried in a run of `genie`. Random rooms
+are development ones (`rislam-rt new --seed`); seed 1.
 """
 
 import argparse

@@ -106,7 +106,7 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
 
     link, sent = agent.link, None
     if link is not None and means.designer is not None:
-        ahead = dt + control.delay_cycles * _nominal_step(told.time)
+        ahead = dt + control.delay_cycles * usual_step(told.time)
         sent = means.designer(partial(estimator.predict, agent.state, ahead, config), cycle, room, rng=rng.design)
     clock.append(perf_counter())
 
@@ -141,6 +141,6 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
     return Agent(state, link, measurement), outcome
 
 
-def _nominal_step(time: Floats) -> float:
-    """Cycle time [s] of times (K,)."""
-    return float(time[1] - time[0]) if len(time) > 1 else 0.0
+def usual_step(time: Floats) -> float:
+    """Cycle time [s] of times (K,), which a recording's clock keeps only nearly: the median; 0 for a single cycle."""
+    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0

@@ -1,6 +1,7 @@
 """From a scene folder to a `Scene`."""
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -138,7 +139,9 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
     except Fault as fault:
         findings.append(fault.at(str(file), "ris.up"))
     try:
-        agent, shelf.contents["trajectory"] = build_motion(spec.agent, file.parent)
+        if not (findings and spec.agent.random_walk):  # which needs the whole room
+            surfaces = _surfaces(reflectors, [*shades, *(s.shade for s in scatterers if s.shade)])
+            agent, shelf.contents["trajectory"] = build_motion(spec.agent, file.parent, surfaces)
     except Fault as fault:
         findings.append(fault.at(str(file), "agent"))
     corners = np.concatenate([np.zeros((0, 3)), *(reflector.vertices for reflector in reflectors)])
@@ -148,6 +151,11 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
     digest = _digest(content, shelf.contents)
     scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), panel, agent, digest, tuple(shades))
     return Draft(str(file), scene, [], bounds)
+
+
+def _surfaces(reflectors: Sequence[Reflector], shades: Sequence[Shade]) -> Floats:
+    """(T, 3, 3) [m] of all that stands in an agent's way."""
+    return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in shades)])
 
 
 class Shelf:
