@@ -5,7 +5,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.toml import parse_toml
@@ -28,8 +28,9 @@ Name = Annotated[
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 ItuMaterial = Literal[
-    "brick", "ceiling_board", "chipboard", "concrete", "floorboard", "glass", "marble", "medium_dry_ground", "metal",
-    "plasterboard", "plywood", "very_dry_ground", "wet_ground", "wood",
+    "asphalt_concrete", "brick", "carpet_tile", "ceiling_board", "chipboard", "clear_acrylic", "concrete", "floorboard",
+    "glass", "marble", "medium_dry_ground", "metal", "plasterboard", "plywood", "very_dry_ground", "vinyl_tile",
+    "wet_ground", "wood",
 ]  # fmt: skip
 
 
@@ -43,18 +44,27 @@ class Section(BaseModel):
 
 
 class MaterialSection(Section):
-    """Either `reflection` (the same at every angle) or `itu`, a slab of an ITU-R P.2040 material."""
+    """One of `reflection` (the same at every angle), `itu`, a slab of an ITU-R P.2040 material, and `permittivity`
+    (relative, with `conductivity_s_m`), a slab of one's own. `scattering` takes a share from the mirrored ray.
+    """
 
     reflection: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
     itu: ItuMaterial | None = None
+    permittivity: Annotated[float, Field(ge=1.0, le=1e6, allow_inf_nan=False)] | None = None
+    conductivity_s_m: Annotated[float, Field(ge=0.0, le=1e9, allow_inf_nan=False)] | None = None
     thickness_m: Length | None = None
+    scattering: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
 
     @model_validator(mode="after")
     def _one_kind(self) -> "MaterialSection":
-        if (self.reflection is None) == (self.itu is None):
-            raise ValueError("give either 'reflection' or 'itu'")
-        if self.itu is None and self.thickness_m is not None:
-            raise ValueError("'thickness_m' has a meaning with 'itu' only")
+        if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity)) != 1:
+            raise ValueError("give one of 'reflection', 'itu' and 'permittivity'")
+        if self.reflection is not None and self.thickness_m is not None:
+            raise ValueError("'thickness_m' has a meaning with 'itu' or 'permittivity' only")
+        if self.permittivity is None and self.conductivity_s_m is not None:
+            raise ValueError("'conductivity_s_m' has a meaning with 'permittivity' only")
+        if self.permittivity == 1.0 and not self.conductivity_s_m:
+            raise ValueError("a permittivity of 1 without 'conductivity_s_m' is air; give more of either, or no mesh")
         return self
 
 
@@ -212,6 +222,11 @@ class LimitsSection(Section):
     """Each is traced on its own, with every wall on both legs."""
 
 
+def _listed(value: Any) -> Any:
+    """One table `[ris]` as a list of one."""
+    return [value] if isinstance(value, dict) else value
+
+
 class SceneSpec(Section):
     """A whole scene file."""
 
@@ -220,7 +235,8 @@ class SceneSpec(Section):
     scatterer: list[ScattererSection] = []
     shade: Annotated[list[ShadeSection], Field(max_length=10_000)] = []
     meshes: MeshesSection = MeshesSection()
-    ris: RisSection | None = None
+    ris: Annotated[list[RisSection], BeforeValidator(_listed), Field(max_length=100)] = []
+    """`[ris]` for one panel, `[[ris]]` for several."""
     agent: AgentSection
     limits: LimitsSection = LimitsSection()
 
@@ -231,6 +247,16 @@ class SceneSpec(Section):
                 f"{len(self.scatterer)} scatterers, of which each is traced on its own; "
                 f"take fewer, or raise limits.scatterers = {self.limits.scatterers}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _panels_told_apart(self) -> "SceneSpec":
+        names = [panel.name for panel in self.ris]
+        if len(set(names)) < len(names):
+            raise ValueError(f"ris.name: {', '.join(names)} received; give every panel a name of its own")
+        levels = [panel.levels for panel in self.ris]
+        if len(set(levels)) > 1:
+            raise ValueError(f"ris.levels: {levels} received; give all panels the same number of phase levels")
         return self
 
 
@@ -264,7 +290,8 @@ def validate_spec(table: dict[str, Any]) -> SceneSpec:
     try:
         return SceneSpec.model_validate(table)
     except ValidationError as error:
-        remarks = [_remark(item) for item in error.errors(include_url=False, include_context=False)]
+        lone = isinstance(table.get("ris"), dict)
+        remarks = [_remark(item, lone) for item in error.errors(include_url=False, include_context=False)]
     raise Fault("; ".join(remarks[:8]), f"mend these {len(remarks)} fields" if len(remarks) > 1 else "mend this field")
 
 
@@ -286,9 +313,12 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
     return parse_spec(content), content
 
 
-def _remark(item: Any) -> str:
+def _remark(item: Any, lone_panel: bool) -> str:
     """One bad field: where, what was received, what is wanted."""
-    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"]).lstrip(".")
+    where = item["loc"]
+    if lone_panel and where[:2] == ("ris", 0):  # the file has `[ris]`
+        where = ("ris", *where[2:])
+    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).lstrip(".")
     place = _short(place, 80)
     if item["type"] == "missing":
         return f"{place}: missing"

@@ -65,7 +65,7 @@ def match(tracks: Tracks, glance: Glance, free: Integers, cycle: int) -> tuple[I
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     spread = np.zeros((count, 3, 3))
     spread[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
-    share = (tracks.hits + 1.0) / (cycle - tracks.born + 2.0)
+    share = np.minimum((tracks.hits + 1.0) / (cycle - tracks.born + 2.0), 1.0)
     odds = np.log(share / (1.02 - share))
     candidates = Candidates(
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
