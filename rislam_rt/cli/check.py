@@ -82,7 +82,7 @@ def _advise(folder: Path, settings: "Records", picture: Path | None) -> dict[str
     advice = advise(scene, settings, rng=np.random.default_rng(SEED))
     print_advice(advice)
     if picture is not None:
-        coverage = panel_coverage(scene, settings)
-        said = draw_coverage(scene, coverage, picture) if coverage else "none: the scene has no panel"
+        coverages = panel_coverage(scene, settings)
+        said = draw_coverage(scene, coverages, picture) if coverages else "none: the scene has no panel"
         typer.echo(f"picture: {said}")
     return advice.as_dict()

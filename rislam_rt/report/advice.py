@@ -1,8 +1,10 @@
 """The adviser's word on the terminal, and the panel's coverage as a picture."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 from rich.console import Console
@@ -38,34 +40,38 @@ def print_advice(advice: Advice) -> None:
     console.print(f"to trace {advice.costs[0].walls} walls: {'; '.join(map(cost_words, advice.costs))}", soft_wrap=True)
 
 
-def draw_coverage(scene: Scene, coverage: Coverage, path: Path) -> Path:
-    """The map over the room's plan, the edge of hearing as a line; returns the file."""
+def draw_coverage(scene: Scene, coverages: Sequence[Coverage], path: Path) -> Path:
+    """A map for each panel over the room's plan, the edge of hearing as a line; returns the file."""
+    low, high = scene.bounds
+    height = float(np.clip(6.0 * (high[1] - low[1]) / (high[0] - low[0]), 2.5, 9.0)) + 1.2
+    with styled():
+        figure = Figure(figsize=(7.6, height * len(coverages)))
+        for axis, coverage in zip(figure.subplots(len(coverages), 1, squeeze=False).flat, coverages, strict=True):
+            _draw_map(figure, axis, scene, coverage)
+        return save_figure(figure, path)
+
+
+def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> None:
     from matplotlib import colormaps
 
-    low, high = scene.bounds
-    aspect = (high[1] - low[1]) / (high[0] - low[0])
     colours = colormaps["viridis"].with_extremes(bad=UNSEEN)
-    with styled():
-        figure = Figure(figsize=(7.6, float(np.clip(6.0 * aspect, 2.5, 9.0)) + 1.2))
-        axis = figure.subplots()
-        shown = axis.pcolormesh(
-            coverage.x, coverage.y, coverage.margin_db, cmap=colours, shading="nearest", zorder=-2,
-            norm=BoundaryNorm(STEPS_DB, colours.N, extend="both"),
-        )  # fmt: skip
-        axis.set_facecolor(UNSEEN)
-        level = np.where(np.isfinite(coverage.margin_db), coverage.margin_db, -60.0)
-        if level.min() < 0.0 < level.max():
-            axis.contour(coverage.x, coverage.y, level, levels=[0.0], colors="#d55e00", linewidths=2.0, zorder=1)
-        draw_plan(axis, scene)
-        axis.set_xlabel("x [m]")
-        axis.set_ylabel("y [m]")
-        axis.set_title(
-            f"{coverage.panel} in {scene.name}, agent at z = {coverage.height:.2f} m: heard at "
-            f"{coverage.heard:.0%} of where it is seen", weight="bold",
-        )  # fmt: skip
-        bar = figure.colorbar(shown, ax=axis, fraction=0.05, pad=0.02)
-        bar.set_label("SNR of the direct path under the best code,\nover the threshold [dB]; grey: no such path")
-        return save_figure(figure, path)
+    shown = axis.pcolormesh(
+        coverage.x, coverage.y, coverage.margin_db, cmap=colours, shading="nearest", zorder=-2,
+        norm=BoundaryNorm(STEPS_DB, colours.N, extend="both"),
+    )  # fmt: skip
+    axis.set_facecolor(UNSEEN)
+    level = np.where(np.isfinite(coverage.margin_db), coverage.margin_db, -60.0)
+    if level.min() < 0.0 < level.max():
+        axis.contour(coverage.x, coverage.y, level, levels=[0.0], colors="#d55e00", linewidths=2.0, zorder=1)
+    draw_plan(axis, scene)
+    axis.set_xlabel("x [m]")
+    axis.set_ylabel("y [m]")
+    axis.set_title(
+        f"{coverage.panel} in {scene.name}, agent at z = {coverage.height:.2f} m: heard at "
+        f"{coverage.heard:.0%} of where it is seen", weight="bold",
+    )  # fmt: skip
+    bar = figure.colorbar(shown, ax=axis, fraction=0.05, pad=0.02)
+    bar.set_label("SNR of the direct path under the best code,\nover the threshold [dB]; grey: no such path")
 
 
 def _cell(link: Link, at: int) -> str:

@@ -79,7 +79,10 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[Link]:
         heard = [_all_places(under(paths, scene.ris.spec, levels), looked) for levels in codes.levels]
         if codes.name == "aimed":
             links += [_link(s.name, "", heard, reasons, n) for n, s in enumerate(scene.scatterers)]
-        links.append(_link(scene.ris.name, codes.name, heard, reasons, len(scene.scatterers)))
+        links += [
+            _link(panel.name, codes.name, heard, reasons, len(scene.scatterers) + number)
+            for number, panel in enumerate(scene.panels)
+        ]
     return links
 
 

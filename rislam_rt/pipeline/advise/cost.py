@@ -66,6 +66,7 @@ def _asked(channel: ImageSourceChannel, depth: int) -> int:
     tx, rx = (ends[row : row + 1] for ends in (scene.agent.tx, scene.agent.rx))
     legs = [(tx, rx, -1)]
     for number, point in enumerate(scene.landmark_positions):
-        host = channel.walls.host if number == len(scene.scatterers) else -1
+        panel = scene.panel_number(number)
+        host = channel.walls.hosts[panel] if panel >= 0 else -1
         legs += [(tx, point[None], host), (rx, point[None], host)]
     return sum(1 + sum(len(block) for block in wall_sequences(facets, a, b, depth, host)) for a, b, host in legs)

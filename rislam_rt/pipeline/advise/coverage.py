@@ -39,10 +39,10 @@ class Coverage(NamedTuple):
         return float(np.mean(self.margin_db[seen] >= 0.0)) if seen.any() else 0.0
 
 
-def panel_coverage(scene: Scene, settings: Settings) -> Coverage | None:
-    """The map of a scene's panel; None without one."""
+def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
+    """A map of each of a scene's panels."""
     if scene.ris is None:
-        return None
+        return []
     low, high = scene.bounds
     size = np.maximum(high - low, 4.0 * INSIDE)[:2]
     most = min(POINTS, ELEMENTS // scene.ris.spec.num_elements)
@@ -53,12 +53,15 @@ def panel_coverage(scene: Scene, settings: Settings) -> Coverage | None:
     height = float(np.median(scene.agent.position[:, 2]))
     xx, yy = np.meshgrid(x, y)
     points = np.column_stack([xx.ravel(), yy.ravel(), np.full(xx.size, height)])
-    margin = _direct_margin(scene, points, settings).reshape(xx.shape)
-    return Coverage(scene.ris.name, x, y, height, margin)
+    margins = _direct_margins(scene, points, settings)
+    return [
+        Coverage(panel.name, x, y, height, margin.reshape(xx.shape))
+        for panel, margin in zip(scene.panels, margins, strict=True)
+    ]
 
 
-def _direct_margin(scene: Scene, points: Floats, settings: Settings) -> Floats:
-    """(N,) [dB] at points (N, 3), the agent headed along x."""
+def _direct_margins(scene: Scene, points: Floats, settings: Settings) -> Floats:
+    """(panels, N) [dB] at points (N, 3), the agent headed along x."""
     assert scene.ris is not None
     count = len(points)
     still = Trajectory(
@@ -67,11 +70,11 @@ def _direct_margin(scene: Scene, points: Floats, settings: Settings) -> Floats:
     alone = replace(scene, scatterers=tuple(s for s in scene.scatterers if s.shade is not None), agent=still)
     paths = ImageSourceChannel(alone, settings.radio, 0).paths(still)
     paths = under(paths, scene.ris.spec, aimed_codes(paths, scene.ris.spec, settings.radio))
-    margin = np.full(count, np.nan)
+    margin = np.full((len(scene.panels), count), np.nan)
     for path in np.flatnonzero(paths.kind == PathKind.RIS):
         heard = paths.valid[:, path]
         if settings.radio.array.pattern == "upper":
             heard = heard & (paths.arrival[:, path, 2] >= -HORIZON_MARGIN)
         snr = settings.radio.integrated_snr(paths.gain[:, path]) / settings.sensor.threshold
-        margin[heard] = np.maximum(10.0 * np.log10(np.maximum(snr[heard], 1e-40)), NOTHING_DB)
+        margin[paths.panel[path], heard] = np.maximum(10.0 * np.log10(np.maximum(snr[heard], 1e-40)), NOTHING_DB)
     return margin

@@ -29,8 +29,9 @@ class Reasons(NamedTuple):
     def why(self, number: int, place: int, margin_db: float, covered: int) -> str:
         """The reason, in a few words."""
         point, agent = self.scene.landmark_positions[number], self.scene.agent
-        panel = self.scene.ris if number == len(self.scene.scatterers) else None
-        if panel is not None and (agent.position[place] - panel.center) @ panel.spec.normal <= 0.0:
+        panel = self.scene.panel_number(number)
+        front = self.scene.panels[panel] if panel >= 0 else None
+        if front is not None and (agent.position[place] - front.center) @ front.spec.normal <= 0.0:
             return "the agent is behind the panel"
         hider = self._hider(point, place, number)
         weak = margin_db < 0.0

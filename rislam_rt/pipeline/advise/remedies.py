@@ -90,9 +90,8 @@ def _larger(looked: Survey, link: Link, lack: float) -> Iterator[str]:
     if link.code == "":
         yield f"or an echo of {10.0 ** (lack / 10.0):.2g} times the cross-section"
         return
-    assert scene.ris is not None
-    spec = scene.ris.spec
-    grown = enough_elements(looked, scene.ris, link)
+    panel = next(one for one in scene.panels if one.name == link.landmark)
+    spec, grown = panel.spec, enough_elements(looked, panel, link)
     now = f"(now {spec.rows} x {spec.cols})"
     yield (
         f"or a panel of {grown.rows} x {grown.cols} elements {now}"

@@ -8,7 +8,8 @@ import pytest
 
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import measure
-from rislam_rt.model import PathKind, Scene
+from rislam_rt.model import PathKind, RisPanel, Scene
+from rislam_rt.model.ris import join_panels
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.advise.advice import advise
 from rislam_rt.pipeline.advise.budget import Link, Survey, at_rows, link_budget, survey
@@ -93,7 +94,7 @@ def test_every_reason_is_found_where_it_holds(paper: Scene, office: Scene) -> No
     assert "shaded by 'partition'" in links["ris", "aimed"].reason
     _, links = look(office)
     assert "too weak" in links["ris", "random"].reason
-    assert paper.ris is not None
+    assert isinstance(paper.ris, RisPanel)
     turned = replace(paper, ris=replace(paper.ris, spec=replace(paper.ris.spec, normal=np.array([0.0, 0.0, 1.0]))))
     looked, links = look(turned)
     assert set(links["ris", "aimed"].reason) == {"the agent is behind the panel"}
@@ -121,7 +122,7 @@ def test_what_lacks_is_what_would_do(paper: Scene) -> None:
     weak = weak_places(link)
     _, less = look(paper, f"radio.reference_snr_db={-12 + lack + 0.1}")
     assert float(np.median(less["ris", "aimed"].margin_db[weak])) == pytest.approx(0.1, abs=1e-9)
-    assert paper.ris is not None
+    assert isinstance(paper.ris, RisPanel)
     grown = enough_elements(faint, paper.ris, link)
     assert grown is not None
     share = {}
@@ -146,12 +147,11 @@ def test_a_panel_that_no_size_mends_and_one_that_is_hard_to_find_are_told(paper:
 
 def test_the_map_agrees_with_the_budget(paper: Scene, office: Scene) -> None:
     said = settings()
-    coverage = panel_coverage(office, said)
-    assert coverage is not None
+    (coverage,) = panel_coverage(office, said)
     assert np.isnan(coverage.margin_db).any()
     assert coverage.margin_db.shape == (len(coverage.y), len(coverage.x))
     y, x = np.unravel_index(np.nanargmax(coverage.margin_db), coverage.margin_db.shape)
-    assert office.ris is not None
+    assert isinstance(office.ris, RisPanel)
     step = coverage.x[1] - coverage.x[0]
     assert np.hypot(coverage.x[x] - office.ris.center[0], coverage.y[y] - office.ris.center[1]) < 2.0 * step
     here = replace(office, agent=at_rows(office.agent, np.array([0])))
@@ -161,7 +161,25 @@ def test_the_map_agrees_with_the_budget(paper: Scene, office: Scene) -> None:
     snr = said.radio.integrated_snr(under(paths, office.ris.spec, aimed_codes(paths, office.ris.spec, said.radio)).gain)
     direct = float(snr[0, paths.kind == PathKind.RIS][0])
     assert coverage.margin_db[y, x] == pytest.approx(10.0 * np.log10(direct / said.sensor.threshold), abs=1e-9)
-    assert panel_coverage(replace(paper, ris=None), said) is None
+    assert panel_coverage(replace(paper, ris=None), said) == []
+
+
+def test_two_panels_are_judged_as_each_alone(paper: Scene) -> None:
+    """Elements of one reflect nothing of the other's paths; what changes is which other paths cover one."""
+    assert isinstance(paper.ris, RisPanel)
+    spec = replace(paper.ris.spec, normal=np.array([0.0, 1.0, 0.0]), up=np.array([0.0, 0.0, 1.0]), rows=4)
+    other = RisPanel(spec, np.array([3.0, 0.0, 1.5]), "wall_y0", "second")
+    both = replace(paper, ris=join_panels((paper.ris, other)))
+    looked, links = look(both)
+    for alone in (paper, replace(paper, ris=other)):
+        _, single = look(alone)
+        name = alone.panels[0].name
+        for code in ("aimed", "swept"):
+            np.testing.assert_allclose(links[name, code].margin_db, single[name, code].margin_db, rtol=0, atol=1e-9)
+    assert [one.panel for one in panel_coverage(both, looked.settings)] == ["ris", "second"]
+    first, _ = panel_coverage(both, looked.settings)
+    (lone,) = panel_coverage(paper, looked.settings)
+    assert abs(np.nanmax(first.margin_db) - np.nanmax(lone.margin_db)) < 1.0  # the grids differ
 
 
 def test_the_cost_counts_what_there_is(paper: Scene) -> None:
