@@ -13,7 +13,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.measurement import FrontEnd, measure
-from rislam_rt.model import Measurement, Paths, PathTruth, RisCode, RisSpec, SlamEstimate, Trajectory
+from rislam_rt.model import DataSheet, Measurement, Paths, PathTruth, RisCode, SlamEstimate, Trajectory
 from rislam_rt.pipeline.control import Link, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.spec import PipelineSpec, Settings
@@ -63,7 +63,7 @@ class Agent(NamedTuple):
 class Means(NamedTuple):
     """What leads a scheme through its cycles, the same in all of them."""
 
-    panel: RisSpec | None
+    panel: DataSheet | None
     designer: "Designer | None"
     estimator: Estimator
     spec: PipelineSpec

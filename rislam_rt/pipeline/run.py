@@ -234,10 +234,11 @@ def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
     Gains are element by element, so that the far field's limit binds nothing; a path over the panel is one delay, which
     a panel larger than the band resolves would not be.
     """
-    if scene.ris is None or not any(SCHEMES[name].panel for name in spec.schemes):
+    if not any(SCHEMES[name].panel for name in spec.schemes):
         return ()
-    bandwidth = spec.radio.bandwidth_ghz * 1e9
-    return delay_spread_warnings(scene.ris.spec, scene.ris.center, scene.agent.tx, scene.agent.rx, bandwidth)
+    bandwidth, agent = spec.radio.bandwidth_ghz * 1e9, scene.agent
+    each = (delay_spread_warnings(panel.spec, panel.center, agent.tx, agent.rx, bandwidth) for panel in scene.panels)
+    return tuple(line for lines in each for line in lines)
 
 
 def library_versions() -> dict[str, str]:

@@ -89,8 +89,8 @@ def _draw_truth(axis: Axes, scene: Scene) -> None:
     axis.annotate("start", (path[0, 0], path[0, 1]), (6, -10), textcoords="offset points", fontsize=9)
     for scatterer in scene.scatterers:
         _mark(axis, scatterer.position, scatterer.name, "o")
-    if scene.ris is not None:
-        _mark(axis, scene.ris.center, scene.ris.name, "s")
+    for panel in scene.panels:
+        _mark(axis, panel.center, panel.name, "s")
     axis.set_aspect("equal")
     axis.grid(False)
 
@@ -203,9 +203,9 @@ def _draw_objects_3d(axis: Any, scene: Scene, cycle: int) -> None:
     for scatterer in scene.scatterers:
         axis.plot(*scatterer.position, "o", color=KIND[PathKind.PS], mec=TRUTH, ms=9, zorder=9)
         axis.text(*(scatterer.position + label), scatterer.name, fontsize=9, zorder=10)
-    if scene.ris is not None:
-        axis.plot(*scene.ris.center, "s", color=KIND[PathKind.RIS], mec=TRUTH, ms=10, zorder=9)
-        axis.text(*(scene.ris.center + label), scene.ris.name, fontsize=9, zorder=10)
+    for panel in scene.panels:
+        axis.plot(*panel.center, "s", color=KIND[PathKind.RIS], mec=TRUTH, ms=10, zorder=9)
+        axis.text(*(panel.center + label), panel.name, fontsize=9, zorder=10)
 
 
 def _draw_class(axis: Any, scene: Scene, paths: Paths, gain: Floats, cycle: int, kind: PathKind) -> Line2D | None:

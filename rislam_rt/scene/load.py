@@ -8,12 +8,12 @@ import numpy as np
 
 from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade
+from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade, join_panels
 from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.containers import too_many_faces
-from rislam_rt.scene.findings import Fault, Finding, raise_errors
+from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
 from rislam_rt.scene.lying import UNITS, place_mesh
-from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, read_inside
+from rislam_rt.scene.meshes import MAX_COORDINATE, MAX_MESH_BYTES, Mesh, MeshReader, read_inside
 from rislam_rt.scene.motion import build_motion
 from rislam_rt.scene.schema import (
     LimitsSection,
@@ -110,19 +110,16 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
             shades.append(Shade(mesh.vertices, mesh.faces, shade.name))
         except Fault as fault:
             findings.append(fault.at(str(file), f"shade[{number}].mesh ({shade.name})"))
-    panel = None
-    try:
-        panel = _panel(spec.ris) if spec.ris else None
-    except Fault as fault:
-        findings.append(fault.at(str(file), "ris.up"))
+    panels = _panels(spec.ris, str(file), findings)
     try:
         agent, shelf.contents["trajectory"] = build_motion(spec.agent, file.parent)
     except Fault as fault:
         findings.append(fault.at(str(file), "agent"))
     if findings:
         return Draft(str(file), None, findings)
+    ris = join_panels(panels)
     digest = _digest(content, shelf.contents)
-    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), panel, agent, digest, tuple(shades))
+    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(shades))
     return Draft(str(file), scene, [])
 
 
@@ -141,13 +138,14 @@ class Shelf:
         if name not in self.contents:
             self.contents[name] = read_inside(self.folder, name, MAX_MESH_BYTES)
         most = self.limits.faces
-        mesh = self.reader.parse(self.contents[name], name, node or None, most, self.limits.nodes)
+        up, unit = section.up_axis or self.lying.up, UNITS[section.units or self.lying.units]
+        reach = MAX_COORDINATE / unit
+        mesh = self.reader.parse(self.contents[name], name, node or None, most, self.limits.nodes, reach)
         self.faces += len(mesh.faces)
         if self.faces > most:
             raise too_many_faces(self.faces, most)
-        up, units = section.up_axis or self.lying.up, section.units or self.lying.units
         origin = self.lying.origin if section.origin is None else section.origin
-        return place_mesh(mesh, up, UNITS[units], np.array(origin))
+        return place_mesh(mesh, up, unit, np.array(origin))
 
 
 def _reflector(section: ReflectorSection, shelf: Shelf) -> Reflector:
@@ -186,6 +184,17 @@ def _scatterer(section: ScattererSection, shelf: Shelf) -> Scatterer:
         mesh = solid_mesh(position, radius or 0.0, height, axis)
     shade = None if mesh is None else Shade(mesh.vertices, mesh.faces)
     return Scatterer(section.name, position, rcs, radius, law, height, axis, shade)
+
+
+def _panels(sections: list[RisSection], file: str, findings: list[Finding]) -> tuple[RisPanel, ...]:
+    """The panels that can be made; what is wrong with the others goes to the findings."""
+    panels = []
+    for number, section in enumerate(sections):
+        try:
+            panels.append(_panel(section))
+        except Fault as fault:
+            findings.append(fault.at(file, f"{panel_key(number, len(sections))}.up"))
+    return tuple(panels)
 
 
 def _panel(section: RisSection) -> RisPanel:

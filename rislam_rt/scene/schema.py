@@ -5,7 +5,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.toml import parse_toml
@@ -188,6 +188,11 @@ class LimitsSection(Section):
     """Each is traced on its own, with every wall on both legs."""
 
 
+def _listed(value: Any) -> Any:
+    """One table `[ris]` as a list of one."""
+    return [value] if isinstance(value, dict) else value
+
+
 class SceneSpec(Section):
     """A whole scene file."""
 
@@ -196,7 +201,8 @@ class SceneSpec(Section):
     scatterer: list[ScattererSection] = []
     shade: Annotated[list[ShadeSection], Field(max_length=10_000)] = []
     meshes: MeshesSection = MeshesSection()
-    ris: RisSection | None = None
+    ris: Annotated[list[RisSection], BeforeValidator(_listed), Field(max_length=100)] = []
+    """`[ris]` for one panel, `[[ris]]` for several."""
     agent: AgentSection
     limits: LimitsSection = LimitsSection()
 
@@ -207,6 +213,16 @@ class SceneSpec(Section):
                 f"{len(self.scatterer)} scatterers, of which each is traced on its own; "
                 f"take fewer, or raise limits.scatterers = {self.limits.scatterers}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _panels_told_apart(self) -> "SceneSpec":
+        names = [panel.name for panel in self.ris]
+        if len(set(names)) < len(names):
+            raise ValueError(f"ris.name: {', '.join(names)} received; give every panel a name of its own")
+        levels = [panel.levels for panel in self.ris]
+        if len(set(levels)) > 1:
+            raise ValueError(f"ris.levels: {levels} received; give all panels the same number of phase levels")
         return self
 
 
@@ -240,7 +256,8 @@ def validate_spec(table: dict[str, Any]) -> SceneSpec:
     try:
         return SceneSpec.model_validate(table)
     except ValidationError as error:
-        remarks = [_remark(item) for item in error.errors(include_url=False, include_context=False)]
+        lone = isinstance(table.get("ris"), dict)
+        remarks = [_remark(item, lone) for item in error.errors(include_url=False, include_context=False)]
     raise Fault("; ".join(remarks[:8]), f"mend these {len(remarks)} fields" if len(remarks) > 1 else "mend this field")
 
 
@@ -262,9 +279,12 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
     return parse_spec(content), content
 
 
-def _remark(item: Any) -> str:
+def _remark(item: Any, lone_panel: bool) -> str:
     """One bad field: where, what was received, what is wanted."""
-    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"]).lstrip(".")
+    where = item["loc"]
+    if lone_panel and where[:2] == ("ris", 0):  # the file has `[ris]`
+        where = ("ris", *where[2:])
+    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).lstrip(".")
     place = _short(place, 80)
     if item["type"] == "missing":
         return f"{place}: missing"
