@@ -1,4 +1,4 @@
-"""A room: reflecting meshes, point scatterers, at most one panel, and the agent's true motion."""
+"""A room: reflecting meshes, point scatterers, panels, and the agent's true motion."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, freeze, show_point
 from rislam_rt.errors import SceneError
 from rislam_rt.model.picture import Plan, html_with, outline
-from rislam_rt.model.ris import RisPanel
+from rislam_rt.model.ris import RisPanel, RisPanels
 from rislam_rt.model.trajectory import Trajectory
 
 
@@ -152,7 +152,8 @@ class Scene:
     name: str
     reflectors: tuple[Reflector, ...]
     scatterers: tuple[Scatterer, ...]
-    ris: RisPanel | None
+    ris: RisPanel | RisPanels | None
+    """The panel, or several of them (`join_panels`)."""
     agent: Trajectory
     digest: str = ""
     """SHA-256 over the scene file and its meshes; empty for a scene built in memory."""
@@ -161,11 +162,12 @@ class Scene:
 
     def __repr__(self) -> str:
         size = " x ".join(f"{length:.3g}" for length in self.bounds[1] - self.bounds[0])
-        panel = "no panel"
-        if self.ris is not None:
-            spec = self.ris.spec
-            panel = f"panel of {spec.rows} x {spec.cols} elements at {show_point(self.ris.center)} m"
-        counts = f"{len(self.reflectors)} reflectors, {len(self.scatterers)} scatterers, {panel}"
+        each = (
+            f"panel of {panel.spec.rows} x {panel.spec.cols} elements at {show_point(panel.center)} m"
+            for panel in self.panels
+        )
+        panels = ", ".join(each) or "no panel"
+        counts = f"{len(self.reflectors)} reflectors, {len(self.scatterers)} scatterers, {panels}"
         return f"Scene '{self.name}': {size} m, {counts}, {len(self.agent)} cycles"
 
     def _repr_html_(self) -> str:
@@ -177,15 +179,24 @@ class Scene:
         return Plan(self.bounds, edges, list(zip(self.landmarks, self.landmark_positions, strict=True)), ways)
 
     @property
+    def panels(self) -> tuple[RisPanel, ...]:
+        """All panels, in the order of the code's elements; empty without one."""
+        return self.ris.panels if self.ris is not None else ()
+
+    @property
     def landmarks(self) -> tuple[str, ...]:
-        """Names in the order of landmark numbers: scatterers first, then the panel."""
-        return tuple(s.name for s in self.scatterers) + ((self.ris.name,) if self.ris else ())
+        """Names in the order of landmark numbers: scatterers first, then the panels."""
+        return tuple(s.name for s in self.scatterers) + tuple(panel.name for panel in self.panels)
 
     @property
     def landmark_positions(self) -> Floats:
         """(num_landmarks, 3) [m], in the order of `landmarks`."""
-        points = [s.position for s in self.scatterers] + ([self.ris.center] if self.ris else [])
+        points = [s.position for s in self.scatterers] + [panel.center for panel in self.panels]
         return np.array(points, dtype=np.float64).reshape(-1, 3)
+
+    def panel_number(self, landmark: int) -> int:
+        """Which of the panels a landmark is, -1 for a scatterer."""
+        return max(landmark - len(self.scatterers), -1)
 
     @property
     def bounds(self) -> Floats:

@@ -103,7 +103,7 @@ def paths_to_dataset(paths: Paths, motion: Trajectory) -> "xr.Dataset":
 
 def dataset_to_paths(data: "xr.Dataset") -> Paths:
     """The inverse of `paths_to_dataset`."""
-    walls, landmarks = (_names(data.attrs[name]) for name in ("walls", "landmarks"))
+    walls, landmarks = (names_of(data.attrs[name]) for name in ("walls", "landmarks"))
     return Paths(**_values(data, PATHS, ""), walls=walls, landmarks=landmarks, source=str(data.attrs["source"]))
 
 
@@ -121,7 +121,7 @@ def scheme_to_dataset(result: SchemeResult) -> "xr.Dataset":
 
 def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
     """The inverse of `scheme_to_dataset`."""
-    outcomes = _names(data.attrs["outcomes"])
+    outcomes = names_of(data.attrs["outcomes"])
     return SchemeResult(
         scheme=str(data.attrs["scheme"]),
         levels=int(data.attrs["levels"]),
@@ -258,6 +258,6 @@ def _dataset(content: dict[str, Any], attributes: dict[str, Any], coords: dict[s
     return xr.Dataset(content, {**coords, **labels}, {"Conventions": "CF-1.11", **attributes})
 
 
-def _names(value: Any) -> tuple[str, ...]:
+def names_of(value: Any) -> tuple[str, ...]:
     """Names from an attribute, which NetCDF gives back as one string if there is only one."""
     return (value,) if isinstance(value, str) else tuple(str(item) for item in value)

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.model import Body, Measurement, RisCode, RisSpec
-from rislam_rt.pipeline.dataset import AXES, Entry, told
+from rislam_rt.model import Body, DataSheet, Measurement, RisCode, RisSpec
+from rislam_rt.model.ris import join_sheets
+from rislam_rt.pipeline.dataset import AXES, Entry, names_of, told
 from rislam_rt.slam import StartPrior
 
 if TYPE_CHECKING:
@@ -31,9 +32,11 @@ INPUTS: dict[str, Entry] = {
     "start_velocity": (("xyz",), "m/s", "told velocity at the start"),
     "tx_offset": (("xyz",), "m", "Tx from the agent's position, body frame"),
     "rx_offset": (("xyz",), "m", "centre of the Rx array from the agent's position, body frame"),
-    "panel_spacing": (("pair",), "m", "between columns, between rows"),
-    "panel_normal": (("xyz",), "1", "unit vector out of the panel's front"),
-    "panel_up": (("xyz",), "1", "unit vector along a column"),
+    "panel_shape": (("panel", "pair"), "1", "rows, columns of elements"),
+    "panel_spacing": (("panel", "pair"), "m", "between columns, between rows"),
+    "panel_normal": (("panel", "xyz"), "1", "unit vector out of the panel's front"),
+    "panel_up": (("panel", "xyz"), "1", "unit vector along a column"),
+    "panel_amplitude": (("panel",), "1", "amplitude of an element"),
 }
 """What an estimator may see."""
 
@@ -43,7 +46,7 @@ class Inputs(NamedTuple):
 
     start: StartPrior
     body: Body
-    panel: RisSpec | None
+    panel: DataSheet | None
     """Data sheet; None without a panel."""
     time: Floats
     """(K,) [s] since the first cycle."""
@@ -70,8 +73,11 @@ def inputs_to_dataset(inputs: Inputs, **about: Any) -> "xr.Dataset":
     codes = [code for code in inputs.codes if code is not None]
     if inputs.panel is not None and len(codes) == len(inputs.codes):
         values["code"] = np.array([code.index for code in codes])
-        values |= {f"panel_{name}": getattr(inputs.panel, name) for name in ("spacing", "normal", "up")}
-        attributes |= {f"panel_{name}": getattr(inputs.panel, name) for name in ("levels", "element", "amplitude")}
+        sheets = inputs.panel.panels
+        for name in ("spacing", "normal", "up", "amplitude"):
+            values[f"panel_{name}"] = np.array([getattr(sheet, name) for sheet in sheets])
+        values["panel_shape"] = np.array([(sheet.rows, sheet.cols) for sheet in sheets])
+        attributes |= {"panel_levels": inputs.panel.levels, "panel_element": [sheet.element for sheet in sheets]}
     content = {name: (INPUTS[name][0], value, told(INPUTS[name])) for name, value in values.items()}
     coords: dict[str, Any] = {name: AXES[name] for name in ("xyz", "cosine")}
     coords["component"] = np.arange(values["tau"].shape[1])  # so that files join along time
@@ -105,16 +111,17 @@ def marked_rng(data: "xr.Dataset") -> np.random.Generator | None:
     return np.random.default_rng(np.random.SeedSequence(int(data.attrs["filter_entropy"]), spawn_key=key))
 
 
-def _panel(data: "xr.Dataset") -> tuple[RisSpec | None, tuple[RisCode | None, ...]]:
+def _panel(data: "xr.Dataset") -> tuple[DataSheet | None, tuple[RisCode | None, ...]]:
     """Data sheet, and one code a cycle; None without a panel."""
     if "code" not in data:
         return None, (None,) * data.sizes["time"]
-    index, marks = data["code"].to_numpy(), data.attrs
-    rows, cols, levels = *index.shape[1:], int(marks["panel_levels"])
-    spacing, normal, up = (data[f"panel_{name}"].to_numpy() for name in ("spacing", "normal", "up"))
-    element, amplitude = str(marks["panel_element"]), float(marks["panel_amplitude"])
-    panel = RisSpec(rows, cols, spacing, normal, up, levels, element, amplitude)
-    return panel, tuple(RisCode(code, levels) for code in index)
+    levels, elements = int(data.attrs["panel_levels"]), names_of(data.attrs["panel_element"])
+    parts = (data[f"panel_{name}"].to_numpy() for name in ("shape", "spacing", "normal", "up", "amplitude"))
+    sheets = tuple(
+        RisSpec(int(rows), int(cols), spacing, normal, up, levels, element, float(amplitude))
+        for (rows, cols), spacing, normal, up, amplitude, element in zip(*parts, elements, strict=True)
+    )
+    return join_sheets(sheets), tuple(RisCode(code, levels) for code in data["code"].to_numpy())
 
 
 def _measurements(data: "xr.Dataset") -> tuple[Measurement, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError, StoreError
-from rislam_rt.model import Material, Scatterer, Scene, Trajectory
+from rislam_rt.model import Material, RisPanel, Scatterer, Scene, Trajectory
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
 from rislam_rt.scene.names import safe_name
@@ -151,15 +151,18 @@ def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
     ]
     table["scatterer"] = [_scatterer_table(scatterer) for scatterer in scene.scatterers]
     table["shade"] = [{"name": shade.name, "mesh": _mesh_file(shade.name)} for shade in scene.shades]
-    if scene.ris is not None:
-        spec = scene.ris.spec
-        table["ris"] = {"name": scene.ris.name, "center": scene.ris.center.tolist()}
-        table["ris"] |= {"normal": spec.normal.tolist(), "up": spec.up.tolist()}
-        table["ris"] |= {"rows": spec.rows, "cols": spec.cols, "spacing_m": spec.spacing.tolist()}
-        table["ris"] |= {"levels": spec.levels, "element": spec.element, "amplitude": spec.amplitude}
-        table["ris"] |= {"host": scene.ris.host} if scene.ris.host else {}
+    panels = [_panel_table(panel) for panel in scene.panels]
+    table["ris"] = panels[0] if len(panels) == 1 else panels
     table["agent"] = agent
     return {key: value for key, value in table.items() if value != []}
+
+
+def _panel_table(panel: RisPanel) -> dict[str, Any]:
+    spec, table = panel.spec, {"name": panel.name, "center": panel.center.tolist()}
+    table |= {"normal": spec.normal.tolist(), "up": spec.up.tolist()}
+    table |= {"rows": spec.rows, "cols": spec.cols, "spacing_m": spec.spacing.tolist()}
+    table |= {"levels": spec.levels, "element": spec.element, "amplitude": spec.amplitude}
+    return table | ({"host": panel.host} if panel.host else {})
 
 
 def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:

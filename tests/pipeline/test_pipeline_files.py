@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from rislam_rt.model import RisCode, RisSpec
+from rislam_rt.model.ris import RisSpecs
 from rislam_rt.pipeline.identity import run_identity
+from rislam_rt.pipeline.inputs import dataset_to_inputs, inputs_to_dataset
 from rislam_rt.pipeline.own import localise, read_inputs, run_rng
 from rislam_rt.pipeline.spec import build_radio
 from rislam_rt.pipeline.store import open_run
@@ -73,3 +76,16 @@ def test_the_same_measurements_give_the_same_estimate(stored, short_spec, scheme
     np.testing.assert_array_equal(found, result.schemes[scheme].position)
     covariance = np.array([one.covariance for one in answers.estimates])
     np.testing.assert_array_equal(covariance, result.schemes[scheme].covariance)
+
+
+def test_several_panels_are_written_and_read(stored):
+    inputs = stored[1].schemes["random"].given.inputs
+    one = inputs.panel
+    both = RisSpecs((one, RisSpec(2, 3, [0.01, 0.02], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], one.levels, "energy", 0.5)))
+    codes = tuple(RisCode(np.full((1, both.num_elements), number % 2), one.levels) for number in range(8))
+    again = dataset_to_inputs(inputs_to_dataset(inputs._replace(panel=both, codes=codes)))
+    for found, wanted in zip(again.panel.panels, both.panels, strict=True):
+        assert (found.rows, found.cols, found.element) == (wanted.rows, wanted.cols, wanted.element)
+        np.testing.assert_array_equal(found.offsets(), wanted.offsets())
+        assert found.amplitude == wanted.amplitude
+    np.testing.assert_array_equal([code.index for code in again.codes], [code.index for code in codes])

@@ -25,7 +25,7 @@ from rislam_rt.channel.image_source.fresnel import slab_coefficients, slab_permi
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import Material, PathKind, Paths, RadioConfig, Scene, Trajectory
+from rislam_rt.model import Material, Paths, RadioConfig, Scene, Trajectory
 
 SINGLE, DOUBLE = 2.0**-24, 2.0**-53
 """Unit roundoff of float32 and float64."""
@@ -140,13 +140,12 @@ class Precision:
             if scatterer.law == "cylinder" and scatterer.height is not None:
                 rows = paths.landmark[path] == number
                 error[rows] = wavenumber * scatterer.height * turn[rows].sum(axis=1)
-        if self.scene.ris is None:
-            return error
-        spec, rows = self.scene.ris.spec, np.flatnonzero(np.isin(paths.kind[path], [PathKind.RIS, PathKind.VRIS]))
-        for leg, toward in enumerate(_landmark_directions(paths, cycle[rows], path[rows], trajectory)):
-            error[rows] += 0.5 * wavenumber * spec.diagonal * turn[rows, leg]
-            # the element's pattern, at most cos^(3/2) in amplitude
-            error[rows] += (1.0 + _ratio(turn[rows, leg], np.abs(toward @ spec.normal))) ** 2 - 1.0
+        for number, panel in enumerate(self.scene.panels):
+            rows = np.flatnonzero(paths.panel[path] == number)
+            for leg, toward in enumerate(_landmark_directions(paths, cycle[rows], path[rows], trajectory)):
+                error[rows] += 0.5 * wavenumber * panel.spec.diagonal * turn[rows, leg]
+                # the element's pattern, at most cos^(3/2) in amplitude
+                error[rows] += (1.0 + _ratio(turn[rows, leg], np.abs(toward @ panel.spec.normal))) ** 2 - 1.0
         return error
 
 

@@ -76,8 +76,9 @@ class TracedChannel:
         tx, rx, heading = trajectory.tx, trajectory.rx, trajectory.heading
         problems = [Problem(tx, rx, heading, to_rx=True)]
         for number, point in enumerate(self.scene.landmark_positions):
-            panel = self.scene.ris if number == len(self.scene.scatterers) else None
-            behind, front = (self.walls.host, panel.spec.normal) if panel is not None else (-1, None)
+            panel, behind, front = self.scene.panel_number(number), -1, None
+            if panel >= 0:
+                behind, front = self.walls.hosts[panel], self.scene.panels[panel].spec.normal
             spared = number if number in self.stage.shades else -1
             for from_rx, device in ((False, tx), (True, rx)):
                 problems.append(Problem(device, point[None], heading, from_rx, False, behind, front, spared))
