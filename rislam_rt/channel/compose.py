@@ -63,7 +63,9 @@ def compose_paths(
     if responses:
         sides = [np.concatenate(legs, axis=1) if len(legs) > 1 else legs[0] for legs in zip(*responses, strict=True)]
         tx_leg, rx_leg = (np.concatenate([block[name] for block in blocks]) for name in ("tx_leg", "rx_leg"))
-        ris = RisLegs(sides[0], sides[1], tx_leg[keep], rx_leg[keep])
+        assert scene.ris is not None
+        spans = tuple(scene.ris.spec.span(number) for number in range(len(scene.panels)))
+        ris = RisLegs(sides[0], sides[1], tx_leg[keep], rx_leg[keep], spans)
     fields: dict[str, Any] = {
         name: value[keep] if name in _PER_PATH else value[:, keep] for name, value in merged.items()
     }

@@ -206,7 +206,7 @@ def _panel_legs(
             ratio = _ratio(panel.spec, panel.center, old, new, radio.wavelength)
             moved[:, used[mine]] *= scene.ris.spec.place(number, ratio)
         responses.append(moved)
-    return RisLegs(responses[0], responses[1], paths.ris.tx_leg, paths.ris.rx_leg)
+    return replace(paths.ris, tx=responses[0], rx=responses[1])
 
 
 def _ratio(spec: RisSpec, center: Floats, before: Floats, after: Floats, wavelength: float) -> Complexes:

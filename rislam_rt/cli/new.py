@@ -29,6 +29,10 @@ def command(
     within: Annotated[
         str, typer.Option(metavar="X0,Y0,X1,Y1", help="Of an XML scene: this window of the plan alone [m].")
     ] = "",
+    floorplan: Annotated[
+        str | None, typer.Option(metavar="CORNERS", help='One room by its corners [m], e.g. "0,0 4,0 4,3 0,3".')
+    ] = None,
+    height: Annotated[float, typer.Option(min=1.0, max=100.0, help="Of a floor plan's rooms [m].")] = 2.7,
     units: Annotated[
         Literal["mm", "cm", "m", "in"] | None, typer.Option(help="What a unit of the file is; metres without it.")
     ] = None,
@@ -62,17 +66,22 @@ def command(
         from rislam_rt.errors import ConfigError
 
         raise ConfigError("--within: only XML scenes are cut to a window; leave it out")
-    if source is not None:
-        from rislam_rt.scene.importing import ImportOptions, import_room
+    if source is not None or floorplan is not None:
+        from rislam_rt.scene.importing import ImportOptions, import_corners, import_room
         from rislam_rt.scene.importing.materials import parse_choices, parse_material
 
         options = ImportOptions(
             units=units, up=up, origin=_point(origin), carrier_ghz=carrier_ghz, detail=detail, curved=curved,
             max_walls=max_walls, materials=parse_choices(material or []), rest=parse_material(rest),
         )  # fmt: skip
-        for remark in import_room(source, scene, options, overwrite=overwrite):
+        remarks = (
+            import_room(source, scene, options, height=height, overwrite=overwrite)
+            if source is not None
+            else import_corners(floorplan or "", scene, options, height=height, overwrite=overwrite)
+        )
+        for remark in remarks:
             typer.echo(f"- {remark}")
-        typer.echo(f"{scene}: made from '{source}'; edit its scene.toml")
+        typer.echo(f"{scene}: made from '{source or 'a floor plan'}'; edit its scene.toml")
         return
     if seed is not None:
         from rislam_rt.scene.random_rooms import draw_room

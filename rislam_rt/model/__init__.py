@@ -5,7 +5,17 @@ from rislam_rt.model.measurement import Measurement, PathTruth
 from rislam_rt.model.paths import PathKind, Paths, RisLegs
 from rislam_rt.model.radio import RadioConfig, RxArray
 from rislam_rt.model.result import NOTHING, STEPS, SchemeResult, SlamResult
-from rislam_rt.model.ris import DataSheet, RisCode, RisPanel, RisPanels, RisSpec, RisSpecs, join_codes, join_panels
+from rislam_rt.model.ris import (
+    DataSheet,
+    RisCode,
+    RisPanel,
+    RisPanels,
+    RisSpec,
+    RisSpecs,
+    join_codes,
+    join_panels,
+    join_sheets,
+)
 from rislam_rt.model.scene import Material, Reflector, Scatterer, Scene, Shade
 from rislam_rt.model.sensor import SensorModel, detection_probability, merged_pull
 from rislam_rt.model.trajectory import Body, Trajectory
@@ -43,6 +53,7 @@ __all__ = [
     "empty_map",
     "join_codes",
     "join_panels",
+    "join_sheets",
     "merged_pull",
     "pose_estimate",
 ]

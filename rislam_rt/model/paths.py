@@ -38,6 +38,8 @@ class RisLegs:
     """(P,) Tx leg of each path, -1 where the path does not meet the panel."""
     rx_leg: Integers
     """(P,) Rx leg of each path, -1 where the path does not meet the panel."""
+    spans: tuple[slice, ...] = (slice(None),)
+    """Where the elements of each panel stand among all, row by row."""
 
     def __post_init__(self) -> None:
         freeze(self, "tx", np.complex128, (None, None, None, None))

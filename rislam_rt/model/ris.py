@@ -156,6 +156,11 @@ DataSheet: TypeAlias = RisSpec | RisSpecs
 """What the agent is told of the panel, or of the panels."""
 
 
+def join_sheets(sheets: tuple[RisSpec, ...]) -> DataSheet:
+    """One data sheet of one or more panels."""
+    return sheets[0] if len(sheets) == 1 else RisSpecs(sheets)
+
+
 def join_codes(codes: "tuple[RisCode, ...]") -> "RisCode":
     """One code of all panels from the code (..., N, M) of each; that of a single panel is taken as it is."""
     if len(codes) == 1:

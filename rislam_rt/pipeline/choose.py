@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.design import design_code, designer, problem_from_paths
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import prior_from_covariance
-from rislam_rt.model import DataSheet, RisCode, RisSpec, SlamEstimate
+from rislam_rt.model import DataSheet, RisCode, SlamEstimate
 from rislam_rt.pipeline.cycle import Designer, Room
 from rislam_rt.pipeline.own_methods import is_own, own_code
 from rislam_rt.pipeline.schemes import Scheme
@@ -32,7 +32,6 @@ def _on_belief(method: str, spec: PipelineSpec, told: Told) -> Designer:
             return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)
         if is_own(method):
             return own_code(method, belief(), panel, settings.radio, rng=rng)
-        assert isinstance(panel, RisSpec)
         design = design_code(
             belief(), panel, settings.radio, method=method, rng=rng, samples=section.samples, config=settings.design,
             landmark_uncertainty=section.landmark_uncertainty, least_snr=section.least_snr,

@@ -84,16 +84,23 @@ class Palette:
 
     def material(self, wall: str, node: str, material: str) -> dict[str, Any]:
         """By hand (wall, material or node), by a word in the material's name or the node's, or that of the rest."""
-        for pattern, table in self.choices.items():
-            if any(fnmatchcase(name, pattern) for name in (wall, material, node) if name):
-                self.used.add(pattern)
-                return table
+        chosen = self.by_hand(wall, material, node)
+        if chosen is not None:
+            return chosen
         for name in (material, node):
             found = itu_by_word(name)
             if found is not None:
                 return {"itu": found, "thickness_m": THICKNESS[found]}
         self.assumed.add(material or wall)
         return self.rest
+
+    def by_hand(self, *names: str) -> dict[str, Any] | None:
+        """What was given for any of the names."""
+        for pattern, table in self.choices.items():
+            if any(fnmatchcase(name, pattern) for name in names if name):
+                self.used.add(pattern)
+                return table
+        return None
 
     def unused(self) -> list[str]:
         """Patterns that nothing matched."""

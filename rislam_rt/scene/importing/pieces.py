@@ -19,9 +19,7 @@ _NAMELESS = re.compile(
     r"(?i)(mesh|object|obj|node|geometry|geom|cube|plane|cylinder|sphere|circle|default|group|scene|root|world|solid|"
     r"polygon|shape|model|untitled|material|mat|surface|part|element|layer|g|o)?[\W_\d]*"
 )
-_SHELL = re.compile(
-    r"(?i)(^|[^a-z])(walls?|floors?|ceilings?|roof|rooms?|shell|building|house|wand|boden|decke)([^a-z]|$)"
-)
+_SHELL = re.compile(r"(?i)(^|[^a-z])(walls?|floors?|ceilings?|roof|wand|boden|decke)([^a-z]|$)")
 
 
 class Piece(NamedTuple):
@@ -44,13 +42,16 @@ def find_pieces(facets: Facets, nodes: list[str]) -> list[Piece]:
     box = bounds_of(facets, np.arange(len(part)))
     shell: list[int] = []
     others: list[Piece] = []
-    groups = {name: np.flatnonzero(node == name) for name in sorted(set(node) - {""})}
-    for name, regions in groups.items():
-        if _is_shell(bounds_of(facets, regions), box) or _SHELL.search(name):
+    whole = node == ""
+    for name in sorted(set(node) - {""}):
+        regions = np.flatnonzero(node == name)
+        if _SHELL.search(name):
             shell += regions.tolist()
+        elif _is_shell(bounds_of(facets, regions), box):
+            whole[regions] = True  # a whole room under one name
         else:
             others.append(Piece(name, name, regions, False))
-    loose = np.flatnonzero(node == "")
+    loose = np.flatnonzero(whole)
     things: list[Integers] = []
     for component in np.unique(facets.component[loose]):
         regions = loose[facets.component[loose] == component]

@@ -8,13 +8,16 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError, SceneError
-from rislam_rt.model import Body, Material, Reflector, Scene, Shade, Trajectory
+from rislam_rt.model import Body, Material, Reflector, RisPanel, Scene, Shade, Trajectory
 from rislam_rt.scene.check import find_errors
 from rislam_rt.scene.findings import Fault, raise_errors
-from rislam_rt.scene.load import SCENE_FILE, load_scene
-from rislam_rt.scene.meshes import MAX_FACES
+from rislam_rt.scene.importing.draft import RoomDraft, propose_panel
+from rislam_rt.scene.importing.free_space import Free
+from rislam_rt.scene.load import SCENE_FILE, build_panel, load_scene
+from rislam_rt.scene.meshes import MAX_FACES, Mesh
 from rislam_rt.scene.motion import straight_motion
 from rislam_rt.scene.placing import suggest_agent
+from rislam_rt.scene.schema import RisSection
 from rislam_rt.scene.templates import room_name
 from rislam_rt.scene.write import write_scene
 from rislam_rt.scene.xml.materials import material_element, read_material
@@ -78,9 +81,11 @@ def scene_of_xml(path: Path, name: str, within: Sequence[float] = ()) -> tuple[S
     if whole is not None:
         notes.append(f"agent, panel and {len(whole.scatterers)} scatterers are those of the {SCENE_FILE} beside it")
         return replace(whole, name=name, reflectors=reflectors, shades=shades, digest=""), notes
-    notes.append("the agent's motion is a suggestion: edit [agent]; a panel and scatterers can be added")
     agent = _motion(path, reflectors, shades)
-    return Scene(name, reflectors, (), None, agent, "", shades), notes
+    panel, about = _panel(reflectors, shades, agent)
+    way = float(np.linalg.norm(agent.position[-1] - agent.position[0]))
+    notes.append(f"proposed way: {way:.2g} m in {agent.time[-1]:.0f} s, to be edited in [agent]; {about}")
+    return Scene(name, reflectors, (), panel, agent, "", shades), notes
 
 
 def _window(within: Sequence[float]) -> Floats | None:
@@ -98,6 +103,17 @@ def _exact(read: Material, exact: Material | None) -> Material:
     if exact is not None and read_material(material_element(exact, "written")).material == read:
         return exact
     return read
+
+
+def _panel(reflectors: Sequence[Reflector], shades: Sequence[Shade], agent: Trajectory) -> tuple[RisPanel | None, str]:
+    """A panel like the paper's above or beside the way, where there is a place for one, and words on it."""
+    draft = RoomDraft(
+        {r.name: (Mesh(r.vertices, r.faces), {}) for r in reflectors},
+        {s.name: Mesh(s.vertices, s.faces) for s in shades},
+    )
+    way = agent.position[[0, -1]]
+    table, about = propose_panel(draft, Free(way, way, 0.0, 0.0))
+    return (build_panel(RisSection(**table)) if table else None), about
 
 
 def _motion(path: Path, reflectors: Sequence[Reflector], shades: Sequence[Shade]) -> Trajectory:

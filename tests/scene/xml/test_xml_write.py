@@ -73,7 +73,7 @@ def test_own_materials_and_shades_come_back(tmp_path):
 
 def test_a_scene_of_sionna_passes_its_check_and_gets_a_way(tmp_path):
     notes = new_from_xml("sionna:simple_street_canyon", tmp_path / "canyon")
-    assert [n for n in notes if "suggestion" in n]
+    assert [n for n in notes if "proposed way" in n]
     findings = check_scene(tmp_path / "canyon")
     assert not [f for f in findings if f.severity == "error"]
     agent = load_scene(tmp_path / "canyon").agent
