@@ -12,6 +12,7 @@ from rislam_rt.slam.window.expect import Clusters, Expected
 from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.gauss import HEAD
 from rislam_rt.slam.window.guesses import BESIDE, known_features
+from rislam_rt.slam.window.identify import told_panel
 from rislam_rt.slam.window.kinds import NEW, Verdict, judge, wanted
 from rislam_rt.slam.window.learn import seed
 from rislam_rt.slam.window.levels import LEVELS
@@ -40,10 +41,10 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.book, mean[:3])
     histories = digest(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
     told = explanations(context, rows, histories, expected, groups, mean, covariance)
+    side, panel = told_panel(context, ats), context.book.panel
+    told = [(row, value + side[row] * (panel >= 0 and forms[0, 0] == panel), forms) for row, value, forms in told]
     lonely = _missing_legs(context, histories, mean)
-    verdicts, shares = judge(
-        histories, known, context.book, context.scene, [(row, value) for row, value, _ in told], lonely
-    )  # fmt: skip
+    verdicts, shares = judge(context, ats, histories, known, [(row, value) for row, value, _ in told], lonely)
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked = context.tracks.looked.copy()
     for (row, _, forms), share in zip(told, shares, strict=True):
@@ -185,7 +186,7 @@ def _enter(context: Context, at: Integers, verdict: Verdict, histories: Digest, 
     new = len(context.book.ident)
     holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))
     window = gauss.add_feature(context.window, verdict.place, holds)
-    book = enter(context.book, verdict.is_wall, histories.middle, len(at), 5.0)
+    book = enter(context.book, verdict.is_wall, histories.middle, len(at), 5.0, verdict.identity)
     forms = np.full((2, 5), UNKNOWN)
     forms[0] = [new if part == NEW else part for part in verdict.form]
     if verdict.kind == BESIDE:
