@@ -12,7 +12,6 @@ from rislam_rt.slam.window.expect import Clusters, Expected
 from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.gauss import HEAD
 from rislam_rt.slam.window.guesses import BESIDE, known_features
-from rislam_rt.slam.window.identify import told_panel
 from rislam_rt.slam.window.kinds import NEW, Verdict, judge, wanted
 from rislam_rt.slam.window.learn import seed
 from rislam_rt.slam.window.levels import LEVELS
@@ -41,10 +40,10 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.book, mean[:3])
     histories = digest(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
     told = explanations(context, rows, histories, expected, groups, mean, covariance)
-    side, panel = told_panel(context, ats), context.book.panel
-    told = [(row, value + side[row] * (panel >= 0 and forms[0, 0] == panel), forms) for row, value, forms in told]
+    panel = context.book.panel
     lonely = _missing_legs(context, histories, mean)
-    verdicts, shares = judge(context, ats, histories, known, [(row, value) for row, value, _ in told], lonely)
+    over = [(row, value, 0 <= panel == int(forms[0, 0])) for row, value, forms in told]
+    verdicts, shares = judge(context, ats, histories, known, over, lonely)
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked = context.tracks.looked.copy()
     for (row, _, forms), share in zip(told, shares, strict=True):

@@ -26,7 +26,7 @@ from rislam_rt.slam.window.guesses import (
     Known,
     hypotheses,
 )
-from rislam_rt.slam.window.identify import identify, told_panel
+from rislam_rt.slam.window.identify import identify
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.panel import Identity, unknown
 from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
@@ -92,10 +92,12 @@ _TEMPLATES = (
 
 
 def judge(
-    context: Context, ats: list[Integers], digest: Digest, known: Known, explained: list[tuple[int, float]],
+    context: Context, ats: list[Integers], digest: Digest, known: Known, told: list[tuple[int, float, bool]],
     lonely: Floats,
 ) -> tuple[list[Verdict], Floats]:  # fmt: skip
-    """Verdicts of T tracks, and the posterior (E,) of each of the explanations (track, log evidence) by the map.
+    """Verdicts of T tracks, and the posterior (E,) of each of the explanations by the map.
+
+    Of these `told` gives track, log evidence, and whether they run over the panel.
 
     `ats` are the tracks' rows of the log; `lonely` (T,) is the log probability that two walls throw so few single
     returns beside it.
@@ -111,21 +113,22 @@ def judge(
     evidence += _beside(table, digest, known, book, scene)
     gain = _upright(table, fits, digest, known, book)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
-    gain, identity = identify(context, ats, table, fits, evidence)
-    evidence += gain
+    over = identify(context, ats, table, fits, evidence)
+    evidence += over.gain
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
     none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LOG_VOLUME + LOG_NONE
-    none += np.logaddexp(np.log(1.0 - OVER_PANEL), np.log(OVER_PANEL) + told_panel(context, ats))
+    none += np.logaddexp(np.log(1.0 - OVER_PANEL), np.log(OVER_PANEL) + over.elsewhere)
+    explained = [(row, value + over.elsewhere[row] * panel) for row, value, panel in told]
     evidence += _shared(table, fits, evidence, none, explained)
     verdicts, shares = [], np.zeros(len(explained))
     for row in range(len(digest.seen)):
         own = (track == row).nonzero()[0]
-        told = [i for i, (which, _) in enumerate(explained) if which == row]
-        weight = np.concatenate([[none[row]], evidence[own], [explained[i][1] for i in told]])
+        own_told = [i for i, (which, _) in enumerate(explained) if which == row]
+        weight = np.concatenate([[none[row]], evidence[own], [explained[i][1] for i in own_told]])
         total = np.logaddexp.reduce(weight)
-        shares[told] = np.exp(weight[1 + len(own) :] - total)
+        shares[own_told] = np.exp(weight[1 + len(own) :] - total)
         best = int(np.argmax(weight[: 1 + len(own)]))
         probability = float(np.exp(weight[best] - total))
         if best == 0:
@@ -138,7 +141,7 @@ def judge(
             Verdict(
                 int(table.kind[at]), probability, int(table.known[at]), fits.place[at], fits.held[at],
                 beliefs(fits.place[at], digest, known, book) if table.trials.is_wall[at] else no_holds(),
-                float(fits.share[at]), float(misfit), identity.take(np.array([at])),
+                float(fits.share[at]), float(misfit), over.identity.take(np.array([at])),
             )
         )  # fmt: skip
     return verdicts, shares

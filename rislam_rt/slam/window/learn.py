@@ -12,7 +12,7 @@ from rislam_rt.slam.window.book import Book, learn_ratio
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene
 from rislam_rt.slam.window.gauss import HEAD, Window
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.panel import Sight, spread_places, weigh
+from rislam_rt.slam.window.panel import Sight, gains, spread_places, weigh
 
 
 class Sights(NamedTuple):
@@ -156,5 +156,6 @@ def _identities(
         spread_places(window.features[points], blocks), np.tile(poses.tx, (count, 1)), np.tile(poses.rx, (count, 1)),
         np.ones(count), amplitude[heard], side[heard], heard >= 0,
     )  # fmt: skip
-    fresh = weigh(book.identity.take(points), sight, scene.ris, code, scene.sensor)
+    gain = gains(sight, scene.ris, code, scene.radio)
+    fresh = weigh(book.identity.take(points), sight, gain, scene.sensor).settled()
     return book._replace(**book.identity.put(points, fresh)._asdict())

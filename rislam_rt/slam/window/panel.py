@@ -12,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.information import amplitude_std
-from rislam_rt.model import RisCode, RisSpec, SensorModel
+from rislam_rt.model import RadioConfig, RisCode, RisSpec, SensorModel
 from rislam_rt.slam.identity import (
     DOUBT,
     STRENGTHS,
@@ -54,6 +54,10 @@ class Identity(NamedTuple):
         for field, value in zip(fields, fresh, strict=True):
             field[rows] = value
         return Identity(*fields)
+
+    def settled(self) -> "Identity":
+        """With odds that new evidence can still turn."""
+        return self._replace(log_ris=np.clip(self.log_ris, -CERTAIN, CERTAIN))
 
     def join(self, other: "Identity") -> "Identity":
         """Both, one after the other."""
@@ -104,8 +108,16 @@ def spread_places(mean: Floats, covariance: Floats) -> Floats:
     return np.array(draws).reshape(len(mean), -1, 3)
 
 
-def weigh(before: Identity, sight: Sight, spec: RisSpec | None, code: RisCode | None, sensor: SensorModel) -> Identity:
-    """The identities (N,) after one more cycle; without a panel all are scatterers."""
+def gains(sight: Sight, spec: RisSpec | None, code: RisCode | None, radio: RadioConfig) -> Floats | None:
+    """Amplitudes (N, S) of the panel, were it at each of the places; None without a panel."""
+    if spec is None or code is None:
+        return None
+    ends = sight.tx[:, None], sight.rx[:, None]
+    return np.abs(predicted_panel_gain(spec, code, sight.place, *ends, sight.ratio[:, None], radio))
+
+
+def weigh(before: Identity, sight: Sight, gain: Floats | None, sensor: SensorModel) -> Identity:
+    """The identities (N,) after one more cycle, in which the panel has one of the amplitudes `gain` (N, S)."""
     radio, count = sensor.radio, len(sight.place)
     if not count:
         return before
@@ -114,27 +126,22 @@ def weigh(before: Identity, sight: Sight, spec: RisSpec | None, code: RisCode | 
     middle, std = sight.place.mean(axis=1), np.full(count, noise)
     first, second = (np.maximum(np.linalg.norm(middle - end, axis=1), 0.05) for end in (sight.tx, sight.rx))
     first = first / sight.ratio  # what walls take, a longer way takes as well
-    gain = np.zeros((count, 1), dtype=np.complex128)
-    if spec is not None and code is not None:
-        gain = predicted_panel_gain(
-            spec, code, sight.place, sight.tx[:, None], sight.rx[:, None], sight.ratio[:, None], radio
-        )  # fmt: skip
     log_grid, log_ris, hidden = before.log_grid.copy(), before.log_ris.copy(), before.hidden.copy()
     at, silent = sight.seen.nonzero()[0], (~sight.seen).nonzero()[0]
     if len(at):
         amplitude = sight.amplitude[at]
         panel = np.full(len(at), -np.inf)
-        if spec is not None:
+        if gain is not None:
             panel = np.where(sight.side[at] == OTHER, -np.inf, log_panel(amplitude, std[at], gain[at]))
         scatterer = log_scatterer(amplitude, std[at], first[at], second[at], radio)
         log_grid[at], log_ris[at] = add_evidence(log_grid[at], log_ris[at], scatterer, panel)
         log_ris[at] += np.where(sight.side[at] == PANEL, DOUBT, 0.0)
         hidden[at] = 0.0
-    if len(silent) and spec is not None:
+    if len(silent) and gain is not None:
         each = log_scatterer_missed(std[silent], first[silent], second[silent], radio, threshold)
         grid = log_grid[silent] - np.logaddexp.reduce(log_grid[silent], axis=1, keepdims=True)
         scatterer = np.logaddexp.reduce(grid + each, axis=1)
         missed = np.stack([log_panel_missed(std[silent], gain[silent], threshold), scatterer], axis=1)
         hidden[silent], surplus = weigh_silence(hidden[silent], np.exp(missed))
         log_ris[silent] += surplus
-    return Identity(log_grid, np.clip(log_ris, -CERTAIN, CERTAIN), hidden)
+    return Identity(log_grid, log_ris, hidden)

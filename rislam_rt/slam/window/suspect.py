@@ -12,7 +12,7 @@ from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.expect import Scene
 from rislam_rt.slam.window.gauss import HEAD
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.panel import DRAWS, Sight, weigh
+from rislam_rt.slam.window.panel import DRAWS, Sight, gains, weigh
 from rislam_rt.slam.window.tracks import Tracks
 
 LOG_FEW = np.log(LEVELS.panels)
@@ -32,7 +32,8 @@ def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: Scene, code: R
         place, np.tile(poses.tx, (count, 1)), np.tile(poses.rx, (count, 1)), np.ones(count),
         np.exp(tracks.log_amplitude[rows]), tracks.side[rows], tracks.last[rows] == cycle,
     )  # fmt: skip
-    fresh = weigh(tracks.identity.take(rows), sight, scene.ris, code, scene.sensor)
+    gain = gains(sight, scene.ris, code, scene.radio)
+    fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).settled()
     return tracks._replace(**tracks.identity.put(rows, fresh)._asdict())
 
 
