@@ -78,8 +78,8 @@ def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: 
     number = np.array([len(at) for at in rows])[:, None]
     # the difference of two alternated codes holds the panel's paths and nothing of the others
     alone = np.array([bool((log.side[at] == PANEL).all()) for at in rows])[:, None]
-    crowd = np.where(alone, 1.0, crowd)
-    scatter = np.sqrt((4.0 * crowd + number * scatter**2) / (4.0 + number))
+    around = np.where(alone, 1.0, crowd)
+    scatter = np.sqrt((4.0 * around + number * scatter**2) / (4.0 + number))
     count = len(rows)
     found = Digest(
         np.zeros((count, POINTS, 3)), np.zeros((count, POINTS, 3)), np.zeros((count, POINTS)),

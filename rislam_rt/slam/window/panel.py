@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import amplitude_std
 from rislam_rt.model import RadioConfig, RisCode, RisSpec, SensorModel
 from rislam_rt.slam.identity import (
@@ -108,16 +108,16 @@ def spread_places(mean: Floats, covariance: Floats) -> Floats:
     return np.array(draws).reshape(len(mean), -1, 3)
 
 
-def gains(sight: Sight, spec: RisSpec | None, code: RisCode | None, radio: RadioConfig) -> Floats | None:
-    """Amplitudes (N, S) of the panel, were it at each of the places; None without a panel."""
+def gains(sight: Sight, spec: RisSpec | None, code: RisCode | None, radio: RadioConfig) -> Complexes | None:
+    """Gains (N, S) of the panel, were it at each of the places; None without a panel."""
     if spec is None or code is None:
         return None
     ends = sight.tx[:, None], sight.rx[:, None]
-    return np.abs(predicted_panel_gain(spec, code, sight.place, *ends, sight.ratio[:, None], radio))
+    return predicted_panel_gain(spec, code, sight.place, *ends, sight.ratio[:, None], radio)
 
 
-def weigh(before: Identity, sight: Sight, gain: Floats | None, sensor: SensorModel) -> Identity:
-    """The identities (N,) after one more cycle, in which the panel has one of the amplitudes `gain` (N, S)."""
+def weigh(before: Identity, sight: Sight, gain: Complexes | None, sensor: SensorModel) -> Identity:
+    """The identities (N,) after one more cycle, in which the panel has one of the gains (N, S)."""
     radio, count = sensor.radio, len(sight.place)
     if not count:
         return before
