@@ -1,9 +1,11 @@
 """`rislam-rt new SCENE`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
+
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the files of a folder that exists.")]
 
 
 def command(
@@ -11,14 +13,60 @@ def command(
         Path, typer.Argument(metavar="SCENE", help="Folder to make; it must not exist yet.", show_default=False)
     ],
     template: Annotated[str, typer.Option(help="Built-in room to start from.")] = "paper_room",
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the files of a folder that exists.")] = False,
+    overwrite: Overwrite = False,
     seed: Annotated[
         int | None, typer.Option(min=0, help="A random room instead: the one that 'unseen' draws from this number.")
     ] = None,
-) -> None:
-    """Make a scene folder from a built-in room, or of a random one, to be edited."""
+    source: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="FILE", help="A room from a file: GLB, glTF, OBJ, PLY, STL, or a floor plan."),
+    ] = None,
+    floorplan: Annotated[
+        str | None, typer.Option(metavar="CORNERS", help='One room by its corners [m], e.g. "0,0 4,0 4,3 0,3".')
+    ] = None,
+    height: Annotated[float, typer.Option(min=1.0, max=100.0, help="Of a floor plan's rooms [m].")] = 2.7,
+    units: Annotated[
+        Literal["mm", "cm", "m", "in"] | None, typer.Option(help="What a unit of the file is; metres without it.")
+    ] = None,
+    up: Annotated[Literal["y", "z"] | None, typer.Option(help="Axis that points up; y for glTF, else z.")] = None,
+    origin: Annotated[
+        str, typer.Option(metavar="X,Y,Z", help="Point that becomes the room's zero [m], z up.")
+    ] = "0,0,0",
+    material: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=MATERIAL", help="Of a wall, node or material of the file (patterns too); "
+                     "itu:concrete, itu:concrete:0.2 (thickness in m) or reflection:0.8; repeatable."),
+    ] = None,
+    rest: Annotated[str, typer.Option(metavar="MATERIAL", help="Material of all else.")] = "itu:concrete",
+    carrier_ghz: Annotated[
+        float, typer.Option(min=0.1, max=1000.0, help="Carrier: small and round are meant in its wavelengths.")
+    ] = 10.0,
+    detail: Annotated[
+        float, typer.Option(min=0.0, max=1e4, help="What is flat but narrower than this many wavelengths shades.")
+    ] = 3.0,
+    curved: Annotated[Literal["shade", "planes"], typer.Option(help="What cylinders become.")] = "shade",
+    max_walls: Annotated[int, typer.Option(min=4, max=10_000, help="Of a file with more the widest reflect.")] = 150,
+) -> None:  # fmt: skip
+    """Make a scene folder from a built-in room, of a random one, or from a file of another program, to be edited."""
     from rislam_rt.scene import new_scene, write_scene
 
+    if source is not None or floorplan is not None:
+        from rislam_rt.scene.importing import ImportOptions, import_corners, import_room
+        from rislam_rt.scene.importing.materials import parse_choices, parse_material
+
+        options = ImportOptions(
+            units=units, up=up, origin=_point(origin), carrier_ghz=carrier_ghz, detail=detail, curved=curved,
+            max_walls=max_walls, materials=parse_choices(material or []), rest=parse_material(rest),
+        )  # fmt: skip
+        remarks = (
+            import_room(source, scene, options, height=height, overwrite=overwrite)
+            if source is not None
+            else import_corners(floorplan or "", scene, options, height=height, overwrite=overwrite)
+        )
+        for remark in remarks:
+            typer.echo(f"- {remark}")
+        typer.echo(f"{scene}: made from '{source or 'a floor plan'}'; edit its scene.toml")
+        return
     if seed is not None:
         from rislam_rt.scene.random_rooms import draw_room
 
@@ -27,3 +75,24 @@ def command(
         typer.echo(f"{scene}: random room {seed} ({room.shape}, {room.motion}); edit its scene.toml")
         return
     typer.echo(f"{new_scene(template, scene, overwrite=overwrite)}: made from '{template}'; edit its scene.toml")
+
+
+def _point(text: str) -> tuple[float, float, float]:
+    """Three numbers `x,y,z`.
+
+    Raises
+    ------
+    ConfigError
+        They are not.
+    """
+    from math import isfinite
+
+    from rislam_rt.errors import ConfigError
+
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+        if all(isfinite(value) and abs(value) <= 1e5 for value in (x, y, z)):
+            return x, y, z
+    except ValueError:
+        pass
+    raise ConfigError(f"--origin: '{text[:60]}' received; give three numbers in metres, e.g. --origin 1.5,2,0")

@@ -9,7 +9,7 @@ from rislam_rt import slam
 from rislam_rt.arrays import Integers
 from rislam_rt.errors import ConfigError, expect
 from rislam_rt.information.landmarks import Unknown
-from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel, SlamEstimate
+from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.pipeline.own_methods import at_work, load_own
 from rislam_rt.pipeline.spec import Settings
 from rislam_rt.slam import StartPrior
@@ -54,7 +54,7 @@ def own_estimator(name: str) -> Estimator:
             raise ConfigError(f"'{name}': {what}: a position of {far:g} m returned; give one up to {FARTHEST:g} m")
         return found
 
-    def init(start: StartPrior, body: Body, panel: RisSpec | None, sensor: SensorModel, config: Any,
+    def init(start: StartPrior, body: Body, panel: DataSheet | None, sensor: SensorModel, config: Any,
              *, rng: np.random.Generator) -> Any:  # fmt: skip
         with at_work(name):
             return own.init(start, body, panel, sensor, rng=rng)

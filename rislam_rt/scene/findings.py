@@ -40,6 +40,11 @@ class Fault(SceneError):
         return Finding("error", file, field, self.message, self.mend)
 
 
+def panel_key(number: int, panels: int) -> str:
+    """Key of a panel in the scene file: `ris` of one, `ris[number]` of several."""
+    return "ris" if panels == 1 else f"ris[{number}]"
+
+
 def one_line(text: str) -> str:
     """Text without line breaks and other control characters (names in hostile files may hold both)."""
     return "".join(c if c.isprintable() else " " for c in " ".join(text.split()))

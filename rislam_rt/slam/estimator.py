@@ -4,20 +4,21 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel, SlamEstimate
+from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam import filter as cycle
 from rislam_rt.slam import mapping, window
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.filter import StepInfo
+from rislam_rt.slam.inputs import lone_panel
 
 
 def init(
-    start: StartPrior, body: Body, ris: RisSpec | None, sensor: SensorModel, config: SlamConfig,
+    start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> Any:  # fmt: skip
     """The start prior, and an empty map."""
     begin = window.init if config.filter == "window" else cycle.init
-    return begin(start, body, ris, sensor, config, rng=rng)
+    return begin(start, body, lone_panel(ris), sensor, config, rng=rng)
 
 
 def step(

@@ -41,10 +41,24 @@ class RoughConstantReflection(rt.RadioMaterial):  # type: ignore[misc]
         return kept_components(mi.Float(self._reflection), to_world @ ki_local, to_world @ ko_local)
 
 
+def slab_of_ones_own(name: str, material: Material, scattering: float) -> rt.RadioMaterial:
+    """Sionna's slab of a given permittivity and conductivity."""
+    return rt.RadioMaterial(
+        name,
+        thickness=material.thickness,
+        relative_permittivity=material.permittivity,
+        conductivity=material.conductivity,
+        scattering_coefficient=scattering,
+    )
+
+
 def rough_material(material: Material, number: int, scattering: float) -> rt.RadioMaterialBase:
-    """The radio material of a wall with scattering coefficient S in [0, 1]."""
+    """The radio material of a wall with scattering coefficient S in [0, 1]; a material's own S goes before it."""
+    scattering = material.scattering or scattering
     if material.reflection is not None:
         return RoughConstantReflection(f"rough-{number}", material.reflection, scattering)
+    if material.permittivity is not None:
+        return slab_of_ones_own(f"slab-{number}", material, scattering)
     try:
         return rt.ITURadioMaterial(f"itu-{number}", material.itu, material.thickness, scattering_coefficient=scattering)
     except ValueError as error:

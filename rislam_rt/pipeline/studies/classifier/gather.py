@@ -9,7 +9,7 @@ from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.design.single import exact_code
 from rislam_rt.measurement import ReceiverConfig, TrackingConfig, init_tracks, measure, step_tracks
-from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, RisSpec, Trajectory
+from rislam_rt.model import DataSheet, PathKind, Paths, RadioConfig, RisCode, Trajectory
 from rislam_rt.ris import rephase
 from rislam_rt.slam.classify import Sightings, track_features
 
@@ -61,7 +61,7 @@ def join(parts: list[Examples]) -> Examples:
     return Examples._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
 
 
-def set_codes(paths: Paths, panel: RisSpec | None, policy: str, *, rng: np.random.Generator) -> Paths:
+def set_codes(paths: Paths, panel: DataSheet | None, policy: str, *, rng: np.random.Generator) -> Paths:
     """The paths of a walk under the codes of a policy."""
     if panel is None or paths.ris is None:
         return paths
@@ -72,7 +72,7 @@ def set_codes(paths: Paths, panel: RisSpec | None, policy: str, *, rng: np.rando
     return rephase(paths, RisCode(index, panel.levels))
 
 
-def _best_codes(paths: Paths, panel: RisSpec) -> Integers:
+def _best_codes(paths: Paths, panel: DataSheet) -> Integers:
     """(K, N, M) codes of largest gain for the direct path; zero where it is hidden."""
     assert paths.ris is not None
     column = int(np.flatnonzero(paths.kind == PathKind.RIS)[0])

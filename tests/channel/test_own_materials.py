@@ -1,0 +1,98 @@
+"""Materials of one's own: permittivity, conductivity, thickness, scattering; the same in both channels."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rislam_rt import load_scene
+from rislam_rt.channel.compare.channels import compare_channels
+from rislam_rt.channel.image_source import ImageSourceChannel
+from rislam_rt.errors import SceneError
+from rislam_rt.model import Material, RadioConfig, Scene
+from rislam_rt.model.itu import itu_parameters
+from rislam_rt.scene import check_scene
+from rislam_rt.scene.load import scene_file
+
+RADIO = RadioConfig()
+
+
+def coated(scene: Scene, *materials: Material) -> Scene:
+    """A scene whose reflectors take turns with materials."""
+    turns = [materials[n % len(materials)] for n in range(len(scene.reflectors))]
+    reflectors = tuple(replace(r, material=m) for r, m in zip(scene.reflectors, turns, strict=True))
+    return replace(scene, reflectors=reflectors)
+
+
+def gains(scene: Scene, depth: int = 2) -> np.ndarray:
+    """Gains and bounces of the first cycle's paths."""
+    paths = ImageSourceChannel(scene, RADIO, depth).paths(scene.agent[:1])
+    bounces = (paths.tx_walls >= 0).sum(axis=1) + (paths.rx_walls >= 0).sum(axis=1)
+    return paths.gain[0], bounces
+
+
+@pytest.mark.parametrize("name", ["concrete", "glass", "metal"])
+def test_the_numbers_of_an_itu_material_are_that_material(name):
+    """P.2040's own formulas for the two numbers, written out here."""
+    a, b, c, d = itu_parameters(name, RADIO.carrier)
+    room = load_scene("itu_room")
+    itu, _ = gains(coated(room, Material(itu=name, thickness=0.07)))
+    own, _ = gains(coated(room, Material(permittivity=a * 10.0**b, conductivity=c * 10.0**d, thickness=0.07)))
+    np.testing.assert_allclose(own, itu, rtol=1e-12)
+
+
+@pytest.mark.parametrize("smooth", [Material(reflection=0.8), Material(permittivity=4.5, conductivity=0.05)])
+def test_every_bounce_on_a_rough_wall_costs_what_it_scatters(smooth):
+    room = load_scene("empty_box")
+    plain, bounces = gains(coated(room, smooth))
+    rough, _ = gains(coated(room, replace(smooth, scattering=0.6)))
+    np.testing.assert_allclose(rough, plain * 0.8**bounces, rtol=1e-12)
+    assert set(bounces) == {0, 1, 2}
+
+
+def test_both_channels_agree_on_own_materials():
+    room = coated(
+        load_scene("itu_room"),
+        Material(permittivity=4.5, conductivity=0.05),
+        Material(permittivity=2.2, conductivity=0.0, thickness=0.013),
+        Material(reflection=0.7, scattering=0.3),
+        Material(itu="plasterboard", thickness=0.02, scattering=0.2),
+    )
+    report = compare_channels(room, RADIO, poses=3, depth=2, rng=np.random.default_rng(5), refine=False)
+    assert report.passed
+    assert report.matched > 300
+
+
+@pytest.mark.parametrize(
+    ("material", "words"),
+    [
+        ("{ permittivity = 4.5, itu = 'wood' }", "give one of 'reflection', 'itu' and 'permittivity'"),
+        ("{ reflection = 0.5, conductivity_s_m = 1.0 }", "'conductivity_s_m' has a meaning with 'permittivity' only"),
+        ("{ permittivity = 1.0 }", "is air"),
+        ("{ permittivity = 0.9 }", "greater than or equal to 1"),
+        ("{ reflection = 0.5, scattering = 1.0 }", "less than 1"),
+    ],
+)
+def test_a_bad_material_is_one_line(tmp_path, material, words):
+    text = scene_file("empty_box").read_text().replace("{ reflection = 0.85 }", material, 1)
+    (tmp_path / "scene.toml").write_text(text)
+    (tmp_path / "meshes").symlink_to(scene_file("empty_box").parent / "meshes")
+    lines = [finding.line for finding in check_scene(tmp_path)]
+    assert len(lines) == 1
+    assert words in lines[0]
+    assert "reflector[0].material" in lines[0]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"permittivity": 0.5},
+        {"permittivity": 1.0},
+        {"permittivity": 3.0, "conductivity": -1.0},
+        {"reflection": 0.5, "conductivity": 1.0},
+        {"reflection": 0.5, "scattering": 1.0},
+    ],
+)
+def test_a_material_in_memory_is_checked_too(wrong):
+    with pytest.raises(SceneError, match="material"):
+        Material(**wrong)
