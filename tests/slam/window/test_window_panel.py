@@ -1,4 +1,4 @@
-"""Who the panel is: one cycle's evidence against quadrature, silence, what alternated codes tell, and whom to suspect."""
+"""Who the panel is: evidence against quadrature, silence, what alternated codes tell, and whom to suspect."""
 
 from dataclasses import replace
 from pathlib import Path
