@@ -23,7 +23,8 @@ def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
         return ahead
     mean, _ = gauss.now(state.window)
     poses = poses_of(mean[:3], np.asarray(state.heading[-1] + mean[6]), state.scene.body)
-    return replace(ahead, suspect=find_suspect(state.tracks, state.book, mean, state.cycle - 1, poses))
+    suspect = find_suspect(state.tracks, state.book, mean, state.cycle - 1, poses)
+    return replace(ahead, suspects=() if suspect is None else (suspect,))
 
 
 def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> SlamEstimate:
