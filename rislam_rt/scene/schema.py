@@ -156,12 +156,28 @@ class RisSection(Section):
     host: Name | None = None
 
 
+class WalkSection(Section):
+    """A walk at random through the room, level, from the agent's start."""
+
+    seed: Annotated[int, Field(ge=0, lt=2**63)]
+    clearance_m: Length = 0.4
+    """Least distance from every surface."""
+
+
 class AgentSection(Section):
-    """The agent's true motion: straight from `start` with `velocity`, or along a TUM file `trajectory`."""
+    """The agent's true motion, one of four: straight from `start` with `velocity`; recorded, `trajectory`, a TUM or CSV
+    file; along `waypoints`; or a `random_walk`."""
 
     start: Vector | None = None
     velocity: Vector | None = None
     trajectory: str | None = None
+    columns: dict[str, str] | None = None
+    """What the columns of a CSV file are called, where not as `recorded.COLUMNS`."""
+    waypoints: Annotated[list[Vector], Field(min_length=2, max_length=10_000)] | None = None
+    random_walk: WalkSection | None = None
+    speed_m_s: Length | None = None
+    acceleration_m_s2: Length = 0.5
+    """At the corners of a way: their arcs have the radius speed squared over this."""
     cycles: Count | None = None
     cycle_s: Length | None = None
     tx_offset_m: Vector | None = None
@@ -169,12 +185,30 @@ class AgentSection(Section):
 
     @model_validator(mode="after")
     def _one_motion(self) -> "AgentSection":
-        if (self.velocity is None) == (self.trajectory is None):
-            raise ValueError("give either 'velocity' or 'trajectory'")
-        straight = (self.start, self.cycles, self.cycle_s)
-        if self.velocity is not None and any(value is None for value in straight):
-            raise ValueError("'velocity' needs 'start', 'cycles' and 'cycle_s' beside it")
+        given = [name for name in MOTIONS if getattr(self, name) is not None]
+        if len(given) != 1:
+            received = f"{' and '.join(map(repr, given))} given; " if given else ""
+            raise ValueError(f"{received}give one of {', '.join(map(repr, MOTIONS))}")
+        missing = [name for name in MOTIONS[given[0]] if getattr(self, name) is None]
+        if missing:
+            raise ValueError(f"'{given[0]}' needs {', '.join(map(repr, missing))} beside it")
+        if self.waypoints is not None and self.start is not None:
+            raise ValueError("the first waypoint is the start; leave 'start' out")
+        if self.speed_m_s is not None and given[0] not in ("waypoints", "random_walk"):
+            raise ValueError(f"'speed_m_s' means nothing with '{given[0]}'; leave it out")
+        unknown = set(self.columns or ()) - {"time", "x", "y", "z", "heading", "qx", "qy", "qz", "qw"}
+        if unknown:
+            raise ValueError(f"columns: '{min(unknown)[:20]}' is none of time, x, y, z, heading, qx, qy, qz, qw")
         return self
+
+
+MOTIONS = {
+    "velocity": ("start", "cycles", "cycle_s"),
+    "trajectory": (),
+    "waypoints": ("speed_m_s", "cycle_s"),
+    "random_walk": ("start", "speed_m_s", "cycles", "cycle_s"),
+}
+"""Keys of a motion, one of which is given, and what each needs beside it."""
 
 
 class LimitsSection(Section):
@@ -301,7 +335,7 @@ def _remark(item: Any, lone_panel: bool) -> str:
 
 def _known_keys() -> list[str]:
     sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, ShadeSection, MeshesSection,
-                RisSection, AgentSection, LimitsSection)  # fmt: skip
+                RisSection, AgentSection, WalkSection, LimitsSection)  # fmt: skip
     return [key for section in sections for key in section.model_fields]
 
 

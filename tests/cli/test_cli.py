@@ -248,7 +248,9 @@ def test_interrupted_run_goes_on(run, tmp_path, monkeypatch, blow):
     assert err.splitlines()[-1] == "interrupted: 1 schemes kept; the same command goes on from there"
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     (folder,) = (tmp_path / "runs").iterdir()
-    assert sorted(path.name for path in folder.iterdir()) == ["run.json", "scheme_optimized.nc"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "measurements_optimized.nc", "run.json", "scheme_optimized.nc",
+    ]  # fmt: skip
     assert run("report", folder)[0] == 2
     assert run("run", PIPELINE, *SHORT, "--no-report", "--jobs", 1)[0] == 0
     assert seen == ["optimized", "random", "random"]

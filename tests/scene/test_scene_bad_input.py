@@ -68,7 +68,11 @@ def refusal(folder: Path) -> str:
         ("start = [0.5, 0.7, 0.5]", "start = {x = 1}", "agent.start"),
         ("cycles = 600", "cycles = 100000000000", "agent.cycles"),
         ("cycle_s = 0.1", "cycle_s = 0.0", "agent.cycle_s: 0.0 received"),
-        ("velocity = [0.0707, 0.0707, 0.0]", "", "agent: give either 'velocity' or 'trajectory'"),
+        (
+            "velocity = [0.0707, 0.0707, 0.0]",
+            "",
+            "agent: give one of 'velocity', 'trajectory', 'waypoints', 'random_walk'",
+        ),
         ("tx_offset_m = [-0.04388, -0.02397, 0.0]", "tx_offset_m = [0.04388, 0.02397, 0.0]", "Tx and Rx coincide"),
         ('name = "paper_room"', "name = ", "not valid TOML"),
         ('name = "paper_room"', "x = " + "[" * 5000, "not valid TOML"),
