@@ -53,6 +53,10 @@ def command(
         float, typer.Option(min=0.0, max=1e4, help="What is flat but narrower than this many wavelengths shades.")
     ] = 3.0,
     curved: Annotated[Literal["shade", "planes"], typer.Option(help="What cylinders become.")] = "shade",
+    scan: Annotated[
+        bool | None, typer.Option("--scan/--no-scan", help="The mesh is a scan, with noise; as it looks without it.")
+    ] = None,
+    fill: Annotated[float, typer.Option(min=0.0, help="Holes of a scan up to this are filled [m^2].")] = 1.0,
     max_walls: Annotated[int, typer.Option(min=4, max=10_000, help="Of a file with more the widest reflect.")] = 150,
 ) -> None:  # fmt: skip
     """Make a scene folder from a built-in room, of a random one, or from a file of another program, to be edited."""
@@ -71,8 +75,8 @@ def command(
         from rislam_rt.scene.importing.materials import parse_choices, parse_material
 
         options = ImportOptions(
-            units=units, up=up, origin=_point(origin), carrier_ghz=carrier_ghz, detail=detail, curved=curved,
-            max_walls=max_walls, materials=parse_choices(material or []), rest=parse_material(rest),
+            units=units, up=up, origin=_point(origin), carrier_ghz=carrier_ghz, detail=detail, curved=curved, scan=scan,
+            max_walls=max_walls, fill=fill, materials=parse_choices(material or []), rest=parse_material(rest),
         )  # fmt: skip
         remarks = (
             import_room(source, scene, options, height=height, overwrite=overwrite)
