@@ -4,12 +4,13 @@
     python benchmarks/import_gauntlet.py --only scan       one of them
     python benchmarks/import_gauntlet.py --keep FOLDER     files, rooms and runs stay there
 
-(a) `glb`: a furnished room as one mesh of more than 20 000 triangles in millimetres, y up: round table, six chairs, column,
-cabinet, a ball. (b) `obj`, (c) `stl`, (d) `ply`: the same. (e) `planes`: the same with its column as planes. (f) `svg`:
-a floor plan of five rooms with doors and windows, centimetres. (g) `scan`: a room scanned with 5 mm of noise and holes.
-A row holds triangles, walls, CPU seconds of each command (all processes, libraries' start included), paths that match and
-paths that nothing explains, and what the importer says of its errors. Exit code 1 where a command fails, paths are
-unexplained, or a check takes 5 s or more.
+(a) `glb`: a furnished room as one mesh of more than 20 000 triangles in millimetres, y up: round table, six chairs,
+column, cabinet, a ball. (b) `obj`, (c) `stl`, (d) `ply`: the same. (e) `planes`: the same with its column as planes.
+(f) `svg`: a floor plan of five rooms with doors and windows, centimetres. (g) `scan`: a room scanned with 5 mm of noise
+and holes.
+A row holds walls and shades, CPU seconds of each command (all processes, libraries' start included), paths that match,
+paths that nothing explains, and the agent's error; before it stands what the importer says. Exit code 1 where a command
+fails, paths are unexplained, or a check takes 5 s or more.
 """
 
 import argparse

@@ -185,8 +185,8 @@ def test_no_file_a_folder_and_too_large_a_one(tmp_path: Path, refuses: Callable[
 
 def test_the_same_box_sound_is_a_room(tmp_path: Path) -> None:
     """What the cases above are damaged copies of; a material library that is missing is a remark alone."""
-    files = {"a.gltf": json.dumps(gltf()).encode(), "b.stl": stl(BOX.vertices[BOX.faces]),
-             "c.ply": ply(BOX.vertices, BOX.faces), "d.obj": ("mtllib gone.mtl\nusemtl Oak\n" + OBJ).encode()}  # fmt: skip
+    files = {"a.gltf": json.dumps(gltf()).encode(), "b.stl": stl(BOX.vertices[BOX.faces])}
+    files |= {"c.ply": ply(BOX.vertices, BOX.faces), "d.obj": ("mtllib gone.mtl\nusemtl Oak\n" + OBJ).encode()}
     for name, content in files.items():
         (tmp_path / name).write_bytes(content)
         remarks = import_room(tmp_path / name, tmp_path / name[0], ImportOptions())
