@@ -62,8 +62,8 @@ def material_element(material: Material | None, name: str) -> Element:
     """A `<bsdf>` that Sionna reads: its own ITU slab, a slab of given permittivity, or air for None.
 
     A constant R has no counterpart that Sionna's `load_scene` knows; what comes nearest is `Material.as_body`. What
-    only hides is a slab of air, which Sionna's rays do not pass unless refraction is on: in Sionna RT 2.2.0 no frequency
-    can be set where there is an `absorber-radio-material`.
+    only hides is a slab of air, which Sionna's rays do not pass unless refraction is on: in Sionna RT 2.2.0 no
+    frequency can be set where there is an `absorber-radio-material`.
     """
     if material is None:
         return Element("bsdf", {"type": "radio-material", "id": name})
