@@ -47,7 +47,10 @@ def command(
     curved: Annotated[Literal["shade", "planes"], typer.Option(help="What cylinders become.")] = "shade",
     max_walls: Annotated[int, typer.Option(min=4, max=10_000, help="Of a file with more the widest reflect.")] = 150,
 ) -> None:  # fmt: skip
-    """Make a scene folder from a built-in room, of a random one, or from a file of another program, to be edited."""
+    """Make a scene folder from a built-in room, of a random one, or from a file of another program, to be edited.
+
+    Example: rislam-rt new myroom --template two_scatterers
+    """
     from rislam_rt.scene import new_scene, write_scene
 
     if source is not None or floorplan is not None:
