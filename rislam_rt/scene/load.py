@@ -225,13 +225,20 @@ def _panels(sections: list[RisSection], file: str, findings: list[Finding]) -> t
     panels = []
     for number, section in enumerate(sections):
         try:
-            panels.append(_panel(section))
+            panels.append(build_panel(section))
         except Fault as fault:
             findings.append(fault.at(file, f"{panel_key(number, len(sections))}.up"))
     return tuple(panels)
 
 
-def _panel(section: RisSection) -> RisPanel:
+def build_panel(section: RisSection) -> RisPanel:
+    """The panel of a section.
+
+    Raises
+    ------
+    Fault
+        Its directions have no length, or are not at right angles.
+    """
     normal, up = unit(np.array(section.normal)), unit(np.array(section.up))
     if not normal.any() or not up.any():
         raise Fault("ris.normal or ris.up has no length", "give two directions")

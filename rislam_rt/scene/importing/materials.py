@@ -102,6 +102,14 @@ class Palette:
                 return table
         return None
 
+    def remarks(self) -> list[str]:
+        """What was assumed, on one line, if anything."""
+        if not self.assumed:
+            return []
+        names, what = sorted(self.assumed), ", ".join(f"{value}" for value in self.rest.values())
+        more = f" and {len(names) - 8} more" if len(names) > 8 else ""
+        return [f"material unknown, taken as {what}: {', '.join(names[:8])}{more} (--material NAME=...)"]
+
     def unused(self) -> list[str]:
         """Patterns that nothing matched."""
         return sorted(set(self.choices) - self.used)

@@ -11,6 +11,7 @@ from rislam_rt.slam.window.expect import Expected
 from rislam_rt.slam.window.forms import UNKNOWN
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals
+from rislam_rt.slam.window.panel import unknown
 from rislam_rt.slam.window.tracks import Tracks
 
 RECENT = 5
@@ -53,7 +54,7 @@ def _resume(tracks: Tracks, log: Log, lost: Booleans, cycle: int) -> tuple[Track
         track[rows] = ident
         fresh.append((
             ident, best.T, spread, log.log_amplitude[late[-1]], log.side[late[-1]], log.cycle[rows[0]],
-            log.cycle[late[-1]], len(rows), 0,
+            log.cycle[late[-1]], len(rows), 0, *(field[0] for field in unknown(1)),
         ))  # fmt: skip
         ident += 1
     if not fresh:
