@@ -194,6 +194,8 @@ def _material(section: MaterialSection) -> Material:
         section.itu,
         permittivity=section.permittivity,
         conductivity=section.conductivity_s_m or 0.0,
+        reflection_te=section.reflection_te,
+        reflection_tm=section.reflection_tm,
         scattering=section.scattering,
         **given,
     )

@@ -50,7 +50,11 @@ def refusal(folder: Path) -> str:
         ("radius = 0.05", "", "scatterer[0]: give 'radius' or 'rcs_m2'"),
         ("radius = 0.05", "rcs_m2 = nan", "scatterer[0].rcs_m2: nan received"),
         ("reflection = 0.85", "reflection = 1.5", "reflector[0].material.reflection: 1.5 received"),
-        ("reflection = 0.85", "", "reflector[0].material: give one of 'reflection', 'itu' and 'permittivity'"),
+        (
+            "reflection = 0.85",
+            "",
+            "reflector[0].material: give one of 'reflection', 'itu', 'permittivity' and 'reflection_te'",
+        ),
         ("reflection = 0.85", 'itu = "cheese"', "reflector[0].material.itu: 'cheese' received"),
         ("rows = 6", "rows = 0", "ris.rows: 0 received"),
         ("rows = 6", "rows = 6.5", "ris.rows: 6.5 received"),
