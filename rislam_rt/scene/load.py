@@ -1,21 +1,25 @@
 """From a scene folder to a `Scene`."""
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from rislam_rt.arrays import Floats
 from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade, join_panels
 from rislam_rt.scene.check import find_errors, find_warnings, material_errors
+from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
 from rislam_rt.scene.containers import too_many_faces
-from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
+from rislam_rt.scene.findings import Fault, Faults, Finding, panel_key, raise_errors
 from rislam_rt.scene.lying import UNITS, place_mesh
 from rislam_rt.scene.meshes import MAX_COORDINATE, MAX_MESH_BYTES, Mesh, MeshReader, read_inside
 from rislam_rt.scene.motion import build_motion
 from rislam_rt.scene.schema import (
+    MAX_SCENE_BYTES,
     LimitsSection,
     MaterialSection,
     MeshesSection,
@@ -28,6 +32,7 @@ from rislam_rt.scene.schema import (
 )
 from rislam_rt.scene.solids import solid_mesh
 from rislam_rt.shipped import find_room
+from rislam_rt.toml import parse_toml
 
 SCENE_FILE = "scene.toml"
 
@@ -38,6 +43,8 @@ class Draft(NamedTuple):
     file: str
     scene: Scene | None
     findings: list[Finding]
+    bounds: Floats | None = None
+    """(2, 3) [m] of the meshes that could be read."""
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -60,16 +67,32 @@ def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> 
     """Everything wrong (errors), suspicious (warnings) or worth knowing (notes) about a scene, or a scene folder.
 
     A bad scene is an answer, not an exception. Materials are held against the carrier of a radio that is given;
-    warnings about the panel depend on the radio too, the default one if none is given. Where there are errors, warnings
-    are not looked for.
+    warnings about the panel depend on the radio too, the default one if none is given. Where there are errors, of the
+    warnings only those about units are looked for: such a mistake often is what the errors come from.
     """
-    draft = Draft(scene.name, scene, []) if isinstance(scene, Scene) else read_draft(scene)
-    if draft.scene is None:
-        return draft.findings
-    errors = find_errors(draft.scene, draft.file)
+    if isinstance(scene, Scene):
+        return _look_at(scene, scene.name, radio)
+    draft = read_draft(scene)
+    findings = draft.findings if draft.scene is None else _look_at(draft.scene, draft.file, radio)
+    units = list(unit_warnings(draft.file, _plain_table(Path(draft.file)), draft.bounds))
+    if any(finding.severity == "error" for finding in findings):
+        return findings + units
+    return findings + [finding for finding in units if finding.field != SPEED_FIELD]  # the motion's own warning says it
+
+
+def _look_at(scene: Scene, file: str, radio: RadioConfig | None) -> list[Finding]:
+    errors = find_errors(scene, file)
     if radio is not None:
-        errors += material_errors(draft.scene, draft.file, radio)
-    return errors or find_warnings(draft.scene, draft.file, radio or RadioConfig())
+        errors += material_errors(scene, file, radio)
+    return errors or find_warnings(scene, file, radio or RadioConfig())
+
+
+def _plain_table(file: Path) -> dict[str, Any]:
+    """The scene file as TOML gives it; empty if it is none."""
+    try:
+        return parse_toml(file.read_bytes()[: MAX_SCENE_BYTES + 1].decode())
+    except (OSError, ValueError):
+        return {}
 
 
 def read_draft(path: str | Path) -> Draft:
@@ -77,6 +100,8 @@ def read_draft(path: str | Path) -> Draft:
     file = scene_file(path)
     try:
         spec, content = read_spec(file)
+    except Faults as faults:
+        return Draft(str(file), None, [fault.at(str(file), "") for fault in faults.faults])
     except Fault as fault:
         return Draft(str(file), None, [fault.at(str(file), "")])
     return assemble(spec, file, content)
@@ -112,15 +137,24 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
             findings.append(fault.at(str(file), f"shade[{number}].mesh ({shade.name})"))
     panels = _panels(spec.ris, str(file), findings)
     try:
-        agent, shelf.contents["trajectory"] = build_motion(spec.agent, file.parent)
+        if not (findings and spec.agent.random_walk):  # which needs the whole room
+            surfaces = _surfaces(reflectors, [*shades, *(s.shade for s in scatterers if s.shade)])
+            agent, shelf.contents["trajectory"] = build_motion(spec.agent, file.parent, surfaces)
     except Fault as fault:
         findings.append(fault.at(str(file), "agent"))
+    corners = np.concatenate([np.zeros((0, 3)), *(reflector.vertices for reflector in reflectors)])
+    bounds = np.stack([corners.min(axis=0), corners.max(axis=0)]) if len(corners) else None
     if findings:
-        return Draft(str(file), None, findings)
+        return Draft(str(file), None, findings, bounds)
     ris = join_panels(panels)
     digest = _digest(content, shelf.contents)
     scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(shades))
-    return Draft(str(file), scene, [])
+    return Draft(str(file), scene, [], bounds)
+
+
+def _surfaces(reflectors: Sequence[Reflector], shades: Sequence[Shade]) -> Floats:
+    """(T, 3, 3) [m] of all that stands in an agent's way."""
+    return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in shades)])
 
 
 class Shelf:
@@ -160,6 +194,8 @@ def _material(section: MaterialSection) -> Material:
         section.itu,
         permittivity=section.permittivity,
         conductivity=section.conductivity_s_m or 0.0,
+        reflection_te=section.reflection_te,
+        reflection_tm=section.reflection_tm,
         scattering=section.scattering,
         **given,
     )
@@ -191,13 +227,20 @@ def _panels(sections: list[RisSection], file: str, findings: list[Finding]) -> t
     panels = []
     for number, section in enumerate(sections):
         try:
-            panels.append(_panel(section))
+            panels.append(build_panel(section))
         except Fault as fault:
             findings.append(fault.at(file, f"{panel_key(number, len(sections))}.up"))
     return tuple(panels)
 
 
-def _panel(section: RisSection) -> RisPanel:
+def build_panel(section: RisSection) -> RisPanel:
+    """The panel of a section.
+
+    Raises
+    ------
+    Fault
+        Its directions have no length, or are not at right angles.
+    """
     normal, up = unit(np.array(section.normal)), unit(np.array(section.up))
     if not normal.any() or not up.any():
         raise Fault("ris.normal or ris.up has no length", "give two directions")

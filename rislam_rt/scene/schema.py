@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.scene.findings import Fault, Faults, one_line
 from rislam_rt.toml import parse_toml
 
 MAX_SCENE_BYTES = 4_000_000
@@ -44,8 +44,9 @@ class Section(BaseModel):
 
 
 class MaterialSection(Section):
-    """One of `reflection` (the same at every angle), `itu`, a slab of an ITU-R P.2040 material, and `permittivity`
-    (relative, with `conductivity_s_m`), a slab of one's own. `scattering` takes a share from the mirrored ray.
+    """One of `reflection` (the same at every angle), `reflection_te` with `reflection_tm` (one for each polarisation),
+    `itu`, a slab of an ITU-R P.2040 material, and `permittivity` (relative, with `conductivity_s_m`), a slab of one's
+    own. `scattering` takes a share from the mirrored ray.
     """
 
     reflection: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
@@ -53,13 +54,19 @@ class MaterialSection(Section):
     permittivity: Annotated[float, Field(ge=1.0, le=1e6, allow_inf_nan=False)] | None = None
     conductivity_s_m: Annotated[float, Field(ge=0.0, le=1e9, allow_inf_nan=False)] | None = None
     thickness_m: Length | None = None
+    reflection_te: Annotated[float, Field(ge=-1.0, le=1.0)] | None = None
+    reflection_tm: Annotated[float, Field(ge=-1.0, le=1.0)] | None = None
     scattering: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
 
     @model_validator(mode="after")
     def _one_kind(self) -> "MaterialSection":
-        if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity)) != 1:
-            raise ValueError("give one of 'reflection', 'itu' and 'permittivity'")
-        if self.reflection is not None and self.thickness_m is not None:
+        if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity, self.reflection_te)) != 1:
+            raise ValueError("give one of 'reflection', 'itu', 'permittivity' and 'reflection_te'")
+        if (self.reflection_te is None) != (self.reflection_tm is None) or 0.0 in (
+            self.reflection_te, self.reflection_tm
+        ):  # fmt: skip
+            raise ValueError("give 'reflection_te' and 'reflection_tm' together, neither of them 0")
+        if self.itu is None and self.permittivity is None and self.thickness_m is not None:
             raise ValueError("'thickness_m' has a meaning with 'itu' or 'permittivity' only")
         if self.permittivity is None and self.conductivity_s_m is not None:
             raise ValueError("'conductivity_s_m' has a meaning with 'permittivity' only")
@@ -156,12 +163,28 @@ class RisSection(Section):
     host: Name | None = None
 
 
+class WalkSection(Section):
+    """A walk at random through the room, level, from the agent's start."""
+
+    seed: Annotated[int, Field(ge=0, lt=2**63)]
+    clearance_m: Length = 0.4
+    """Least distance from every surface."""
+
+
 class AgentSection(Section):
-    """The agent's true motion: straight from `start` with `velocity`, or along a TUM file `trajectory`."""
+    """The agent's true motion, one of four: straight from `start` with `velocity`; recorded, `trajectory`, a TUM or CSV
+    file; along `waypoints`; or a `random_walk`."""
 
     start: Vector | None = None
     velocity: Vector | None = None
     trajectory: str | None = None
+    columns: dict[str, str] | None = None
+    """What the columns of a CSV file are called, where not as `recorded.COLUMNS`."""
+    waypoints: Annotated[list[Vector], Field(min_length=2, max_length=10_000)] | None = None
+    random_walk: WalkSection | None = None
+    speed_m_s: Length | None = None
+    acceleration_m_s2: Length = 0.5
+    """At the corners of a way: their arcs have the radius speed squared over this."""
     cycles: Count | None = None
     cycle_s: Length | None = None
     tx_offset_m: Vector | None = None
@@ -169,12 +192,30 @@ class AgentSection(Section):
 
     @model_validator(mode="after")
     def _one_motion(self) -> "AgentSection":
-        if (self.velocity is None) == (self.trajectory is None):
-            raise ValueError("give either 'velocity' or 'trajectory'")
-        straight = (self.start, self.cycles, self.cycle_s)
-        if self.velocity is not None and any(value is None for value in straight):
-            raise ValueError("'velocity' needs 'start', 'cycles' and 'cycle_s' beside it")
+        given = [name for name in MOTIONS if getattr(self, name) is not None]
+        if len(given) != 1:
+            received = f"{' and '.join(map(repr, given))} given; " if given else ""
+            raise ValueError(f"{received}give one of {', '.join(map(repr, MOTIONS))}")
+        missing = [name for name in MOTIONS[given[0]] if getattr(self, name) is None]
+        if missing:
+            raise ValueError(f"'{given[0]}' needs {', '.join(map(repr, missing))} beside it")
+        if self.waypoints is not None and self.start is not None:
+            raise ValueError("the first waypoint is the start; leave 'start' out")
+        if self.speed_m_s is not None and given[0] not in ("waypoints", "random_walk"):
+            raise ValueError(f"'speed_m_s' means nothing with '{given[0]}'; leave it out")
+        unknown = set(self.columns or ()) - {"time", "x", "y", "z", "heading", "qx", "qy", "qz", "qw"}
+        if unknown:
+            raise ValueError(f"columns: '{min(unknown)[:20]}' is none of time, x, y, z, heading, qx, qy, qz, qw")
         return self
+
+
+MOTIONS = {
+    "velocity": ("start", "cycles", "cycle_s"),
+    "trajectory": (),
+    "waypoints": ("speed_m_s", "cycle_s"),
+    "random_walk": ("start", "speed_m_s", "cycles", "cycle_s"),
+}
+"""Keys of a motion, one of which is given, and what each needs beside it."""
 
 
 class LimitsSection(Section):
@@ -250,15 +291,15 @@ def validate_spec(table: dict[str, Any]) -> SceneSpec:
 
     Raises
     ------
-    Fault
-        Fields are missing, unknown or out of range; all of them in one line.
+    Faults
+        Fields are missing, unknown or out of range: one fault a field.
     """
     try:
         return SceneSpec.model_validate(table)
     except ValidationError as error:
         lone = isinstance(table.get("ris"), dict)
         remarks = [_remark(item, lone) for item in error.errors(include_url=False, include_context=False)]
-    raise Fault("; ".join(remarks[:8]), f"mend these {len(remarks)} fields" if len(remarks) > 1 else "mend this field")
+    raise Faults([Fault(remark, "mend this field") for remark in remarks])
 
 
 def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
@@ -266,7 +307,7 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
 
     Raises
     ------
-    Fault
+    Fault, Faults
         The file cannot be read or its content is not a scene.
     """
     if not path.is_file():
@@ -301,7 +342,7 @@ def _remark(item: Any, lone_panel: bool) -> str:
 
 def _known_keys() -> list[str]:
     sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, ShadeSection, MeshesSection,
-                RisSection, AgentSection, LimitsSection)  # fmt: skip
+                RisSection, AgentSection, WalkSection, LimitsSection)  # fmt: skip
     return [key for section in sections for key in section.model_fields]
 
 

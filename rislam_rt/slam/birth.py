@@ -310,10 +310,8 @@ def _images(history: History, scene: Scene) -> list[Verdict]:
     """The image of each known point in a new wall on the Rx leg."""
     verdicts = []
     for kind in (IMAGE, TWIN):
-        starts = {
-            int(p): first_guess(kind, scene.features[p], scene.anchor, history)
-            for p in _sources(scene.book, history.side)
-        }
+        sources = _sources(scene.book, history.side)
+        starts = {int(p): first_guess(kind, scene.features[p], scene.anchor, history) for p in sources}
         good = {p: start for p, start in starts.items() if start is not None}
         if kind is TWIN:  # a wall far from throwing both into one cell is not worth a fit
             good = {p: start for p, start in good.items() if _one_cell(start, scene.features[p], scene, history, 2.0)}

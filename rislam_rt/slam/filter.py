@@ -16,7 +16,7 @@ from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.engine import Told, engine_of
 from rislam_rt.slam.expect import Belief, expected_returns, shown_share
 from rislam_rt.slam.health import Health, check
-from rislam_rt.slam.inputs import check_step
+from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.learn import Hits, learn
 from rislam_rt.slam.match import Outlook, candidates, hidden_tracks, look_ahead
 from rislam_rt.slam.moments import POSE, Moments, poses_of
@@ -140,9 +140,10 @@ def step(
     Raises
     ------
     ConfigError
-        One of them is no number, or not of the panel.
+        One of them is no number, or not of the panel; or a component's panel is not named.
     """
     check_step(dt, heading, code, state.ris)
+    check_sides(measurement, state.ris)
     state = _move(state, dt, heading, config, rng=rng)
     glance = glance_of(measurement, state.radio)
     landmark = np.where(is_los(glance, state.body), REMOVED, UNUSED)

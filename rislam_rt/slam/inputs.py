@@ -3,7 +3,7 @@
 import math
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.model import DataSheet, RisCode, RisSpec, RisSpecs
+from rislam_rt.model import DataSheet, Measurement, RisCode, RisSpec, RisSpecs
 
 MAX_STEP = 1e6
 """[s] Twelve days; the squares of longer steps leave nothing of what was known."""
@@ -23,6 +23,20 @@ def lone_panel(ris: DataSheet | None) -> RisSpec | None:
             "give 'rao_blackwellised'"
         )
     return ris
+
+
+def check_sides(measurement: Measurement, ris: DataSheet | None) -> None:
+    """Check that a measurement which tells the panels' components says which of several they ran over.
+
+    Raises
+    ------
+    ConfigError
+        It does not.
+    """
+    if measurement.from_panel is not None and measurement.panel is None and isinstance(ris, RisSpecs):
+        raise ConfigError(
+            f"measurement.panel: missing, with from_panel and {len(ris.panels)} panels; give both or none"
+        )
 
 
 def check_step(dt: float, heading: float, code: RisCode | None = None, ris: DataSheet | None = None) -> None:

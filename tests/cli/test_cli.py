@@ -131,7 +131,7 @@ def test_missing_library_is_one_line_and_exit_3(tmp_path):
     environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(tmp_path / "libLLVM.so")}
     for words in (["doctor"], ["run", PIPELINE], ["trace", SCENE]):
         done = subprocess.run(
-            [sys.executable, "-m", "rislam_rt.cli", *map(str, words)],
+            [sys.executable, "-m", "rislam_rt", *map(str, words)],
             capture_output=True, text=True, cwd=tmp_path, env=environment, check=False,
         )  # fmt: skip
         assert done.returncode == 3
@@ -248,7 +248,9 @@ def test_interrupted_run_goes_on(run, tmp_path, monkeypatch, blow):
     assert err.splitlines()[-1] == "interrupted: 1 schemes kept; the same command goes on from there"
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     (folder,) = (tmp_path / "runs").iterdir()
-    assert sorted(path.name for path in folder.iterdir()) == ["run.json", "scheme_optimized.nc"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "measurements_optimized.nc", "run.json", "scheme_optimized.nc",
+    ]  # fmt: skip
     assert run("report", folder)[0] == 2
     assert run("run", PIPELINE, *SHORT, "--no-report", "--jobs", 1)[0] == 0
     assert seen == ["optimized", "random", "random"]

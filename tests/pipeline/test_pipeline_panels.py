@@ -10,6 +10,7 @@ import rislam_rt
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.dataset import dataset_to_paths, dataset_to_scheme, paths_to_dataset, scheme_to_dataset
+from rislam_rt.pipeline.inputs import dataset_to_inputs, inputs_to_dataset
 from rislam_rt.pipeline.join import join_schemes, thinned_scheme
 from rislam_rt.pipeline.summary import landmark_scores, landmark_track
 from rislam_rt.report.verdict import panel_found_at
@@ -56,6 +57,10 @@ def test_which_panel_is_kept_in_the_files(result):
     paths = dataset_to_paths(paths_to_dataset(result.paths, result.scene.agent))
     np.testing.assert_array_equal(paths.panel, result.paths.panel)
     assert set(paths.panel.tolist()) == {-1, 0, 1}
+    given = dataset_to_inputs(inputs_to_dataset(scheme.given.inputs))
+    assert given.panel.num_elements == 100
+    for one, other in zip(given.measurements, scheme.given.inputs.measurements, strict=True):
+        np.testing.assert_array_equal(one.panel, other.panel)
     few = thinned_scheme(scheme, np.array([3, 29]))
     np.testing.assert_array_equal(few.panel, scheme.panel[[3, 29]])
     twice = join_schemes([scheme, scheme], [result.paths, result.paths])

@@ -23,7 +23,7 @@ from rislam_rt.pipeline.summary import (
 PER_CYCLE = [
     name
     for name, (dims, _, _) in SCHEME.items()
-    if dims[0] == "cycle" and not name.startswith("component") and name != "panel"  # of several panels alone
+    if dims[0] == "time" and not name.startswith("component") and name != "panel"  # of several panels alone
 ]
 
 

@@ -1,15 +1,18 @@
 """Which landmark is which panel: several data sheets, one point each at most."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
 
-from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec, RisSpecs, SensorModel
+from rislam_rt.errors import ConfigError
+from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec, RisSpecs, SensorModel
 from rislam_rt.slam.book import Book, empty_book, enter
 from rislam_rt.slam.expect import Belief
 from rislam_rt.slam.filter import side_of
 from rislam_rt.slam.identity import panel_probabilities, predicted_panel_gain
+from rislam_rt.slam.inputs import check_sides
 from rislam_rt.slam.match import return_sides
 from rislam_rt.slam.moments import POSE, Moments, poses_of
 from rislam_rt.slam.returns import TX, Returns, observe
@@ -125,3 +128,12 @@ def test_a_component_is_on_the_side_of_the_panel_that_it_likely_ran_over() -> No
     assert table.shape == (4, 2)
     assert (table[[0, 1], [0, 1]] > 6.0).all()
     assert (table[[0, 1, 3, 3], [1, 0, 0, 1]] < -6.0).all()
+
+
+def test_a_measurement_must_say_which_of_several_panels() -> None:
+    none = np.zeros(0)
+    told = Measurement(none, np.zeros((0, 2)), none, none, np.zeros((0, 2)), none, none)
+    check_sides(told, SHEET)
+    check_sides(replace(told, panel=np.zeros(0, dtype=np.int64)), SHEETS)
+    with pytest.raises(ConfigError, match=r"measurement.panel: missing"):
+        check_sides(told, SHEETS)

@@ -107,7 +107,7 @@ def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
     center, height = room.mean(axis=0), float(room[1, 2] - room[0, 2])
     if abs(normal[2]) >= LEVEL:
         share = (float(middle[2]) - float(room[0, 2])) / height if height else 0.0
-        return "floor" if share < 0.2 else "ceiling" if share > 0.7 else "level"
+        return "floor" if share < 0.2 else "ceiling" if share > 0.8 else "table_top" if share < 0.5 else "level"
     outward = normal * (1.0 if (middle - center) @ normal >= 0.0 else -1.0)
     eighth = int(np.round(np.degrees(np.arctan2(outward[1], outward[0])) / 45.0)) % 8
     side = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")[eighth]

@@ -42,6 +42,15 @@ def signed_area(corners: Floats) -> float:
     return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
 
 
+def inside_loop(corners: Floats, point: Floats) -> bool:
+    """Whether a polygon (n, 2) holds a point (2,), by the even-odd rule."""
+    a, b = corners, np.roll(corners, -1, axis=0)
+    spans = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+    return bool((spans & (at > point[0])).sum() % 2)
+
+
 def simplify_loop(loop: list[int], points: Floats, kept: Booleans, tolerance: float) -> list[int]:
     """The corners of a loop that matter: all that are `kept` (V,), and as few others as keep it within a tolerance.
 

@@ -165,20 +165,20 @@ def _with_clutter(
     raw, planes = [], _shell_planes(surfaces)
     for number, piece in enumerate(pieces):
         regions = piece.regions[rest[piece.regions]]
-        triangles = _off_planes(facets.mesh.vertices[facets.faces_of(regions)], planes)
+        triangles = off_planes(facets.mesh.vertices[facets.faces_of(regions)], planes)
         if len(triangles) and np.ptp(triangles.reshape(-1, 3), axis=0).max() >= narrow:
             raw.append(Clutter(number, triangles))
         else:
             gone += float(facets.area[regions].sum())
             rest[regions] = False
-    thin, error, cell = _in_cells(raw, wavelength)
-    shading = float(facets.area[rest].sum()) + sum(_area(clutter.triangles) for clutter in prisms)
-    thin = [Clutter(c.piece, _off_planes(c.triangles, planes)) for c in (*prisms, *thin)]
+    thin, error, cell = in_cells(raw, wavelength)
+    shading = float(facets.area[rest].sum()) + sum(surface_area(clutter.triangles) for clutter in prisms)
+    thin = [Clutter(c.piece, off_planes(c.triangles, planes)) for c in (*prisms, *thin)]
     thin = [clutter for clutter in thin if len(clutter.triangles)]
     return Sorted(surfaces, thin, error, cell, narrow, shading, gone, cylinders)
 
 
-def _in_cells(raw: list[Clutter], cell: float) -> tuple[list[Clutter], float, float]:
+def in_cells(raw: list[Clutter], cell: float) -> tuple[list[Clutter], float, float]:
     """Clutter thinned in cells of one size, the smallest with which it is few enough."""
     while True:
         found = [(clutter.piece, *clustered(clutter.triangles, cell)) for clutter in raw]
@@ -195,7 +195,7 @@ def _shell_planes(surfaces: list[Surface]) -> list[tuple[Floats, float]]:
     ]
 
 
-def _off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats:
+def off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats:
     """Triangles (T, 3, 3) without those that lie flat on a wall of the shell."""
     keep = has_area(triangles)
     for normal, offset in planes:
@@ -203,6 +203,7 @@ def _off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats
     return triangles[keep]
 
 
-def _area(triangles: Floats) -> float:
+def surface_area(triangles: Floats) -> float:
+    """Area [m^2] of triangles (T, 3, 3)."""
     edge = triangles[:, 1:] - triangles[:, :1]
     return 0.5 * float(np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1).sum())

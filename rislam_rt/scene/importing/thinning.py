@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.scene.importing.facets import Facets
-from rislam_rt.scene.importing.polygons import outline_loops, signed_area, simplify_loop, triangulate
+from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
 from rislam_rt.scene.importing.rounded import across
 from rislam_rt.scene.meshes import Mesh
 
@@ -75,13 +75,8 @@ def _around(hole: Floats, outers: list[Floats]) -> int | None:
 
 
 def _holds(outer: Floats, hole: Floats) -> bool:
-    """Whether a loop (n, 2) holds the middle of another's first edge (even-odd rule)."""
-    x, y = 0.5 * (hole[0] + hole[1])
-    a, b = outer, np.roll(outer, -1, axis=0)
-    spans = (a[:, 1] > y) != (b[:, 1] > y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
-    return bool((spans & (at > x)).sum() % 2)
+    """Whether a loop (n, 2) holds the middle of another's first edge."""
+    return inside_loop(outer, 0.5 * (hole[0] + hole[1]))
 
 
 def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:

@@ -9,28 +9,12 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SlamEstimate, empty_map
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
+from rislam_rt.pipeline.inputs import Inputs
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.sweeps.axes import put
 from rislam_rt.pipeline.told import tell_settings
 from rislam_rt.slam import StartPrior
-
-
-class Inputs(NamedTuple):
-    """All that an estimator gets over K cycles."""
-
-    start: StartPrior
-    body: Body
-    panel: DataSheet | None
-    """Data sheet; None without a panel."""
-    time: Floats
-    """(K,) [s] since the first cycle."""
-    heading: Floats
-    """(K,) [rad], of the compass."""
-    measurements: tuple[Measurement, ...]
-    """(K,)."""
-    codes: tuple[RisCode | None, ...]
-    """(K,) what the agent holds the panel to be set to; None without a panel."""
 
 
 class Answers(NamedTuple):
