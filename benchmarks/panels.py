@@ -2,7 +2,7 @@
 
 `python benchmarks/panels.py --seeds 10` runs `pipelines/two_panels.toml` on the image-source channel with both panels,
 with each alone, and without the codes in turn that set the panels' paths apart; RMSE over the cycles, then over the
-seeds. `--figure FILE` draws the first seed's room.
+seeds. `--figure FILE` draws the first seed's room; `--double` says how strong paths from panel to panel are.
 """
 
 import argparse
@@ -13,11 +13,14 @@ from pathlib import Path
 import numpy as np
 
 import rislam_rt
-from rislam_rt.model import Scene, SlamResult
+from rislam_rt.arrays import Complexes
+from rislam_rt.model import RadioConfig, Scene, SlamResult
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.summary import landmark_track, summarise
 from rislam_rt.report.room import draw_above
 from rislam_rt.report.verdict import panel_found_at
+from rislam_rt.ris import leg_response
+from rislam_rt.ris.element import element_gain_area, element_pattern
 from rislam_rt.shipped import find_pipeline, find_room
 
 HEAD = (
@@ -31,7 +34,11 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--cycles", type=int, default=240)
     parser.add_argument("--figure", type=Path)
+    parser.add_argument("--double", action="store_true", help="the strength of paths from panel to panel, alone")
     options = parser.parse_args()
+    if options.double:
+        print_double_reflection(rislam_rt.load_scene(find_room("two_panels")), RadioConfig())
+        return
     print("| " + " | ".join(HEAD) + " |\n|" + " --- |" * len(HEAD))
     for name, scene, alternation in variants():
         schemes = ["optimized", "random"] + ["no_ris"] * (name == "both")
@@ -71,6 +78,51 @@ def rows_of(runs: list[SlamResult], scheme: str) -> Iterator[list[str]]:
         wrong = sum(named_wrongly(run, scheme, number) for run in runs)
         yield [*(agent if not number else [""] * 3), panel.name, f"{len(known)} of {len(runs)}", times, f"{error:.3f}",
                str(wrong)]  # fmt: skip
+
+
+def print_double_reflection(scene: Scene, radio: RadioConfig) -> None:
+    """Paths from panel to panel, which no channel here has: the best that codes for nothing else could make of them.
+
+    The gain of Tx, one panel, the other, Rx is bilinear in the two codes: raised in turn with continuous phases, from
+    five random codes. `sure` is the sum of the moduli of all its terms, which no code exceeds.
+    """
+    one, other = scene.panels
+    places = [(panel.center + panel.spec.offsets()).reshape(-1, 3) for panel in (one, other)]
+    span = places[1][None] - places[0][:, None]
+    length = np.linalg.norm(span, axis=-1)
+    pattern = [element_pattern(p.spec, s * (span @ p.spec.normal) / length) for p, s in ((one, 1.0), (other, -1.0))]
+    # a leg from element to element: half the join of either panel, as `leg_response` has it
+    join = [np.sqrt(4.0 * np.pi * element_gain_area(p.spec, radio.wavelength)) * p.spec.amplitude / radio.wavelength
+            for p in (one, other)]  # fmt: skip
+    turn = np.exp(-2j * np.pi / radio.wavelength * length)
+    between = np.sqrt(pattern[0] * pattern[1] * join[0] * join[1]) * radio.wavelength / (4.0 * np.pi * length) * turn
+    direct, double, sure = [], [], []
+    for cycle in range(0, len(scene.agent), 20):
+        ends = scene.agent.tx[cycle], scene.agent.rx[cycle]
+        legs = [[leg_response(p.spec, p.center, end, np.ones(()), radio.wavelength).ravel() for end in ends]
+                for p in (one, other)]  # fmt: skip
+        direct.append([np.abs(tx * rx).sum() for tx, rx in legs])
+        terms = legs[0][0][:, None] * between * legs[1][1]
+        double.append(best_bilinear(terms, np.random.default_rng(cycle)))
+        sure.append(np.abs(terms).sum())
+    level = 20.0 * np.log10(np.array([np.max(direct), np.max(double), np.max(sure)]))
+    below = 20.0 * np.log10(np.min(np.max(direct, axis=1) / np.array(double)))
+    print(
+        f"direct {level[0]:.1f} dB at most; panel to panel {level[1]:.1f} dB at most (no code above {level[2]:.1f} dB)"
+    )
+    print(f"at least {below:.1f} dB below the stronger direct path")
+
+
+def best_bilinear(terms: Complexes, rng: np.random.Generator) -> float:
+    """Largest modulus of x' terms y over phases x, y that raising either in turn finds."""
+    best = 0.0
+    for _ in range(5):
+        second = np.exp(2j * np.pi * rng.uniform(size=terms.shape[1]))
+        for _ in range(30):
+            first = np.exp(-1j * np.angle(terms @ second))
+            second = np.exp(-1j * np.angle(first @ terms))
+        best = max(best, float(abs(first @ terms @ second)))
+    return best
 
 
 def named_wrongly(run: SlamResult, scheme: str, panel: int) -> int:
