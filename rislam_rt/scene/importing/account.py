@@ -29,10 +29,9 @@ def account(
         f"walls are within {max(1e3 * max(s.error for s in surfaces), 0.01):.2g} mm of the mesh",
     ]
     if found.shading:
-        why = (
-            "that lie on no plane" if scanned else f"narrower than {100 * found.narrow:.2g} cm ({waves:.2g} wavelengths "
-            f"at {options.carrier_ghz:g} GHz)" + (" or round" if options.curved == "shade" else "")
-        )  # fmt: skip
+        width = f"{100 * found.narrow:.2g} cm ({waves:.2g} wavelengths at {options.carrier_ghz:g} GHz)"
+        narrow = f"narrower than {width}" + (" or round" if options.curved == "shade" else "")
+        why = "that lie on no plane" if scanned else narrow
         remarks.append(f"{found.shading:.3g} m^2 {why} shade and do not reflect")
     if found.shade_error:
         how = f"corners joined in cells of {1e3 * found.cell:.2g} mm, moved {1e3 * found.shade_error:.2g} mm at most"
