@@ -24,11 +24,14 @@ def command(
 
     Example: rislam-rt report runs/demo-paper_room-7-0123abcd --rerun demo.rrd
     """
+    from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.long import read_any
     from rislam_rt.pipeline.store import hold_run
     from rislam_rt.report import write_report
     from rislam_rt.report.tables import print_summary
 
+    if gif is not None and gif.suffix.lower() != ".gif":
+        raise ConfigError(f"--gif: '{gif}' received; give a name that ends in .gif")
     summary, result = read_any(run)
     if rerun is not None:
         from rislam_rt.pipeline.files import write_atomic

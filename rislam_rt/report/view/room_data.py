@@ -9,7 +9,7 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.geometry.triangles import outline_edges
 from rislam_rt.model import RisPanel, Scene
 
-MOST_TRIANGLES = 4000
+MOST_TRIANGLES = 8000
 """Of a view: the walls of the largest surface come first, the rest of a finely meshed room is left out."""
 MOST_NAMES = 60
 WAY_POINTS = 600

@@ -79,7 +79,7 @@ class View {
   }
   resize() {
     const width = this.canvas.parentElement.clientWidth;
-    const height = Math.round(Math.min(640, Math.max(280, 0.72 * width)));
+    const height = Math.round(Math.max(260, Math.min(0.62 * window.innerHeight, 0.72 * width)));
     this.painter = new Painter(fit(this.canvas, width, height), this.camera);
     this.camera.frame(width, height);
     this.draw();
