@@ -59,7 +59,11 @@ def command(
     fill: Annotated[float, typer.Option(min=0.0, help="Holes of a scan up to this are filled [m^2].")] = 1.0,
     max_walls: Annotated[int, typer.Option(min=4, max=10_000, help="Of a file with more the widest reflect.")] = 150,
 ) -> None:  # fmt: skip
-    """Make a scene folder from a built-in room, of a random one, or from a file of another program, to be edited."""
+    """Make a scene folder from a built-in room, of a random one, or from a file of another program, to be edited.
+
+    Example: rislam-rt new myroom --template two_scatterers
+    """
+    from rislam_rt.errors import ConfigError
     from rislam_rt.scene import new_scene, write_scene
 
     if source is not None and is_xml(source):
@@ -67,9 +71,13 @@ def command(
         _from_xml(source, scene, within, [name for name, value in own.items() if value], overwrite)
         return
     if within:
-        from rislam_rt.errors import ConfigError
-
         raise ConfigError("--within: only XML scenes are cut to a window; leave it out")
+    needless = {"--units": units, "--up": up, "--material": material, "--origin": origin != "0,0,0", "--scan": scan}
+    useless = [name for name, value in needless.items() if value]
+    if source is not None and floorplan is not None:
+        raise ConfigError("--floorplan: a room comes from it or from --from; leave one out")
+    if source is None and floorplan is None and useless:
+        raise ConfigError(f"{useless[0]}: it says how a file lies; give --from FILE, or leave it out")
     if source is not None or floorplan is not None:
         from rislam_rt.scene.importing import ImportOptions, import_corners, import_room
         from rislam_rt.scene.importing.materials import parse_choices, parse_material

@@ -61,6 +61,8 @@ SCHEME: dict[str, Entry] = {
     "ris_probability": (("time", "landmark"), "1", "probability of being the panel"),
     "seconds": (("time", "step"), "s", "time taken by optimise, communicate, measure, localise"),
 }
+SMOOTHED: dict[str, Entry] = {"smoothed": (("time", "xyz"), "m", "position with hindsight")}
+"""Of filters that look back."""
 MAP: dict[str, Entry] = {
     "ident": (("feature",), "1", "number of the landmark or image"),
     "position": (("feature", "xyz"), "m", "estimated position"),
@@ -114,6 +116,8 @@ def scheme_to_dataset(result: SchemeResult) -> "xr.Dataset":
         content[f"info_{name}"] = (("time",), values, {"long_name": f"filter diagnostic {name}"})
     outcomes = sorted(set(result.outcome))
     codes = np.array([outcomes.index(outcome) for outcome in result.outcome], dtype=np.int64)
+    if result.smoothed is not None:
+        content |= _entries({"smoothed": result.smoothed}, SMOOTHED, "")
     content["outcome"] = (("time",), codes, {"long_name": "how the cycle went, index into attribute 'outcomes'"})
     coords = {"landmark": (("landmark",), result.ident, {"long_name": "number of each landmark ever held"})}
     return _dataset(content, {"scheme": result.scheme, "levels": result.levels, "outcomes": outcomes}, coords)
@@ -129,6 +133,7 @@ def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
         info={str(n).removeprefix("info_"): data[n].to_numpy() for n in data.data_vars if str(n).startswith("info_")},
         outcome=tuple(outcomes[code] for code in data["outcome"].to_numpy()),
         map=MapEstimate(**_values(data, MAP, "map_")),
+        smoothed=_values(data, SMOOTHED, "")["smoothed"] if "smoothed" in data else None,
     )
 
 

@@ -71,6 +71,7 @@ def thinned_scheme(scheme: SchemeResult, rows: Integers) -> SchemeResult:
         scheme,
         **{name: getattr(scheme, name)[rows] for name in names},
         info={name: values[rows] for name, values in scheme.info.items()},
+        smoothed=None if scheme.smoothed is None else scheme.smoothed[rows],
         outcome=tuple(scheme.outcome[row] for row in rows),
         given=None,
     )

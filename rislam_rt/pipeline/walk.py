@@ -78,7 +78,10 @@ class Walk:
             tell(self.name, cycle + 1, len(self.motion))
         given = given_of(self.means.told, first, cycles, self.seeds.filter)
         levels = self.means.panel.levels if self.means.panel is not None else 0
-        return gather(self.name, self.motion.time[first:last], cycles, levels, given)
+        found = gather(self.name, self.motion.time[first:last], cycles, levels, given)
+        # a slice does not know what later ones tell of its end
+        whole = first == 0 and last == len(self.motion)
+        return replace(found, smoothed=self.means.estimator.smoothed(self.agent.state)) if whole else found
 
 
 def without_panel(paths: Paths) -> Paths:

@@ -206,6 +206,8 @@ def _material_table(material: Material) -> dict[str, Any]:
         return {"reflection": material.reflection} | rough
     if material.itu is not None:
         return {"itu": material.itu, "thickness_m": material.thickness} | rough
+    if material.reflection_te is not None:
+        return {"reflection_te": material.reflection_te, "reflection_tm": material.reflection_tm} | rough
     own = {"permittivity": material.permittivity, "conductivity_s_m": material.conductivity}
     return own | {"thickness_m": material.thickness} | rough
 

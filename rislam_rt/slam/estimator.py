@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from rislam_rt.arrays import Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam import filter as cycle
 from rislam_rt.slam import mapping, window
@@ -34,6 +35,11 @@ def predict(state: Any, dt: float, config: SlamConfig) -> SlamEstimate:
     """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent."""
     ahead = window.predict if isinstance(state, window.WindowState) else mapping.predict
     return ahead(state, dt, config)
+
+
+def smoothed(state: Any) -> Floats | None:
+    """Positions (K, 3) [m] of all cycles with the hindsight of the window; None of a filter that does not look back."""
+    return window.smoothed(state) if isinstance(state, window.WindowState) else None
 
 
 def estimate(state: Any, config: SlamConfig) -> SlamEstimate:

@@ -13,9 +13,6 @@ from rislam_rt.scene.xml.shapes import number
 DEFAULT_THICKNESS = 0.1
 """[m] What Sionna takes where a scene gives none."""
 ABSORBER = "absorber-radio-material"
-THICK, LOSS = 10.0, 0.1
-"""Thickness [m] of what stands for a constant R, and the conductivity [S/m] that, times its refractive index, keeps the
-back of it from being seen."""
 LEFT_OUT = ("xpd_coefficient", "alpha_r", "alpha_i", "lambda_")
 """Properties of a Sionna material that are not carried over: all of diffuse scattering alone."""
 
@@ -64,18 +61,13 @@ def read_material(bsdf: Element) -> Coat:
 def material_element(material: Material | None, name: str) -> Element:
     """A `<bsdf>` that Sionna reads: its own ITU slab, a slab of given permittivity, or air for None.
 
-    A constant R has no counterpart that Sionna's `load_scene` knows. What comes nearest is the face of a thick and
-    slightly lossy body that has |R| at normal incidence, `permittivity = ((1 + R) / (1 - R))^2`; elsewhere it follows
-    Fresnel. What only hides is a slab of air, which Sionna's rays do not pass unless refraction is on: in Sionna RT
-    2.2.0 no frequency can be set where there is an `absorber-radio-material`.
+    A constant R has no counterpart that Sionna's `load_scene` knows; what comes nearest is `Material.as_body`. What
+    only hides is a slab of air, which Sionna's rays do not pass unless refraction is on: in Sionna RT 2.2.0 no
+    frequency can be set where there is an `absorber-radio-material`.
     """
     if material is None:
         return Element("bsdf", {"type": "radio-material", "id": name})
-    if material.reflection is not None:
-        index = (1.0 + material.reflection) / max(1.0 - material.reflection, 1e-3)
-        material = Material(
-            permittivity=index**2, conductivity=LOSS * index, thickness=THICK, scattering=material.scattering
-        )
+    material = material.as_body()
     bsdf = Element("bsdf", {"type": "itu-radio-material" if material.itu else "radio-material", "id": name})
     if material.itu:
         SubElement(bsdf, "string", {"name": "type", "value": material.itu})

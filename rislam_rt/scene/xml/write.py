@@ -69,7 +69,7 @@ def xml_bytes(scene: Scene) -> bytes:
 
 def left_behind(scene: Scene) -> list[str]:
     """What of a scene a Sionna scene file has no place for, each in one line."""
-    constant = [r.name for r in scene.reflectors if r.material.reflection is not None]
+    constant = [r.name for r in scene.reflectors if r.material.level is not None]
     notes = []
     if constant:
         few = ", ".join(constant[:6]) + (f" and {len(constant) - 6} more" if len(constant) > 6 else "")
@@ -86,4 +86,4 @@ def _word(material: Material | None) -> str:
     """What a material is called in the file. Sionna reads names that begin with `itu` in a way of its own."""
     if material is None:
         return "air"
-    return material.itu if material.itu else ("constant" if material.reflection is not None else "slab")
+    return material.itu if material.itu else ("constant" if material.level is not None else "slab")
