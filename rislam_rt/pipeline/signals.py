@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from rislam_rt.design import exact_code
+from rislam_rt.design import focus_codes
 from rislam_rt.errors import ConfigError, StoreError
 from rislam_rt.measurement import NO_COMPONENT, ReceiverConfig, num_tones, signals_dataset, twin
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene
@@ -84,8 +84,7 @@ def signal_settings(spec: SignalsSpec) -> tuple[RadioConfig, ReceiverConfig]:
 def signals_size(scene: Scene, spec: SignalsSpec) -> SignalsSize:
     """How large the samples will be."""
     radio, receiver = signal_settings(spec)
-    captures = 1 + int(receiver.alternation)
-    return SignalsSize(len(scene.agent), captures, radio.array.num_antennas, num_tones(radio, receiver))
+    return SignalsSize(len(scene.agent), receiver.num_captures, radio.array.num_antennas, num_tones(radio, receiver))
 
 
 def check_space(file: Path, size: SignalsSize) -> None:
@@ -130,13 +129,9 @@ def panel_codes(scene: Scene, paths: Paths, kind: str, *, rng: np.random.Generat
         return None
     panel = scene.ris.spec
     shape = (paths.num_cycles, panel.rows, panel.cols)
-    direct = np.flatnonzero(paths.kind == PathKind.RIS)
-    if kind == "random" or paths.ris is None or not len(direct):
+    if kind == "random" or paths.ris is None or not (paths.kind == PathKind.RIS).any():
         return RisCode(rng.integers(panel.levels, size=shape), panel.levels)
-    legs, row = paths.ris, int(direct[0])
-    response = legs.tx[:, legs.tx_leg[row]] * legs.rx[:, legs.rx_leg[row]]
-    index, _ = exact_code(response.reshape(paths.num_cycles, -1), panel.levels)
-    return RisCode(index.reshape(shape), panel.levels)
+    return focus_codes(paths, panel.levels)
 
 
 def build_signals(

@@ -315,15 +315,16 @@ class Settings(NamedTuple):
     """What the front end does wrong."""
 
 
-def build_settings(spec: PipelineSpec) -> Settings:
-    """Radio, receiver and filter settings in SI units and linear ratios.
+def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
+    """Radio, receiver and filter settings in SI units and linear ratios, in a room of so many panels.
 
     Raises
     ------
     ConfigError
         A value is out of the range that the record itself checks.
     """
-    radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump(), slot=spec.budget.measure_s)
+    own = {"slot": spec.budget.measure_s, "panels": panels}
+    radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump() | own)
     return Settings(
         radio,
         receiver,
