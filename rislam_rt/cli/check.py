@@ -45,6 +45,10 @@ def command(
     if carrier_ghz is not None:
         changed += [f"radio.carrier_ghz={carrier_ghz}", f"radio.bandwidth_ghz={min(1.0, carrier_ghz)}"]
     settings = settings_of(pipeline, changed)
+    if picture is not None:
+        from rislam_rt.report.style import picture_kind
+
+        picture_kind(picture)  # before anything is worked out
     findings = check_scene(Path(scene), settings.radio)
     for finding in findings:
         typer.echo(f"{finding.severity}: {finding.line}")

@@ -38,6 +38,10 @@ def command(
     from rislam_rt.scene.names import safe_name
 
     settings = settings_of(pipeline, set_ or ()) if html is not None else None
+    if out is not None:
+        from rislam_rt.report.style import picture_kind
+
+        picture_kind(out)  # before anything is worked out
     opened = open_scene(scene, settings.radio if settings is not None else None)
     opened.warn()
     room = opened.scene
