@@ -127,8 +127,10 @@ def _name_walls(axis: Axes, scene: Scene) -> None:
         if extent[2] < 0.2 * extent[:2].max():
             continue
         turn = 90.0 if extent[1] > 2.0 * extent[0] else 0.0
-        axis.text(float(point[0]), float(point[1]), name, fontsize=7, color=WALL_NAME, ha="center", va="center", rotation=turn,
-                  zorder=3, bbox=paper)  # fmt: skip
+        x, y, _ = point.tolist()
+        axis.text(
+            x, y, name, fontsize=7, color=WALL_NAME, ha="center", va="center", rotation=turn, zorder=3, bbox=paper
+        )
 
 
 def _mark(axis: Axes, point: Floats, name: str, marker: str) -> None:
