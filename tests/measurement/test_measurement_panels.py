@@ -6,11 +6,11 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from rislam_rt.measurement import ReceiverConfig, measure
+from rislam_rt.measurement import ReceiverConfig, load_signals, measure, signals_dataset
 from rislam_rt.measurement.config import ORDERS
 from rislam_rt.measurement.received import receive
 from rislam_rt.measurement.slot import codes_in_turn, look_signs, slot_mean, split
-from rislam_rt.model import PathKind, Paths, RadioConfig
+from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 
 RADIO = RadioConfig()
 BOTH = ReceiverConfig(clutter_rate=0.0, alternation=True, panels=2)
@@ -92,3 +92,16 @@ def test_what_a_fast_path_leaves_in_another_panels_difference_is_not_taken_for_t
         leaks += list(zip(measurement.panel[faint], measurement.from_panel[faint], strict=True))
     assert len(leaks) == 20
     assert all(number == 1 and probability > 0.5 for number, probability in leaks)
+
+
+def test_signals_of_two_panels_name_the_panel_of_every_component(make_paths, make_gain, tmp_path) -> None:
+    still = Trajectory(np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1))
+    config = replace(BOTH, estimator="waveform", false_alarm_rate=1e-3)
+    data = signals_dataset(two_panels(make_paths, make_gain), still, RADIO, config, rng=np.random.default_rng(1))
+    data.to_netcdf(tmp_path / "signals.nc", engine="h5netcdf")
+    loaded = load_signals(tmp_path / "signals.nc")
+    assert loaded["samples"].shape[1] == 3
+    path = loaded["found_path"].values[0]
+    assert sorted(path.tolist()) == [0, 1, 2, 3]
+    which = loaded["found_which_panel"].values[0][np.argsort(path)]
+    np.testing.assert_array_equal(which[1:], [0, 1, 1])
