@@ -1,6 +1,6 @@
 """What do scattered and diffracted paths do to the agent's error?
 
-    python benchmarks/extra_paths.py [--seeds 10] [--cycles 300]
+    python benchmarks/extra_paths.py [--seeds 10] [--cycles 300] [--rooms paper_room ...]
 
 `trace_then_slam`, scheme `optimized`, default filter, for each room and level the same motion and paths (seed 7) under
 `--seeds` draws of start, noise and codes. `smooth`: walls that scatter nothing. `rough`: walls that scatter, and what
@@ -59,9 +59,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--cycles", type=int, default=300)
+    parser.add_argument("--rooms", nargs="+", default=ROOMS)
     options = parser.parse_args()
     print("| room | S | | RMSE [m] | 95 % | over 0.5 m | false components a cycle |\n" + "| --- " * 7 + "|")
-    for room in ROOMS:
+    for room in options.rooms:
         print(row(room, "0", "smooth", lead(room, [], options.seeds, options.cycles)), flush=True)
         edges = lead(room, ["extras.diffraction=true"], options.seeds, options.cycles)
         print(row(room, "0", "edges", edges), flush=True)
