@@ -18,6 +18,7 @@ from rislam_rt.cli import (
     sweep,
     trace,
 )
+from rislam_rt.cli.loudness import with_loudness
 
 app = typer.Typer(
     name="rislam-rt",
@@ -27,7 +28,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for _command in (run, sweep, slam, pipelines, config, new, check, export, show, trace, compare, design, report, doctor):
-    app.command(_command.__name__.rpartition(".")[2])(_command.command)
+    app.command(_command.__name__.rpartition(".")[2])(with_loudness(_command.command))
 
 
 def _print_version(wanted: bool) -> None:

@@ -17,7 +17,10 @@ def command(
         ),
     ],
 ) -> None:
-    """Write a scene in another program's format: a Mitsuba scene file that Sionna RT's `load_scene` opens."""
+    """Write a scene in another program's format: a Mitsuba scene file that Sionna RT's `load_scene` opens.
+
+    Example: rislam-rt export office --xml office_xml
+    """
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.scene.xml import write_xml
 

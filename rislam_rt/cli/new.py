@@ -59,7 +59,10 @@ def command(
     fill: Annotated[float, typer.Option(min=0.0, help="Holes of a scan up to this are filled [m^2].")] = 1.0,
     max_walls: Annotated[int, typer.Option(min=4, max=10_000, help="Of a file with more the widest reflect.")] = 150,
 ) -> None:  # fmt: skip
-    """Make a scene folder from a built-in room, of a random one, or from a file of another program, to be edited."""
+    """Make a scene folder from a built-in room, of a random one, or from a file of another program, to be edited.
+
+    Example: rislam-rt new myroom --template two_scatterers
+    """
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene import new_scene, write_scene
 

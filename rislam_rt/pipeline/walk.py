@@ -34,10 +34,11 @@ class Walk:
     def __init__(
         self, name: str, scene: Scene, body: Body, spec: PipelineSpec, seeds: Seeds, estimator: Estimator | None = None
     ) -> None:
-        settings, self.scheme, self.name, self.seeds = build_settings(spec), SCHEMES[name], name, seeds
+        self.scheme, self.name, self.seeds = SCHEMES[name], name, seeds
         self.motion, self.body = scene.agent, body
         self.front_end: FrontEnd | None = None
         panel = scene.ris.spec if scene.ris is not None and self.scheme.panel else None
+        settings = build_settings(spec, 1 if panel is None else len(panel.panels))
         compass, self.sway = (child(seeds.told, number) for number in range(2))
         start = np.random.default_rng(seeds.start)
         told = tell_belief(self.motion, body, panel, spec, settings, start=start, compass=compass)
@@ -86,7 +87,10 @@ class Walk:
             tell(self.name, cycle + 1, len(self.motion))
         given = given_of(self.means.told, first, cycles, self.seeds.filter)
         levels = self.means.panel.levels if self.means.panel is not None else 0
-        return gather(self.name, self.motion.time[first:last], cycles, levels, given)
+        found = gather(self.name, self.motion.time[first:last], cycles, levels, given)
+        # a slice does not know what later ones tell of its end
+        whole = first == 0 and last == len(self.motion)
+        return replace(found, smoothed=self.means.estimator.smoothed(self.agent.state)) if whole else found
 
 
 def without_panel(paths: Paths) -> Paths:

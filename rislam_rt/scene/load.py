@@ -14,7 +14,7 @@ from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec,
 from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
 from rislam_rt.scene.containers import too_many_faces
-from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
+from rislam_rt.scene.findings import Fault, Faults, Finding, panel_key, raise_errors
 from rislam_rt.scene.lying import UNITS, place_mesh
 from rislam_rt.scene.meshes import MAX_COORDINATE, MAX_MESH_BYTES, Mesh, MeshReader, read_inside
 from rislam_rt.scene.motion import build_motion
@@ -100,6 +100,8 @@ def read_draft(path: str | Path) -> Draft:
     file = scene_file(path)
     try:
         spec, content = read_spec(file)
+    except Faults as faults:
+        return Draft(str(file), None, [fault.at(str(file), "") for fault in faults.faults])
     except Fault as fault:
         return Draft(str(file), None, [fault.at(str(file), "")])
     return assemble(spec, file, content)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.scene.findings import Fault, Faults, one_line
 from rislam_rt.toml import parse_toml
 
 MAX_SCENE_BYTES = 4_000_000
@@ -291,15 +291,15 @@ def validate_spec(table: dict[str, Any]) -> SceneSpec:
 
     Raises
     ------
-    Fault
-        Fields are missing, unknown or out of range; all of them in one line.
+    Faults
+        Fields are missing, unknown or out of range: one fault a field.
     """
     try:
         return SceneSpec.model_validate(table)
     except ValidationError as error:
         lone = isinstance(table.get("ris"), dict)
         remarks = [_remark(item, lone) for item in error.errors(include_url=False, include_context=False)]
-    raise Fault("; ".join(remarks[:8]), f"mend these {len(remarks)} fields" if len(remarks) > 1 else "mend this field")
+    raise Faults([Fault(remark, "mend this field") for remark in remarks])
 
 
 def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
@@ -307,7 +307,7 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
 
     Raises
     ------
-    Fault
+    Fault, Faults
         The file cannot be read or its content is not a scene.
     """
     if not path.is_file():

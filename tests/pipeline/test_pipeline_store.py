@@ -19,6 +19,7 @@ from rislam_rt.pipeline.dataset import (
     PATHS,
     SCHEME,
     check_dataset,
+    dataset_to_scheme,
     read_dataset,
     scheme_to_dataset,
     seal_dataset,
@@ -76,7 +77,7 @@ def test_reads_back_to_the_last_bit(stored, short_result):
 
 
 def test_every_array_of_a_result_is_stored():
-    other = {"scheme", "levels", "info", "outcome", "map", "given"}
+    other = {"scheme", "levels", "info", "outcome", "map", "given", "smoothed"}
     assert {f.name for f in fields(SchemeResult)} - other == set(SCHEME)
     assert {f.name for f in fields(MapEstimate)} == set(MAP)
 
@@ -179,6 +180,14 @@ def test_a_changed_value_does_not_fit_the_files_own_checksum(short_result, tmp_p
     write_dataset(changed, file)  # as one would with the library that wrote it
     with pytest.raises(ResultError, match="checksum is"):
         check_dataset(read_dataset(file), file)
+
+
+def test_hindsight_comes_back_if_there_is_any(short_result):
+    scheme = short_result.schemes["random"]
+    assert dataset_to_scheme(scheme_to_dataset(scheme)).smoothed is None
+    looked_back = replace(scheme, smoothed=scheme.position + 0.1)
+    found = dataset_to_scheme(scheme_to_dataset(looked_back)).smoothed
+    np.testing.assert_array_equal(found, looked_back.smoothed)
 
 
 def test_a_stopped_run_goes_on(begun, identity, short_result):

@@ -20,7 +20,7 @@ LAW = """Of each run the receiver alone is looked at, at some places of its seco
 agent. One front end a seed is built with each fault; then the same one is calibrated on the first cycles
 (`hardware.calibration_cycles`), panel at rest. False: components a cycle that are no path. Panel: share of looks in
 which its direct path is reported. Errors: half width of 68 % of the cosine errors over the reported deviations, 1 if
-they are as reported. What false components do to the agent: [receiver](receiver.md#real-hardware)."""
+they are as reported. What false components do to the agent: [receiver](../receiver.md#real-hardware)."""
 
 
 def hardware_content(groups: Sequence[Group], spec: HardwareSpec) -> dict[str, Any]:

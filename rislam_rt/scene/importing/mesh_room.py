@@ -13,7 +13,7 @@ from rislam_rt.scene.importing.facets import Facets, find_facets, weld
 from rislam_rt.scene.importing.free_space import find_free, is_seen
 from rislam_rt.scene.importing.materials import Palette, itu_by_word
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.pieces import Piece, find_pieces, numbered, plain_name, wall_name
+from rislam_rt.scene.importing.pieces import Piece, find_pieces, numbered, place_free_name, wall_name
 from rislam_rt.scene.importing.rounded import find_round
 from rislam_rt.scene.importing.scan_room import looks_scanned, sort_scan
 from rislam_rt.scene.importing.size import place_parts
@@ -61,7 +61,8 @@ def build_draft(facets: Facets, parts: list[Part], notes: list[str], options: Im
     if palette.unused():
         names = ", ".join([*reflectors, *sorted({p.material for p in parts if p.material})][:12])
         raise Fault(f"--material {palette.unused()[0]}: nothing has that name", f"give one of: {names}")
-    remarks = [*notes, *about, *account(facets, found, surfaces, unseen, reflectors, shades, options)]
+    said = account(facets, found, surfaces, unseen, reflectors, shades, options, scanned=bool(about))
+    remarks = [*notes, *about, *said]
     return RoomDraft(reflectors, shades, remarks + palette.remarks())
 
 
@@ -86,7 +87,7 @@ def _reflectors(
     shell = sorted((s for s in surfaces if s.piece == 0), key=lambda s: -s.area)
     corners = np.concatenate([s.mesh.vertices for s in surfaces if s.piece == 0 or not shell])
     room = np.stack([corners.min(axis=0), corners.max(axis=0)])
-    uses = [plain_name(parts[s.part].node) for s in shell]
+    uses = [place_free_name(parts[s.part].node) for s in shell]
     entries: list[tuple[str, Mesh, int]] = []
     for surface, node in zip(shell, uses, strict=True):
         middle = surface.mesh.vertices[surface.mesh.faces].mean(axis=(0, 1))

@@ -84,6 +84,12 @@ def plain_name(name: str) -> str:
     return re.sub(r"_+", "_", plain.replace(".", "_"))[:48]
 
 
+def place_free_name(name: str) -> str:
+    """The same, empty too where it says no more than that it is a wall, floor or ceiling."""
+    plain = plain_name(name)
+    return "" if re.fullmatch(r"(walls?|floors?|ceilings?|roof|wand|boden|decke)?[_\d]*", plain) else plain
+
+
 def guess_kind(bounds: Floats, room: Floats) -> str:
     """What a thing is called by its size and place; a name, nothing that is computed with."""
     size, floor = bounds[1] - bounds[0], float(room[0, 2])

@@ -69,7 +69,8 @@ def sort_regions(facets: Facets, pieces: list[Piece], rounds: list[Round], optio
         owner[piece.regions] = number
     rounded = np.zeros(len(owner), dtype=np.bool_)
     for found in rounds:
-        rounded[found.regions] = True
+        # as planes, cylinders get sides of their own; of other round things the sides that are drawn are taken
+        rounded[found.regions] = found.radius > 0.0 or options.curved == "shade"
     part = np.zeros(len(owner), dtype=np.int64)
     part[facets.region] = facets.mesh.part
     mirror, narrow = _mirrors(facets, rounded, options)
@@ -78,7 +79,8 @@ def sort_regions(facets: Facets, pieces: list[Piece], rounds: list[Round], optio
     group = _coplanar(facets, pieces[0].regions, mirror, part)
     label = group.copy()
     for number, found in enumerate(rounds):
-        label[found.regions] = len(owner) + number
+        if rounded[found.regions[0]]:
+            label[found.regions] = len(owner) + number
     kept = corners_kept(facets, label)
     surfaces = []
     for number in np.unique(group[mirror]):
