@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.pipeline.studies.swept import Group, HardwareSpec
-from rislam_rt.pipeline.studies.swept.spec import FRONT_ENDS, MismatchSection
+from rislam_rt.pipeline.studies.swept.spec import CALIBRATED, MismatchSection
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import NOTHING, paragraph, ratio, table_lines
 
@@ -15,32 +15,35 @@ SCORES = ("false", "panel", "landmarks", "components", "error_over_std", "left")
 HEARD, MORE_FALSE = 0.9, 2.0
 """The panel still matters while it is heard in this share of the looks in which an ideal front end hears it, with at
 most so many more false components a cycle."""
-NAMES = dict(zip(FRONT_ENDS, ("as built", "told", "calibrated", "calibrated, told"), strict=True))
-"""Of the ways in which a fault is met."""
-MARKS = dict(zip(FRONT_ENDS, (("#D55E00", "o"), ("#E69F00", "^"), ("#0072B2", "s"), ("#009E73", "D")), strict=True))
+WAYS = {
+    "built": ("", "receiver"), "told": ("", "told"), "calibrated": (CALIBRATED, "receiver"),
+    "calibrated_told": (CALIBRATED, "told"),
+}  # fmt: skip
+"""How a fault is met: end of the variant's name, and which of its scores."""
+NAMES = dict(zip(WAYS, ("as built", "told", "calibrated", "calibrated, told"), strict=True))
+MARKS = dict(zip(WAYS, (("#D55E00", "o"), ("#E69F00", "^"), ("#0072B2", "s"), ("#009E73", "D")), strict=True))
 LAW = """Of each run the receiver alone is looked at, at some places of its second half, with the panel focused on the
 agent. One front end a seed is built with each fault; then the same one is calibrated on the first cycles
 (`hardware.calibration_cycles`), panel at rest. Told: the estimator counts the power of the distortion as noise
-(`hardware.told`), as the tolerances say or as the calibration left it. False: components a cycle that are no path.
+(`hardware.told`), as the tolerances say or as the calibration left it; of its converters' steps it always is. False: components a cycle that are no path.
 Panel: share of looks in which its direct path is reported. Landmarks: components that came over one. Errors: half
 width of 68 % of the cosine errors over the reported deviations, 1 if they are as reported. What false components do to
 the agent: [receiver](receiver.md#real-hardware)."""
 
 
 def hardware_content(groups: Sequence[Group], spec: HardwareSpec) -> dict[str, Any]:
-    """Plain data: one entry a level with its scores, as built and calibrated, and how far each fault may go."""
-    found = {str(group.point["variant"]): _means(group) for group in groups}
-    ideal = found.get("reference", dict.fromkeys(SCORES))
-    entries = [{"fault": "none", "level": "", "note": "ideal", "way": _way(""), **ideal}]
+    """Plain data: one entry a level and way of meeting it with its scores, and how far each fault may go."""
+    found = {str(group.point["variant"]): group for group in groups}
+    ideal = _means(found.get("reference"), "receiver")
+    entries = [{"fault": "none", "level": "", "note": "ideal", "way": "built", **ideal}]
     for fault in spec.faults:
         for level in fault.levels:
-            for end in FRONT_ENDS:
-                scores = found.get(fault.variant(level).name + end)
-                if scores is not None:
-                    head = {"fault": fault.name, "level": str(level), "note": fault.note, "way": _way(end)}
-                    entries.append({**head, **scores})
+            for way, (end, key) in WAYS.items():
+                group = found.get(fault.variant(level).name + end)
+                head = {"fault": fault.name, "level": str(level), "note": fault.note, "way": way}
+                entries += [{**head, **_means(group, key)}] if group is not None else []
     about = {fault.name: fault.model_dump(exclude={"set"}) for fault in spec.faults}
-    limits = {fault.name: _limits(fault, found, ideal) for fault in spec.faults}
+    limits = {fault.name: {way: _limit(fault, entries, way, ideal) for way in WAYS} for fault in spec.faults}
     return {"entries": entries, "about": about, "limits": limits}
 
 
@@ -54,10 +57,10 @@ def draw_hardware(content: Mapping[str, Any]) -> Figure:
             figure.subplots(1, 2, sharey=True), ("false", "panel"),
             ("false components a cycle", "share of looks in which the panel's direct path is heard"), strict=True,
         ):  # fmt: skip
-            for end, (colour, mark) in MARKS.items():
-                own = [e for e in entries if e["way"] == _way(end) and e[score] is not None]
+            for way, (colour, mark) in MARKS.items():
+                own = [e for e in entries if e["way"] == way and e[score] is not None]
                 place = [rows.index((e["fault"], e["level"])) for e in own]
-                axis.plot([e[score] for e in own], place, mark, color=colour, ms=5, label=NAMES[end], alpha=0.8)
+                axis.plot([e[score] for e in own], place, mark, color=colour, ms=5, label=NAMES[way], alpha=0.8)
             axis.set_xlabel(label, fontsize=9)
         figure.axes[0].set_yticks(range(len(rows)), [" ".join(row).strip() for row in rows], fontsize=8)
         figure.axes[0].invert_yaxis()
@@ -93,25 +96,24 @@ def hardware_page(content: Mapping[str, Any], groups: Sequence[Group], about: Se
 TITLES = {"false": "false", "panel": "panel", "landmarks": "landmarks", "error_over_std": "errors"}
 
 
-def _means(group: Group) -> dict[str, Any]:
+def _means(group: Group | None, key: str) -> dict[str, Any]:
     """Mean of every score over the receivers that were built."""
-    rows = [result["receiver"] for result in group.results if result]
+    rows = [result.get(key, result["receiver"]) for result in group.results if result] if group is not None else []
     known = {name: [row[name] for row in rows if row.get(name) is not None] for name in SCORES}
     return {"runs": len(rows), **{name: float(np.mean(values)) if values else None for name, values in known.items()}}
 
 
-def _limits(fault: MismatchSection, found: Mapping[str, Any], ideal: Mapping[str, Any]) -> dict[str, str | None]:
-    """Largest level at which the panel still matters, by the way it is met; None if it does at none."""
-    limits: dict[str, str | None] = {}
-    for end in FRONT_ENDS:
-        name = _way(end)
-        limits[name] = None
-        for level in fault.levels:
-            scores = found.get(fault.variant(level).name + end)
-            if scores is None or not _matters(scores, ideal):
+def _limit(
+    fault: MismatchSection, entries: Sequence[Mapping[str, Any]], way: str, ideal: Mapping[str, Any]
+) -> str | None:
+    """Largest level, as they stand in the file, up to which the panel still matters; None if it does at none."""
+    limit = None
+    for entry in entries:
+        if entry["fault"] == fault.name and entry["way"] == way:
+            if not _matters(entry, ideal):
                 break
-            limits[name] = str(level)
-    return limits
+            limit = str(entry["level"])
+    return limit
 
 
 def _matters(scores: Mapping[str, Any], ideal: Mapping[str, Any]) -> bool:
@@ -122,7 +124,7 @@ def _matters(scores: Mapping[str, Any], ideal: Mapping[str, Any]) -> bool:
 
 def _limit_row(content: Mapping[str, Any], name: str) -> list[str]:
     fault, limits = content["about"][name], content["limits"][name]
-    found = [limits[_way(end)] for end in FRONT_ENDS]
+    found = [limits[way] for way in WAYS]
     cells = [NOTHING if one is None else f"{one} {fault['unit']}".strip() for one in found]
     return [f"`{name}`: {fault['note']}", *cells, ", ".join(map(str, fault["levels"])) + f" {fault['unit']}"]
 
@@ -137,13 +139,9 @@ def _rows(content: Mapping[str, Any], scores: Sequence[str]) -> list[list[str]]:
         cells = [f"`{name}`", f"{level} {unit}".strip()]
         for score in scores:
             show = _share if score == "panel" else ratio
-            cells += [show(ways[way][score]) if way in ways else NOTHING for way in map(_way, FRONT_ENDS)]
+            cells += [show(ways[way][score]) if way in ways else NOTHING for way in WAYS]
         rows.append(cells)
     return rows
-
-
-def _way(end: str) -> str:
-    return end.lstrip("_") or "built"
 
 
 def _share(value: float | None) -> str:

@@ -144,14 +144,13 @@ class HardwareSpec(_OneRoom):
 
     @property
     def all_variants(self) -> list[VariantSection]:
-        """An ideal front end, and every level of every fault in all `FRONT_ENDS`."""
+        """An ideal front end, and every level of every fault, as built and calibrated."""
         variants = [VariantSection(name="reference")]
         for fault in self.faults:
-            for one in map(fault.variant, fault.levels):
-                for end, (calibrated, told) in FRONT_ENDS.items():
-                    more = {"hardware.calibration_cycles": self.calibration_cycles} if calibrated else {}
-                    more |= {"hardware.told": True} if told else {}
-                    variants.append(VariantSection(name=one.name + end, group=one.group, set={**one.set, **more}))
+            for level in fault.levels:
+                one = fault.variant(level)
+                more = {**one.set, "hardware.calibration_cycles": self.calibration_cycles}
+                variants += [one, VariantSection(name=f"{one.name}{CALIBRATED}", group=one.group, set=more)]
         return variants
 
     @model_validator(mode="after")
@@ -160,14 +159,8 @@ class HardwareSpec(_OneRoom):
         return self
 
 
-FRONT_ENDS = {
-    "": (False, False),
-    "_told": (False, True),
-    "_calibrated": (True, False),
-    "_calibrated_told": (True, True),
-}
-"""How a fault is met, by the end of its variant's name: whether the front end is calibrated, and whether the estimator
-is told to count its distortion as noise."""
+CALIBRATED = "_calibrated"
+"""End of the name of a variant with calibration."""
 
 
 class RoomsSpec(SweptSpec):
