@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import erfc
+import scipy
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.errors import ConfigError
@@ -227,7 +227,7 @@ def _clipped(level: float) -> float:
     """Share of the power of a normal signal that lies above `level` deviations, what is cut off squared; 0 for none."""
     if not level:
         return 0.0
-    tail = 0.5 * erfc(level / np.sqrt(2.0))
+    tail = 0.5 * scipy.special.erfc(level / np.sqrt(2.0))
     return float(2.0 * ((1.0 + level**2) * tail - level * np.exp(-0.5 * level**2) / np.sqrt(2.0 * np.pi)))
 
 

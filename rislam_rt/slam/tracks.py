@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaln, ndtri
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.identity import STRENGTHS
@@ -127,7 +127,12 @@ def log_silence(tracks: Tracks, cycle: int) -> Floats:
     """
     missed, gap = tracks.earlier_misses(cycle), tracks.misses
     total = tracks.length + missed
-    return np.asarray(gammaln(missed + gap + 1) - gammaln(missed + 1) - gammaln(total + gap + 2) + gammaln(total + 2))
+    return np.asarray(
+        scipy.special.gammaln(missed + gap + 1)
+        - scipy.special.gammaln(missed + 1)
+        - scipy.special.gammaln(total + gap + 2)
+        + scipy.special.gammaln(total + 2)
+    )
 
 
 def has_ended(tracks: Tracks, cycle: int, max_misses: int) -> Booleans:
@@ -145,7 +150,7 @@ def overstatement(tracks: Tracks, cycle: int, threshold: float) -> Floats:
     """
     seen, missed = tracks.length, tracks.earlier_misses(cycle)
     share = np.clip((seen + 1.0) / (seen + missed + 2.0), FAINTEST, 1.0 - 1e-9)
-    quantile = ndtri(share)
+    quantile = scipy.special.ndtri(share)
     mean = np.sqrt(2.0 * threshold) + quantile
     return np.asarray(1.0 + np.exp(-0.5 * quantile**2) / np.sqrt(2.0 * np.pi) / share / mean)
 

@@ -11,7 +11,15 @@ from rislam_rt.information import MotionPrior, build_landmark_model, plane_tange
 from rislam_rt.information.landmarks import Rows
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.bound import FLOOR_TILT, UPRIGHT_TILT, fewer_rows, heard_paths, over_distortion, prior_std, scheme_bound
+from rislam_rt.pipeline.bound import (
+    FLOOR_TILT,
+    UPRIGHT_TILT,
+    fewer_rows,
+    heard_paths,
+    over_distortion,
+    prior_std,
+    scheme_bound,
+)
 from rislam_rt.pipeline.run import set_stage
 from rislam_rt.pipeline.spec import build_settings
 from rislam_rt.pipeline.summary import map_score, summarise

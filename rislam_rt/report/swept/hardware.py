@@ -22,13 +22,13 @@ WAYS = {
 """How a fault is met: end of the variant's name, and which of its scores."""
 NAMES = dict(zip(WAYS, ("as built", "told", "calibrated", "calibrated, told"), strict=True))
 MARKS = dict(zip(WAYS, (("#D55E00", "o"), ("#E69F00", "^"), ("#0072B2", "s"), ("#009E73", "D")), strict=True))
-LAW = """Of each run the receiver alone is looked at, at some places of its second half, with the panel focused on the
-agent. One front end a seed is built with each fault; then the same one is calibrated on the first cycles
+LAW = """Of each run the receiver alone is looked at, at some places of its second half, with the panel focused on
+the agent. One front end a seed is built with each fault; then the same one is calibrated on the first cycles
 (`hardware.calibration_cycles`), panel at rest. Told: the estimator counts the power of the distortion as noise
-(`hardware.told`), as the tolerances say or as the calibration left it; of its converters' steps it always is. False: components a cycle that are no path.
-Panel: share of looks in which its direct path is reported. Landmarks: components that came over one. Errors: half
-width of 68 % of the cosine errors over the reported deviations, 1 if they are as reported. What false components do to
-the agent: [receiver](receiver.md#real-hardware)."""
+(`hardware.told`), as the tolerances say or as the calibration left it; of its converters' steps it always is told.
+False: components a cycle that are no path. Panel: share of looks in which its direct path is reported. Landmarks:
+components that came over one. Errors: half width of 68 % of the cosine errors over the reported deviations, 1 if
+they are as reported. What false components do to the agent: [receiver](receiver.md#real-hardware)."""
 
 
 def hardware_content(groups: Sequence[Group], spec: HardwareSpec) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from rislam_rt.pipeline.studies.classifier.score import (
     f1,
     importance,
     mean_over_rooms,
-    odds_over_life,
     right_by_class,
     rules,
     score,
@@ -33,11 +32,12 @@ class Training(NamedTuple):
     network: Network
     sets: Sets
     scores: dict[str, dict[str, Score]]
-    """By room (and `ALL`, `RANDOM`), by rule."""
+    """By named room (and `ALL`, `DRAWN`, `RANDOM`), by rule."""
     mean: dict[str, Floats]
     """Mean (3,) over the test rooms' F1 with its interval, by rule."""
     restarts: list[tuple[float, float]]
-    """F1 of each random start's network on the random rooms for validation, and on all test rooms."""
+    """Of each random start's network: mean over the path classes of the share told rightly on the random rooms for
+    validation, which chooses, and F1 on all test rooms."""
     importance: dict[str, Floats]
     """Loss of F1 on all test rooms, feature by feature, several shuffles each."""
 
@@ -59,9 +59,10 @@ def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:
     """Fit from several random starts, keep the best on the validation rooms, score it on all."""
     starts = np.random.default_rng(spec.seed).spawn(spec.network.restarts)
     networks = [_fit(sets.train, spec, rng=child) for child in starts]
-    restarts = [(_f1_of(sets.validation, network), _f1_of(sets.tested, network)) for network in networks]
+    tested = sets.tested
+    restarts = [(right_by_class(sets.validation, rules(net)["network"]), _f1_of(tested, net)) for net in networks]
     network = networks[int(np.argmax([chosen for chosen, _ in restarts]))]
-    places = {**sets.test, ALL: sets.tested, RANDOM: sets.validation}
+    places = {**sets.test, ALL: tested, DRAWN: sets.all_drawn, RANDOM: sets.validation}
     judges = rules(network)
     scores = {
         name: {
@@ -75,22 +76,33 @@ def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:
         rule: mean_over_rooms(filled, judge, spec.coverage, rng=np.random.default_rng(spec.seed))
         for rule, judge in judges.items()
     }
-    lost = importance(sets.tested, network, rng=np.random.default_rng(spec.seed))
+    lost = importance(tested, network, rng=np.random.default_rng(spec.seed))
     return Training(network, sets, scores, mean, restarts, lost)
 
 
 def _fit(examples: Examples, spec: ClassifierSpec, *, rng: np.random.Generator) -> Network:
-    """One network from one random start; a walk counts by the square root of its examples, both classes alike."""
-    known = examples.pick(examples.labelled)
-    _, row, count = np.unique(known.walk, return_inverse=True, return_counts=True)
-    share = float(np.clip(known.keep.mean(), 1e-6, 1.0 - 1e-6))
-    weight = np.where(known.keep, 1.0 / share, 1.0 / (1.0 - share)) / np.sqrt(count[row])
-    section = spec.network
+    """One network from one random start."""
+    known, section = examples.pick(examples.labelled & ~examples.near), spec.network
     return train_network(
-        known.features, known.keep, weight, section.hidden, section.penalty, section.iterations, rng=rng
+        known.features, known.keep, balance(known), section.hidden, section.penalty, section.iterations, rng=rng
     )
+
+
+def balance(examples: Examples) -> Floats:
+    """Weights (N,) of examples: keep and remove count alike, and so does every path class of either, however rare.
+
+    Within a class an example counts by one over the root of its walk's number of examples.
+    """
+    _, row, count = np.unique(examples.walk, return_inverse=True, return_counts=True)
+    weight = 1.0 / np.sqrt(count[row])
+    for side in (examples.keep, ~examples.keep):
+        kinds = np.unique(examples.kind[side])
+        for kind in kinds:
+            own = examples.kind == kind
+            weight[own] *= 0.5 / (len(kinds) * weight[own].sum())
+    return np.asarray(weight)
 
 
 def _f1_of(examples: Examples, network: Network) -> float:
     known = examples.pick(examples.labelled)
-    return f1(known.keep, odds_over_life(known, network) > 0.0)
+    return f1(known.keep, rules(network)["network"](known))

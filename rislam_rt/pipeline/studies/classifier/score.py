@@ -94,7 +94,7 @@ def mean_over_rooms(rooms: list[Examples], rule: Rule, coverage: float, *, rng: 
 
 def importance(examples: Examples, network: Network, *, rng: np.random.Generator) -> dict[str, Floats]:
     """Loss of F1 (S,) when one feature is shuffled among the examples, S times."""
-    known = examples.pick(examples.labelled)
+    known = examples.pick(examples.labelled & ~examples.near)
     full = f1(known.keep, odds_over_life(known, network) > 0.0)
     lost: dict[str, Floats] = {}
     for column, name in enumerate(FEATURES):

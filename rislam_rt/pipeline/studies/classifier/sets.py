@@ -128,6 +128,4 @@ def gather_motion(
 def _start(scene: Scene, spec: ClassifierSpec) -> Trajectory:
     """The first cycles of a room's own motion."""
     agent, rows = scene.agent, slice(spec.cycles)
-    return replace(
-        agent, **{name: getattr(agent, name)[rows] for name in ("time", "position", "velocity", "heading")}
-    )
+    return replace(agent, **{name: getattr(agent, name)[rows] for name in ("time", "position", "velocity", "heading")})
