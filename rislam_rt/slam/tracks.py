@@ -92,8 +92,10 @@ class Tracks(NamedTuple):
 
     @property
     def specular(self) -> Booleans:
-        """(T,) whether it is taken for a wall return."""
-        return self.moving | np.where(self.looks > 0, self.odds < 0.0, self.shine > 0.3)
+        """(T,) whether it is taken for a wall return; what the receiver says ran over the panel is none, however it looks
+        to a classifier."""
+        told = (self.looks > 0) & (self.side != PANEL)
+        return self.moving | np.where(told, self.odds < 0.0, self.shine > 0.3)
 
     @property
     def length(self) -> Integers:

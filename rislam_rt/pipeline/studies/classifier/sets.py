@@ -82,7 +82,7 @@ def gather_random(number: int, spec: ClassifierSpec) -> Examples:
     radio, policies = with_reference_snr(build_radio(spec.radio), snr), (rng.choice(BLIND), rng.choice(AIMED))
     if number % 2:
         scene = draw_room(LEARNT_FIRST + LEARNT_FIRST * (spec.seed % LEARNT_FIRST) + number).scene
-        return gather_motion(scene, _start(scene, spec), DEPTH, radio, spec, number, policies, rng=rng)
+        return gather_motion(scene, first_cycles(scene, spec.cycles), DEPTH, radio, spec, number, policies, rng=rng)
     for _ in range(_TRIES):
         scene = random_room(f"random_{number}", rng=rng)
         try:
@@ -97,7 +97,9 @@ def gather_drawn(seed: int, spec: ClassifierSpec) -> Examples:
     """Examples of the room of a seed along its own motion, under every policy."""
     scene, rng = draw_room(seed).scene, np.random.default_rng([spec.seed, seed, 1])
     policies = range(len(POLICIES))
-    return gather_motion(scene, _start(scene, spec), DEPTH, build_radio(spec.radio), spec, seed, policies, rng=rng)
+    return gather_motion(
+        scene, first_cycles(scene, spec.cycles), DEPTH, build_radio(spec.radio), spec, seed, policies, rng=rng
+    )
 
 
 def gather_room(scene: Scene, depth: int, spec: ClassifierSpec) -> Examples:
@@ -125,7 +127,7 @@ def gather_motion(
     return join(parts)
 
 
-def _start(scene: Scene, spec: ClassifierSpec) -> Trajectory:
+def first_cycles(scene: Scene, cycles: int) -> Trajectory:
     """The first cycles of a room's own motion."""
-    agent, rows = scene.agent, slice(spec.cycles)
+    agent, rows = scene.agent, slice(cycles)
     return replace(agent, **{name: getattr(agent, name)[rows] for name in ("time", "position", "velocity", "heading")})
