@@ -1,8 +1,9 @@
 """Opening a scene for a command."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
+
+from rislam_rt.cli.loudness import warn
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
@@ -20,7 +21,7 @@ class Opened(NamedTuple):
     def warn(self) -> None:
         """Print the warnings; once all else is known to be in order, so that an error is one line."""
         for line in self.warnings:
-            print(f"warning: {line}", file=sys.stderr)
+            warn(line)
 
 
 def open_scene(path: Path, radio: "RadioConfig | None" = None) -> Opened:

@@ -12,7 +12,10 @@ def command(
     scene: SceneFolder,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Picture to write (PNG or SVG).")] = None,
 ) -> None:
-    """Describe a scene, and draw it from above and in three dimensions."""
+    """Describe a scene, and draw it from above and in three dimensions.
+
+    Example: rislam-rt show office --out office.svg
+    """
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.report.room import draw_scene
     from rislam_rt.report.tables import print_scene

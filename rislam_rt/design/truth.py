@@ -11,7 +11,7 @@ from rislam_rt.model import PathKind, Paths, RadioConfig
 
 def problem_from_arrays(
     response: Complexes, static_gain: Complexes, gradient: Floats, radio: RadioConfig, levels: int,
-    prior: Floats | None = None, least_snr: float = 0.0,
+    prior: Floats | None = None, least_snr: float = 0.0, panels: tuple[tuple[int, slice], ...] = ((0, slice(None)),),
 ) -> DesignProblem:  # fmt: skip
     """A problem of one position from plain arrays.
 
@@ -27,12 +27,14 @@ def problem_from_arrays(
         (2, 2) information [1/m^2] beforehand; none by default.
     least_snr
         SNR over all antennas, linear, at which a path is detected every other time; 0: all paths count.
+    panels
+        Where there are several: as in `DesignProblem`.
     """
     unit_snr = float(radio.integrated_snr(np.ones(())))
     prior = np.zeros((2, 2)) if prior is None else prior
     return DesignProblem(
         response[None], static_gain[None], gradient[None], prior, float(range_information(np.array(unit_snr), radio)),
-        levels, least_power=least_snr / unit_snr,
+        levels, least_power=least_snr / unit_snr, panels=panels,
     )  # fmt: skip
 
 
@@ -64,4 +66,7 @@ def problem_from_paths(
     gradient = vertex_gradient(tx, rx, paths.vertices[cycle, order], paths.num_vertices[order])[:, :2]
     legs = paths.ris
     response = legs.tx[cycle, legs.tx_leg[over_panel]] * legs.rx[cycle, legs.rx_leg[over_panel]]
-    return problem_from_arrays(response, paths.gain[cycle, static], gradient, radio, levels, prior, least_snr)
+    met = paths.panel[over_panel]
+    # the first path of a panel; of one that is out of sight any: its elements have no response
+    panels = tuple((int(np.argmax(met == number)), span) for number, span in enumerate(legs.spans))
+    return problem_from_arrays(response, paths.gain[cycle, static], gradient, radio, levels, prior, least_snr, panels)

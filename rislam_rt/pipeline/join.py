@@ -39,7 +39,7 @@ def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> Schem
     parent = np.full(len(ident), -1)
     for part, place in zip(parts, places, strict=True):
         parent[place] = np.where(part.parent >= 0, part.parent, parent[place])
-    plain = ("position", "velocity", "heading", "covariance", "sent", "applied", "seconds")
+    plain = ("time", "position", "velocity", "heading", "covariance", "sent", "applied", "seconds")
     held = ("held", "landmark_position", "ris_probability")
     course: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in plain}
     course |= {name: _spread([getattr(part, name) for part in parts], places, len(ident)) for name in held}
@@ -53,6 +53,7 @@ def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> Schem
         parent=parent,
         info={name: np.concatenate([part.info[name] for part in parts]) for name in parts[0].info},
         outcome=tuple(outcome for part in parts for outcome in part.outcome),
+        given=None,
     )
 
 
@@ -64,13 +65,15 @@ def thinned_paths(paths: Paths, rows: Integers) -> Paths:
 
 def thinned_scheme(scheme: SchemeResult, rows: Integers) -> SchemeResult:
     """Some cycles alone."""
-    names = ("position", "velocity", "heading", "covariance", "sent", "applied", "gain", "component_path",
+    names = ("time", "position", "velocity", "heading", "covariance", "sent", "applied", "gain", "component_path",
              "component_landmark", "held", "landmark_position", "ris_probability", "seconds")  # fmt: skip
     return replace(
         scheme,
         **{name: getattr(scheme, name)[rows] for name in names},
         info={name: values[rows] for name, values in scheme.info.items()},
+        smoothed=None if scheme.smoothed is None else scheme.smoothed[rows],
         outcome=tuple(scheme.outcome[row] for row in rows),
+        given=None,
     )
 
 

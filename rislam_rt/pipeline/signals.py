@@ -154,4 +154,4 @@ def build_signals(
 
 def mean_components(data: "xr.Dataset") -> float:
     """Components a cycle."""
-    return float((data["found_path"] != NO_COMPONENT).sum()) / max(data.sizes["cycle"], 1)
+    return float((data["found_path"] != NO_COMPONENT).sum()) / max(data.sizes["time"], 1)

@@ -33,7 +33,7 @@ def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
                 _draw_code(axis, scheme.applied[cycle], scheme.levels)
                 gain = np.abs(scheme.gain[cycle, direct]).max(initial=0.0)
                 level = f"{20.0 * np.log10(gain):.1f} dB" if gain > 0.0 else "not seen"
-                axis.set_title(f"t = {result.scene.agent.time[cycle]:.0f} s, {level}", fontsize=9)
+                axis.set_title(f"t = {result.scene.agent.elapsed[cycle]:.0f} s, {level}", fontsize=9)
             row[0].set_ylabel(scheme.scheme, weight="bold")
         _colour_bar(figure, axes, schemes[0].levels)
     return figure

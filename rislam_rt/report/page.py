@@ -71,7 +71,7 @@ def draw_figures(result: SlamResult) -> dict[str, bytes]:
     budget = spec.budget
     cycle = len(result.scene.agent) // 2
     first = next(iter(result.schemes.values()))
-    time = result.scene.agent.time[cycle]
+    time = result.scene.agent.elapsed[cycle]
     figures = {
         "room": draw_above(result),
         "error": draw_agent_error(result),

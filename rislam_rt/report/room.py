@@ -33,7 +33,7 @@ def draw_above(result: SlamResult) -> Figure:
         final = [scheme.position[-1, :2] - result.scene.agent.position[-1, :2] for scheme in schemes]
         half = max(ZOOM, 2.5 * float(np.linalg.norm(final, axis=1).max()))
         for axis, scheme in zip(axes, schemes, strict=True):
-            _draw_truth(axis, result.scene)
+            draw_plan(axis, result.scene)
             _draw_estimate(axis, result.scene, scheme)
             _draw_close_up(axis, result.scene, scheme, half)
             error = np.sqrt(np.mean(np.sum((scheme.position - result.scene.agent.position) ** 2, axis=1)))
@@ -67,7 +67,7 @@ def draw_scene(scene: Scene, path: Path) -> Path:
     with styled():
         figure = Figure(figsize=(11.0, 5.0))
         flat = figure.add_subplot(1, 2, 1)
-        _draw_truth(flat, scene)
+        draw_plan(flat, scene)
         flat.set_xlabel("x [m]")
         flat.set_ylabel("y [m]")
         flat.set_title(f"{scene.name} from above", weight="bold")
@@ -77,7 +77,7 @@ def draw_scene(scene: Scene, path: Path) -> Path:
         return save_figure(figure, path)
 
 
-def _draw_truth(axis: Axes, scene: Scene) -> None:
+def draw_plan(axis: Axes, scene: Scene) -> None:
     """Walls (thick where they stand at the agent's height), path and landmarks as they are."""
     walls, path = build_walls(scene), scene.agent.position
     for edge in outline_edges(walls):
@@ -89,8 +89,8 @@ def _draw_truth(axis: Axes, scene: Scene) -> None:
     axis.annotate("start", (path[0, 0], path[0, 1]), (6, -10), textcoords="offset points", fontsize=9)
     for scatterer in scene.scatterers:
         _mark(axis, scatterer.position, scatterer.name, "o")
-    if scene.ris is not None:
-        _mark(axis, scene.ris.center, scene.ris.name, "s")
+    for panel in scene.panels:
+        _mark(axis, panel.center, panel.name, "s")
     axis.set_aspect("equal")
     axis.grid(False)
 
@@ -203,9 +203,9 @@ def _draw_objects_3d(axis: Any, scene: Scene, cycle: int) -> None:
     for scatterer in scene.scatterers:
         axis.plot(*scatterer.position, "o", color=KIND[PathKind.PS], mec=TRUTH, ms=9, zorder=9)
         axis.text(*(scatterer.position + label), scatterer.name, fontsize=9, zorder=10)
-    if scene.ris is not None:
-        axis.plot(*scene.ris.center, "s", color=KIND[PathKind.RIS], mec=TRUTH, ms=10, zorder=9)
-        axis.text(*(scene.ris.center + label), scene.ris.name, fontsize=9, zorder=10)
+    for panel in scene.panels:
+        axis.plot(*panel.center, "s", color=KIND[PathKind.RIS], mec=TRUTH, ms=10, zorder=9)
+        axis.text(*(panel.center + label), panel.name, fontsize=9, zorder=10)
 
 
 def _draw_class(axis: Any, scene: Scene, paths: Paths, gain: Floats, cycle: int, kind: PathKind) -> Line2D | None:

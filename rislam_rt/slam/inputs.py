@@ -3,13 +3,26 @@
 import math
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.model import RisCode, RisSpec
+from rislam_rt.model import DataSheet, RisCode, RisSpec, RisSpecs
 
 MAX_STEP = 1e6
 """[s] Twelve days; the squares of longer steps leave nothing of what was known."""
 
 
-def check_step(dt: float, heading: float, code: RisCode | None = None, ris: RisSpec | None = None) -> None:
+def lone_panel(ris: DataSheet | None) -> RisSpec | None:
+    """The data sheet, for a filter that knows one panel.
+
+    Raises
+    ------
+    ConfigError
+        There are several panels.
+    """
+    if isinstance(ris, RisSpecs):
+        raise ConfigError(f"slam: {len(ris.panels)} panels in the room, and this filter knows one; take another room")
+    return ris
+
+
+def check_step(dt: float, heading: float, code: RisCode | None = None, ris: DataSheet | None = None) -> None:
     """Check time step [s], heading [rad] and code before a cycle.
 
     Raises

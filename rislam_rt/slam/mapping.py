@@ -31,7 +31,8 @@ def predict(state: FilterState, dt: float, config: SlamConfig) -> SlamEstimate:
     ahead = estimate(state, config, moments)
     if state.ris is None or named_panel(state.book):
         return ahead
-    return replace(ahead, suspect=find_suspect(state.tracks, state.book, moments, state.body))
+    suspect = find_suspect(state.tracks, state.book, moments, state.body)
+    return replace(ahead, suspects=() if suspect is None else (suspect,))
 
 
 def estimate(state: FilterState, config: SlamConfig, moments: Moments | None = None) -> SlamEstimate:

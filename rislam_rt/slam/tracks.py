@@ -92,8 +92,8 @@ class Tracks(NamedTuple):
 
     @property
     def specular(self) -> Booleans:
-        """(T,) whether it is taken for a wall return; what the receiver says ran over the panel is none, however it looks
-        to a classifier."""
+        """(T,) whether it is taken for a wall return. What the receiver says ran over the panel is none, however it
+        looks to a classifier."""
         told = (self.looks > 0) & (self.side != PANEL)
         return self.moving | np.where(told, self.odds < 0.0, self.shine > 0.3)
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Integers
 from rislam_rt.design.single import exact_code
-from rislam_rt.model import PathKind, Paths, RisCode, RisSpec
+from rislam_rt.model import DataSheet, PathKind, Paths, RisCode
 from rislam_rt.ris import rephase
 
 POLICIES = ("random", "held", "aimed", "exact")
@@ -14,7 +14,7 @@ AIMED = tuple(POLICIES.index(name) for name in ("aimed", "exact"))
 """Those that know where the agent is."""
 
 
-def set_codes(paths: Paths, panel: RisSpec | None, policy: str, *, rng: np.random.Generator) -> Paths:
+def set_codes(paths: Paths, panel: DataSheet | None, policy: str, *, rng: np.random.Generator) -> Paths:
     """The paths of a walk under the codes of a policy; as they are without a panel.
 
     With no direct path among them, the policies that aim take one random code.
@@ -36,7 +36,7 @@ def _middle(paths: Paths) -> int:
     return int(there[len(there) // 2]) if len(there) else 0
 
 
-def _best_codes(paths: Paths, panel: RisSpec) -> Integers:
+def _best_codes(paths: Paths, panel: DataSheet) -> Integers:
     """(K, N, M) codes of largest gain for the direct path; zero where it is hidden."""
     assert paths.ris is not None
     column = int(np.flatnonzero(paths.kind == PathKind.RIS)[0])
