@@ -42,5 +42,5 @@ def command(
     if figure is not None:
         from rislam_rt.report.code import draw_codes
 
-        typer.echo(f"figure: {draw_codes(found.designs, figure)}")
+        typer.echo(f"figure: {draw_codes(found.designs, figure, room.ris.spec if room.ris else None)}")
     write_json(json, {"scene": room.name, "at_m": point.tolist(), "seed": seed, **table})

@@ -358,6 +358,7 @@ def map_table(estimate: MapEstimate) -> dict[str, Any]:
             "std_m": std[row].tolist(),
             "image_of": int(estimate.ident[estimate.parent[row]]) if estimate.parent[row] >= 0 else None,
             "ris_probability": float(estimate.ris_probability[row]),
+            **({} if estimate.panel is None else {"panel": int(estimate.panel[row])}),
             "strength": float(estimate.strength[row]),
         }
         for row in range(len(estimate.ident))

@@ -32,10 +32,11 @@ class Walk:
     def __init__(
         self, name: str, scene: Scene, body: Body, spec: PipelineSpec, seeds: Seeds, estimator: Estimator | None = None
     ) -> None:
-        settings, self.scheme, self.name, self.seeds = build_settings(spec), SCHEMES[name], name, seeds
+        self.scheme, self.name, self.seeds = SCHEMES[name], name, seeds
         self.motion, self.body = scene.agent, body
         self.front_end: FrontEnd | None = None
         panel = scene.ris.spec if scene.ris is not None and self.scheme.panel else None
+        settings = build_settings(spec, 1 if panel is None else len(panel.panels))
         compass, self.sway = (child(seeds.told, number) for number in range(2))
         start = np.random.default_rng(seeds.start)
         told = tell_belief(self.motion, body, panel, spec, settings, start=start, compass=compass)

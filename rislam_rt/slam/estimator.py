@@ -18,8 +18,9 @@ def init(
     *, rng: np.random.Generator,
 ) -> Any:  # fmt: skip
     """The start prior, and an empty map."""
-    begin = window.init if config.filter == "window" else cycle.init
-    return begin(start, body, lone_panel(ris), sensor, config, rng=rng)
+    if config.filter == "window":
+        return window.init(start, body, lone_panel(ris), sensor, config, rng=rng)
+    return cycle.init(start, body, ris, sensor, config, rng=rng)
 
 
 def step(

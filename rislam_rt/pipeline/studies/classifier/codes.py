@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Integers
-from rislam_rt.design.single import exact_code
+from rislam_rt.design import focus_codes
 from rislam_rt.model import DataSheet, PathKind, Paths, RisCode
 from rislam_rt.ris import rephase
 
@@ -23,7 +22,7 @@ def set_codes(paths: Paths, panel: DataSheet | None, policy: str, *, rng: np.ran
         return paths
     shape = (paths.num_cycles, panel.rows, panel.cols)
     if policy in ("aimed", "exact") and np.any(paths.kind == PathKind.RIS):
-        best = _best_codes(paths, panel)
+        best = focus_codes(paths, panel.levels).index
         index = best if policy == "exact" else best[_middle(paths)]
     else:
         index = rng.integers(panel.levels, size=shape if policy == "random" else shape[1:])
@@ -34,12 +33,3 @@ def _middle(paths: Paths) -> int:
     """The cycle in the middle of those in which the direct path over the panel is there."""
     there = np.flatnonzero(paths.valid[:, paths.kind == PathKind.RIS].any(axis=1))
     return int(there[len(there) // 2]) if len(there) else 0
-
-
-def _best_codes(paths: Paths, panel: DataSheet) -> Integers:
-    """(K, N, M) codes of largest gain for the direct path; zero where it is hidden."""
-    assert paths.ris is not None
-    column = int(np.flatnonzero(paths.kind == PathKind.RIS)[0])
-    tx, rx = paths.ris.tx[:, paths.ris.tx_leg[column]], paths.ris.rx[:, paths.ris.rx_leg[column]]
-    response = (tx * rx).reshape(len(tx), -1)
-    return exact_code(response, panel.levels)[0].reshape(tx.shape)
