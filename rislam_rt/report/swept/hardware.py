@@ -28,7 +28,7 @@ the agent. One front end a seed is built with each fault; then the same one is c
 (`hardware.told`), as the tolerances say or as the calibration left it; of its converters' steps it always is told.
 False: components a cycle that are no path. Panel: share of looks in which its direct path is reported. Landmarks:
 components that came over one. Errors: half width of 68 % of the cosine errors over the reported deviations, 1 if
-they are as reported. What false components do to the agent: [receiver](receiver.md#real-hardware)."""
+they are as reported. What false components do to the agent: [receiver](../receiver.md#real-hardware)."""
 
 
 def hardware_content(groups: Sequence[Group], spec: HardwareSpec) -> dict[str, Any]:
