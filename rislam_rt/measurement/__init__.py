@@ -4,7 +4,7 @@ from rislam_rt.measurement.calibrate import calibrate
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.dataset import NO_COMPONENT, load_signals, signals_dataset
 from rislam_rt.measurement.false_alarms import detection_threshold, expected_false_alarms
-from rislam_rt.measurement.hardware import Correction, FrontEnd, HardwareConfig, build_front_end
+from rislam_rt.measurement.hardware import Correction, FrontEnd, HardwareConfig, build_front_end, expected_distortion
 from rislam_rt.measurement.measure import measure
 from rislam_rt.measurement.noise import (
     paper_snr_db,
@@ -40,6 +40,7 @@ __all__ = [
     "capture",
     "detection_probability",
     "detection_threshold",
+    "expected_distortion",
     "expected_false_alarms",
     "find_components",
     "init_tracks",
