@@ -65,6 +65,21 @@ def test_help_and_version_import_nothing_heavy():
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+def test_settings_are_printed_without_what_only_a_run_needs():
+    """Half a second of scipy, trimesh and plots for a list of settings; on modules, as clocks lie."""
+    heavy = ["scipy.special", "scipy.optimize", "scipy.spatial", "scipy.stats", "trimesh", "xarray", "matplotlib"]
+    code = (
+        "import sys\n"
+        "from rislam_rt.cli import main\n"
+        "sys.argv = ['rislam-rt', 'config']\n"
+        "try:\n    main()\n"
+        "except SystemExit as left:\n    assert left.code in (0, None), left.code\n"
+        f"print([name for name in {heavy} if name in sys.modules])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
