@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -19,6 +19,9 @@ from rislam_rt.report.style import KIND, TRUTH, WALL, save_figure, scheme_colour
 
 ZOOM = 0.25
 """Half the width [m] of the close-up of the path's end, unless the error is larger."""
+
+SHADE = "#d9cdb8"
+"""Colour of what hides and does not reflect."""
 
 WALL_NAME, MOST_NAMES = "#54606e", 40
 """Colour of walls' names, and how many are written at most."""
@@ -87,9 +90,10 @@ def draw_scene(scene: Scene, path: Path) -> Path:
 
 
 def draw_plan(axis: Axes, scene: Scene) -> None:
-    """Walls (thick where they stand at the agent's height), path and landmarks as they are."""
+    """Walls (thick where they stand at the agent's height), shades, path and landmarks as they are."""
     walls, path = build_walls(scene), scene.agent.position
     cuts = section(walls.triangles, float(path[-1, 2]))
+    axis.add_collection(PolyCollection(list(walls.shades.triangles[..., :2]), color=SHADE, lw=0.5, zorder=0))
     axis.add_collection(LineCollection(list(outline_edges(walls)[..., :2]), colors="#dddddd", lw=0.8, zorder=0))
     axis.add_collection(LineCollection(list(cuts), colors=WALL, lw=3.0, capstyle="round", zorder=1))
     axis.plot(path[:, 0], path[:, 1], color=TRUTH, lw=4.0, alpha=0.25, zorder=2)
@@ -217,6 +221,7 @@ def _draw_room_3d(axis: Any, scene: Scene) -> None:
     if len(floor):
         axis.add_collection3d(Poly3DCollection(list(floor), facecolor="#f1f1f1", edgecolor="none", zorder=0))
     axis.add_collection3d(Line3DCollection(list(outline_edges(walls)), colors=WALL, lw=1.0, zorder=1))
+    axis.add_collection3d(Poly3DCollection(list(walls.shades.triangles), facecolor=SHADE, alpha=0.3, zorder=1))
     axis.set_xlim(low[0], high[0])
     axis.set_ylim(low[1], high[1])
     axis.set_zlim(low[2], high[2])

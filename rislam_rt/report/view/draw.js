@@ -66,6 +66,15 @@ class Painter {
     this.context.lineWidth = 1.2;
     this.context.stroke();
   }
+  // What hides and reflects nothing: all of it in one go.
+  shade(triangles) {
+    this.context.globalAlpha = 0.3;
+    this.context.fillStyle = "#777";
+    this.context.beginPath();
+    for (const corners of triangles) this.trace(corners, true);
+    this.context.fill("nonzero");
+    this.context.globalAlpha = 1;
+  }
   point(point, shape, size, colour, filled = true) {
     const [x, y] = this.camera.place(point), c = this.context;
     c.strokeStyle = colour;

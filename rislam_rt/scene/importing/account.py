@@ -13,7 +13,7 @@ from rislam_rt.scene.meshes import Mesh
 
 def account(
     facets: Facets, found: Sorted, surfaces: list[Surface], unseen: float, reflectors: dict[str, Any],
-    shades: dict[str, Mesh], options: ImportOptions,
+    shades: dict[str, Mesh], options: ImportOptions, *, scanned: bool,
 ) -> list[str]:  # fmt: skip
     """What became of the mesh, in numbers."""
     walls = sum(
@@ -29,17 +29,15 @@ def account(
         f"walls are within {max(1e3 * max(s.error for s in surfaces), 0.01):.2g} mm of the mesh",
     ]
     if found.shading:
-        hint = " (--curved planes: round ones as planes)" if options.curved == "shade" else ""
-        cells = (
-            f" (corners joined in cells of {1e3 * found.cell:.2g} mm, moved {1e3 * found.shade_error:.2g} mm at most)"
-        )
-        remarks.append(
-            f"{found.shading:.3g} m^2 narrower than {100 * found.narrow:.2g} cm ({waves:.2g} wavelengths at "
-            f"{options.carrier_ghz:g} GHz) or round shade and do not reflect{hint}"
-            + (cells if found.shade_error else "")
-        )
+        width = f"{100 * found.narrow:.2g} cm ({waves:.2g} wavelengths at {options.carrier_ghz:g} GHz)"
+        narrow = f"narrower than {width}" + (" or round" if options.curved == "shade" else "")
+        why = "that lie on no plane" if scanned else narrow
+        remarks.append(f"{found.shading:.3g} m^2 {why} shade and do not reflect")
+    if found.shade_error:
+        how = f"corners joined in cells of {1e3 * found.cell:.2g} mm, moved {1e3 * found.shade_error:.2g} mm at most"
+        remarks.append(f"clutter is thinned: {how}")
     for (radius, sides, error), count in _counted(found.cylinders)[:8]:
-        what = "reflect" if options.curved == "planes" else "shade"
+        what = "reflect" if options.curved == "planes" else "shade (--curved planes: reflect)"
         many = "a cylinder" if count == 1 else f"each of {count} cylinders"
         off = f"{1e3 * error:.2g} mm"
         remarks.append(f"{many} of {radius:.3g} m became {sides} flat sides within {off} that {what}")

@@ -61,7 +61,8 @@ def build_draft(facets: Facets, parts: list[Part], notes: list[str], options: Im
     if palette.unused():
         names = ", ".join([*reflectors, *sorted({p.material for p in parts if p.material})][:12])
         raise Fault(f"--material {palette.unused()[0]}: nothing has that name", f"give one of: {names}")
-    remarks = [*notes, *about, *account(facets, found, surfaces, unseen, reflectors, shades, options)]
+    said = account(facets, found, surfaces, unseen, reflectors, shades, options, scanned=bool(about))
+    remarks = [*notes, *about, *said]
     return RoomDraft(reflectors, shades, remarks + palette.remarks())
 
 

@@ -60,7 +60,11 @@ def find_pieces(facets: Facets, nodes: list[str]) -> list[Piece]:
         else:
             things.append(regions)
     for regions in _touching(facets, things):
-        others.append(Piece(guess_kind(bounds_of(facets, regions), box), "", regions, False))
+        bounds = bounds_of(facets, regions)
+        if _is_shell(bounds, box):  # walls that were drawn apart
+            shell += regions.tolist()
+        else:
+            others.append(Piece(guess_kind(bounds, box), "", regions, False))
     return [Piece("", "", np.array(sorted(shell), dtype=np.int64), True), *others]
 
 

@@ -18,6 +18,8 @@ SMOOTHING = 3
 """Times that the direction in which corners face is averaged over their neighbours."""
 LEAN = np.cos(np.radians(30.0))
 """A point belongs to a plane whose normal is this near its own."""
+ALIKE = np.cos(np.radians(1.0))
+"""Two parts of one wall are parallel within this."""
 LEAST_AREA = 0.3
 """[m^2] Smaller planes are clutter."""
 GAP = 0.3
@@ -138,8 +140,11 @@ def _best_plane(cloud: Cloud, free: Booleans, reach: float) -> ScanPlane | None:
         on = rows[(np.abs(height) < width) & (cloud.normal[rows] @ plane > LEAN)]
         if len(on) < 4:
             break
-        members = _hanging_together(cloud, on)
+        groups = _hanging_together(cloud, on)
+        members = groups[0]
         plane, offset = _fit(cloud.points[members], cloud.area[members], plane)
+    else:
+        members = np.concatenate([members, *(g for g in groups[1:] if _fits(cloud, g, plane, offset))])
     height = cloud.points[members] @ plane - offset
     weight = cloud.area[members]
     residual = float(np.sqrt((weight * height**2).sum() / max(weight.sum(), 1e-12)))
@@ -148,14 +153,22 @@ def _best_plane(cloud: Cloud, free: Booleans, reach: float) -> ScanPlane | None:
     return ScanPlane(plane, offset, members, residual, float(weight.sum()), float(np.sqrt(12.0 * max(spread[1], 0.0))))
 
 
-def _hanging_together(cloud: Cloud, rows: Integers) -> Integers:
-    """The largest group of points over gaps of up to `GAP`, and all others of at least `LEAST_AREA`."""
+def _hanging_together(cloud: Cloud, rows: Integers) -> list[Integers]:
+    """Groups of points over gaps of up to `GAP`: the largest first, then others of at least `LEAST_AREA`."""
     cells, box = np.unique(np.floor(cloud.points[rows] / (0.5 * GAP)).astype(np.int64), axis=0, return_inverse=True)
     near = cKDTree(cells).query_pairs(1.8, output_type="ndarray")
     label = connected(near, len(cells))[box.ravel()]
     size = np.bincount(label, cloud.area[rows])
-    keep = (size >= LEAST_AREA) | (size == size.max())
-    return rows[keep[label]]
+    order = np.argsort(-size, kind="stable")
+    return [rows[label == k] for k in order if size[k] >= LEAST_AREA or k == order[0]]
+
+
+def _fits(cloud: Cloud, rows: Integers, plane: Floats, offset: float) -> bool:
+    """Whether points apart from those that a plane was fitted to lie on it too, with no lean or step of their own."""
+    height = cloud.points[rows] @ plane - offset
+    own, _ = _fit(cloud.points[rows], cloud.area[rows], plane)
+    noise = max(cloud.noise, 1e-3)
+    return bool(abs(height.mean()) < 0.5 * noise and height.std() < 1.1 * noise and own @ plane > ALIKE)
 
 
 def _fit(points: Floats, weight: Floats, side: Floats) -> tuple[Floats, float]:

@@ -29,7 +29,7 @@ SLANT = np.cos(np.radians(20.0))
 
 
 class Outline(NamedTuple):
-    """A plane's mesh, and the holes of the scan that were filled [m^2]."""
+    """A plane's mesh, and what was filled of the scan's holes that no bridge closed [m^2]."""
 
     mesh: Mesh
     filled: float
@@ -111,7 +111,7 @@ def _closed(there: Booleans, ridges: Booleans, fill: float) -> tuple[Booleans, f
     parts, count = label(patched)
     keep = [k for k in range(1, count + 1) if (parts == k).sum() * CELL**2 >= LEAST_PART]
     kept = np.isin(parts, keep)
-    return kept, float((kept & ~there).sum()) * CELL**2
+    return kept, float((kept & ~solid).sum()) * CELL**2
 
 
 def _loops(there: Booleans) -> list[list[Floats]]:

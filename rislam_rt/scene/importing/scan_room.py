@@ -8,7 +8,7 @@ from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.facets import Facets, Welded
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.scan import WIDTHS, ScanPlane, find_planes, thin_cloud
-from rislam_rt.scene.importing.scan_outline import CELL, Outline, outline_planes
+from rislam_rt.scene.importing.scan_outline import BRIDGE, CELL, Outline, outline_planes
 from rislam_rt.scene.importing.surfaces import Clutter, Sorted, Surface, in_cells, off_planes, surface_area
 
 FLAT_SHARE = 0.3
@@ -81,7 +81,8 @@ def _remarks(kept: list[tuple[ScanPlane, Outline]], noise: float) -> list[str]:
         f"a scan: points lie {1e3 * noise:.2g} mm (standard deviation) off the patches about them",
         f"{len(kept)} planes fitted, residual of the largest {1e3 * kept[0][0].residual:.2g} mm, at most "
         f"{1e3 * worst:.2g} mm (root mean square)",
-        f"{filled:.3g} m^2 of gaps and holes filled (--fill: holes up to that area), in cells of {100 * CELL:g} cm",
+        f"gaps up to {200 * BRIDGE * CELL:g} cm bridged, {filled:.3g} m^2 of larger holes filled (--fill: up to that "
+        f"area each), outlines in cells of {100 * CELL:g} cm",
     ]
 
 
