@@ -66,13 +66,15 @@ class Painter {
     this.context.lineWidth = 1.2;
     this.context.stroke();
   }
-  // What hides and reflects nothing: all of it in one go.
+  // What hides and reflects nothing. Triangle by triangle: in one path the front and the back of a body cancel.
   shade(triangles) {
-    this.context.globalAlpha = 0.3;
-    this.context.fillStyle = "#777";
-    this.context.beginPath();
-    for (const corners of triangles) this.trace(corners, true);
-    this.context.fill("nonzero");
+    this.context.globalAlpha = 0.2;
+    this.context.fillStyle = "#666";
+    for (const corners of triangles) {
+      this.context.beginPath();
+      this.trace(corners, true);
+      this.context.fill();
+    }
     this.context.globalAlpha = 1;
   }
   point(point, shape, size, colour, filled = true) {
