@@ -14,7 +14,7 @@ from rislam_rt.measurement.noise import (
     with_reference_snr,
 )
 from rislam_rt.measurement.parts import path_std
-from rislam_rt.measurement.received import Received, receive, twin
+from rislam_rt.measurement.received import Clutter, Received, receive, twin
 from rislam_rt.measurement.sensor import build_sensor
 from rislam_rt.measurement.signal import num_tones, pulse_samples, to_samples, to_tones, tones
 from rislam_rt.measurement.tracking import TrackInfo, TrackingConfig, TrackState, init_tracks, step_tracks
@@ -24,6 +24,7 @@ from rislam_rt.model import detection_probability
 __all__ = [
     "NO_COMPONENT",
     "Capture",
+    "Clutter",
     "Components",
     "Correction",
     "FrontEnd",
