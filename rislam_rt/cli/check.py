@@ -38,9 +38,17 @@ def command(
 
     Example: rislam-rt check myroom --set radio.reference_snr_db=0 --picture coverage.png
     """
+    from rislam_rt.cli.scenes import settings_of
     from rislam_rt.scene import check_scene
 
-    settings = _settings(pipeline, set_ or [], carrier_ghz)
+    changed = list(set_ or ())
+    if carrier_ghz is not None:
+        changed += [f"radio.carrier_ghz={carrier_ghz}", f"radio.bandwidth_ghz={min(1.0, carrier_ghz)}"]
+    settings = settings_of(pipeline, changed)
+    if picture is not None:
+        from rislam_rt.report.style import picture_kind
+
+        picture_kind(picture)  # before anything is worked out
     findings = check_scene(Path(scene), settings.radio)
     for finding in findings:
         typer.echo(f"{finding.severity}: {finding.line}")
@@ -57,15 +65,6 @@ def command(
     typer.echo(f"{scene}: {errors} errors, {warnings} warnings")
     if errors:
         raise typer.Exit(2)
-
-
-def _settings(pipeline: Path, changed: list[str], carrier_ghz: float | None) -> "Records":
-    from rislam_rt.pipeline import load_spec
-    from rislam_rt.pipeline.spec import build_settings
-
-    if carrier_ghz is not None:
-        changed = [*changed, f"radio.carrier_ghz={carrier_ghz}", f"radio.bandwidth_ghz={min(1.0, carrier_ghz)}"]
-    return build_settings(load_spec(pipeline, changed))
 
 
 def _advise(folder: Path, settings: "Records", picture: Path | None) -> dict[str, object]:

@@ -4,9 +4,10 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.design.problem import DesignProblem
+from rislam_rt.design.single import exact_code
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import range_information, vertex_gradient
-from rislam_rt.model import PathKind, Paths, RadioConfig
+from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode
 
 
 def problem_from_arrays(
@@ -42,6 +43,25 @@ def panel_columns(paths: Paths, cycle: int) -> Integers:
     """Panel paths (P,) of a cycle, the direct one first if it is there."""
     over_panel = np.flatnonzero(paths.valid[cycle] & np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS)))
     return over_panel[np.argsort(paths.kind[over_panel] != PathKind.RIS, kind="stable")]
+
+
+def focus_codes(paths: Paths, levels: int) -> RisCode:
+    """Codes (K, N, M), one a cycle: every panel at the optimum of its direct path, 0 where it is hidden.
+
+    Raises
+    ------
+    ConfigError
+        The paths hold no panel.
+    """
+    if paths.ris is None:
+        raise ConfigError("design: the scene has no panel; add a [ris] section")
+    legs, (cycles, _, *shape) = paths.ris, paths.ris.tx.shape
+    index = np.zeros((cycles, shape[0] * shape[1]), dtype=np.int64)
+    for path in np.flatnonzero(paths.kind == PathKind.RIS):
+        span = legs.spans[int(paths.panel[path])]
+        response = (legs.tx[:, legs.tx_leg[path]] * legs.rx[:, legs.rx_leg[path]]).reshape(cycles, -1)
+        index[:, span] = exact_code(response[:, span], levels)[0]
+    return RisCode(index.reshape(cycles, *shape), levels)
 
 
 def problem_from_paths(

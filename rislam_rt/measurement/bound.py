@@ -50,26 +50,34 @@ class Components(NamedTuple):
 
 
 def measure_bound(
-    received: Received, radio: RadioConfig, config: ReceiverConfig, num_paths: int, *, rng: np.random.Generator
+    received: Received,
+    radio: RadioConfig,
+    config: ReceiverConfig,
+    num_paths: int,
+    num_extra: int = 0,
+    *,
+    rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
     """Components with bound-driven errors, missed detections, merging and clutter, in the order of their delays.
 
     The errors have the variance that belongs to the true SNR; the standard deviations reported are those that the
     measured one suggests, all that a receiver knows. Each of the `num_paths` columns has its own draws in every capture
-    whether heard or not, so that two codes see the same noise.
+    whether heard or not, so that two codes see the same noise; the `num_extra` columns beyond have theirs from a
+    generator of their own, so that they change nobody else's.
     """
     sensor, captures = build_sensor(radio, config), split(received, config)
     draws = rng.standard_normal((len(captures), num_paths, 5))
+    if num_extra:
+        more = rng.spawn(1)[0].standard_normal((len(captures), num_extra, 5))
+        draws = np.concatenate([draws, more], axis=1)
     # false components are as many in all, whichever capture they are in
     rate = replace(sensor, false_alarms=sensor.false_alarms / len(captures))
     parts = [_capture(*one, rate, config, rng=rng) for one in zip(captures, draws, strict=True)]
-    side = np.repeat(np.arange(len(parts)) > 0, [len(part.path) for part in parts])
+    side = np.repeat(np.arange(len(parts)), [len(part.path) for part in parts])
     found = Components._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
     order = np.argsort(found.points[:, 0])
     found, side = Components._make(field[order] for field in found), side[order]
-    over_panel = None
-    if config.alternation:
-        over_panel = panel_probability(Found(*found[1:], side), radio, config)
+    told = panel_probability(Found(*found[1:], side), radio, config) if config.alternation else ()
     measurement = Measurement(
         found.points[:, 0],
         into_disc(blind_axes(found.points[:, 1:], radio)),
@@ -77,7 +85,7 @@ def measure_bound(
         found.deviation[:, 0],
         capped(found.deviation[:, 1:], radio),
         found.gain_std / np.sqrt(2.0),
-        over_panel,
+        *told,
     )
     return measurement, PathTruth(found.path)
 

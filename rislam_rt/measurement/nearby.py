@@ -45,7 +45,7 @@ def measure_local(
         samples = np.array([one.samples / np.sqrt(one.noise_psd) for one in captures])
     else:
         samples = _samples(waves, [one.gain[near] for one in heard], sounding, radio, rng=rng)
-        captures = [Capture(one, radio.noise_psd, bool(number)) for number, one in enumerate(samples)]
+        captures = [Capture(one, radio.noise_psd, number) for number, one in enumerate(samples)]
     window = (sensor.window[0] * radio.bandwidth, sensor.window[1] * radio.bandwidth)
     found = estimate_local(sounding, _asked(waves, snr[:, near], sensor), samples, sensor.threshold, window)
     parts = []

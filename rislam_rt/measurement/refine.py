@@ -8,8 +8,8 @@ nuisance, so the joint Cramer-Rao bound comes with it.
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import lapack
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.measurement.atoms import Factors, Grams, Sounding, correlate, factors, inner_products, synthesise
@@ -181,7 +181,7 @@ def _solve(matrix: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
     scale, factor = _factor(matrix)
     if not len(scale):
         return right
-    solve = lapack.zpotrs if np.iscomplexobj(factor) else lapack.dpotrs
+    solve = scipy.linalg.lapack.zpotrs if np.iscomplexobj(factor) else scipy.linalg.lapack.dpotrs
     return scale * solve(factor, scale * right, lower=1)[0]
 
 
@@ -190,7 +190,7 @@ def _inverse(matrix: NDArray[Any]) -> NDArray[Any]:
     scale, factor = _factor(matrix)
     if not len(scale):
         return matrix
-    invert = lapack.zpotri if np.iscomplexobj(factor) else lapack.dpotri
+    invert = scipy.linalg.lapack.zpotri if np.iscomplexobj(factor) else scipy.linalg.lapack.dpotri
     lower = np.tril(invert(factor, lower=1)[0])
     full = lower + np.tril(lower, -1).conj().T
     return scale[:, None] * full * scale
@@ -201,7 +201,7 @@ def _factor(matrix: NDArray[Any]) -> tuple[Floats, NDArray[Any]]:
     diagonal = np.real(np.diagonal(matrix))
     scale = 1.0 / np.sqrt(np.maximum(diagonal, np.finfo(np.float64).tiny))
     scaled = matrix * scale[:, None] * scale
-    decompose = lapack.zpotrf if np.iscomplexobj(matrix) else lapack.dpotrf
+    decompose = scipy.linalg.lapack.zpotrf if np.iscomplexobj(matrix) else scipy.linalg.lapack.dpotrf
     ridge = RIDGE
     while len(scale):
         scaled[np.diag_indices(len(scale))] += ridge

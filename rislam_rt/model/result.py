@@ -65,6 +65,11 @@ class SchemeResult:
     """(K,) how each cycle went, in the filter's words."""
     map: MapEstimate
     """After the last cycle."""
+    panel: Any = None
+    """(K, I) which of several panels `ris_probability` is about; None: there is one."""
+    smoothed: Any = None
+    """(K, 3) positions with hindsight [m], of filters that look back (`slam.filter = "window"`: 40 cycles, fewer at the
+    end); None of others, and of runs in slices."""
     given: Any = None
     """What the estimator was given, cycle by cycle, and the seed that it drew from (`rislam_rt.pipeline.record.Given`);
     None where the result was read from a file: it lies in one of its own."""
@@ -90,6 +95,14 @@ class SchemeResult:
             ("seconds", np.float64, (cycles, len(STEPS))),
         ):
             freeze(self, name, dtype, shape)
+        if self.panel is not None:
+            freeze(self, "panel", np.int64, (cycles, held))
+        if self.smoothed is not None:
+            freeze(self, "smoothed", np.float64, (cycles, 3))
+
+    def named(self, panel: int) -> Booleans:
+        """(K, I) whether the landmark was held for a panel."""
+        return (self.ris_probability > 0.5) & (panel == (0 if self.panel is None else self.panel))
 
     def __repr__(self) -> str:
         ended = self.outcome[-1] if self.outcome else "before it began"

@@ -11,11 +11,15 @@ from rislam_rt.model.picture import Plan, html_with, outline
 from rislam_rt.model.ris import RisPanel, RisPanels
 from rislam_rt.model.trajectory import Trajectory
 
+BODY_THICKNESS, BODY_LOSS, BODY_LEAST = 10.0, 0.1, 2e-3
+"""What stands for a constant R: its thickness [m]; the conductivity [S/m] that, times its refractive index, keeps the
+back of it from being seen; and the least 1 - R."""
+
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """One of three: a constant reflection coefficient at every angle, a slab of an ITU-R P.2040 material, or a slab of
-    a permittivity and conductivity of one's own.
+    """One of four: a constant reflection coefficient at every angle, one for each polarisation, a slab of an ITU-R
+    P.2040 material, or a slab of a permittivity and conductivity of one's own.
     """
 
     reflection: float | None = None
@@ -28,13 +32,24 @@ class Material:
     """Real part of the relative permittivity, at least 1, the same at every carrier."""
     conductivity: float = 0.0
     """[S/m] beside `permittivity`."""
+    reflection_te: float | None = None
+    """Coefficient in [-1, 1] of the field across the plane of incidence, the same at every angle,"""
+    reflection_tm: float | None = None
+    """...and of the field in that plane; signs as Fresnel's: of a dense dielectric near normal incidence, TE is
+    negative and TM positive."""
     scattering: float = 0.0
     """S in [0, 1): share of the reflected field that the surface scatters in all directions; the mirrored ray keeps
     `sqrt(1 - S^2)` of its field."""
 
     def __post_init__(self) -> None:
-        if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity)) != 1:
-            raise SceneError("material: give one of 'reflection', 'itu' and 'permittivity'")
+        if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity, self.reflection_te)) != 1:
+            raise SceneError("material: give one of 'reflection', 'itu', 'permittivity' and 'reflection_te'")
+        if (self.reflection_te is None) != (self.reflection_tm is None):
+            raise SceneError("material: give 'reflection_te' and 'reflection_tm' together")
+        for name in ("reflection_te", "reflection_tm"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < abs(value) <= 1.0:
+                raise SceneError(f"material.{name}: {value} received; give a number in [-1, 1], and not 0")
         if self.reflection is not None and not 0.0 < self.reflection <= 1.0:
             raise SceneError(f"material.reflection: {self.reflection} received; give a number in (0, 1]")
         if not self.thickness > 0.0:
@@ -52,19 +67,40 @@ class Material:
 
     @property
     def is_slab(self) -> bool:
-        """Whether it reflects by Fresnel's law, as a slab does."""
+        """Whether it treats the fields across and in the plane of incidence apart, as a slab does."""
         return self.reflection is None
+
+    @property
+    def level(self) -> float | None:
+        """Constant |R|, in the mean of both polarisations; None for a slab, whose own depends on the angle."""
+        if self.reflection_te is not None and self.reflection_tm is not None:
+            return 0.5 * (abs(self.reflection_te) + abs(self.reflection_tm))
+        return self.reflection
 
     @property
     def specular_share(self) -> float:
         """Share of the reflected field that stays in the mirrored ray."""
         return float(np.sqrt(1.0 - self.scattering**2))
 
+    def as_body(self) -> "Material":
+        """The face of a thick, slightly lossy body with this |R| at normal incidence (0.998 at most); a slab stays.
+
+        `permittivity = ((1 + R) / (1 - R))^2`; elsewhere it follows Fresnel's law.
+        """
+        if self.level is None:
+            return self
+        index = (1.0 + self.level) / max(1.0 - self.level, BODY_LEAST)
+        return Material(
+            permittivity=index**2, conductivity=BODY_LOSS * index, thickness=BODY_THICKNESS, scattering=self.scattering
+        )
+
     @property
     def words(self) -> str:
         """What it is, in few words."""
         if self.reflection is not None:
             return f"R = {self.reflection:g}"
+        if self.reflection_te is not None:
+            return f"TE {self.reflection_te:g}, TM {self.reflection_tm:g}"
         return self.itu or f"permittivity {self.permittivity:g}, {self.conductivity:g} S/m"
 
 

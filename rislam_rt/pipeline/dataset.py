@@ -58,15 +58,19 @@ SCHEME: dict[str, Entry] = {
     "parent": (("landmark",), "1", "number of the landmark whose mirror image this is, -1 for a point"),
     "held": (("time", "landmark"), "1", "whether the landmark was in the map"),
     "landmark_position": (("time", "landmark", "xyz"), "m", "its estimated position"),
-    "ris_probability": (("time", "landmark"), "1", "probability of being the panel"),
+    "ris_probability": (("time", "landmark"), "1", "probability of being the panel, of several the likeliest"),
+    "panel": (("time", "landmark"), "1", "number of that panel; left out where there is one"),
     "seconds": (("time", "step"), "s", "time taken by optimise, communicate, measure, localise"),
 }
+SMOOTHED: dict[str, Entry] = {"smoothed": (("time", "xyz"), "m", "position with hindsight")}
+"""Of filters that look back."""
 MAP: dict[str, Entry] = {
     "ident": (("feature",), "1", "number of the landmark or image"),
     "position": (("feature", "xyz"), "m", "estimated position"),
     "covariance": (("feature", "xyz", "xyz_"), "m2", "believed covariance"),
     "parent": (("feature",), "1", "row of the landmark whose image this is, -1 for none"),
-    "ris_probability": (("feature",), "1", "probability of being the panel"),
+    "ris_probability": (("feature",), "1", "probability of being the panel, of several the likeliest"),
+    "panel": (("feature",), "1", "number of that panel; left out where there is one"),
     "strength": (("feature",), "m", "root of the cross-section; for an image, amplitude ratio of the wall"),
     "wall_normal": (("wall", "xyz"), "1", "unit normal, away from the agent"),
     "wall_offset": (("wall",), "m", "normal . x = offset"),
@@ -98,13 +102,14 @@ def paths_to_dataset(paths: Paths, motion: Trajectory) -> "xr.Dataset":
         "landmark_name": (("path",), names[paths.landmark], {"long_name": "landmark, empty for LOS and VT"}),
     }
     attributes = {"walls": list(paths.walls), "landmarks": list(paths.landmarks), "source": paths.source}
-    return _dataset(content, attributes, coords)
+    return _dataset(content, attributes | ({"panels": paths.num_panels} if paths.num_panels > 1 else {}), coords)
 
 
 def dataset_to_paths(data: "xr.Dataset") -> Paths:
     """The inverse of `paths_to_dataset`."""
     walls, landmarks = (names_of(data.attrs[name]) for name in ("walls", "landmarks"))
-    return Paths(**_values(data, PATHS, ""), walls=walls, landmarks=landmarks, source=str(data.attrs["source"]))
+    about: dict[str, Any] = {"source": str(data.attrs["source"]), "num_panels": int(data.attrs.get("panels", 1))}
+    return Paths(**_values(data, PATHS, ""), walls=walls, landmarks=landmarks, **about)
 
 
 def scheme_to_dataset(result: SchemeResult) -> "xr.Dataset":
@@ -114,6 +119,8 @@ def scheme_to_dataset(result: SchemeResult) -> "xr.Dataset":
         content[f"info_{name}"] = (("time",), values, {"long_name": f"filter diagnostic {name}"})
     outcomes = sorted(set(result.outcome))
     codes = np.array([outcomes.index(outcome) for outcome in result.outcome], dtype=np.int64)
+    if result.smoothed is not None:
+        content |= _entries({"smoothed": result.smoothed}, SMOOTHED, "")
     content["outcome"] = (("time",), codes, {"long_name": "how the cycle went, index into attribute 'outcomes'"})
     coords = {"landmark": (("landmark",), result.ident, {"long_name": "number of each landmark ever held"})}
     return _dataset(content, {"scheme": result.scheme, "levels": result.levels, "outcomes": outcomes}, coords)
@@ -129,6 +136,7 @@ def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
         info={str(n).removeprefix("info_"): data[n].to_numpy() for n in data.data_vars if str(n).startswith("info_")},
         outcome=tuple(outcomes[code] for code in data["outcome"].to_numpy()),
         map=MapEstimate(**_values(data, MAP, "map_")),
+        smoothed=_values(data, SMOOTHED, "")["smoothed"] if "smoothed" in data else None,
     )
 
 
@@ -216,7 +224,8 @@ def read_dataset(path: Path) -> "xr.Dataset":
 
 def _arrays(record: Any, table: dict[str, Entry], prefix: str) -> dict[str, Any]:
     names = {f.name for f in fields(record)}
-    return _entries({name: getattr(record, name) for name in table if name in names}, table, prefix)
+    found = {name: getattr(record, name) for name in table if name in names}
+    return _entries({name: value for name, value in found.items() if value is not None}, table, prefix)
 
 
 def _entries(values: dict[str, Any], table: dict[str, Entry], prefix: str) -> dict[str, Any]:
@@ -245,7 +254,7 @@ def _values(data: "xr.Dataset", table: dict[str, Entry], prefix: str) -> dict[st
         key = prefix + name
         if f"{key}_real" in data:
             values[name] = data[f"{key}_real"].to_numpy() + 1j * data[f"{key}_imag"].to_numpy()
-        else:
+        elif key in data or name != "panel":  # the one variable that may be left out
             values[name] = data[key].to_numpy()
     return values
 

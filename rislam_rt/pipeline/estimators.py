@@ -33,6 +33,8 @@ class Estimator(NamedTuple):
     """Whether it uses angles of arrival, or delays alone: what its posterior bound may count."""
     walls: Unknown = "planes"
     """How its bound holds mirror images: `planes`, tied to walls; `images`, each a point of its own."""
+    smoothed: Callable[..., Any] = lambda state: None
+    """Positions (K, 3) of all cycles with hindsight; None of an estimator that does not look back."""
 
 
 class Outcomes(NamedTuple):
@@ -90,7 +92,9 @@ class Estimators(dict[str, Estimator]):
 
 
 ESTIMATORS = Estimators({
-    "slam": Estimator(slam.init, slam.predict, slam.step, slam.estimate, lambda settings: settings.slam),
+    "slam": Estimator(
+        slam.init, slam.predict, slam.step, slam.estimate, lambda settings: settings.slam, smoothed=slam.smoothed
+    ),
     "bp_slam": Estimator(
         bp_slam.init, bp_slam.predict, bp_slam.step, bp_slam.estimate, lambda settings: settings.bp_slam,
         angles=False, walls="images",

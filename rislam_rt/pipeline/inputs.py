@@ -27,7 +27,12 @@ INPUTS: dict[str, Entry] = {
     "cosines_std": (("time", "component", "cosine"), "1", "reported standard deviation of cosines"),
     "amplitude_std": (("time", "component"), "1", "reported standard deviation of amplitude"),
     "from_panel": (("time", "component"), "1", "probability that it ran over the panel; left out without alternation"),
-    "code": (("time", "row", "col"), "1", "phase levels that the agent holds the panel to be set to"),
+    "which_panel": (("time", "component"), "1", "number of that panel, the likeliest of several; left out with one"),
+    "code": (
+        ("time", "row", "col"),
+        "1",
+        "phase levels that the agent holds the panel to be set to; several: one row",
+    ),
     "start_position": (("xyz",), "m", "told position at the start"),
     "start_velocity": (("xyz",), "m/s", "told velocity at the start"),
     "tx_offset": (("xyz",), "m", "Tx from the agent's position, body frame"),
@@ -65,6 +70,8 @@ def inputs_to_dataset(inputs: Inputs, **about: Any) -> "xr.Dataset":
     values: dict[str, Any] = {name: _padded([getattr(m, name) for m in inputs.measurements]) for name in PARTS}
     if all(m.from_panel is not None for m in inputs.measurements):
         values["from_panel"] = _padded([np.asarray(m.from_panel) for m in inputs.measurements])
+    if all(m.panel is not None for m in inputs.measurements):
+        values["which_panel"] = _padded([np.asarray(m.panel) for m in inputs.measurements])
     values |= {"time": inputs.time, "heading": inputs.heading}
     values |= {"start_position": inputs.start.position, "start_velocity": inputs.start.velocity}
     values |= {"tx_offset": inputs.body.tx_offset, "rx_offset": inputs.body.rx_offset}
@@ -126,7 +133,8 @@ def _panel(data: "xr.Dataset") -> tuple[DataSheet | None, tuple[RisCode | None, 
 
 def _measurements(data: "xr.Dataset") -> tuple[Measurement, ...]:
     """One a cycle, without the padding."""
-    table = {name: data[name].to_numpy() for name in (*PARTS, "from_panel") if name in data}
+    fields = {name: name for name in (*PARTS, "from_panel")} | {"which_panel": "panel"}
+    table = {field: data[name].to_numpy() for name, field in fields.items() if name in data}
     held = table["tau"] != PADDING
     return tuple(
         Measurement(**{name: value[cycle, held[cycle]] for name, value in table.items()})

@@ -31,12 +31,16 @@ def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, give
     held = np.zeros((len(cycles), len(ident)), dtype=np.bool_)
     landmark = np.zeros((len(cycles), len(ident), 3))
     ris_probability = np.zeros((len(cycles), len(ident)))
+    several = any(m.panel is not None for m in maps)
+    panel = np.zeros(held.shape, dtype=np.int64) if several else None
     for row, m in enumerate(maps):
         column = np.searchsorted(ident, m.ident)
         held[row, column], landmark[row, column] = True, m.position
         image = np.flatnonzero(m.parent >= 0)
         parent[column[image]] = m.ident[m.parent[image]]
         ris_probability[row, column] = m.ris_probability
+        if panel is not None and m.panel is not None:  # an empty map has none
+            panel[row, column] = m.panel
     return SchemeResult(
         scheme=scheme,
         time=time,
@@ -59,6 +63,7 @@ def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, give
         info=_diagnostics([cycle.info for cycle in cycles]),
         outcome=tuple(str(cycle.info.outcome) for cycle in cycles),
         map=maps[-1],
+        panel=panel,
         given=given,
     )
 

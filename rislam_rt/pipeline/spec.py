@@ -10,6 +10,7 @@ from rislam_rt.design import DESIGNERS, DesignConfig
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement import HardwareConfig, ReceiverConfig, build_sensor, with_reference_snr
 from rislam_rt.model import RadioConfig, RxArray, SensorModel
+from rislam_rt.pipeline.extras import ExtrasSection
 from rislam_rt.pipeline.mistold import ToldSection
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
@@ -44,7 +45,7 @@ def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()
 
 
 _Filter = _section("_Filter", SlamConfig, "Fields of `SlamConfig`.")
-_Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.", without=("slot",))
+_Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.", without=("slot", "panels"))
 _BpSlam = _section("_BpSlam", BpSlamConfig, "Fields of `BpSlamConfig`.")
 _ChannelSlam = _section("_ChannelSlam", ChannelSlamConfig, "Fields of `ChannelSlamConfig`.")
 _Designers = _section("_Designers", DesignConfig, "Fields of `DesignConfig`.", without=("certify",))
@@ -66,7 +67,7 @@ class ChannelSlamSection(_ChannelSlam):  # type: ignore[misc, valid-type]
 
 
 class ReceiverSection(_Receiver):  # type: ignore[misc, valid-type]
-    """The receiver's settings, SI units; its slot is `budget.measure_s`."""
+    """The receiver's settings, SI units; its slot is `budget.measure_s`, its panels the room's."""
 
 
 class HardwareSection(_Hardware):  # type: ignore[misc, valid-type]
@@ -225,6 +226,8 @@ class RoomSection(Section):
     """Phase levels of an element."""
     scatterers: Annotated[int, Field(ge=0, le=100)] | None = None
     """Their number: the scene's first ones, and then spheres at places drawn for every seed (see `pipeline.change`)."""
+    scattering: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
+    """Share of the reflected field that every wall scatters: what it reflects like a mirror is weaker for it."""
 
 
 class PipelineSpec(Section):
@@ -256,6 +259,7 @@ class PipelineSpec(Section):
     budget: BudgetSection = BudgetSection()
     control: ControlSection = ControlSection()
     room: RoomSection = RoomSection()
+    extras: ExtrasSection = ExtrasSection()
     panel: PanelSection = PanelSection()
     motion: MotionSection = MotionSection()
     start: StartSection = StartSection()
@@ -315,15 +319,16 @@ class Settings(NamedTuple):
     """What the front end does wrong."""
 
 
-def build_settings(spec: PipelineSpec) -> Settings:
-    """Radio, receiver and filter settings in SI units and linear ratios.
+def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
+    """Radio, receiver and filter settings in SI units and linear ratios, in a room of so many panels.
 
     Raises
     ------
     ConfigError
         A value is out of the range that the record itself checks.
     """
-    radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump(), slot=spec.budget.measure_s)
+    own = {"slot": spec.budget.measure_s, "panels": panels}
+    radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump() | own)
     return Settings(
         radio,
         receiver,

@@ -78,7 +78,9 @@ def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: 
     )
     stream.log(f"{name}/ellipsoid", ellipsoid)
     held = np.flatnonzero(scheme.held[cycle] & (scheme.parent < 0))
-    labels = [f"{scheme.ident[i]}" + (" panel" if scheme.ris_probability[cycle, i] > 0.5 else "") for i in held]
+    number = [""] * len(scheme.ident) if scheme.panel is None else [f" {panel}" for panel in scheme.panel[cycle]]
+    panel = [f" panel{number[i]}" if scheme.ris_probability[cycle, i] > 0.5 else "" for i in held]
+    labels = [f"{scheme.ident[i]}{text}" for i, text in zip(held, panel, strict=True)]
     points = rerun.Points3D(scheme.landmark_position[cycle, held], labels=labels, radii=0.04, colors=[colour])
     stream.log(f"{name}/landmarks", points)
 

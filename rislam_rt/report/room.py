@@ -5,11 +5,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.walls import build_walls
+from rislam_rt.constants import COPLANAR_OFFSET
 from rislam_rt.model import PathKind, Paths, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.summary import landmark_track, match_walls
 from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace, section
@@ -17,6 +19,12 @@ from rislam_rt.report.style import KIND, TRUTH, WALL, save_figure, scheme_colour
 
 ZOOM = 0.25
 """Half the width [m] of the close-up of the path's end, unless the error is larger."""
+
+SHADE = "#d9cdb8"
+"""Colour of what hides and does not reflect."""
+
+WALL_NAME, MOST_NAMES = "#54606e", 40
+"""Colour of walls' names, and how many are written at most."""
 
 LABEL = np.array([0.02, 0.0, 0.014])
 """From an object to its name in the three-dimensional picture, in sizes of the room."""
@@ -68,18 +76,23 @@ def draw_scene(scene: Scene, path: Path) -> Path:
         figure = Figure(figsize=(11.0, 5.0))
         flat = figure.add_subplot(1, 2, 1)
         draw_plan(flat, scene)
+        _name_walls(flat, scene)
         flat.set_xlabel("x [m]")
         flat.set_ylabel("y [m]")
         flat.set_title(f"{scene.name} from above", weight="bold")
         axis: Any = figure.add_subplot(1, 2, 2, projection="3d", computed_zorder=False)
         _draw_room_3d(axis, scene)
+        axis.set_box_aspect(scene.bounds[1] - scene.bounds[0], zoom=0.9)
+        for name, point in wall_places(scene):
+            axis.text(*point, name, fontsize=7, color=WALL_NAME, ha="center", zorder=4)
         _draw_objects_3d(axis, scene, 0)
         return save_figure(figure, path)
 
 
 def draw_plan(axis: Axes, scene: Scene) -> None:
-    """Walls (thick where they stand at the agent's height), path and landmarks as they are."""
+    """Walls (thick where they stand at the agent's height), shades, path and landmarks as they are."""
     walls, path = build_walls(scene), scene.agent.position
+    axis.add_collection(PolyCollection(list(walls.shades.triangles[..., :2]), color=SHADE, lw=0.5, zorder=0))
     for edge in outline_edges(walls):
         axis.plot(edge[:, 0], edge[:, 1], color="#dddddd", lw=0.8, zorder=0)
     for cut in section(walls.triangles, float(path[-1, 2])):
@@ -93,6 +106,36 @@ def draw_plan(axis: Axes, scene: Scene) -> None:
         _mark(axis, panel.center, panel.name, "s")
     axis.set_aspect("equal")
     axis.grid(False)
+
+
+def wall_places(scene: Scene) -> list[tuple[str, Floats]]:
+    """Names of the reflectors, and the middle (3,) [m] of the largest wall of each; not of all, if they are many."""
+    named = [(reflector.name, largest_middle(reflector.triangles)) for reflector in scene.reflectors]
+    return named[:MOST_NAMES]
+
+
+def largest_middle(triangles: Floats) -> Floats:
+    """Centroid (3,) [m] of the largest of triangles (T, 3, 3), with those that share its plane."""
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    area = np.linalg.norm(across, axis=1)
+    normal = across[np.argmax(area)] / max(float(area.max()), 1e-300)
+    height = (triangles - triangles[np.argmax(area), 0]) @ normal
+    same = np.abs(height).max(axis=1) < COPLANAR_OFFSET
+    return np.asarray(np.average(triangles[same].mean(axis=1), axis=0, weights=area[same]))
+
+
+def _name_walls(axis: Axes, scene: Scene) -> None:
+    """Names at walls that stand up, along them; a floor or a ceiling has none from above."""
+    paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
+    for (name, point), reflector in zip(wall_places(scene), scene.reflectors, strict=False):
+        extent = np.ptp(reflector.vertices, axis=0)
+        if extent[2] < 0.2 * extent[:2].max():
+            continue
+        turn = 90.0 if extent[1] > 2.0 * extent[0] else 0.0
+        x, y, _ = point.tolist()
+        axis.text(
+            x, y, name, fontsize=7, color=WALL_NAME, ha="center", va="center", rotation=turn, zorder=3, bbox=paper
+        )
 
 
 def _mark(axis: Axes, point: Floats, name: str, marker: str) -> None:
@@ -180,6 +223,7 @@ def _draw_room_3d(axis: Any, scene: Scene) -> None:
         axis.add_collection3d(Poly3DCollection(list(floor), facecolor="#f1f1f1", edgecolor="none", zorder=0))
     for edge in outline_edges(walls):
         axis.plot(*edge.T, color=WALL, lw=1.0, zorder=1)
+    axis.add_collection3d(Poly3DCollection(list(walls.shades.triangles), facecolor=SHADE, alpha=0.3, zorder=1))
     axis.set_xlim(low[0], high[0])
     axis.set_ylim(low[1], high[1])
     axis.set_zlim(low[2], high[2])

@@ -14,7 +14,7 @@ from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec,
 from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
 from rislam_rt.scene.containers import too_many_faces
-from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
+from rislam_rt.scene.findings import Fault, Faults, Finding, panel_key, raise_errors
 from rislam_rt.scene.lying import UNITS, place_mesh
 from rislam_rt.scene.meshes import MAX_COORDINATE, MAX_MESH_BYTES, Mesh, MeshReader, read_inside
 from rislam_rt.scene.motion import build_motion
@@ -100,6 +100,8 @@ def read_draft(path: str | Path) -> Draft:
     file = scene_file(path)
     try:
         spec, content = read_spec(file)
+    except Faults as faults:
+        return Draft(str(file), None, [fault.at(str(file), "") for fault in faults.faults])
     except Fault as fault:
         return Draft(str(file), None, [fault.at(str(file), "")])
     return assemble(spec, file, content)
@@ -192,6 +194,8 @@ def _material(section: MaterialSection) -> Material:
         section.itu,
         permittivity=section.permittivity,
         conductivity=section.conductivity_s_m or 0.0,
+        reflection_te=section.reflection_te,
+        reflection_tm=section.reflection_tm,
         scattering=section.scattering,
         **given,
     )
@@ -223,13 +227,20 @@ def _panels(sections: list[RisSection], file: str, findings: list[Finding]) -> t
     panels = []
     for number, section in enumerate(sections):
         try:
-            panels.append(_panel(section))
+            panels.append(build_panel(section))
         except Fault as fault:
             findings.append(fault.at(file, f"{panel_key(number, len(sections))}.up"))
     return tuple(panels)
 
 
-def _panel(section: RisSection) -> RisPanel:
+def build_panel(section: RisSection) -> RisPanel:
+    """The panel of a section.
+
+    Raises
+    ------
+    Fault
+        Its directions have no length, or are not at right angles.
+    """
     normal, up = unit(np.array(section.normal)), unit(np.array(section.up))
     if not normal.any() or not up.any():
         raise Fault("ris.normal or ris.up has no length", "give two directions")

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.scene.findings import Fault, Faults, one_line
 from rislam_rt.toml import parse_toml
 
 MAX_SCENE_BYTES = 4_000_000
@@ -44,8 +44,9 @@ class Section(BaseModel):
 
 
 class MaterialSection(Section):
-    """One of `reflection` (the same at every angle), `itu`, a slab of an ITU-R P.2040 material, and `permittivity`
-    (relative, with `conductivity_s_m`), a slab of one's own. `scattering` takes a share from the mirrored ray.
+    """One of `reflection` (the same at every angle), `reflection_te` with `reflection_tm` (one for each polarisation),
+    `itu`, a slab of an ITU-R P.2040 material, and `permittivity` (relative, with `conductivity_s_m`), a slab of one's
+    own. `scattering` takes a share from the mirrored ray.
     """
 
     reflection: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
@@ -53,13 +54,19 @@ class MaterialSection(Section):
     permittivity: Annotated[float, Field(ge=1.0, le=1e6, allow_inf_nan=False)] | None = None
     conductivity_s_m: Annotated[float, Field(ge=0.0, le=1e9, allow_inf_nan=False)] | None = None
     thickness_m: Length | None = None
+    reflection_te: Annotated[float, Field(ge=-1.0, le=1.0)] | None = None
+    reflection_tm: Annotated[float, Field(ge=-1.0, le=1.0)] | None = None
     scattering: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
 
     @model_validator(mode="after")
     def _one_kind(self) -> "MaterialSection":
-        if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity)) != 1:
-            raise ValueError("give one of 'reflection', 'itu' and 'permittivity'")
-        if self.reflection is not None and self.thickness_m is not None:
+        if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity, self.reflection_te)) != 1:
+            raise ValueError("give one of 'reflection', 'itu', 'permittivity' and 'reflection_te'")
+        if (self.reflection_te is None) != (self.reflection_tm is None) or 0.0 in (
+            self.reflection_te, self.reflection_tm
+        ):  # fmt: skip
+            raise ValueError("give 'reflection_te' and 'reflection_tm' together, neither of them 0")
+        if self.itu is None and self.permittivity is None and self.thickness_m is not None:
             raise ValueError("'thickness_m' has a meaning with 'itu' or 'permittivity' only")
         if self.permittivity is None and self.conductivity_s_m is not None:
             raise ValueError("'conductivity_s_m' has a meaning with 'permittivity' only")
@@ -284,15 +291,15 @@ def validate_spec(table: dict[str, Any]) -> SceneSpec:
 
     Raises
     ------
-    Fault
-        Fields are missing, unknown or out of range; all of them in one line.
+    Faults
+        Fields are missing, unknown or out of range: one fault a field.
     """
     try:
         return SceneSpec.model_validate(table)
     except ValidationError as error:
         lone = isinstance(table.get("ris"), dict)
         remarks = [_remark(item, lone) for item in error.errors(include_url=False, include_context=False)]
-    raise Fault("; ".join(remarks[:8]), f"mend these {len(remarks)} fields" if len(remarks) > 1 else "mend this field")
+    raise Faults([Fault(remark, "mend this field") for remark in remarks])
 
 
 def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
@@ -300,7 +307,7 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
 
     Raises
     ------
-    Fault
+    Fault, Faults
         The file cannot be read or its content is not a scene.
     """
     if not path.is_file():

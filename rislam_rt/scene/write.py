@@ -37,12 +37,12 @@ def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) ->
 
 def scene_files(scene: Scene) -> dict[str, bytes]:
     """A scene as files, name -> content: `scene.toml`, one PLY mesh a reflector, the agent's path unless straight."""
-    files = {_mesh_file(r.name): ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
+    files = {mesh_file(r.name): ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
     for scatterer in scene.scatterers:
         if scatterer.shade is not None and not _has_own_shadow(scatterer):
             files[_shade_file(scatterer)] = ply_bytes(scatterer.shade.vertices, scatterer.shade.faces)
     for shade in scene.shades:
-        files[_mesh_file(shade.name)] = ply_bytes(shade.vertices, shade.faces)
+        files[mesh_file(shade.name)] = ply_bytes(shade.vertices, shade.faces)
     agent = _agent_table(scene.agent)
     if "trajectory" in agent:
         files[TRAJECTORY_FILE] = tum_bytes(scene.agent.time, scene.agent.position, scene.agent.heading)
@@ -147,10 +147,10 @@ def _toml_key(key: str) -> str:
 def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
     table: dict[str, Any] = {"name": scene.name}
     table["reflector"] = [
-        {"name": r.name, "mesh": _mesh_file(r.name), "material": _material_table(r.material)} for r in scene.reflectors
+        {"name": r.name, "mesh": mesh_file(r.name), "material": _material_table(r.material)} for r in scene.reflectors
     ]
     table["scatterer"] = [_scatterer_table(scatterer) for scatterer in scene.scatterers]
-    table["shade"] = [{"name": shade.name, "mesh": _mesh_file(shade.name)} for shade in scene.shades]
+    table["shade"] = [{"name": shade.name, "mesh": mesh_file(shade.name)} for shade in scene.shades]
     panels = [_panel_table(panel) for panel in scene.panels]
     table["ris"] = panels[0] if len(panels) == 1 else panels
     table["agent"] = agent
@@ -192,10 +192,11 @@ def _has_own_shadow(scatterer: Scatterer) -> bool:
 
 
 def _shade_file(scatterer: Scatterer) -> str:
-    return _mesh_file(scatterer.name)
+    return mesh_file(scatterer.name)
 
 
-def _mesh_file(name: str) -> str:
+def mesh_file(name: str) -> str:
+    """Where the mesh of a part lies in a scene folder."""
     return f"meshes/{safe_name(name)}.ply"
 
 
@@ -205,6 +206,8 @@ def _material_table(material: Material) -> dict[str, Any]:
         return {"reflection": material.reflection} | rough
     if material.itu is not None:
         return {"itu": material.itu, "thickness_m": material.thickness} | rough
+    if material.reflection_te is not None:
+        return {"reflection_te": material.reflection_te, "reflection_tm": material.reflection_tm} | rough
     own = {"permittivity": material.permittivity, "conductivity_s_m": material.conductivity}
     return own | {"thickness_m": material.thickness} | rough
 

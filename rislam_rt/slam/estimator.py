@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from rislam_rt.arrays import Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam import filter as cycle
 from rislam_rt.slam import mapping, window
@@ -17,8 +18,9 @@ def init(
     *, rng: np.random.Generator,
 ) -> Any:  # fmt: skip
     """The start prior, and an empty map."""
-    begin = window.init if config.filter == "window" else cycle.init
-    return begin(start, body, lone_panel(ris), sensor, config, rng=rng)
+    if config.filter == "window":
+        return window.init(start, body, lone_panel(ris), sensor, config, rng=rng)
+    return cycle.init(start, body, ris, sensor, config, rng=rng)
 
 
 def step(
@@ -34,6 +36,11 @@ def predict(state: Any, dt: float, config: SlamConfig) -> SlamEstimate:
     """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent."""
     ahead = window.predict if isinstance(state, window.WindowState) else mapping.predict
     return ahead(state, dt, config)
+
+
+def smoothed(state: Any) -> Floats | None:
+    """Positions (K, 3) [m] of all cycles with the hindsight of the window; None of a filter that does not look back."""
+    return window.smoothed(state) if isinstance(state, window.WindowState) else None
 
 
 def estimate(state: Any, config: SlamConfig) -> SlamEstimate:

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaln, ndtri
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.identity import STRENGTHS
@@ -18,7 +18,8 @@ FAINTEST = 0.1
 """Least share of cycles from which the strength of a path is reckoned."""
 
 UNTOLD, OTHER, PANEL = -1, 0, 1
-"""Which side a component is on, where the receiver sets the panel's paths apart by alternating codes."""
+"""Which side a component is on, where the receiver sets the panel's paths apart by alternating codes; `PANEL` + q for
+panel q of several."""
 
 
 class Glance(NamedTuple):
@@ -39,7 +40,9 @@ class Glance(NamedTuple):
     side: Integers | None = None
     """(M,) `PANEL`, `OTHER` or, where either may be, `UNTOLD`; None where the receiver does not tell."""
     panel_odds: Floats | None = None
-    """(M,) log odds of having run over the panel, likewise."""
+    """(M,) log odds of having run over the panel, of several the likeliest, likewise."""
+    panel: Integers | None = None
+    """(M,) which panel that is; None where there is one."""
 
     @property
     def sides(self) -> Integers:
@@ -50,6 +53,11 @@ class Glance(NamedTuple):
     def odds(self) -> Floats:
         """(M,) log odds of having run over the panel, 0 where the receiver does not tell."""
         return np.zeros(len(self.ratio)) if self.panel_odds is None else self.panel_odds
+
+    def odds_of(self, panels: int) -> Floats:
+        """(M, Q) log odds of having run over each of the panels; over those that are not the likeliest: no better."""
+        number = np.zeros(len(self.ratio), dtype=np.int64) if self.panel is None else self.panel
+        return np.where(number[:, None] == np.arange(panels), self.odds[:, None], -np.abs(self.odds)[:, None])
 
     def take(self, rows: Integers) -> "Glance":
         """Only some of the measurements."""
@@ -86,14 +94,16 @@ class Tracks(NamedTuple):
     log_grid: Floats
     """(T, G) log posterior of its strength, were it a scatterer (see `identity`)."""
     log_ris: Floats
-    """(T,) log odds of panel against scatterer."""
+    """(T, Q) log odds of each panel against scatterer."""
     side: Integers
     """(T,) that of its measurements."""
 
     @property
     def specular(self) -> Booleans:
-        """(T,) whether it is taken for a wall return."""
-        return self.moving | np.where(self.looks > 0, self.odds < 0.0, self.shine > 0.3)
+        """(T,) whether it is taken for a wall return. What the receiver says ran over the panel is none, however it
+        looks to a classifier."""
+        told = (self.looks > 0) & (self.side != PANEL)
+        return self.moving | np.where(told, self.odds < 0.0, self.shine > 0.3)
 
     @property
     def length(self) -> Integers:
@@ -127,7 +137,12 @@ def log_silence(tracks: Tracks, cycle: int) -> Floats:
     """
     missed, gap = tracks.earlier_misses(cycle), tracks.misses
     total = tracks.length + missed
-    return np.asarray(gammaln(missed + gap + 1) - gammaln(missed + 1) - gammaln(total + gap + 2) + gammaln(total + 2))
+    return np.asarray(
+        scipy.special.gammaln(missed + gap + 1)
+        - scipy.special.gammaln(missed + 1)
+        - scipy.special.gammaln(total + gap + 2)
+        + scipy.special.gammaln(total + 2)
+    )
 
 
 def has_ended(tracks: Tracks, cycle: int, max_misses: int) -> Booleans:
@@ -145,13 +160,13 @@ def overstatement(tracks: Tracks, cycle: int, threshold: float) -> Floats:
     """
     seen, missed = tracks.length, tracks.earlier_misses(cycle)
     share = np.clip((seen + 1.0) / (seen + missed + 2.0), FAINTEST, 1.0 - 1e-9)
-    quantile = ndtri(share)
+    quantile = scipy.special.ndtri(share)
     mean = np.sqrt(2.0 * threshold) + quantile
     return np.asarray(1.0 + np.exp(-0.5 * quantile**2) / np.sqrt(2.0 * np.pi) / share / mean)
 
 
-def no_tracks(window: int) -> Tracks:
-    """Nothing seen yet."""
+def no_tracks(window: int, panels: int = 1) -> Tracks:
+    """Nothing seen yet, in a room of so many panels."""
     return Tracks(
         np.zeros((0, 3, 2)),
         np.zeros((0, 3, 2, 2)),
@@ -166,7 +181,7 @@ def no_tracks(window: int) -> Tracks:
         np.zeros(0),
         np.zeros(0, dtype=np.int64),
         np.zeros((0, len(STRENGTHS))),
-        np.zeros(0),
+        np.zeros((0, panels)),
         np.zeros(0, dtype=np.int64),
     )
 
@@ -241,7 +256,7 @@ def begin(tracks: Tracks, glance: Glance, picks: Integers, bright: Booleans, rat
         np.zeros(count),
         np.zeros(count, dtype=np.int64),
         np.full((count, len(STRENGTHS)), -np.log(len(STRENGTHS))),
-        np.zeros(count),
+        np.zeros((count, tracks.log_ris.shape[1])),
         glance.sides[picks],
     )
     return Tracks._make(np.concatenate([old, new]) for old, new in zip(tracks, fresh, strict=True))

@@ -131,7 +131,7 @@ def test_missing_library_is_one_line_and_exit_3(tmp_path):
     environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(tmp_path / "libLLVM.so")}
     for words in (["doctor"], ["run", PIPELINE], ["trace", SCENE]):
         done = subprocess.run(
-            [sys.executable, "-m", "rislam_rt.cli", *map(str, words)],
+            [sys.executable, "-m", "rislam_rt", *map(str, words)],
             capture_output=True, text=True, cwd=tmp_path, env=environment, check=False,
         )  # fmt: skip
         assert done.returncode == 3

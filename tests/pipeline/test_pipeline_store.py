@@ -19,12 +19,13 @@ from rislam_rt.pipeline.dataset import (
     PATHS,
     SCHEME,
     check_dataset,
+    dataset_to_scheme,
     read_dataset,
     scheme_to_dataset,
     seal_dataset,
     write_dataset,
 )
-from rislam_rt.pipeline.files import write_atomic
+from rislam_rt.pipeline.files import write_atomic, write_pieces
 from rislam_rt.pipeline.identity import code_digest, run_identity
 from rislam_rt.pipeline.lock import hold
 from rislam_rt.pipeline.seal import file_digest, seal
@@ -76,7 +77,7 @@ def test_reads_back_to_the_last_bit(stored, short_result):
 
 
 def test_every_array_of_a_result_is_stored():
-    other = {"scheme", "levels", "info", "outcome", "map", "given"}
+    other = {"scheme", "levels", "info", "outcome", "map", "given", "smoothed"}
     assert {f.name for f in fields(SchemeResult)} - other == set(SCHEME)
     assert {f.name for f in fields(MapEstimate)} == set(MAP)
 
@@ -179,6 +180,14 @@ def test_a_changed_value_does_not_fit_the_files_own_checksum(short_result, tmp_p
     write_dataset(changed, file)  # as one would with the library that wrote it
     with pytest.raises(ResultError, match="checksum is"):
         check_dataset(read_dataset(file), file)
+
+
+def test_hindsight_comes_back_if_there_is_any(short_result):
+    scheme = short_result.schemes["random"]
+    assert dataset_to_scheme(scheme_to_dataset(scheme)).smoothed is None
+    looked_back = replace(scheme, smoothed=scheme.position + 0.1)
+    found = dataset_to_scheme(scheme_to_dataset(looked_back)).smoothed
+    np.testing.assert_array_equal(found, looked_back.smoothed)
 
 
 def test_a_stopped_run_goes_on(begun, identity, short_result):
@@ -284,6 +293,16 @@ def test_the_lock_of_a_dead_process_is_taken_over(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("change", [{"files": None}, {"files": {"a": 1}}, {"state": "over"}, {"identity": 3}, {}])
+def test_a_marker_of_another_form_is_refused_whatever_its_checksum_says(identity, tmp_path, change):
+    """A forged marker has a checksum that fits; it is one line, not a traceback."""
+    about = {"state": "done", "identity": identity.digest, **identity.content, "files": {}} if change else {}
+    (tmp_path / "run.json").write_text(json.dumps(seal({**about, **change})))
+    for reader in (lambda: find_run(tmp_path, identity), lambda: read_run(tmp_path)):
+        with pytest.raises(ResultError, match=r"run\.json: no state, identity or files"):
+            reader()
+
+
 def test_unwritable_place_is_a_store_error(identity):
     with pytest.raises(StoreError, match="cannot be written"), open_run(Path("/proc/nowhere/run"), identity):
         pass
@@ -295,7 +314,8 @@ def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
     try:
         write_atomic(pipe, b"content")
-        assert os.read(reader, 100) == b"content"
+        write_pieces(pipe, (part for part in (b" in", b" pieces")))
+        assert os.read(reader, 100) == b"content in pieces"
     finally:
         os.close(reader)
     assert pipe.is_fifo()

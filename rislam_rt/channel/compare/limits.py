@@ -258,7 +258,7 @@ def field_error(material: Material, carrier: float) -> float:
     are the measure, at the worst angle and polarisation. The root's imaginary part besides comes from `|z| - Re z`,
     which cancels in a slab of little loss: the root is off by `u |z| / (2 Im sqrt(z))`, at most by sqrt(u |z|).
     """
-    if not material.is_slab:
+    if material.level is not None:
         return FIELD_STEPS * SINGLE
     cosine, step = np.linspace(1e-3, 1.0, 4001), 1e-6
     permittivity = slab_permittivity(material, carrier)

@@ -88,6 +88,10 @@ class Coatings:
     """(W,) [m] of the slab."""
     specular: Floats
     """(W,) share of the reflected field that is not scattered."""
+    te: Floats
+    """(W,) constant coefficient across the plane of incidence, NaN where it follows from the angle,"""
+    tm: Floats
+    """(W,) ...and in it."""
 
     def coefficient(self, walls: Integers, normals: Floats, direction: Floats) -> Complexes:
         """Reflection coefficients (N,) of rays that leave along `direction` (N, 3) and meet `walls` (N, d).
@@ -98,14 +102,18 @@ class Coatings:
         """
         constant: Complexes = np.prod(self.reflection[walls], axis=1).astype(np.complex128)
         rows = np.flatnonzero((self.reflection[walls] == 0.0).any(axis=1))
-        incident = direction[rows]
-        field = polarisation_basis(incident)[0].astype(np.complex128)
-        for wall, normal in zip(walls[rows].T, normals[rows].swapaxes(0, 1), strict=True):
+        field = polarisation_basis(direction[rows])[0].astype(np.complex128)
+        field, incident = self.carried(field, walls[rows], normals[rows], direction[rows])
+        constant[rows] = np.sum(field * polarisation_basis(incident)[0], axis=-1)
+        return np.asarray(constant * np.prod(self.specular[walls], axis=1))
+
+    def carried(self, field: Complexes, walls: Integers, normals: Floats, incident: Floats) -> tuple[Complexes, Floats]:
+        """Field vectors (N, 3) after the bounces on `walls` (N, d), nothing scattered, and where the rays go then."""
+        for wall, normal in zip(walls.T, normals.swapaxes(0, 1), strict=True):
             reflected = mirror_direction(incident, normal)
             field = self._reflect(field, incident, reflected, normal, wall)
             incident = reflected
-        constant[rows] = np.sum(field * polarisation_basis(incident)[0], axis=-1)
-        return np.asarray(constant * np.prod(self.specular[walls], axis=1))
+        return field, incident
 
     def _reflect(
         self, field: Complexes, incident: Floats, reflected: Floats, normal: Floats, wall: Integers
@@ -117,6 +125,8 @@ class Coatings:
         """
         cos_theta = np.abs(np.sum(incident * normal, axis=-1))
         te, tm = slab_coefficients(cos_theta, self.permittivity[wall], self.thickness[wall], self.carrier)
+        te = np.where(np.isnan(self.te[wall]), te, self.te[wall])
+        tm = np.where(np.isnan(self.tm[wall]), tm, self.tm[wall])
         across, along_in, along_out = _incidence_basis(incident, reflected, normal)
         slab = _turned(field, across, across, te) + _turned(field, along_in, along_out, tm)
         before, after = polarisation_basis(incident), polarisation_basis(reflected)
@@ -140,6 +150,8 @@ def build_coatings(materials: tuple[Material, ...], carrier: float) -> Coatings:
         np.array([slab_permittivity(m, carrier) for m in materials], dtype=np.complex128),
         np.array([m.thickness for m in materials], dtype=np.float64),
         np.array([m.specular_share for m in materials], dtype=np.float64),
+        np.array([np.nan if m.reflection_te is None else m.reflection_te for m in materials], dtype=np.float64),
+        np.array([np.nan if m.reflection_tm is None else m.reflection_tm for m in materials], dtype=np.float64),
     )
 
 

@@ -11,7 +11,7 @@ import sionna.rt as rt
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.shades import ALONE
 from rislam_rt.channel.traced.material import ConstantReflection
-from rislam_rt.channel.traced.rough import slab_of_ones_own
+from rislam_rt.channel.traced.rough import PolarisedReflection, slab_of_ones_own
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
@@ -226,6 +226,8 @@ def _material(material: Material, number: int) -> rt.RadioMaterialBase:
     """The radio material of a wall: a constant R of ours, or Sionna's own slab."""
     if material.reflection is not None:
         return ConstantReflection(f"constant-{number}", material.reflection * material.specular_share)
+    if material.reflection_te is not None:
+        return PolarisedReflection(f"polarised-{number}", material, material.scattering)
     if material.permittivity is not None:
         return slab_of_ones_own(f"slab-{number}", material, material.scattering)
     try:

@@ -124,13 +124,16 @@ def _gap(soup: Soup, panel: RisPanel) -> float:
 
 
 def _facing(soup: Soup, panel: RisPanel, key: str) -> Iterator[Finding]:
-    """The room is where rays hit something: a panel with nothing before and something behind it looks out."""
+    """The room is where rays hit something: a panel with nothing before and something behind it looks out; unless the
+    agent is before it, in a room that is open there (a street).
+    """
     ahead, behind = (
         ray_hits(panel.center + side * 2.0 * MIN_CLEARANCE * panel.spec.normal, np.array([side * panel.spec.normal]),
                  soup.triangles)[0] >= 0
         for side in (1.0, -1.0)
     )  # fmt: skip
-    if behind and not ahead:
+    before = ((soup.scene.agent.position - panel.center) @ panel.spec.normal > 0.0).any()
+    if behind and not ahead and not before:
         yield soup.error(f"{key}.normal", f"{panel.spec.normal.tolist()} points out of the room", "reverse it")
 
 

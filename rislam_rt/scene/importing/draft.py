@@ -54,7 +54,7 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[Room, list[st
     table: dict[str, Any] = {"name": name}
     table["reflector"] = [_reflector(key, material) for key, (_, material) in draft.reflectors.items()]
     table["shade"] = [{"name": key, "mesh": f"meshes/{safe_name(key)}.ply"} for key in draft.shades]
-    ris, about = _panel(draft, free)
+    ris, about = propose_panel(draft, free)
     table |= {"ris": ris} if ris else {}
     table["agent"] = agent | BASELINE
     meshes = {safe_name(key): mesh for key, (mesh, _) in draft.reflectors.items()}
@@ -74,7 +74,7 @@ def _reflector(name: str, material: dict[str, Any]) -> dict[str, Any]:
     return reflector(name, material) | {"mesh": f"meshes/{safe_name(name)}.ply"}
 
 
-def _panel(draft: RoomDraft, free: Free) -> tuple[dict[str, Any] | None, str]:
+def propose_panel(draft: RoomDraft, free: Free) -> tuple[dict[str, Any] | None, str]:
     """A panel like the paper's on what is above the middle of the way, or else beside it."""
     names = [key for key, (mesh, _) in draft.reflectors.items() for _ in range(len(mesh.faces))]
     triangles = np.concatenate([mesh.vertices[mesh.faces] for mesh, _ in draft.reflectors.values()])

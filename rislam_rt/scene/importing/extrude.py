@@ -107,10 +107,7 @@ def _named(entries: list[Entry], plan: Plan, options: ImportOptions) -> RoomDraf
         f"floor plan of {len(plan.rooms)} rooms: {len(names)} reflectors, {len(plan.openings) - closed} openings, "
         f"{closed} closed doors and windows"
     ]
-    if palette.assumed:
-        what = ", ".join(f"{v}" for v in options.rest.values())
-        remarks.append(f"material unknown, taken as {what}: {', '.join(sorted(palette.assumed)[:12])}")
-    return RoomDraft(reflectors, {}, remarks)
+    return RoomDraft(reflectors, {}, remarks + palette.remarks())
 
 
 def _wall_lines(plan: Plan) -> list[Line]:

@@ -15,6 +15,10 @@ CLEARANCES = (0.4, 0.25, 0.12)
 """[m] Least distances of the way from all surfaces, the first that leaves one."""
 LONGEST = 5.0
 """[m] Of the way that is proposed."""
+OFF_SURFACE = 1e-5
+"""[m] From a surface to where it is looked at: nearer than any two that are drawn apart."""
+ENOUGH = 3
+"""Lines of sight that make a surface seen: a single one may have slipped through the seam of two triangles."""
 _GRID, _RAYS, _STATIONS = 14, 100, 40
 
 
@@ -107,11 +111,13 @@ def is_seen(stations: Floats, groups: list[Floats], triangles: Floats) -> Boolea
     seen = np.zeros(len(groups), dtype=np.bool_)
     for number, group in enumerate(groups):
         points, normal = _spread(group, 16)
+        looks = 0
         for eye in eyes:
             side = np.sign(np.einsum("pi,pi->p", eye - points, normal))[:, None]
-            ends = points + 1e-3 * side * normal
+            ends = points + OFF_SURFACE * side * normal
             blocked, _ = crossings(np.broadcast_to(eye, ends.shape), ends, triangles)
-            if len(np.unique(blocked)) < len(ends):
+            looks += len(ends) - len(np.unique(blocked))
+            if looks >= ENOUGH:
                 seen[number] = True
                 break
     return seen
@@ -138,5 +144,7 @@ def _spread(triangles: Floats, count: int) -> tuple[Floats, Floats]:
     # a lattice of the plane by the roots of x^3 = x + 1 (R2 sequence), folded into the triangle
     u, v = (0.5 + np.outer([0.7548776662466927, 0.5698402909980532], np.arange(count))) % 1.0
     u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
+    # a hundredth off the edges, where another surface may begin
+    u, v = 0.97 * u + 0.01, 0.97 * v + 0.01
     points = triangles[chosen, 0] + u[:, None] * edge[chosen, 0] + v[:, None] * edge[chosen, 1]
     return points, triangle_planes(triangles[chosen])[0]

@@ -8,9 +8,10 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.scene.schema import ItuMaterial
 
 THICKNESS = {
-    "brick": 0.12, "ceiling_board": 0.015, "chipboard": 0.018, "concrete": 0.2, "floorboard": 0.02, "glass": 0.006,
-    "marble": 0.02, "medium_dry_ground": 1.0, "metal": 0.002, "plasterboard": 0.0125, "plywood": 0.012,
-    "very_dry_ground": 1.0, "wet_ground": 1.0, "wood": 0.03,
+    "asphalt_concrete": 0.05, "brick": 0.12, "carpet_tile": 0.006, "ceiling_board": 0.015, "chipboard": 0.018,
+    "clear_acrylic": 0.005, "concrete": 0.2, "floorboard": 0.02, "glass": 0.006, "marble": 0.02,
+    "medium_dry_ground": 1.0, "metal": 0.002, "plasterboard": 0.0125, "plywood": 0.012, "very_dry_ground": 1.0,
+    "vinyl_tile": 0.003, "wet_ground": 1.0, "wood": 0.03,
 }  # fmt: skip
 """[m] Thickness of a slab where none is given: usual sizes of trade (boards), of construction (walls)."""
 
@@ -101,6 +102,14 @@ class Palette:
                 self.used.add(pattern)
                 return table
         return None
+
+    def remarks(self) -> list[str]:
+        """What was assumed, on one line, if anything."""
+        if not self.assumed:
+            return []
+        names, what = sorted(self.assumed), ", ".join(f"{value}" for value in self.rest.values())
+        more = f" and {len(names) - 8} more" if len(names) > 8 else ""
+        return [f"material unknown, taken as {what}: {', '.join(names[:8])}{more} (--material NAME=...)"]
 
     def unused(self) -> list[str]:
         """Patterns that nothing matched."""

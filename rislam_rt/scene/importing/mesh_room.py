@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
-from rislam_rt.geometry.flat import flat_parts
 from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.importing.account import account
 from rislam_rt.scene.importing.draft import RoomDraft
 from rislam_rt.scene.importing.facets import Facets, find_facets, weld
 from rislam_rt.scene.importing.free_space import find_free, is_seen
 from rislam_rt.scene.importing.materials import Palette, itu_by_word
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.pieces import Piece, find_pieces, numbered, plain_name, wall_name
+from rislam_rt.scene.importing.pieces import Piece, find_pieces, numbered, place_free_name, wall_name
 from rislam_rt.scene.importing.rounded import find_round
+from rislam_rt.scene.importing.scan_room import looks_scanned, sort_scan
 from rislam_rt.scene.importing.size import place_parts
 from rislam_rt.scene.importing.source import Part, read_source
 from rislam_rt.scene.importing.surfaces import Sorted, Surface, sort_regions
@@ -43,27 +43,27 @@ def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
 
 
 def build_draft(facets: Facets, parts: list[Part], notes: list[str], options: ImportOptions) -> RoomDraft:
-    """Walls, things and clutter of flat regions."""
-    nodes = [part.node for part in parts]
-    pieces = find_pieces(facets, nodes)
-    found = sort_regions(facets, pieces, find_round(facets), options)
+    """Walls, things and clutter, of flat regions or of the planes of a scan."""
+    if options.scan or (options.scan is None and looks_scanned(facets, options)):
+        found, about = sort_scan(facets.mesh, options)
+        pieces = [Piece("", "", np.zeros(0, dtype=np.int64), True)]
+    else:
+        pieces, about = find_pieces(facets, [part.node for part in parts]), []
+        found = sort_regions(facets, pieces, find_round(facets), options)
     if not found.surfaces:
         raise Fault(
-            f"nothing in it is flat and wider than {100 * found.narrow:.2g} cm",
-            "check --units; for a scan give --scan; or lower --detail",
+            f"nothing in it is flat and wider than {100 * found.narrow:.2g} cm", "check --units, or lower --detail"
         )
     surfaces, unseen = _seen(found)
     palette = Palette(options.materials, options.rest)
-    reflectors = _reflectors(surfaces, pieces, parts, facets, palette)
+    reflectors = _reflectors(surfaces, pieces, parts, palette)
     shades = _shades(found, pieces, list(reflectors))
     if palette.unused():
         names = ", ".join([*reflectors, *sorted({p.material for p in parts if p.material})][:12])
         raise Fault(f"--material {palette.unused()[0]}: nothing has that name", f"give one of: {names}")
-    remarks = [*notes, *_account(facets, found, surfaces, unseen, reflectors, shades, options)]
-    if palette.assumed:
-        what = ", ".join(f"{v}" for v in options.rest.values())
-        remarks.append(f"material unknown, taken as {what}: {_listed(sorted(palette.assumed))} (--material NAME=...)")
-    return RoomDraft(reflectors, shades, remarks)
+    said = account(facets, found, surfaces, unseen, reflectors, shades, options, scanned=bool(about))
+    remarks = [*notes, *about, *said]
+    return RoomDraft(reflectors, shades, remarks + palette.remarks())
 
 
 def _seen(found: Sorted) -> tuple[list[Surface], float]:
@@ -81,13 +81,13 @@ def _seen(found: Sorted) -> tuple[list[Surface], float]:
 
 
 def _reflectors(
-    surfaces: list[Surface], pieces: list[Piece], parts: list[Part], facets: Facets, palette: Palette
+    surfaces: list[Surface], pieces: list[Piece], parts: list[Part], palette: Palette
 ) -> dict[str, tuple[Mesh, dict[str, Any]]]:
     """Named meshes with their materials: each wall of the shell by itself, each thing as one."""
-    corners = np.concatenate([s.mesh.vertices for s in surfaces if s.piece == 0] or [facets.mesh.vertices])
-    room = np.stack([corners.min(axis=0), corners.max(axis=0)])
     shell = sorted((s for s in surfaces if s.piece == 0), key=lambda s: -s.area)
-    uses = [plain_name(parts[s.part].node) for s in shell]
+    corners = np.concatenate([s.mesh.vertices for s in surfaces if s.piece == 0 or not shell])
+    room = np.stack([corners.min(axis=0), corners.max(axis=0)])
+    uses = [place_free_name(parts[s.part].node) for s in shell]
     entries: list[tuple[str, Mesh, int]] = []
     for surface, node in zip(shell, uses, strict=True):
         middle = surface.mesh.vertices[surface.mesh.faces].mean(axis=(0, 1))
@@ -115,44 +115,3 @@ def _shades(found: Sorted, pieces: list[Piece], taken: list[str]) -> dict[str, M
     names = [f"{pieces[piece].name or 'room'}_clutter" for piece in by_piece]
     names = numbered([*taken, "ris", *names])[len(taken) + 1 :]
     return {name: as_mesh(np.concatenate(triangles)) for name, triangles in zip(names, by_piece.values(), strict=True)}
-
-
-def _account(
-    facets: Facets, found: Sorted, surfaces: list[Surface], unseen: float, reflectors: dict[str, Any],
-    shades: dict[str, Mesh], options: ImportOptions,
-) -> list[str]:  # fmt: skip
-    """What became of the mesh, in numbers."""
-    walls = sum(
-        len(flat_parts(mesh.vertices[mesh.faces], COPLANAR_ANGLE, COPLANAR_OFFSET).offset)
-        for mesh, _ in reflectors.values()
-    )
-    total, waves = float(facets.area.sum()), found.narrow / options.wavelength
-    triangles = sum(len(mesh.faces) for mesh in shades.values())
-    mirror = sum(s.area for s in surfaces)
-    yield_ = [
-        f"{len(facets.mesh.faces)} triangles, {total:.4g} m^2: {walls} walls of {mirror:.4g} m^2 in {len(reflectors)} "
-        f"reflectors, {len(shades)} shades of {triangles} triangles",
-        f"walls are within {1e3 * max(s.error for s in surfaces):.2g} mm of the mesh",
-    ]
-    if found.shading:
-        cells = (
-            f" (corners joined in cells of {1e3 * found.cell:.2g} mm, moved {1e3 * found.shade_error:.2g} mm at most)"
-        )
-        yield_.append(
-            f"{found.shading:.3g} m^2 narrower than {100 * found.narrow:.2g} cm ({waves:.2g} wavelengths at "
-            f"{options.carrier_ghz:g} GHz) or round shade and do not reflect" + (cells if found.shade_error else "")
-        )
-    for radius, sides, error in found.cylinders[:8]:
-        what = "reflect" if options.curved == "planes" else "shade"
-        yield_.append(f"a cylinder of {radius:.3g} m became {sides} flat sides within {1e3 * error:.2g} mm that {what}")
-    if found.gone > 1e-4 * total:
-        yield_.append(f"{found.gone:.3g} m^2 are left out: faces that stand on walls, things below the detail")
-    if unseen > 0.0:
-        yield_.append(f"{unseen:.3g} m^2 are left out that nobody inside can see")
-    if found.narrow > options.narrow * (1.0 + 1e-9):
-        yield_.append(f"the {options.max_walls} widest walls reflect (--max-walls)")
-    return yield_
-
-
-def _listed(names: list[str]) -> str:
-    return ", ".join(names[:8]) + (f" and {len(names) - 8} more" if len(names) > 8 else "")

@@ -60,7 +60,11 @@ def find_pieces(facets: Facets, nodes: list[str]) -> list[Piece]:
         else:
             things.append(regions)
     for regions in _touching(facets, things):
-        others.append(Piece(guess_kind(bounds_of(facets, regions), box), "", regions, False))
+        bounds = bounds_of(facets, regions)
+        if _is_shell(bounds, box):  # walls that were drawn apart
+            shell += regions.tolist()
+        else:
+            others.append(Piece(guess_kind(bounds, box), "", regions, False))
     return [Piece("", "", np.array(sorted(shell), dtype=np.int64), True), *others]
 
 
@@ -82,6 +86,12 @@ def plain_name(name: str) -> str:
         return ""
     plain = re.sub(r"[^\w.\-]+", "_", name.strip(), flags=re.UNICODE).strip("_.-").lower()
     return re.sub(r"_+", "_", plain.replace(".", "_"))[:48]
+
+
+def place_free_name(name: str) -> str:
+    """The same, empty too where it says no more than that it is a wall, floor or ceiling."""
+    plain = plain_name(name)
+    return "" if re.fullmatch(r"(walls?|floors?|ceilings?|roof|wand|boden|decke)?[_\d]*", plain) else plain
 
 
 def guess_kind(bounds: Floats, room: Floats) -> str:
@@ -107,7 +117,7 @@ def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
     center, height = room.mean(axis=0), float(room[1, 2] - room[0, 2])
     if abs(normal[2]) >= LEVEL:
         share = (float(middle[2]) - float(room[0, 2])) / height if height else 0.0
-        return "floor" if share < 0.2 else "ceiling" if share > 0.7 else "level"
+        return "floor" if share < 0.2 else "ceiling" if share > 0.8 else "table_top" if share < 0.5 else "level"
     outward = normal * (1.0 if (middle - center) @ normal >= 0.0 else -1.0)
     eighth = int(np.round(np.degrees(np.arctan2(outward[1], outward[0])) / 45.0)) % 8
     side = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")[eighth]

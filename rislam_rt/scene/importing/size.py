@@ -32,7 +32,7 @@ def place_parts(parts: list[Part], suffix: str, options: ImportOptions) -> tuple
     remarks = [f"{size[0]:.3g} x {size[1]:.3g} x {size[2]:.3g} m, with units = {units}, up = {up}"]
     facing = _facing(placed)
     other = "y" if up == "z" else "z"
-    if options.up is None and facing[1] > 1.2 * facing[2]:
+    if options.up is None and facing[1] > 1.2 * facing[2] and size[1] < size[2]:
         remarks.append(f"its largest surfaces look sideways: if it lies on its side, give --up {other}")
     return placed, remarks
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
+from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene.importing.facets import FLAT_ANGLE, Facets
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.pieces import Piece
@@ -69,16 +70,18 @@ def sort_regions(facets: Facets, pieces: list[Piece], rounds: list[Round], optio
         owner[piece.regions] = number
     rounded = np.zeros(len(owner), dtype=np.bool_)
     for found in rounds:
-        rounded[found.regions] = True
+        # as planes, cylinders get sides of their own; of other round things the sides that are drawn are taken
+        rounded[found.regions] = found.radius > 0.0 or options.curved == "shade"
     part = np.zeros(len(owner), dtype=np.int64)
     part[facets.region] = facets.mesh.part
     mirror, narrow = _mirrors(facets, rounded, options)
-    resting = _resting(facets, pieces, mirror, options)
+    resting = _resting(facets, pieces, mirror)
     mirror &= ~resting
     group = _coplanar(facets, pieces[0].regions, mirror, part)
     label = group.copy()
     for number, found in enumerate(rounds):
-        label[found.regions] = len(owner) + number
+        if rounded[found.regions[0]]:
+            label[found.regions] = len(owner) + number
     kept = corners_kept(facets, label)
     surfaces = []
     for number in np.unique(group[mirror]):
@@ -101,7 +104,7 @@ def _mirrors(facets: Facets, rounded: Booleans, options: ImportOptions) -> tuple
     return flat & (width >= narrow), narrow
 
 
-def _resting(facets: Facets, pieces: list[Piece], mirror: Booleans, options: ImportOptions) -> Booleans:
+def _resting(facets: Facets, pieces: list[Piece], mirror: Booleans) -> Booleans:
     """Regions of things that lie on walls of the shell, their thing rising from there."""
     resting = np.zeros(len(mirror), dtype=np.bool_)
     walls = pieces[0].regions[mirror[pieces[0].regions]]
@@ -112,9 +115,13 @@ def _resting(facets: Facets, pieces: list[Piece], mirror: Booleans, options: Imp
         height = np.einsum("fci,wi->fcw", points, facets.normal[walls]) - facets.offset[walls]
         rises = np.abs(height).max(axis=(0, 1)) > 2.0 * RESTING
         one_side = (height.min(axis=(0, 1)) > -RESTING) | (height.max(axis=(0, 1)) < RESTING)
-        near = (np.abs(height).max(axis=1) < RESTING)[:, rises & one_side].any(axis=1)
-        far = np.unique(region[~near])
-        resting[np.setdiff1d(np.unique(region), far)] = True
+        near = np.abs(height).max(axis=1) < RESTING
+        on = np.zeros(len(points), dtype=np.bool_)
+        for wall in np.flatnonzero(rises & one_side & near.any(axis=0)):
+            rows = np.flatnonzero(near[:, wall])
+            solid = facets.mesh.vertices[facets.faces_of(walls[wall : wall + 1])]
+            on[rows] |= distance_to_triangles(points[rows].mean(axis=1), solid) < RESTING
+        resting[np.setdiff1d(np.unique(region), np.unique(region[~on]))] = True
     return resting
 
 
@@ -165,20 +172,20 @@ def _with_clutter(
     raw, planes = [], _shell_planes(surfaces)
     for number, piece in enumerate(pieces):
         regions = piece.regions[rest[piece.regions]]
-        triangles = _off_planes(facets.mesh.vertices[facets.faces_of(regions)], planes)
+        triangles = off_planes(facets.mesh.vertices[facets.faces_of(regions)], planes)
         if len(triangles) and np.ptp(triangles.reshape(-1, 3), axis=0).max() >= narrow:
             raw.append(Clutter(number, triangles))
         else:
             gone += float(facets.area[regions].sum())
             rest[regions] = False
-    thin, error, cell = _in_cells(raw, wavelength)
-    shading = float(facets.area[rest].sum()) + sum(_area(clutter.triangles) for clutter in prisms)
-    thin = [Clutter(c.piece, _off_planes(c.triangles, planes)) for c in (*prisms, *thin)]
+    thin, error, cell = in_cells(raw, wavelength)
+    shading = float(facets.area[rest].sum()) + sum(surface_area(clutter.triangles) for clutter in prisms)
+    thin = [Clutter(c.piece, off_planes(c.triangles, planes)) for c in (*prisms, *thin)]
     thin = [clutter for clutter in thin if len(clutter.triangles)]
     return Sorted(surfaces, thin, error, cell, narrow, shading, gone, cylinders)
 
 
-def _in_cells(raw: list[Clutter], cell: float) -> tuple[list[Clutter], float, float]:
+def in_cells(raw: list[Clutter], cell: float) -> tuple[list[Clutter], float, float]:
     """Clutter thinned in cells of one size, the smallest with which it is few enough."""
     while True:
         found = [(clutter.piece, *clustered(clutter.triangles, cell)) for clutter in raw]
@@ -195,7 +202,7 @@ def _shell_planes(surfaces: list[Surface]) -> list[tuple[Floats, float]]:
     ]
 
 
-def _off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats:
+def off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats:
     """Triangles (T, 3, 3) without those that lie flat on a wall of the shell."""
     keep = has_area(triangles)
     for normal, offset in planes:
@@ -203,6 +210,7 @@ def _off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats
     return triangles[keep]
 
 
-def _area(triangles: Floats) -> float:
+def surface_area(triangles: Floats) -> float:
+    """Area [m^2] of triangles (T, 3, 3)."""
     edge = triangles[:, 1:] - triangles[:, :1]
     return 0.5 * float(np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1).sum())

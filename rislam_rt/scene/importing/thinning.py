@@ -3,6 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.triangles import distance_to_edges
 from rislam_rt.scene.importing.facets import Facets
 from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
 from rislam_rt.scene.importing.rounded import across
@@ -32,11 +33,11 @@ def region_mesh(facets: Facets, regions: Integers, kept: Booleans, tolerance: fl
     faces = np.where(turned[:, None], faces[:, ::-1], faces)
     height = points[faces] @ normal - offset
     off = float(np.abs(height).max())
-    filled = _filled(faces, points, normal, kept, tolerance)
+    filled, moved = _filled(faces, points, normal, kept, tolerance)
     if filled is None:
         used, compact = np.unique(faces, return_inverse=True)
         return Mesh(_onto(points[used], normal, offset), compact.reshape(-1, 3)), off
-    return Mesh(_onto(filled.vertices, normal, offset), filled.faces), off + tolerance
+    return Mesh(_onto(filled.vertices, normal, offset), filled.faces), float(np.hypot(off, moved))
 
 
 def _onto(points: Floats, normal: Floats, offset: float) -> Floats:
@@ -45,27 +46,38 @@ def _onto(points: Floats, normal: Floats, offset: float) -> Floats:
     return points - height[:, None] * normal if np.abs(height).max() > 1e-6 else points
 
 
-def _filled(faces: Integers, points: Floats, normal: Floats, kept: Booleans, tolerance: float) -> Mesh | None:
+def _filled(
+    faces: Integers, points: Floats, normal: Floats, kept: Booleans, tolerance: float
+) -> tuple[Mesh | None, float]:
+    """The thinned outlines as a mesh, and how far the farthest corner is off them [m]."""
     u, v = across(normal)
     flat = points @ np.stack([u, v], axis=-1)
-    loops = [simplify_loop(loop, points, kept, tolerance) for loop in outline_loops(faces)]
+    drawn = outline_loops(faces)
+    loops = [simplify_loop(loop, points, kept, tolerance) for loop in drawn]
+    moved = max(_off_loop(points[a], points[b]) for a, b in zip(drawn, loops, strict=True)) if drawn else 0.0
     loops = [loop for loop in loops if len(loop) > 2 and abs(signed_area(flat[loop])) > tolerance**2]
     outer = [loop for loop in loops if signed_area(flat[loop]) > 0.0]
     holes = [loop for loop in loops if signed_area(flat[loop]) < 0.0]
     owner = [_around(flat[hole], [flat[loop] for loop in outer]) for hole in holes]
     if not outer or None in owner:
-        return None
+        return None, 0.0
     corners: list[int] = []
     found: list[Integers] = []
     for number, loop in enumerate(outer):
         mine = [hole for hole, parent in zip(holes, owner, strict=True) if parent == number]
         triangles = triangulate(flat[loop], [flat[hole] for hole in mine])
         if triangles is None:
-            return None
+            return None, 0.0
         found.append(triangles + len(corners))
         corners += [*loop, *(corner for hole in mine for corner in hole)]
     used, compact = np.unique(np.array(corners)[np.concatenate(found)], return_inverse=True)
-    return Mesh(points[used], compact.reshape(-1, 3))
+    return Mesh(points[used], compact.reshape(-1, 3)), moved
+
+
+def _off_loop(corners: Floats, loop: Floats) -> float:
+    """Largest distance [m] of corners (n, 3) from a closed loop (m, 3)."""
+    edges = np.stack([loop, np.roll(loop, -1, axis=0)], axis=1)
+    return float(distance_to_edges(corners, edges).max())
 
 
 def _around(hole: Floats, outers: list[Floats]) -> int | None:

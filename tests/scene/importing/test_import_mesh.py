@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from rislam_rt.model import Scene
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.check.probe import winding
 from rislam_rt.scene.importing import ImportOptions, import_room
-from rislam_rt.scene.importing.materials import itu_by_word, parse_choices, parse_material
+from rislam_rt.scene.importing.materials import THICKNESS, itu_by_word, parse_choices, parse_material
+from rislam_rt.scene.schema import ItuMaterial
 
 SHELL = {"floor", "ceiling", "wall_north", "wall_south", "wall_east", "wall_west"}
 
@@ -119,6 +121,7 @@ def test_names_speak_of_materials() -> None:
     names = {"Oak.003": "wood", "itu_concrete": "concrete", "Window Glass": "glass", "Stahl-blank": "metal",
              "M_Ceiling_Board": "ceiling_board", "Material.004": None, "": None}  # fmt: skip
     assert {name: itu_by_word(name) for name in names} == names
+    assert set(THICKNESS) == set(get_args(ItuMaterial))
     assert parse_material("itu:glass") == {"itu": "glass", "thickness_m": 0.006}
     for wrong in ("itu:cheese", "reflection:1.5", "concrete", "itu:wood:-1", "reflection:nan"):
         with pytest.raises(RislamError, match="--material"):
