@@ -9,6 +9,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -332,7 +333,7 @@ def read_run(folder: Path) -> SlamResult:
         }
         return SlamResult(
             name=about["name"],
-            scene=Scene(scene.name, scene.reflectors, scene.scatterers, scene.ris, agent, about["scene"]["sha256"]),
+            scene=replace(scene, agent=agent, digest=about["scene"]["sha256"]),
             paths=paths,
             schemes=schemes,
             config=about["config"],

@@ -168,6 +168,10 @@ def test_run_report_and_json(run, tmp_path, monkeypatch):
     page = tmp_path / "mine" / "report.html"
     first = page.read_bytes()
     assert len(list((tmp_path / "mine" / "figures").glob("*.png"))) == 7
+    words = ("--config", "mine/config.toml", "--truth", "mine/truth.tum", "--json", "slam.json", "--out", "again")
+    assert run("slam", "mine/measurements_random.nc", *words)[0] == 0
+    found = json.loads((tmp_path / "slam.json").read_text())
+    assert found["rmse_m"] == pytest.approx(content["schemes"]["random"]["rmse_m"], abs=1e-8)  # poses of nine digits
     monkeypatch.setitem(sys.modules, "rerun", None)  # as where the extra is not installed
     code, _, err = run("report", "mine", "--rerun", "mine.rrd")
     assert code == 3
