@@ -1,4 +1,4 @@
-"""Write the golden files, `python tests/channel/golden/build.py [ROOM ...]`, after a change that is meant to change paths.
+"""Write the golden files: `python tests/channel/golden/build.py [ROOM ...]`, after a change meant to change paths.
 
 One NetCDF file a room: two poses and every path of theirs from the image-source channel, panel at level 0.
 """
