@@ -19,7 +19,7 @@ def build_sensor(radio: RadioConfig, config: ReceiverConfig) -> SensorModel:
     """
     threshold = detection_threshold(radio, config)
     rate = config.clutter_rate
-    if config.estimator != "bound":
+    if config.estimator == "waveform":
         captures = 2 if config.alternation else 1
         expected = expected_false_alarms(threshold, radio, config.max_delay - config.min_delay)
         rate = captures * GRID_SHARE * expected
