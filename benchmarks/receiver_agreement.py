@@ -74,8 +74,8 @@ def main() -> None:
 
 def kept(kind: str, work: Any, name: str, seed: int, arguments: argparse.Namespace) -> dict[str, Any]:
     """One room with one receiver, from the folder if it is there."""
-    folder, name = (arguments.before, "waveform") if name == "before" else (arguments.keep, name)
-    file = Path(folder) / f"{kind}-{name}-{seed}-{arguments.cycles}.npz"
+    folder, label = (arguments.before, "waveform") if name == "before" else (arguments.keep, name)
+    file = Path(folder) / f"{kind}-{label}-{seed}-{arguments.cycles}.npz"
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
         result = work(name, seed, arguments)
@@ -113,7 +113,7 @@ def room_of(seed: int, cycles: int) -> tuple[Scene, Trajectory, Paths, RadioConf
 
 def settings_of(name: str, seed: int) -> ReceiverConfig:
     """Four seeds with the codes held, four with code and twin."""
-    return ReceiverConfig(**RECEIVERS[name], alternation=bool((seed // 4) % 2))
+    return ReceiverConfig(**RECEIVERS["waveform" if name == "before" else name], alternation=bool((seed // 4) % 2))
 
 
 def hear(name: str, seed: int, arguments: argparse.Namespace) -> dict[str, Any]:
