@@ -31,12 +31,12 @@ BATCH = 16
 ROUNDS = 40
 """Most rounds of search; each but the last adds a path."""
 SEARCH_STEPS = 2
-"""Refinements a round: enough for the residual of the next one, since every round refines all paths again."""
-KNOWN_STEPS = 6
+"""Refinements a round: enough for the residual of the next one."""
+KNOWN_STEPS = 3
 """Most refinements of paths that were known beforehand: a cycle moves them by less than a tenth of a cell."""
 FINAL_STEPS = 12
-FINAL_TOLERANCE = 0.02
-"""Noise energy that the last step may leave in each path: a fifth of a standard deviation of one parameter."""
+FINAL_TOLERANCE = 0.03
+"""Noise energy that the last step may leave in each path: a quarter of a standard deviation of one parameter."""
 TRIAL_STEPS = 6
 """Most refinements of the other paths after one was taken out, before the costs are compared."""
 TOUCHED = 1.0

@@ -21,11 +21,13 @@ PRIOR = np.array([0.0, 2.0, 2.0])
 axis on which the array has no aperture."""
 LARGEST_STEP = np.array([0.3, 0.15, 0.15])
 """Most that one step may change (B tau, u, v): about a third of a cell, within which the error is nearly quadratic."""
+SEARCH_TOLERANCE = 0.3
+"""Noise energy that refinement may leave in each path while paths are still looked for."""
 OVERLAP = 0.3
 """Correlation of two signals from which on one is refined along with the other."""
-WORTHWHILE = 0.6
+WORTHWHILE = 0.4
 """Share of the paths up to which it saves time to refine them alone,"""
-FEW = 8
+FEW = 16
 """...of more than so many."""
 HOPE = 2.0
 """Times what a step promises that is gained in the end, at most: of 411 trials in random rooms 4 gained more than one
@@ -137,7 +139,7 @@ def contribution(fit: Fit, rows: Integers | Booleans, samples: Complexes) -> Com
 
 
 def refine(
-    sounding: Sounding, fit: Fit, samples: Complexes, *, steps: int, tolerance: float = 0.1, enough: float = 0.0
+    sounding: Sounding, fit: Fit, samples: Complexes, *, steps: int, tolerance: float = SEARCH_TOLERANCE, enough: float = 0.0
 ) -> Fit:
     """Up to so many damped Gauss-Newton steps.
 
@@ -176,7 +178,7 @@ def refine(
 
 
 def refine_some(
-    sounding: Sounding, fit: Fit, samples: Complexes, rows: Integers, *, steps: int, tolerance: float = 0.1
+    sounding: Sounding, fit: Fit, samples: Complexes, rows: Integers, *, steps: int, tolerance: float = SEARCH_TOLERANCE
 ) -> Fit:
     """Refine some paths, the others held."""
     begun, local = part(sounding, fit, rows, samples)
