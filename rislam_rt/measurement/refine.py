@@ -139,7 +139,13 @@ def contribution(fit: Fit, rows: Integers | Booleans, samples: Complexes) -> Com
 
 
 def refine(
-    sounding: Sounding, fit: Fit, samples: Complexes, *, steps: int, tolerance: float = SEARCH_TOLERANCE, enough: float = 0.0
+    sounding: Sounding,
+    fit: Fit,
+    samples: Complexes,
+    *,
+    steps: int,
+    tolerance: float = SEARCH_TOLERANCE,
+    enough: float = 0.0,
 ) -> Fit:
     """Up to so many damped Gauss-Newton steps.
 
