@@ -87,7 +87,8 @@ def pick_peaks(
         signal = matched / sounding.num_samples * tones
         residual = residual - np.multiply.outer(antennas, signal)
         beams = grid.antennas @ antennas.astype(np.complex64)
-        output -= np.multiply.outer(beams, _delay_spectrum(grid, signal.astype(np.complex64)[None])[0])
+        single: Complexes = signal[None].astype(np.complex64)
+        output -= np.multiply.outer(beams, _delay_spectrum(grid, single)[0])
     return np.array(picked).reshape(-1, 3)
 
 

@@ -96,10 +96,10 @@ def _exact_fit(sounding: Sounding, waves: Waves, inner: Inner, samples: Complexe
     """Likewise with the signals of `waves.wave_signals`."""
     exact = wave_signals(sounding, waves.parameters)
     products = exact.conj().T @ exact + RIDGE * sounding.num_samples * np.eye(exact.shape[1])
-    amplitude = np.linalg.solve(products, exact.conj().T @ samples.ravel())
+    amplitude = np.asarray(np.linalg.solve(products, exact.conj().T @ samples.ravel()), dtype=np.complex128)
     rest = samples - (exact @ amplitude).reshape(samples.shape)
     matched, slopes = correlate_waves(sounding, exact, rest)
-    cost, seen = float(np.vdot(rest, rest).real), np.concatenate([matched[None], slopes])
+    cost, seen = float(np.vdot(rest, rest).real), np.asarray(np.concatenate([matched[None], slopes]))
     return Fit(waves, inner, exact, seen, inverse(inner.signal), amplitude, slopes, energy, cost)
 
 
