@@ -4,6 +4,7 @@
 # make check  linter and type checker
 # make docs   build the site of the documentation under site/
 # make newest run the tests with the newest allowed version of every dependency, in .venv-newest
+# make interop  have deepmimo, evo and rerun read our files, in .venv-interop
 # make lock   resolve the dependencies anew
 # make clean  remove .venv and caches (results under runs/ stay)
 
@@ -11,7 +12,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test slow check docs newest lock clean
+.PHONY: demo test slow check docs newest interop lock clean
 .DELETE_ON_ERROR:
 
 demo: $(READY)
@@ -51,11 +52,17 @@ newest: $(READY)
 	@.venv-newest/bin/python -m pip install --quiet --disable-pip-version-check --upgrade --upgrade-strategy eager -e '.[dev]'
 	@.venv-newest/bin/python -m pytest -n 2
 
+# deepmimo asks for an older numpy than the lock file has, and rerun is 700 MB: neither is in .venv.
+interop: $(READY)
+	@$(BIN)/python -m venv .venv-interop
+	@.venv-interop/bin/python -m pip install --quiet --disable-pip-version-check -e '.[interop]' pytest pytest-timeout
+	@.venv-interop/bin/python -m pytest -m interop tests/report/test_interop.py
+
 lock:
 	@uv pip compile --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 --extra dev \
 	  --quiet --output-file requirements.lock pyproject.toml
 	@! grep -n '://' requirements.lock
 
 clean:
-	rm -rf $(VENV) .venv-newest build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	rm -rf $(VENV) .venv-newest .venv-interop build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

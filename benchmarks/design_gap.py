@@ -174,7 +174,7 @@ def random_belief(scene: Scene, *, rng: np.random.Generator, std: float = 0.05) 
         strength.append(0.0 if panel else np.sqrt(scene.scatterers[number].rcs))
     for number, point in enumerate(scene.landmark_positions):
         for wall in range(len(walls)):
-            if number == len(scene.scatterers) and wall == walls.host:
+            if number == len(scene.scatterers) and wall == walls.hosts[0]:
                 continue
             points.append(mirror(point, walls.normal[wall], walls.offset[wall]))
             parent.append(number)

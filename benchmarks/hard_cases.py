@@ -7,7 +7,7 @@ semidefinite, the outcome a proper value; warnings count as failures. Beside it 
 deviations; `said` are those among them that reported `diverged` at some time; `back` the runs that reported it and are
 not lost. Absolute position is unobservable: after a start that is wrong by 1 m the whole map is off by 1 m, which no
 filter can notice, so that errors are taken relative to the start. Run:
-`python benchmarks/hard_cases.py [--cases 1000] [--filter nested] [--seed 1] [--kind KIND] [--json FILE]`.
+`python benchmarks/hard_cases.py [--cases 1000] [--filter nested | window] [--seed 1] [--kind KIND] [--json FILE]`.
 """
 
 import argparse
@@ -45,6 +45,7 @@ from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import Outcome, SlamConfig, StartPrior, StepInfo, estimate, init, predict, step
 from rislam_rt.slam.filter import believed
+from rislam_rt.slam.window import WindowState, gauss
 
 ROOM = Path(__file__).parents[1] / "scenes" / "paper_room"
 ROUNDING = 1e-10
@@ -302,6 +303,8 @@ def _settings(engine: str, rng: np.random.Generator) -> SlamConfig:
             birth_cycles=int(rng.choice([12, 3, 1])),
             window=window,
         )
+    if engine == "window":
+        return replace(config, filter="window", use_vt=True, heading="known", num_particles=1)
     if engine != "nested":
         return config
     # as many as a thousand runs allow; the laws looked at here do not depend on their number
@@ -375,7 +378,7 @@ def run_case(case: Case) -> Verdict:
                     state, cycle.measurement, cycle.code, cycle.dt, cycle.heading, case.config, rng=rng
                 )  # fmt: skip
                 belief = estimate(state, case.config)
-                found = faults_of(belief, info, len(cycle.measurement), believed(state).covariance)
+                found = faults_of(belief, info, len(cycle.measurement), _believed(state))
                 found += faults_of(predict(state, 0.1, case.config), info, len(cycle.measurement))
                 faults += [f"cycle {row}: {fault}" for fault in found]
                 outcomes.append(info.outcome)
@@ -389,6 +392,11 @@ def run_case(case: Case) -> Verdict:
             )
             faults.append(f"{type(error).__name__} in {Path(where.filename).name}:{where.lineno}: {error}"[:150])
     return Verdict(case.kind, case.seed, tuple(faults), tuple(outcomes), drift, std)
+
+
+def _believed(state: Any) -> Floats:
+    """Covariance of all that the filter holds of the present."""
+    return gauss.now(state.window)[1] if isinstance(state, WindowState) else believed(state).covariance
 
 
 def faults_of(belief: SlamEstimate, info: StepInfo, count: int, covariance: Floats | None = None) -> list[str]:
@@ -439,7 +447,7 @@ def draw_cases(count: int, seed: int, engine: str, kinds: Sequence[str] = KINDS)
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=1000)
-    parser.add_argument("--filter", choices=("rao_blackwellised", "nested"), default="rao_blackwellised")
+    parser.add_argument("--filter", choices=("rao_blackwellised", "nested", "window"), default="rao_blackwellised")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kind", choices=KINDS)
     parser.add_argument("--json", type=Path)

@@ -58,8 +58,9 @@ def received(tau: Floats, cosines: Floats, snr_db: float, phase: Floats) -> Rece
         tau / RADIO.bandwidth,
         np.column_stack([cosines, up]),
         amplitude * np.exp(1j * phase),
-        np.zeros(count, dtype=bool),
+        np.full(count, -1),
         np.full(count, 10.0),
+        np.zeros(count),
     )
 
 

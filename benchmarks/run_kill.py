@@ -254,7 +254,7 @@ def start(words: tuple[str, ...], folder: Path, *, fresh: bool = False) -> Any:
     """The command in a process group of its own; `fresh`: in an interpreter of its own too."""
     if not fresh:
         return Forked(words, folder)
-    command = [sys.executable, "-m", "rislam_rt.cli", words[0], PIPELINE, *words[1:]]
+    command = [sys.executable, "-m", "rislam_rt", words[0], PIPELINE, *words[1:]]
     return subprocess.Popen(
         command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)},

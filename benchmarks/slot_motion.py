@@ -79,7 +79,7 @@ def leaks(paths: Paths, motion: Trajectory, radio: RadioConfig, config: Receiver
     for cycle in range(len(motion)):
         heard = receive(paths, cycle, float(motion.heading[cycle]), radio, config, shift[cycle])
         common, difference = split(heard, config)
-        leak = np.where(heard.from_panel, common.gain, difference.gain)
+        leak = np.where(heard.panel >= 0, common.gain, difference.gain)
         snr = [10.0 * np.log10(np.maximum(radio.integrated_snr(gain), 1e-9)) for gain in (heard.gain, leak)]
         found.append(np.column_stack([paths.kind[heard.path], *snr]))
     return np.vstack(found)

@@ -62,7 +62,7 @@ def taken_for_granted(wanted: bool) -> Iterator[None]:
     """What is found in the difference is reported as the panel's for certain, as if nothing moved."""
     asked = bound.panel_probability
     if wanted:
-        bound.panel_probability = lambda found, *_: np.where(found.in_difference, 1.0 - 1e-6, 1e-6)
+        bound.panel_probability = lambda found, *_: (np.where(found.capture > 0, 1.0 - 1e-6, 1e-6), None)
     try:
         yield
     finally:

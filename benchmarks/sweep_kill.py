@@ -80,7 +80,7 @@ def torture(
 def start(folder: Path, how: tuple[str, str]) -> "subprocess.Popen[bytes]":
     """The sweep, in a process group of its own."""
     pipeline = str(ROOT / "pipelines" / "trace_then_slam.toml")
-    command = [sys.executable, "-m", "rislam_rt.cli", "sweep", pipeline, *SWEEP, *how, "--out", str(folder)]
+    command = [sys.executable, "-m", "rislam_rt", "sweep", pipeline, *SWEEP, *how, "--out", str(folder)]
     quiet = subprocess.DEVNULL
     return subprocess.Popen(command, cwd=ROOT, stdout=quiet, stderr=quiet, start_new_session=True)
 

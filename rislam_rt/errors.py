@@ -1,16 +1,31 @@
 """What can go wrong, each with the exit code that the command line ends with.
 
-A message is one line: what was wrong, the value received, and what to do about it.
+A message is one line: what was wrong, the value received, and what to do about it. An error may hold several, one for
+each fault.
 """
+
+MOST_LINES = 20
+"""Faults that are told one by one."""
 
 
 class RislamError(Exception):
-    """Any failure that this package raises on purpose; exit code 1. Its text is one printable line."""
+    """Any failure that this package raises on purpose; exit code 1.
+
+    Its text is one printable line, the first of its arguments, and says how many more there are.
+    """
 
     exit_code = 1
 
     def __str__(self) -> str:
-        return "".join(c if c.isprintable() else " " for c in super().__str__())
+        more = f" (and {len(self.args) - 1} more)" if len(self.args) > 1 else ""
+        return _printable(str(self.args[0]) + more) if self.args else ""
+
+    @property
+    def lines(self) -> list[str]:
+        """Every fault on one printable line."""
+        told = [_printable(str(text)) for text in self.args[:MOST_LINES]]
+        more = len(self.args) - len(told)
+        return [*told, f"{more} more of this kind"] if more else told
 
 
 class ConfigError(RislamError):
@@ -53,6 +68,10 @@ class StoreError(RislamError):
     """A result could not be written or read back."""
 
     exit_code = 4
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def expect(name: str, value: object, kind: type | tuple[type, ...]) -> None:

@@ -50,6 +50,9 @@ def test_the_wheel_carries_them(tmp_path: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "site")
     assert (tmp_path / "site" / "rislam_rt" / "py.typed").exists()
+    for asset in (ROOT / "rislam_rt" / "report" / "view").glob("*.*"):
+        carried = tmp_path / "site" / "rislam_rt" / "report" / "view" / asset.name
+        assert carried.read_bytes() == asset.read_bytes()
     (tmp_path / "empty").mkdir()
     listed = subprocess.run(
         [sys.executable, "-m", "rislam_rt", "pipelines", "--json", "list.json"],

@@ -36,14 +36,14 @@ def compose_paths(
         How the legs were found, kept in the result.
     """
     blocks = [_direct_block(direct, radio, depth)]
-    ris_legs: tuple[Complexes, Complexes] | None = None
+    responses: list[tuple[Complexes, Complexes]] = []
     for number, (tx, rx) in enumerate(zip(tx_legs, rx_legs, strict=True)):
-        is_ris = scene.ris is not None and number == len(scene.landmarks) - 1
-        point = scene.landmark_positions[number]
-        block = _join_block(tx, rx, point, number, is_ris, depth)
-        if is_ris:
-            assert scene.ris is not None
-            ris_legs = _panel_responses(scene, radio, tx, rx)
+        panel = scene.panel_number(number)
+        block = _join_block(tx, rx, scene.landmark_positions[number], number, panel >= 0, depth)
+        if panel >= 0:
+            for name, before in zip(("tx_leg", "rx_leg"), zip(*responses, strict=True), strict=False):
+                block[name] = block[name] + sum(legs.shape[1] for legs in before)
+            responses.append(_panel_responses(scene, radio, panel, tx, rx))
         else:
             i, j = block["tx_leg"], block["rx_leg"]
             rcs = cross_section(scene.scatterers[number], radio.wavelength, tx.at_far_end[:, i], rx.at_far_end[:, j])
@@ -60,16 +60,22 @@ def compose_paths(
     }
     keep: Booleans = np.logical_or.reduce(merged["valid"], axis=0)
     ris = None
-    if ris_legs is not None:
+    if responses:
+        sides = [np.concatenate(legs, axis=1) if len(legs) > 1 else legs[0] for legs in zip(*responses, strict=True)]
         tx_leg, rx_leg = (np.concatenate([block[name] for block in blocks]) for name in ("tx_leg", "rx_leg"))
-        ris = RisLegs(*ris_legs, tx_leg[keep], rx_leg[keep])
+        assert scene.ris is not None
+        spans = tuple(scene.ris.spec.span(number) for number in range(len(scene.panels)))
+        ris = RisLegs(sides[0], sides[1], tx_leg[keep], rx_leg[keep], spans)
     fields: dict[str, Any] = {
         name: value[keep] if name in _PER_PATH else value[:, keep] for name, value in merged.items()
     }
     for name in ("tau", "departure", "arrival", "gain", "vertices"):
         mask = fields["valid"].reshape(fields["valid"].shape + (1,) * (fields[name].ndim - 2))
         fields[name] = np.where(mask, fields[name], 0.0)
-    paths = Paths(**fields, walls=walls.names, landmarks=scene.landmarks, ris=ris, source=source)
+    paths = Paths(
+        **fields, walls=walls.names, landmarks=scene.landmarks, ris=ris, source=source,
+        num_panels=max(len(scene.panels), 1),
+    )  # fmt: skip
     return rephase(paths, zero_code(scene.ris.spec)) if scene.ris is not None else paths
 
 
@@ -122,17 +128,18 @@ def _join_block(tx: Legs, rx: Legs, point: Floats, landmark: int, is_ris: bool, 
     }
 
 
-def _panel_responses(scene: Scene, radio: RadioConfig, tx: Legs, rx: Legs) -> tuple[Complexes, Complexes]:
-    """Element responses (K, I, N, M) and (K, J, N, M) of the legs to the panel, from their mirrored devices."""
+def _panel_responses(scene: Scene, radio: RadioConfig, number: int, tx: Legs, rx: Legs) -> tuple[Complexes, Complexes]:
+    """Element responses (K, I, N, M) and (K, J, N, M) of the legs to a panel, from their mirrored devices."""
     assert scene.ris is not None
-    spec, center = scene.ris.spec, scene.ris.center
+    spec, center = scene.panels[number].spec, scene.panels[number].center
     responses = []
     for legs, antenna_gain in ((tx, radio.tx_gain), (rx, radio.rx_gain)):
         length = np.where(legs.valid, legs.length, 1.0)
         direction = np.where(legs.valid[..., None], legs.at_far_end, spec.normal)
         device = center + length[..., None] * direction
         coefficient = np.where(legs.valid, legs.coefficient, 0.0) * np.sqrt(antenna_gain)
-        responses.append(leg_response(spec, center, device, coefficient, radio.wavelength))
+        response = leg_response(spec, center, device, coefficient, radio.wavelength)
+        responses.append(scene.ris.spec.place(number, response))
     return responses[0], responses[1]
 
 

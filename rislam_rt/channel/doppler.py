@@ -200,9 +200,13 @@ def _panel_legs(
         ends = (getattr(before, end), getattr(after, end))
         images = [_mirrored(np.repeat(p[:, None], len(used), axis=1), walls, sequences[path]) for p in ends]
         moved = np.array(response)
-        moved[:, used] *= _ratio(scene.ris.spec, scene.ris.center, images[0], images[1], radio.wavelength)
+        for number, panel in enumerate(scene.panels):
+            mine = paths.panel[path] == number
+            old, new = (image[:, mine] for image in images)
+            ratio = _ratio(panel.spec, panel.center, old, new, radio.wavelength)
+            moved[:, used[mine]] *= scene.ris.spec.place(number, ratio)
         responses.append(moved)
-    return RisLegs(responses[0], responses[1], paths.ris.tx_leg, paths.ris.rx_leg)
+    return replace(paths.ris, tx=responses[0], rx=responses[1])
 
 
 def _ratio(spec: RisSpec, center: Floats, before: Floats, after: Floats, wavelength: float) -> Complexes:

@@ -1,4 +1,4 @@
-"""Shades: meshes of scatterers that hide what lies behind them and reflect nothing."""
+"""Shades: meshes, of scatterers or alone, that hide what lies behind them and reflect nothing."""
 
 from dataclasses import dataclass
 
@@ -7,6 +7,9 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.model import Scene
+
+ALONE = -2
+"""Landmark of a shade that belongs to no scatterer; -1 is that of a leg without landmark, which is spared nothing."""
 
 SEAM = 1e-9
 """[m] Triangles reach this far over their edges, so that no ray slips between two that share one (float64 rounding)."""
@@ -19,8 +22,10 @@ _BLOCK = 1_000_000
 class Shades:
     """S shades made of T triangles, shade by shade."""
 
+    names: tuple[str, ...]
+    """(S,)."""
     landmark: Integers
-    """(S,) number of the scatterer in the order of `scene.landmarks`."""
+    """(S,) number of the scatterer in the order of `scene.landmarks`, `ALONE` without one."""
     first: Integers
     """(S + 1,) triangles of shade s are first[s] : first[s + 1]."""
     triangles: Floats
@@ -61,12 +66,16 @@ class Shades:
 
 
 def build_shades(scene: Scene) -> Shades:
-    """Collect the shades of a scene's scatterers."""
+    """Collect the shades of a scene's scatterers, and those that stand alone."""
     owners = [n for n, scatterer in enumerate(scene.scatterers) if scatterer.shade is not None]
     meshes = [s.shade.triangles for s in scene.scatterers if s.shade is not None]
+    names = [scene.scatterers[n].name for n in owners] + [shade.name for shade in scene.shades]
+    owners += [ALONE] * len(scene.shades)
+    meshes += [shade.triangles for shade in scene.shades]
     center = np.array([(m.min(axis=(0, 1)) + m.max(axis=(0, 1))) / 2.0 for m in meshes]).reshape(-1, 3)
     reach = [np.linalg.norm(m - c, axis=-1).max() for m, c in zip(meshes, center, strict=True)]
     return Shades(
+        tuple(names),
         np.array(owners, dtype=np.int64),
         np.cumsum([0] + [len(m) for m in meshes]),
         np.concatenate([np.zeros((0, 3, 3)), *meshes]),

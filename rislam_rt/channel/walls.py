@@ -10,7 +10,7 @@ from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.flat import flat_parts
 from rislam_rt.geometry.planes import signed_distance
 from rislam_rt.geometry.stack import stack_walls, tracer_gap
-from rislam_rt.model import Material, Scene
+from rislam_rt.model import Material, RisPanel, Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,8 +33,8 @@ class Walls:
     """(W,) the wall whose plane each shares: its own number, unless it lies on another or another on it."""
     over: tuple[Integers, ...]
     """(W,) for each wall those that lie on it: where they are, they reflect and it does not."""
-    host: int
-    """The wall behind the panel, -1 without one."""
+    hosts: tuple[int, ...]
+    """The wall behind each panel, -1 where there is none."""
     shades: Shades
     """What hides but is no wall: it never reflects."""
 
@@ -49,7 +49,7 @@ class Walls:
 def build_walls(scene: Scene) -> Walls:
     """Number the walls of a scene, each the plane that fits all its corners.
 
-    Walls that lie on each other share one plane, that of the largest, into which the others are moved. The panel's host
+    Walls that lie on each other share one plane, that of the largest, into which the others are moved. A panel's host
     wall is the plane of the reflector named `host` that lies nearest to the panel's centre.
     """
     parts = [flat_parts(reflector.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for reflector in scene.reflectors]
@@ -74,7 +74,7 @@ def build_walls(scene: Scene) -> Walls:
         owner,
         stack.plane,
         stack.over,
-        _host(scene, np.repeat(np.arange(len(counts)), counts), normal, offset),
+        tuple(_host(panel, scene, np.repeat(np.arange(len(counts)), counts), normal, offset) for panel in scene.panels),
         build_shades(scene),
     )
 
@@ -84,10 +84,10 @@ def _names(reflector: str, count: int) -> list[str]:
     return [reflector] if count == 1 else [f"{reflector}#{facet}" for facet in range(count)]
 
 
-def _host(scene: Scene, reflector: Integers, normal: Floats, offset: Floats) -> int:
-    """The wall behind the panel, of walls whose `reflector` (W,) is given."""
-    panel, names = scene.ris, [r.name for r in scene.reflectors]
-    if panel is None or panel.host not in names:
+def _host(panel: RisPanel, scene: Scene, reflector: Integers, normal: Floats, offset: Floats) -> int:
+    """The wall behind a panel, of walls whose `reflector` (W,) is given."""
+    names = [r.name for r in scene.reflectors]
+    if panel.host not in names:
         return -1
     of_host = np.flatnonzero(reflector == names.index(panel.host))
     distance = np.abs(signed_distance(panel.center, normal[of_host], offset[of_host]))

@@ -2,6 +2,10 @@
 
 import os
 import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rislam_rt.errors import RislamError
 
 
 def main() -> None:
@@ -31,14 +35,16 @@ def _run(heard: list[int]) -> int:
 
     from rislam_rt.cli.app import app
     from rislam_rt.cli.interrupts import EXIT_CODE
+    from rislam_rt.cli.loudness import reset
     from rislam_rt.errors import RislamError
 
+    reset()
     try:
         code = app(sys.argv[1:] or ["--help"], prog_name="rislam-rt", standalone_mode=False)
     except RislamError as error:
         if heard:  # it reached the workers too, and the first to die was mourned
             return _say("interrupted: what is done is kept; the same command goes on from there", EXIT_CODE)
-        return _say(f"error: {error}", error.exit_code)
+        return _tell(error)
     except typer.Abort:
         return _say("interrupted", EXIT_CODE)
     except Exception as error:
@@ -49,6 +55,19 @@ def _run(heard: list[int]) -> int:
     if code == EXIT_CODE:  # an interrupt that no command has answered
         return _say("interrupted", EXIT_CODE)
     return code if isinstance(code, int) else 0
+
+
+def _tell(error: "RislamError") -> int:
+    """Every fault on a line of its own; returns the exit code."""
+    from rislam_rt.cli.loudness import loudness
+
+    if loudness().verbose:
+        import traceback
+
+        traceback.print_exception(error)
+    for line in error.lines:
+        _say(f"error: {line}", error.exit_code)
+    return error.exit_code
 
 
 def _say(line: str, code: int) -> int:

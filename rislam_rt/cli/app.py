@@ -2,7 +2,23 @@
 
 import typer
 
-from rislam_rt.cli import check, compare, config, design, doctor, new, pipelines, report, run, show, slam, sweep, trace
+from rislam_rt.cli import (
+    check,
+    compare,
+    config,
+    design,
+    doctor,
+    export,
+    new,
+    pipelines,
+    report,
+    run,
+    show,
+    slam,
+    sweep,
+    trace,
+)
+from rislam_rt.cli.loudness import with_loudness
 
 app = typer.Typer(
     name="rislam-rt",
@@ -11,8 +27,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _command in (run, sweep, slam, pipelines, config, new, check, show, trace, compare, design, report, doctor):
-    app.command(_command.__name__.rpartition(".")[2])(_command.command)
+for _command in (run, sweep, slam, pipelines, config, new, check, export, show, trace, compare, design, report, doctor):
+    app.command(_command.__name__.rpartition(".")[2])(with_loudness(_command.command))
 
 
 def _print_version(wanted: bool) -> None:

@@ -1,37 +1,87 @@
 """`rislam-rt check SCENE`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import JsonFile, SceneFolder, write_json
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, SceneFolder, Settings, pipeline_file, write_json
+
+if TYPE_CHECKING:
+    from rislam_rt.pipeline.spec import Settings as Records
+
+SEED = 0
+"""Of the random codes that a panel is tried under."""
 
 
 def command(
     scene: SceneFolder,
     carrier_ghz: Annotated[
-        float, typer.Option(min=0.001, max=1000.0, help="Carrier that materials and panel are held against.")
-    ] = 10.0,
+        float | None,
+        typer.Option(min=0.001, max=1000.0, help="Carrier, for that of the pipeline (10 GHz)."),
+    ] = None,
+    pipeline: Annotated[
+        Path,
+        typer.Option(metavar="PIPELINE", help="Whose radio and receiver the room is held against.",
+                     parser=pipeline_file),
+    ] = MAIN_JOB,
+    set_: Settings = None,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw where the panel can be heard (PNG, SVG or PDF).")
+    ] = None,
     json: JsonFile = None,
-) -> None:
-    """Look for what is wrong with a scene. Exit code 2 if it is unusable; warnings are allowed."""
-    from rislam_rt.model import RadioConfig
+) -> None:  # fmt: skip
+    """Look for what is wrong with a scene, and say what a run in it will hear.
+
+    Exit code 2 if it is unusable; warnings are allowed. What a run will hear depends on radio and receiver: those of
+    the main job, of --pipeline, or as changed.
+
+    Example: rislam-rt check myroom --set radio.reference_snr_db=0 --picture coverage.png
+    """
+    from rislam_rt.cli.scenes import settings_of
     from rislam_rt.scene import check_scene
 
-    findings = check_scene(Path(scene), RadioConfig(carrier=1e9 * carrier_ghz, bandwidth=min(1e9, 1e9 * carrier_ghz)))
+    changed = list(set_ or ())
+    if carrier_ghz is not None:
+        changed += [f"radio.carrier_ghz={carrier_ghz}", f"radio.bandwidth_ghz={min(1.0, carrier_ghz)}"]
+    settings = settings_of(pipeline, changed)
+    if picture is not None:
+        from rislam_rt.report.style import picture_kind
+
+        picture_kind(picture)  # before anything is worked out
+    findings = check_scene(Path(scene), settings.radio)
     for finding in findings:
         typer.echo(f"{finding.severity}: {finding.line}")
     errors, warnings = (sum(f.severity == severity for f in findings) for severity in ("error", "warning"))
     fields = ("severity", "file", "field", "message", "mend")
-    write_json(
-        json,
-        {
-            "scene": str(scene),
-            "errors": errors,
-            "findings": [{name: getattr(finding, name) for name in fields} for finding in findings],
-        },
-    )
+    content = {
+        "scene": str(scene),
+        "errors": errors,
+        "findings": [{name: getattr(finding, name) for name in fields} for finding in findings],
+    }
+    if not errors:
+        content["advice"] = _advise(Path(scene), settings, picture)
+    write_json(json, content)
     typer.echo(f"{scene}: {errors} errors, {warnings} warnings")
     if errors:
         raise typer.Exit(2)
+
+
+def _advise(folder: Path, settings: "Records", picture: Path | None) -> dict[str, object]:
+    """Print the adviser's word and draw the map; what was said, for the machine-readable copy."""
+    import numpy as np
+
+    from rislam_rt.pipeline.advise.advice import advise
+    from rislam_rt.pipeline.advise.coverage import panel_coverage
+    from rislam_rt.report.advice import draw_coverage, print_advice
+    from rislam_rt.scene.load import read_draft
+
+    scene = read_draft(folder).scene
+    assert scene is not None  # it has been checked
+    advice = advise(scene, settings, rng=np.random.default_rng(SEED))
+    print_advice(advice)
+    if picture is not None:
+        coverages = panel_coverage(scene, settings)
+        said = draw_coverage(scene, coverages, picture) if coverages else "none: the scene has no panel"
+        typer.echo(f"picture: {said}")
+    return advice.as_dict()

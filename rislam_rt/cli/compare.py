@@ -19,6 +19,8 @@ def command(
 
     Twice: with the tracer's own float32 vertices, which are the independent evidence and the verdict; and refined in
     float64, as every run uses them. A refined number beyond its limits is exit code 1 too.
+
+    Example: rislam-rt compare paper_room --poses 20 --depth 1
     """
     import numpy as np
 

@@ -21,6 +21,8 @@ def command(
     """Print every setting of a pipeline: value, unit, range, and what it means.
 
     What is printed is a pipeline file itself: `rislam-rt config > mine.toml`, edit, `rislam-rt run mine.toml`.
+
+    Example: rislam-rt config trace_then_slam --explain slam.sigma_a
     """
     from rislam_rt.pipeline.settings import explain as find
     from rislam_rt.pipeline.settings import list_settings

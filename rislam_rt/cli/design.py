@@ -17,7 +17,10 @@ def command(
     figure: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the codes (PNG or SVG).")] = None,
     json: JsonFile = None,
 ) -> None:
-    """Design the panel's code for one position with every method, and say how far each is from the optimum."""
+    """Design the panel's code for one position with every method, and say how far each is from the optimum.
+
+    Example: rislam-rt design paper_room --at 1.5,1.5,0 --figure codes.png
+    """
     import numpy as np
 
     from rislam_rt.cli.scenes import open_scene, parse_point
@@ -39,5 +42,5 @@ def command(
     if figure is not None:
         from rislam_rt.report.code import draw_codes
 
-        typer.echo(f"figure: {draw_codes(found.designs, figure)}")
+        typer.echo(f"figure: {draw_codes(found.designs, figure, room.ris.spec if room.ris else None)}")
     write_json(json, {"scene": room.name, "at_m": point.tolist(), "seed": seed, **table})

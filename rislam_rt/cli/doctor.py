@@ -6,7 +6,10 @@ from rislam_rt.cli.options import JsonFile, write_json
 
 
 def command(json: JsonFile = None) -> None:
-    """Say what this machine has, and trace a small box to prove it. Exit code 3 if something is missing."""
+    """Say what this machine has, and trace a small box to prove it. Exit code 3 if something is missing.
+
+    Example: rislam-rt doctor --json doctor.json
+    """
     from dataclasses import asdict
 
     from rislam_rt.backend import diagnose, prepare_backend

@@ -1,9 +1,11 @@
 """`rislam-rt new SCENE`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
+
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the files of a folder that exists.")]
 
 
 def command(
@@ -11,14 +13,88 @@ def command(
         Path, typer.Argument(metavar="SCENE", help="Folder to make; it must not exist yet.", show_default=False)
     ],
     template: Annotated[str, typer.Option(help="Built-in room to start from.")] = "paper_room",
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the files of a folder that exists.")] = False,
+    overwrite: Overwrite = False,
     seed: Annotated[
         int | None, typer.Option(min=0, help="A random room instead: the one that 'unseen' draws from this number.")
     ] = None,
-) -> None:
-    """Make a scene folder from a built-in room, or of a random one, to be edited."""
+    source: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="FILE",
+            help="A room from a file: GLB, glTF, OBJ, PLY, STL, a floor plan, a scene of Mitsuba or Sionna RT (XML); "
+            "or sionna:NAME, a scene that Sionna RT brings along.",
+        ),
+    ] = None,
+    within: Annotated[
+        str, typer.Option(metavar="X0,Y0,X1,Y1", help="Of an XML scene: this window of the plan alone [m].")
+    ] = "",
+    floorplan: Annotated[
+        str | None, typer.Option(metavar="CORNERS", help='One room by its corners [m], e.g. "0,0 4,0 4,3 0,3".')
+    ] = None,
+    height: Annotated[float, typer.Option(min=1.0, max=100.0, help="Of a floor plan's rooms [m].")] = 2.7,
+    units: Annotated[
+        Literal["mm", "cm", "m", "in"] | None, typer.Option(help="What a unit of the file is; metres without it.")
+    ] = None,
+    up: Annotated[Literal["y", "z"] | None, typer.Option(help="Axis that points up; y for glTF, else z.")] = None,
+    origin: Annotated[
+        str, typer.Option(metavar="X,Y,Z", help="Point that becomes the room's zero [m], z up.")
+    ] = "0,0,0",
+    material: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=MATERIAL", help="Of a wall, node or material of the file (patterns too); "
+                     "itu:concrete, itu:concrete:0.2 (thickness in m) or reflection:0.8; repeatable."),
+    ] = None,
+    rest: Annotated[str, typer.Option(metavar="MATERIAL", help="Material of all else.")] = "itu:concrete",
+    carrier_ghz: Annotated[
+        float, typer.Option(min=0.1, max=1000.0, help="Carrier: small and round are meant in its wavelengths.")
+    ] = 10.0,
+    detail: Annotated[
+        float, typer.Option(min=0.0, max=1e4, help="What is flat but narrower than this many wavelengths shades.")
+    ] = 3.0,
+    curved: Annotated[Literal["shade", "planes"], typer.Option(help="What cylinders become.")] = "shade",
+    scan: Annotated[
+        bool | None, typer.Option("--scan/--no-scan", help="The mesh is a scan, with noise; as it looks without it.")
+    ] = None,
+    fill: Annotated[float, typer.Option(min=0.0, help="Holes of a scan up to this are filled [m^2].")] = 1.0,
+    max_walls: Annotated[int, typer.Option(min=4, max=10_000, help="Of a file with more the widest reflect.")] = 150,
+) -> None:  # fmt: skip
+    """Make a scene folder from a built-in room, of a random one, or from a file of another program, to be edited.
+
+    Example: rislam-rt new myroom --template two_scatterers
+    """
+    from rislam_rt.errors import ConfigError
     from rislam_rt.scene import new_scene, write_scene
 
+    if source is not None and is_xml(source):
+        own = {"--units": units, "--up": up, "--origin": origin != "0,0,0", "--material": material}
+        _from_xml(source, scene, within, [name for name, value in own.items() if value], overwrite)
+        return
+    if within:
+        raise ConfigError("--within: only XML scenes are cut to a window; leave it out")
+    needless = {"--units": units, "--up": up, "--material": material, "--origin": origin != "0,0,0", "--scan": scan}
+    useless = [name for name, value in needless.items() if value]
+    if source is not None and floorplan is not None:
+        raise ConfigError("--floorplan: a room comes from it or from --from; leave one out")
+    if source is None and floorplan is None and useless:
+        raise ConfigError(f"{useless[0]}: it says how a file lies; give --from FILE, or leave it out")
+    if source is not None or floorplan is not None:
+        from rislam_rt.scene.importing import ImportOptions, import_corners, import_room
+        from rislam_rt.scene.importing.materials import parse_choices, parse_material
+
+        options = ImportOptions(
+            units=units, up=up, origin=_point(origin), carrier_ghz=carrier_ghz, detail=detail, curved=curved, scan=scan,
+            max_walls=max_walls, fill=fill, materials=parse_choices(material or []), rest=parse_material(rest),
+        )  # fmt: skip
+        remarks = (
+            import_room(source, scene, options, height=height, overwrite=overwrite)
+            if source is not None
+            else import_corners(floorplan or "", scene, options, height=height, overwrite=overwrite)
+        )
+        for remark in remarks:
+            typer.echo(f"- {remark}")
+        typer.echo(f"{scene}: made from '{source or 'a floor plan'}'; edit its scene.toml")
+        return
     if seed is not None:
         from rislam_rt.scene.random_rooms import draw_room
 
@@ -27,3 +103,48 @@ def command(
         typer.echo(f"{scene}: random room {seed} ({room.shape}, {room.motion}); edit its scene.toml")
         return
     typer.echo(f"{new_scene(template, scene, overwrite=overwrite)}: made from '{template}'; edit its scene.toml")
+
+
+def is_xml(source: Path) -> bool:
+    """Whether a room comes from a scene file of Mitsuba or Sionna RT."""
+    return source.suffix.lower() == ".xml" or str(source).startswith("sionna:")
+
+
+def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overwrite: bool) -> None:
+    """A room from an XML scene, which says itself how it lies and what it is made of.
+
+    Raises
+    ------
+    ConfigError
+        Options are given that contradict it.
+    """
+    from rislam_rt.cli.options import parse_numbers
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.scene.xml import new_from_xml
+
+    if useless:
+        raise ConfigError(f"{useless[0]}: an XML scene is in metres, z up, and names its materials; leave it out")
+    for note in new_from_xml(str(source), folder, within=parse_numbers("--within", within), overwrite=overwrite):
+        typer.echo(f"- {note}")
+    typer.echo(f"{folder}: made from '{source}'; edit its scene.toml")
+
+
+def _point(text: str) -> tuple[float, float, float]:
+    """Three numbers `x,y,z`.
+
+    Raises
+    ------
+    ConfigError
+        They are not.
+    """
+    from math import isfinite
+
+    from rislam_rt.errors import ConfigError
+
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+        if all(isfinite(value) and abs(value) <= 1e5 for value in (x, y, z)):
+            return x, y, z
+    except ValueError:
+        pass
+    raise ConfigError(f"--origin: '{text[:60]}' received; give three numbers in metres, e.g. --origin 1.5,2,0")

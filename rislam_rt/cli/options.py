@@ -53,6 +53,22 @@ Depth = Annotated[int, typer.Option(min=0, max=4, help="Largest number of wall b
 ChannelName = Annotated[Literal["traced", "image_source"], typer.Option(help="Ray tracer, or exact image sources.")]
 
 
+def parse_numbers(option: str, text: str) -> list[float]:
+    """Numbers parted by commas; none of an empty text.
+
+    Raises
+    ------
+    ConfigError
+        Something in it is no number.
+    """
+    from rislam_rt.errors import ConfigError
+
+    try:
+        return [float(word) for word in text.split(",")] if text.strip() else []
+    except ValueError:
+        raise ConfigError(f"{option}: '{text[:60]}' received; give numbers parted by commas") from None
+
+
 def write_json(file: Path | None, content: dict[str, Any]) -> None:
     """Write a JSON file whole or not at all; nothing if no file was asked for.
 

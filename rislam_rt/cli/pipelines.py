@@ -9,6 +9,8 @@ def command(json: JsonFile = None) -> None:
     """List the pipelines and the rooms that come with the package.
 
     Each can be given by its name wherever a pipeline file or a scene folder is asked for, in any folder.
+
+    Example: rislam-rt pipelines --json pipelines.json
     """
     from rich.console import Console
     from rich.table import Table

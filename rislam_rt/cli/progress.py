@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
+from rislam_rt.cli.loudness import loudness
+
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
@@ -39,7 +41,7 @@ def show_progress() -> Iterator[Tell]:
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), refresh_per_second=4) as bars:
+    with Progress(*columns, console=Console(stderr=True), refresh_per_second=4, disable=loudness().quiet) as bars:
         tasks: dict[str, TaskID] = {}
 
         def tell(stage: str, at: int, total: int) -> None:
@@ -57,13 +59,13 @@ def show_sweep() -> "Iterator[Callable[[Told], None]]":
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     columns = (TextColumn("cells"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[left]}"))
-    with Progress(*columns, console=Console(stderr=True), refresh_per_second=4) as bar:
+    with Progress(*columns, console=Console(stderr=True), refresh_per_second=4, disable=loudness().quiet) as bar:
         task = bar.add_task("cells", total=None, left="one cell goes first, to tell the cost")
 
         def tell(told: "Told") -> None:
-            if told.last is None:
+            if told.last is None and not loudness().quiet:
                 bar.console.print(describe_cost(told), markup=False, highlight=False)
-            elif told.last.failed:
+            elif told.last is not None and told.last.failed:
                 cell = told.last.cell
                 where = ", ".join([*(f"{key}={v}" for key, v in cell.point.items()), f"repetition {cell.repetition}"])
                 text = f"failed: {where}: {told.last.state}: {told.last.message}"

@@ -1,26 +1,58 @@
 """`rislam-rt report RUN`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rislam_rt.cli.options import JsonFile, write_json
 
+if TYPE_CHECKING:
+    from rislam_rt.model import SlamResult
+
 
 def command(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a completed run.", show_default=False)],
+    rerun: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a recording for the Rerun viewer (.rrd); needs the extra `viz`."),
+    ] = None,
+    gif: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a moving picture of the run (.gif).")] = None,
     json: JsonFile = None,
 ) -> None:
-    """Score a completed run again and draw its figures and page."""
+    """Score a completed run again and draw its figures and page, which holds a map with a slider over the time.
+
+    Example: rislam-rt report runs/demo-paper_room-7-0123abcd --rerun demo.rrd
+    """
+    from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.long import read_any
     from rislam_rt.pipeline.store import hold_run
     from rislam_rt.report import write_report
     from rislam_rt.report.tables import print_summary
 
+    if gif is not None and gif.suffix.lower() != ".gif":
+        raise ConfigError(f"--gif: '{gif}' received; give a name that ends in .gif")
     summary, result = read_any(run)
+    if rerun is not None:
+        from rislam_rt.pipeline.files import write_atomic
+        from rislam_rt.report.recording import recording_bytes
+
+        write_atomic(rerun, recording_bytes(result, run.resolve().name))
+        typer.echo(f"recording: {rerun}")
+    if gif is not None:
+        typer.echo(f"moving picture: {_write_gif(result, gif)}")
     print_summary(summary)
     with hold_run(run):
         page = write_report(result, summary, run)
     typer.echo(f"report: {page}")
     write_json(json, summary)
+
+
+def _write_gif(result: "SlamResult", file: Path) -> Path:
+    from rislam_rt.cli.progress import show_progress
+    from rislam_rt.pipeline.files import write_atomic
+    from rislam_rt.report.animation import gif_bytes
+
+    with show_progress() as tell:
+        write_atomic(file, gif_bytes(result, tell))
+    return file

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rislam_rt.cli.loudness import warn
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, write_json
 from rislam_rt.cli.study import Given
 
@@ -36,6 +37,8 @@ def command(
     A file of another kind is a study: 'compare_channels' (exit code 1 if the channels differ), 'fig4a', 'claims',
     'train_classifier', or 'fig4b', 'fig4c', 'rooms', 'ablations', 'robustness', 'hardware', 'unseen', which go through
     settings, rooms and seeds (exit code 1 if a run failed).
+
+    Example: rislam-rt run trace_then_slam --scene office --set seed=1 --set 'schemes=["optimized", "no_ris"]'
     """
     from rislam_rt.cli.study import run_claims, run_compare_channels, run_gain_curves, run_swept
     from rislam_rt.pipeline.studies import (
@@ -131,7 +134,7 @@ def compute_run(spec: "PipelineSpec", room: "Scene", identity: "Identity", folde
     try:
         with open_run(folder, identity) as store:
             for name in store.spoiled:
-                typer.echo(f"warning: {folder}: scheme '{name}' is not as it was written; it runs again", err=True)
+                warn(f"{folder}: scheme '{name}' is not as it was written; it runs again")
             try:
                 rng, jobs = np.random.default_rng(spec.seed), given.jobs or os.cpu_count() or 1
                 with show_progress() as progress:

@@ -1,13 +1,17 @@
 """Opening a scene for a command."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from rislam_rt.cli.loudness import warn
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rislam_rt.arrays import Floats
     from rislam_rt.model import RadioConfig, Scene
     from rislam_rt.pipeline import PipelineSpec
+    from rislam_rt.pipeline.spec import Settings
     from rislam_rt.pipeline.studies import Fig4aSpec
 
 
@@ -20,7 +24,7 @@ class Opened(NamedTuple):
     def warn(self) -> None:
         """Print the warnings; once all else is known to be in order, so that an error is one line."""
         for line in self.warnings:
-            print(f"warning: {line}", file=sys.stderr)
+            warn(line)
 
 
 def open_scene(path: Path, radio: "RadioConfig | None" = None) -> Opened:
@@ -37,6 +41,20 @@ def open_scene(path: Path, radio: "RadioConfig | None" = None) -> Opened:
     findings = check_scene(path, radio)
     raise_errors(findings)
     return Opened(load_scene(path), tuple(f.line for f in findings if f.severity == "warning"))
+
+
+def settings_of(pipeline: Path, changed: "Sequence[str]") -> "Settings":
+    """Radio, receiver and the rest as a pipeline has them, with settings changed (`KEY=VALUE`).
+
+    Raises
+    ------
+    ConfigError
+        The pipeline or a setting is unusable.
+    """
+    from rislam_rt.pipeline import load_spec
+    from rislam_rt.pipeline.spec import build_settings
+
+    return build_settings(load_spec(pipeline, changed))
 
 
 def scene_of(option: Path | None, spec: "PipelineSpec | Fig4aSpec", pipeline: Path) -> Path:

@@ -1,25 +1,86 @@
 """`rislam-rt show SCENE`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import SceneFolder
+from rislam_rt.cli.options import MAIN_JOB, Depth, SceneFolder, Settings, pipeline_file
+
+if TYPE_CHECKING:
+    from rislam_rt.model import Scene
+    from rislam_rt.pipeline.spec import Settings as Records
 
 
 def command(
     scene: SceneFolder,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Picture to write (PNG or SVG).")] = None,
-) -> None:
-    """Describe a scene, and draw it from above and in three dimensions."""
-    from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.report.room import draw_scene
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Picture to write (PNG, SVG or PDF).")] = None,
+    html: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a view that turns, with paths; for any browser, offline.")
+    ] = None,
+    depth: Depth = 1,
+    pipeline: Annotated[
+        Path,
+        typer.Option(metavar="PIPELINE", help="Whose radio and receiver say which paths are heard (--html).",
+                     parser=pipeline_file),
+    ] = MAIN_JOB,
+    set_: Settings = None,
+) -> None:  # fmt: skip
+    """Describe a scene, and draw it from above and in three dimensions; or as a page that turns (--html).
+
+    The page shows the paths of poses along the way by class, found by exact image sources, --depth bounces at most.
+
+    Example: rislam-rt show office --html office.html --depth 2
+    """
+    from rislam_rt.cli.progress import show_progress
+    from rislam_rt.cli.scenes import open_scene, settings_of
     from rislam_rt.report.tables import print_scene
     from rislam_rt.scene.names import safe_name
 
-    opened = open_scene(scene)
+    settings = settings_of(pipeline, set_ or ()) if html is not None else None
+    if out is not None:
+        from rislam_rt.report.style import picture_kind
+
+        picture_kind(out)  # before anything is worked out
+    opened = open_scene(scene, settings.radio if settings is not None else None)
     opened.warn()
     room = opened.scene
     print_scene(room)
-    typer.echo(f"picture: {draw_scene(room, out or Path(f'{safe_name(room.name)}.png'))}")
+    if html is not None and settings is not None:
+        typer.echo(f"view: {_write_view(room, settings, depth, html)}")
+    if out is None and html is not None:
+        return
+    from rislam_rt.report.room import draw_scene
+
+    with show_progress() as tell:
+        tell("draw", 0, 1)
+        file = draw_scene(room, out or Path(f"{safe_name(room.name)}.png"))
+        tell("draw", 1, 1)
+    typer.echo(f"picture: {file}")
+
+
+def _write_view(room: "Scene", settings: "Records", depth: int, file: Path) -> Path:
+    """Find the paths of some poses, and write the page."""
+    import numpy as np
+
+    from rislam_rt.channel.image_source import ImageSourceChannel
+    from rislam_rt.cli.progress import show_progress
+    from rislam_rt.pipeline.advise.budget import at_rows
+    from rislam_rt.pipeline.files import write_atomic
+    from rislam_rt.report.view.page import view_page
+    from rislam_rt.report.view.paths_data import paths_data, poses_of
+
+    with show_progress() as tell:
+        tell("paths", 0, 2)
+        channel = ImageSourceChannel(room, settings.radio, depth)
+        middle = channel.paths(at_rows(room.agent, np.array([len(room.agent) // 2])))
+        tell("paths", 1, 2)
+        motion = at_rows(room.agent, poses_of(room, int(middle.valid.sum())))
+        data = paths_data(room, motion, channel.paths(motion), settings)
+        tell("paths", 2, 2)
+    size = " x ".join(f"{side:.3g}" for side in room.bounds[1] - room.bounds[0])
+    about = f"{size} m, {len(motion)} poses along the way. Drag to turn, wheel or two fingers to zoom."
+    if data["left_out"]:
+        about += f" {data['left_out']} small walls are left out."
+    write_atomic(file, view_page(room.name, about, data).encode())
+    return file

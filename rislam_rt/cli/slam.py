@@ -10,7 +10,8 @@ from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, pipeline_file, w
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
     from rislam_rt.model import Body
-    from rislam_rt.pipeline.studies.unseen import Answers, Inputs
+    from rislam_rt.pipeline.inputs import Inputs
+    from rislam_rt.pipeline.studies.unseen import Answers
     from rislam_rt.slam import StartPrior
 
 FARTHEST = 1e5
@@ -48,12 +49,16 @@ def command(
     direction cosines or in radians, body frame. How well the start is known is set by start.position_std_m and
     start.velocity_std_m_s.
 
+    A run's folder holds its measurements, too: with its config.toml they give the run's estimate again.
+
     Example: rislam-rt slam mine.csv --start 0.5,0.7,0.5 --set radio.noise_psd=1e-12 --set slam.use_vt=true
+
+    Example: rislam-rt slam RUN/measurements_random.nc --config RUN/config.toml --truth RUN/truth.tum
     """
     import numpy as np
 
     from rislam_rt.pipeline import load_spec
-    from rislam_rt.pipeline.own import localise, read_inputs
+    from rislam_rt.pipeline.own import localise, read_inputs, run_rng
     from rislam_rt.pipeline.spec import build_radio
 
     spec = load_spec(config, set_ or ())
@@ -61,7 +66,8 @@ def command(
     inputs = read_inputs(measurements, prior, build_radio(spec.radio), _body(tx, rx))
     true = None if truth is None else _true_positions(truth, len(inputs.time))
     folder = _new_folder(out or Path(f"{measurements.stem}-slam"))
-    answers = localise(inputs, spec, rng=np.random.default_rng(spec.seed))
+    drawn = None if any(word.startswith("seed=") for word in set_ or ()) else run_rng(measurements)
+    answers = localise(inputs, spec, rng=drawn or np.random.default_rng(spec.seed))
     summary = _summary(inputs, answers, true)
     _write(folder, inputs, answers)
     for name, value in summary.items():
@@ -109,7 +115,7 @@ def _triple(option: str, text: str) -> "Floats":
 def _true_positions(file: Path, cycles: int) -> "Floats":
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene.findings import Fault
-    from rislam_rt.scene.motion import parse_tum
+    from rislam_rt.scene.recorded import parse_tum
 
     try:
         _, position, _ = parse_tum(file.read_bytes())

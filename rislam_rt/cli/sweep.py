@@ -38,7 +38,10 @@ def command(
     ] = None,
     json: JsonFile = None,
 ) -> None:
-    """Run a pipeline over settings and seeds. What is there already is not run again. Exit code 1 if a run failed."""
+    """Run a pipeline over settings and seeds. What is there already is not run again. Exit code 1 if a run failed.
+
+    Example: rislam-rt sweep trace_then_slam --axis radio.reference_snr_db=0,13 --repeat 5 --estimate
+    """
     import os
 
     from rislam_rt.cli.interrupts import Interrupted

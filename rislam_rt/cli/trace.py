@@ -48,22 +48,35 @@ def command(
         Path | None,
         typer.Option(metavar="FILE", help="Write NetCDF: all paths; <scene>-signals.nc by default with --signals."),
     ] = None,
+    deepmimo: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Write a scenario of DeepMIMO v4, one scene a cycle: a new folder, lower case."
+        ),
+    ] = None,
     json: JsonFile = None,
 ) -> None:
-    """Trace a scene along the agent's trajectory and print what was found, class by class."""
+    """Trace a scene along the agent's trajectory and print what was found, class by class.
+
+    Example: rislam-rt trace paper_room --stride 50 --deepmimo scenarios/paper_room
+    """
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.errors import ConfigError
     from rislam_rt.model import RadioConfig
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.signals import load_signals_spec, signal_settings
+    from rislam_rt.report.deepmimo import deepmimo_files
     from rislam_rt.report.tables import path_table, print_paths
     from rislam_rt.scene.names import safe_name
+    from rislam_rt.scene.write import write_files
 
     if set_ and not signals:
         raise ConfigError(f"--set {set_[0][:60]}: settings are for --signals; add it, or leave them out")
     radio = signal_settings(load_signals_spec(set_ or ()))[0] if signals else RadioConfig()
     opened = open_scene(scene, radio)
     room = thinned(opened.scene, cycles, stride)
+    if deepmimo is not None:
+        check_new(deepmimo)
     prepare_channel(channel)
     if signals:
         traced = trace_signals(
@@ -72,12 +85,31 @@ def command(
     else:
         opened.warn()
         traced = trace_paths(room, channel, depth, out)
+    if deepmimo is not None:
+        traced.content.setdefault("files", {})["deepmimo"] = str(deepmimo)
+        write_files(deepmimo_files(room, traced.paths, radio, depth), deepmimo)
     table = path_table(traced.paths)
     print_paths(room.name, traced.paths, table, traced.seconds, traced.panel)
     for kind, file in traced.content.get("files", {}).items():
         typer.echo(f"{kind}: {file}")
     content = {"scene": room.name, "depth": depth, "cycles": len(room.agent), "source": traced.paths.source}
     write_json(json, {**content, "seconds": traced.seconds, "classes": table, **traced.content})
+
+
+def check_new(folder: Path) -> None:
+    """Refuse a folder for a DeepMIMO scenario before anything is traced.
+
+    Raises
+    ------
+    ConfigError
+        It is there already, or has a name that the package cannot load.
+    """
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.report.deepmimo import check_name
+
+    check_name(folder.name)
+    if folder.exists():
+        raise ConfigError(f"--deepmimo {folder}: exists already; give a folder that does not exist yet")
 
 
 def thinned(scene: "Scene", cycles: int | None, stride: int) -> "Scene":

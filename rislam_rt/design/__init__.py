@@ -9,7 +9,7 @@ from rislam_rt.design.objective import Objective, build_objective
 from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.result import Design, DesignConfig, Designer
 from rislam_rt.design.single import continuous_phases, exact_code, nearest_code
-from rislam_rt.design.truth import panel_columns, problem_from_arrays, problem_from_paths
+from rislam_rt.design.truth import focus_codes, panel_columns, problem_from_arrays, problem_from_paths
 
 __all__ = [
     "DESIGNERS",
@@ -29,6 +29,7 @@ __all__ = [
     "direct_only",
     "dual_bound",
     "exact_code",
+    "focus_codes",
     "gain_curves",
     "nearest_code",
     "panel_columns",

@@ -1,5 +1,6 @@
 """Design on the belief: the problem as the agent sees it, from its own pose, map and the panel's data sheet."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from rislam_rt.design.search import search_code
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import mirror, mirror_direction, plane_between
 from rislam_rt.information import GradientMode, path_gradient, prior_from_covariance, range_information
-from rislam_rt.model import MapEstimate, RadioConfig, RisCode, RisSpec, SlamEstimate
+from rislam_rt.model import DataSheet, MapEstimate, RadioConfig, RisCode, RisSpec, SlamEstimate, join_codes, join_sheets
 from rislam_rt.ris import leg_response
 
 _DEFAULT = DesignConfig()
@@ -20,7 +21,7 @@ _DEFAULT = DesignConfig()
 
 def design_code(
     belief: SlamEstimate,
-    ris: RisSpec,
+    ris: DataSheet,
     radio: RadioConfig,
     *,
     method: str,
@@ -54,45 +55,61 @@ def design_code(
     last
         The code before this one.
 
-    If no landmark is held for the panel yet, the outcome is `NO_PATHS` and the code one that looks for it.
+    If no landmark is held for the panel yet, the outcome is `NO_PATHS` and the code one that looks for it. Of several
+    panels those that are known are designed for together, and the others each look for a landmark of their own.
     """
     chosen = designer(method)
     problem = problem_from_belief(
         belief, ris, radio, samples=samples, landmark_uncertainty=landmark_uncertainty, least_snr=least_snr,
         gradient=gradient,
     )  # fmt: skip
+    codes = {
+        panel: search_code(belief, ris.panels[panel], radio, number, ris.parts(last)[panel] if last else None, panel)
+        for panel in range(len(ris.panels))
+        if belief.map.panel_row(panel) < 0
+    }
     if problem is None:
-        return blind_design(method, search_code(belief, ris, radio, number, last))
-    return chosen(problem, rng=rng, config=config)
+        return blind_design(method, join_codes(tuple(codes.values())))
+    found = chosen(problem, rng=rng, config=config)
+    if not codes:
+        return found
+    known = [panel for panel in range(len(ris.panels)) if panel not in codes]
+    codes |= zip(known, join_sheets(tuple(ris.panels[panel] for panel in known)).parts(found.code), strict=True)
+    code = join_codes(tuple(code for _, code in sorted(codes.items())))
+    return replace(found, code=code, xi=code.xi)
 
 
 def problem_from_belief(
-    belief: SlamEstimate, ris: RisSpec, radio: RadioConfig, *, samples: int = 4, landmark_uncertainty: bool = False,
+    belief: SlamEstimate, ris: DataSheet, radio: RadioConfig, *, samples: int = 4, landmark_uncertainty: bool = False,
     least_snr: float = 0.0, gradient: GradientMode = "exact",
 ) -> DesignProblem | None:  # fmt: skip
-    """The design problem of a belief; None if its map holds no panel.
+    """The design problem of a belief: that of the elements of the panels which its map holds; None if it holds none.
 
     A point landmark gives one path; an image gives two, with its wall on the Rx leg and on the Tx leg. Paths of the
     panel and its images depend on the code, the others do not. The wall between the panel and its image mirrors the
     device, as the panel sees it. Predicted gains follow from the geometry and the landmarks' strengths.
     """
-    if belief.map.ris < 0:
+    rows = [belief.map.panel_row(panel) for panel in range(len(ris.panels))]
+    known = [(row, panel) for row, panel in zip(rows, ris.panels, strict=True) if row >= 0]
+    if not known:
         return None
+    sheets, held = join_sheets(tuple(panel for _, panel in known)), [row for row, _ in known]
     position = np.concatenate([belief.position[None], belief.samples[: max(samples - 1, 0)]])
     tx, rx = (end[:, None, :] for end in belief.body.ends(position, np.array(belief.heading, dtype=np.float64)))
-    panel, static = _believed_paths(belief.map)
+    panel, static = _believed_paths(belief.map, held)
     both = _Believed(*(np.concatenate(pair) for pair in zip(panel, static, strict=True)))
     points = belief.map.position
     unit_snr = float(radio.integrated_snr(np.ones(())))
     return DesignProblem(
-        response=_panel_responses(belief.map, panel, tx, rx, ris, radio),
+        response=_panel_responses(belief.map, panel, tx, rx, held, sheets, radio),
         static_gain=_point_gains(belief.map, static, tx, rx, radio),
         gradient=_gradient(points, both, tx, rx, gradient)[..., :2],
         prior=prior_from_covariance(belief.covariance[:2, :2]),
         scale=float(range_information(np.array(unit_snr), radio)),
-        levels=ris.levels,
+        levels=sheets.levels,
         variance=_length_variance(belief.map, both, tx, rx) if landmark_uncertainty else None,
         least_power=least_snr / unit_snr,
+        panels=tuple((number, sheets.span(number)) for number in range(len(held))),
     )
 
 
@@ -104,11 +121,11 @@ class _Believed(NamedTuple):
     rx_point: Integers
 
 
-def _believed_paths(landmarks: MapEstimate) -> tuple[_Believed, _Believed]:
-    """Paths over the panel, the direct one first, and the others. Images of images are too weak to matter."""
+def _believed_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_Believed, _Believed]:
+    """Paths over the panels' rows, the direct ones first, and the others. Images of images are too weak to matter."""
     rows = np.arange(len(landmarks.parent))
     points = rows[landmarks.parent < 0]
-    points = np.concatenate([[landmarks.ris], points[points != landmarks.ris]])
+    points = np.concatenate([held, points[~np.isin(points, held)]])
     images = rows[(landmarks.parent >= 0) & np.isin(landmarks.parent, points)]
     parents = landmarks.parent[images]
     paths = _Believed(
@@ -116,7 +133,7 @@ def _believed_paths(landmarks: MapEstimate) -> tuple[_Believed, _Believed]:
         np.concatenate([points, parents, images]),
         np.concatenate([points, images, parents]),
     )
-    over_panel = paths.source == landmarks.ris
+    over_panel = np.isin(paths.source, held)
     return _Believed(*(field[over_panel] for field in paths)), _Believed(*(field[~over_panel] for field in paths))
 
 
@@ -145,11 +162,23 @@ def _ratio(landmarks: MapEstimate, paths: _Believed) -> Floats:
 
 
 def _panel_responses(
-    landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, ris: RisSpec, radio: RadioConfig
+    landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, held: list[int], ris: DataSheet,
+    radio: RadioConfig,
+) -> Complexes:  # fmt: skip
+    """(B, Q, N, M) element responses of the paths of all panels, whose rows are `held`."""
+    whole = np.zeros((len(tx), len(paths.source), ris.rows, ris.cols), dtype=np.complex128)
+    for number, row in enumerate(held):
+        mine = np.flatnonzero(paths.source == row)
+        one = _Believed(*(field[mine] for field in paths))
+        whole[:, mine] = ris.place(number, _responses_of(landmarks, one, tx, rx, row, ris.panels[number], radio))
+    return whole
+
+
+def _responses_of(
+    landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, row: int, ris: RisSpec, radio: RadioConfig
 ) -> Complexes:
-    """(B, Q, N, M) element responses of the panel's paths."""
-    center = landmarks.position[landmarks.ris]
-    legs = []
+    """(B, Q, N, M) element responses of the paths of the panel in a row of the map."""
+    center, legs = landmarks.position[row], []
     for end, seen, antenna_gain in ((tx, paths.tx_point, radio.tx_gain), (rx, paths.rx_point, radio.rx_gain)):
         # a point that is the panel itself has no plane: its zero normal mirrors nothing
         device = mirror(end, *plane_between(center, landmarks.position[seen]))

@@ -82,12 +82,21 @@ def _first_changes(index: Integers, order: Integers, change: Integers, levels: i
         count *= 2
 
 
+def exact_codes(problem: DesignProblem) -> Integers:
+    """(N M,) the elements of every panel at the optimum of its direct path."""
+    return np.concatenate([exact_code(target, problem.levels)[0] for target in problem.targets])
+
+
 def coordinate_search(
     problem: DesignProblem, objective: Objective, starts: int, max_steps: int
 ) -> tuple[Integers, Floats]:
     """Descend from the single-path optima at the belief's first sample; the best `starts` of them are tried."""
-    panel = problem.response.shape[1]
-    codes, _ = exact_code(problem.response[0].reshape(panel, -1), problem.levels)
+    paths = problem.response.shape[1]
+    own, _ = exact_code(problem.response[0].reshape(paths, -1), problem.levels)
+    codes = np.tile(exact_codes(problem), (paths, 1))  # what a path leaves open, the other panels, is at their optimum
+    for path, panel in enumerate(problem.owner()):
+        span = problem.panels[panel][1]
+        codes[path, span] = own[path, span]
     rank = np.argsort(objective.of_index(codes), kind="stable")[:starts]
     found = [coordinate_descent(objective, codes[row], problem.levels, max_steps) for row in rank]
     return min(found, key=lambda result: result[1][-1])

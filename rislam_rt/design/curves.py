@@ -12,7 +12,7 @@ from rislam_rt.design.result import DesignConfig
 from rislam_rt.design.single import exact_code
 from rislam_rt.design.truth import problem_from_paths
 from rislam_rt.errors import ConfigError
-from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, RisSpec
+from rislam_rt.model import DataSheet, PathKind, Paths, RadioConfig, RisCode
 
 
 class Interval(NamedTuple):
@@ -92,7 +92,7 @@ def design_along(
     tx: Floats,
     rx: Floats,
     radio: RadioConfig,
-    ris: RisSpec,
+    ris: DataSheet,
     *,
     method: str,
     rng: np.random.Generator,

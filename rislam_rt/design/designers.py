@@ -8,12 +8,12 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.design.bound import best_magnitudes, relaxation_bound
-from rislam_rt.design.coordinate import coordinate_search
+from rislam_rt.design.coordinate import coordinate_search, exact_codes
 from rislam_rt.design.genetic import genetic_search
 from rislam_rt.design.objective import Objective, build_objective
 from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.result import Design, DesignConfig, Designer
-from rislam_rt.design.single import continuous_phases, exact_code, nearest_code
+from rislam_rt.design.single import continuous_phases, nearest_code
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import Outcome
 from rislam_rt.model import RisCode
@@ -30,7 +30,7 @@ def _genetic(p: DesignProblem, o: Objective, rng: np.random.Generator, c: Design
 
 
 def _exact(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
-    return exact_code(p.target, p.levels)[0], _NO_HISTORY
+    return exact_codes(p), _NO_HISTORY
 
 
 def _coordinate(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
@@ -46,11 +46,11 @@ def _zero(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignCon
 
 
 def _nearest(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
-    return nearest_code(p.target, p.levels), _NO_HISTORY
+    return np.concatenate([nearest_code(target, p.levels) for target in p.targets]), _NO_HISTORY
 
 
 def _continuous(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Floats, Floats]:
-    return continuous_phases(p.target), _NO_HISTORY
+    return np.concatenate([continuous_phases(target) for target in p.targets]), _NO_HISTORY
 
 
 def _designer(name: str, search: _Search) -> Designer:

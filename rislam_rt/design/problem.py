@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats, freeze
+from rislam_rt.arrays import Complexes, Floats, Integers, freeze
 from rislam_rt.errors import ConfigError
 
 
@@ -17,7 +17,8 @@ class DesignProblem:
     the path's landmark and walls are not known to (`variance`) is added to its own error. With `least_power`,
     |alpha|^2 is multiplied by `1 / (1 + (least_power / |alpha|^2)^4)`, about the chance of detecting the path:
     information spread over paths that are then missed is worth nothing. With both left at zero this is Proposition 1.
-    Path 0 of the panel paths is the direct one; it is the target of the single-target designers.
+    Path 0 of the panel paths is the direct one; it is the target of the single-target designers, which set the elements
+    of each of several panels for its own direct path (`panels`). Elements of other panels have response 0.
     """
 
     response: Complexes
@@ -36,6 +37,8 @@ class DesignProblem:
     """(B, P + S) variance [m^2] of a path's predicted length; None is zero."""
     least_power: float = 0.0
     """|alpha|^2 at which a path is detected every other time; 0: all are."""
+    panels: tuple[tuple[int, slice], ...] = ((0, slice(None)),)
+    """For each panel the row of its direct path, and where its elements stand among all, in their order."""
 
     def __post_init__(self) -> None:
         freeze(self, "response", np.complex128, (None, None, None, None))
@@ -62,3 +65,13 @@ class DesignProblem:
     def target(self) -> Complexes:
         """(N M,) response of the direct panel path at the first sample of the belief (its mean)."""
         return self.response[0, 0].ravel()
+
+    @property
+    def targets(self) -> list[Complexes]:
+        """For each panel the same of its own direct path, at its own elements."""
+        return [self.response[0, row].ravel()[span] for row, span in self.panels]
+
+    def owner(self) -> Integers:
+        """(P,) the panel that each panel path runs over: at whose elements it has a response."""
+        elements = np.abs(self.response[0].reshape(self.response.shape[1], -1))
+        return np.argmax([elements[:, span].max(axis=1) for _, span in self.panels], axis=0)

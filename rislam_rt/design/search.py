@@ -24,12 +24,14 @@ SETTLED = 8
 """Measurements of a suspect from which on one looks round."""
 
 
-def search_code(belief: SlamEstimate, ris: RisSpec, radio: RadioConfig, number: int, last: RisCode | None) -> RisCode:
-    """The code that looks for the panel: `last` or aimed at the belief's suspect, else the next beam of the sweep.
+def search_code(
+    belief: SlamEstimate, ris: RisSpec, radio: RadioConfig, number: int, last: RisCode | None, panel: int = 0
+) -> RisCode:
+    """The code that looks for a panel: `last` or aimed at the belief's suspect, else the next beam of the sweep.
 
-    `number` counts codes; `last` is the one before, None at first.
+    `number` counts codes; `last` is the one before, None at first; `panel` is which of several panels is sought.
     """
-    suspect = belief.suspect
+    suspect = next((one for one in belief.suspects if one.panel == panel), None)
     if suspect is not None and suspect.hits <= HOLD and last is not None:
         return last
     beams = sweep_codes(ris, radio.wavelength)

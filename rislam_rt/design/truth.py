@@ -4,14 +4,15 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.design.problem import DesignProblem
+from rislam_rt.design.single import exact_code
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import range_information, vertex_gradient
-from rislam_rt.model import PathKind, Paths, RadioConfig
+from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode
 
 
 def problem_from_arrays(
     response: Complexes, static_gain: Complexes, gradient: Floats, radio: RadioConfig, levels: int,
-    prior: Floats | None = None, least_snr: float = 0.0,
+    prior: Floats | None = None, least_snr: float = 0.0, panels: tuple[tuple[int, slice], ...] = ((0, slice(None)),),
 ) -> DesignProblem:  # fmt: skip
     """A problem of one position from plain arrays.
 
@@ -27,12 +28,14 @@ def problem_from_arrays(
         (2, 2) information [1/m^2] beforehand; none by default.
     least_snr
         SNR over all antennas, linear, at which a path is detected every other time; 0: all paths count.
+    panels
+        Where there are several: as in `DesignProblem`.
     """
     unit_snr = float(radio.integrated_snr(np.ones(())))
     prior = np.zeros((2, 2)) if prior is None else prior
     return DesignProblem(
         response[None], static_gain[None], gradient[None], prior, float(range_information(np.array(unit_snr), radio)),
-        levels, least_power=least_snr / unit_snr,
+        levels, least_power=least_snr / unit_snr, panels=panels,
     )  # fmt: skip
 
 
@@ -40,6 +43,25 @@ def panel_columns(paths: Paths, cycle: int) -> Integers:
     """Panel paths (P,) of a cycle, the direct one first if it is there."""
     over_panel = np.flatnonzero(paths.valid[cycle] & np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS)))
     return over_panel[np.argsort(paths.kind[over_panel] != PathKind.RIS, kind="stable")]
+
+
+def focus_codes(paths: Paths, levels: int) -> RisCode:
+    """Codes (K, N, M), one a cycle: every panel at the optimum of its direct path, 0 where it is hidden.
+
+    Raises
+    ------
+    ConfigError
+        The paths hold no panel.
+    """
+    if paths.ris is None:
+        raise ConfigError("design: the scene has no panel; add a [ris] section")
+    legs, (cycles, _, *shape) = paths.ris, paths.ris.tx.shape
+    index = np.zeros((cycles, shape[0] * shape[1]), dtype=np.int64)
+    for path in np.flatnonzero(paths.kind == PathKind.RIS):
+        span = legs.spans[int(paths.panel[path])]
+        response = (legs.tx[:, legs.tx_leg[path]] * legs.rx[:, legs.rx_leg[path]]).reshape(cycles, -1)
+        index[:, span] = exact_code(response[:, span], levels)[0]
+    return RisCode(index.reshape(cycles, *shape), levels)
 
 
 def problem_from_paths(
@@ -64,4 +86,7 @@ def problem_from_paths(
     gradient = vertex_gradient(tx, rx, paths.vertices[cycle, order], paths.num_vertices[order])[:, :2]
     legs = paths.ris
     response = legs.tx[cycle, legs.tx_leg[over_panel]] * legs.rx[cycle, legs.rx_leg[over_panel]]
-    return problem_from_arrays(response, paths.gain[cycle, static], gradient, radio, levels, prior, least_snr)
+    met = paths.panel[over_panel]
+    # the first path of a panel; of one that is out of sight any: its elements have no response
+    panels = tuple((int(np.argmax(met == number)), span) for number, span in enumerate(legs.spans))
+    return problem_from_arrays(response, paths.gain[cycle, static], gradient, radio, levels, prior, least_snr, panels)

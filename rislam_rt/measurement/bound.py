@@ -63,13 +63,11 @@ def measure_bound(
     # false components are as many in all, whichever capture they are in
     rate = replace(sensor, false_alarms=sensor.false_alarms / len(captures))
     parts = [_capture(*one, rate, config, rng=rng) for one in zip(captures, draws, strict=True)]
-    side = np.repeat(np.arange(len(parts)) > 0, [len(part.path) for part in parts])
+    side = np.repeat(np.arange(len(parts)), [len(part.path) for part in parts])
     found = Components._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
     order = np.argsort(found.points[:, 0])
     found, side = Components._make(field[order] for field in found), side[order]
-    over_panel = None
-    if config.alternation:
-        over_panel = panel_probability(Found(*found[1:], side), radio, config)
+    told = panel_probability(Found(*found[1:], side), radio, config) if config.alternation else ()
     measurement = Measurement(
         found.points[:, 0],
         into_disc(blind_axes(found.points[:, 1:], radio)),
@@ -77,7 +75,7 @@ def measure_bound(
         found.deviation[:, 0],
         capped(found.deviation[:, 1:], radio),
         found.gain_std / np.sqrt(2.0),
-        over_panel,
+        *told,
     )
     return measurement, PathTruth(found.path)
 

@@ -34,6 +34,9 @@ class ReceiverConfig:
     """Whether the slot is split between the code and its phase-reversed twin, which sets the panel's paths apart."""
     order: str = "ABBA"
     """Order of code and twin within the slot: `ABBA` cancels what moves evenly, `AB` lets it leak."""
+    panels: int = 1
+    """Panels that are told apart by alternation, each with signs of its own; with fewer than there are, the last stands
+    for the rest."""
     code_dwell: float = 0.0
     """Time [s] for which a code is held, the order repeated until the slot is full; 0 goes through it once. The panel
     has to switch as fast."""
@@ -79,6 +82,7 @@ class ReceiverConfig:
             ("num_subcarriers", 0, 65536),
             ("converter_bits", 0, 32),
             ("max_components", 1, 1000),
+            ("panels", 1, 100),
         ):
             if not least <= getattr(self, name) <= most:
                 raise ConfigError(f"receiver.{name}: {getattr(self, name)} received; give {least} to {most}")
@@ -86,3 +90,8 @@ class ReceiverConfig:
             raise ConfigError(
                 f"receiver.max_delay: {self.max_delay} s received; give more than min_delay, {self.min_delay} s"
             )
+
+    @property
+    def num_captures(self) -> int:
+        """Sets of paths that the receiver looks into: with alternation the sum, and one difference a panel."""
+        return 1 + self.panels if self.alternation else 1

@@ -23,22 +23,23 @@ NO_COMPONENT = -9
 """Fills the integer variables where a cycle has fewer components than the fullest one."""
 
 SCHEMA: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "samples": (("cycle", "capture", "antenna", "tone"), "sqrt(J)", "received tones, noise of variance noise_variance"),
-    "noise_variance": (("cycle", "capture"), "J", "variance of the noise in a tone, converters included"),
-    "heard": (("cycle", "path"), "1", "truth: whether the array hears the path, 1 or 0"),
-    "capture": (("capture",), "1", "0 as received (or the sum of both codes), 1 difference of code and twin"),
+    "samples": (("time", "capture", "antenna", "tone"), "sqrt(J)", "received tones, noise of variance noise_variance"),
+    "noise_variance": (("time", "capture"), "J", "variance of the noise in a tone, converters included"),
+    "heard": (("time", "path"), "1", "truth: whether the array hears the path, 1 or 0"),
+    "capture": (("capture",), "1", "0 as received (or the sum of all codes), 1 + q difference of panel q"),
     "frequency": (("tone",), "Hz", "baseband frequency of each tone"),
     "antenna_position": (("antenna", "xyz"), "m", "element positions in the body frame, about the array's centre"),
-    "receiver_heading": (("cycle",), "rad", "heading of the body about z"),
-    "found_tau": (("cycle", "component"), "s", "delay"),
-    "found_cosines": (("cycle", "component", "cosine"), "1", "direction cosines along body x and y"),
-    "found_gain": (("cycle", "component"), "1", "complex gain, carrier phase included"),
-    "found_tau_std": (("cycle", "component"), "s", "standard deviation of found_tau"),
-    "found_cosines_std": (("cycle", "component", "cosine"), "1", "standard deviation of found_cosines"),
-    "found_amplitude_std": (("cycle", "component"), "1", "standard deviation of |found_gain|"),
-    "found_from_panel": (("cycle", "component"), "1", "probability that it ran over the panel, -9 no component"),
-    "found_label": (("cycle", "component"), "1", "the tracker's label, -9 no component"),
-    "found_path": (("cycle", "component"), "1", "truth, for scoring only: column of the path, -1 clutter, -9 none"),
+    "receiver_heading": (("time",), "rad", "heading of the body about z"),
+    "found_tau": (("time", "component"), "s", "delay"),
+    "found_cosines": (("time", "component", "cosine"), "1", "direction cosines along body x and y"),
+    "found_gain": (("time", "component"), "1", "complex gain, carrier phase included"),
+    "found_tau_std": (("time", "component"), "s", "standard deviation of found_tau"),
+    "found_cosines_std": (("time", "component", "cosine"), "1", "standard deviation of found_cosines"),
+    "found_amplitude_std": (("time", "component"), "1", "standard deviation of |found_gain|"),
+    "found_from_panel": (("time", "component"), "1", "probability that it ran over the panel, -9 no component"),
+    "found_which_panel": (("time", "component"), "1", "number of that panel, -9 no component; left out with one"),
+    "found_label": (("time", "component"), "1", "the tracker's label, -9 no component"),
+    "found_path": (("time", "component"), "1", "truth, for scoring only: column of the path, -1 clutter, -9 none"),
 }
 """Dimensions, unit and meaning; complex variables are stored as `_real` and `_imag`."""
 
@@ -56,7 +57,7 @@ def signals_dataset(
 
     Variables as in `SCHEMA`; the radio and the receiver are in the attributes. `on_cycle` is called after each cycle.
     """
-    samples, noise, found, labels, truth, over_panel = [], [], [], [], [], []
+    samples, noise, found, labels, truth, over_panel, which = [], [], [], [], [], [], []
     heard = np.zeros((paths.num_cycles, paths.num_paths), dtype=np.int8)
     shift = doppler_shift(paths, trajectory, radio.wavelength)
     tracks, last, previous = init_tracks(), trajectory.time[0], None
@@ -75,6 +76,7 @@ def signals_dataset(
         labels.append(info.label)
         truth.append(true_paths(components, received, radio, config))
         over_panel.append(np.zeros(len(components.tau)) if previous.from_panel is None else previous.from_panel)
+        which.append(previous.panel)
         if on_cycle is not None:
             on_cycle()
     values: dict[str, Any] = {
@@ -89,6 +91,8 @@ def signals_dataset(
         "found_path": _padded(truth, NO_COMPONENT),
         "found_from_panel": _padded(over_panel, float(NO_COMPONENT)),
     }
+    if config.alternation and config.panels > 1:
+        values["found_which_panel"] = _padded(which, NO_COMPONENT)
     for name in Components._fields[:-1]:
         values[f"found_{name}"] = _padded([getattr(one, name) for one in found], 0.0)
     return _dataset(values, radio, config)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import rotation_z
@@ -26,8 +26,8 @@ class Received(NamedTuple):
     """(N, 3) unit vectors towards the arriving rays, body frame."""
     gain: Complexes
     """(N,)."""
-    from_panel: Booleans
-    """(N,) whether the path meets the panel: its gain changes sign under the phase-reversed code."""
+    panel: Integers
+    """(N,) number of the panel that the path meets, whose phase-reversed code changes its sign; -1 for none."""
     wave_radius: Floats
     """(N,) distance [m] from the array back to the point from which the wave spreads: the mirrored Tx or landmark."""
     doppler: Floats
@@ -59,12 +59,11 @@ def receive(
     kind = paths.kind[path]
     leakage = 10.0 ** (-config.leakage_cancellation_db / 20.0)
     gain = paths.gain[cycle, path] * np.where(kind == PathKind.LOS, leakage, 1.0)
-    from_panel = (kind == PathKind.RIS) | (kind == PathKind.VRIS)
     radius = SPEED_OF_LIGHT * paths.tau[cycle, path]
     shift = np.zeros(len(path)) if doppler is None else doppler[path]
     if config.element_exact:
         radius = radius - _tx_leg_length(paths, cycle, path)
-    return Received(path, paths.tau[cycle, path], arrival[path], gain, from_panel, radius, shift)
+    return Received(path, paths.tau[cycle, path], arrival[path], gain, paths.panel[path], radius, shift)
 
 
 def direct_gain(paths: Paths, cycle: int) -> complex:

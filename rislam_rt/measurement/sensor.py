@@ -20,9 +20,8 @@ def build_sensor(radio: RadioConfig, config: ReceiverConfig) -> SensorModel:
     threshold = detection_threshold(radio, config)
     rate = config.clutter_rate
     if config.estimator == "waveform":
-        captures = 2 if config.alternation else 1
         expected = expected_false_alarms(threshold, radio, config.max_delay - config.min_delay)
-        rate = captures * GRID_SHARE * expected
+        rate = config.num_captures * GRID_SHARE * expected
     resolution = "cell" if config.estimator == "bound" and config.resolution == "cell" else "joint"
     return SensorModel(
         radio,

@@ -1,18 +1,18 @@
-"""With what probability a component came over the panel, from what the receiver sees of it alone.
+"""With what probability a component came over a panel, from what the receiver sees of it alone.
 
 What is found in the difference of the codes came over the panel, or is what motion within the slot left there of a path
-that the sum shows at the same place. The second kind has the source's complex amplitude times a factor that its Doppler
-shift sets, within the speed that the receiver reckons with; the first has any. Sum and difference change their roles
-for what is found in the sum.
+that another capture (the sum, another panel's difference) shows at the same place. The second kind has the source's
+complex amplitude times a factor that its Doppler shift sets, within the speed that the receiver reckons with; the first
+has any. The captures change their roles for what is found in the sum.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.slot import slot_weights
+from rislam_rt.measurement.slot import look_signs, slot_mean
 from rislam_rt.model import RadioConfig
 
 DENSITY = 0.5
@@ -41,29 +41,40 @@ class Found(NamedTuple):
     """(N,)."""
     gain_std: Floats
     """(N,) of the complex gain."""
-    in_difference: Booleans
-    """(N,)."""
+    capture: Integers
+    """(N,) 0 for the sum, 1 + q for the difference of panel q."""
 
 
-def panel_probability(found: Found, radio: RadioConfig, config: ReceiverConfig) -> Floats:
-    """(N,) probability that each component, if a path made it, ran over the panel."""
-    probability = np.full(len(found.gain), np.nan)
-    factors = leak_factors(radio, config)
-    for side in (True, False):
-        here, there = found.in_difference == side, found.in_difference != side
-        own = 1.0 / (1.0 + _leak_odds(_pick(found, here), _pick(found, there), factors, radio))
-        probability[here] = own if side else 1.0 - own
-    return np.clip(probability, SUREST, 1.0 - SUREST)
+def panel_probability(found: Found, radio: RadioConfig, config: ReceiverConfig) -> tuple[Floats, Integers | None]:
+    """(N,) probability that each component, if a path made it, ran over a panel, and which (N,): the likeliest.
+
+    Where there is one panel the second is None.
+    """
+    over = np.zeros((len(found.gain), config.num_captures))
+    for own in range(config.num_captures):
+        here = found.capture == own
+        odds = np.zeros((np.count_nonzero(here), config.num_captures))
+        for other in range(config.num_captures):
+            if other != own:
+                factors = leak_factors(radio, config, own, other)
+                leak = _leak_odds(_pick(found, here), _pick(found, found.capture == other), factors, radio)
+                odds[:, other] = np.minimum(leak, 1e300)  # a sum of them stays finite
+        total = odds.sum(axis=1)
+        certain = 1.0 / (1.0 + total)
+        over[here] = (1.0 - certain)[:, None] * odds / np.where(total > 0.0, total, 1.0)[:, None]
+        over[here, own] = certain
+    probability = np.clip(over[:, 1:].max(axis=1), SUREST, 1.0 - SUREST)
+    return probability, np.argmax(over[:, 1:], axis=1) if config.panels > 1 else None
 
 
-def leak_factors(radio: RadioConfig, config: ReceiverConfig) -> Complexes:
-    """(`SHIFTS`,) amplitude of what a path leaves in the other capture over what it has in its own, over its shifts.
+def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: int = 0) -> Complexes:
+    """(`SHIFTS`,) amplitude of what a path leaves in another capture over what it has in its own, over its shifts.
 
     Both ends ride on the agent, so that a path shortens by twice its speed at most.
     """
     shift = np.linspace(-1.0, 1.0, SHIFTS) * 2.0 * config.top_speed / radio.wavelength
-    plain, signed = slot_weights(shift, config)
-    return np.asarray(signed / plain)
+    signs = look_signs(config.order, config.panels)
+    return np.asarray(slot_mean(shift, signs[into] * signs[of], config) / slot_mean(shift, signs[0], config))
 
 
 def _leak_odds(found: Found, sources: Found, factors: Complexes, radio: RadioConfig) -> Floats:

@@ -1,29 +1,44 @@
 """What becomes of a path while the agent moves within the measurement slot.
 
 The codes take turns over the slot, and a path of Doppler shift f turns by `2 pi f t` meanwhile. What all codes hear in
-common goes to the sum, what changes its sign with the code to the difference; a path that turns goes into both. The
-order A-B-B-A cancels the first order of it.
+common goes to the sum, what changes its sign with a panel's code to that panel's difference; a path that turns goes
+into all of them. The order A-B-B-A cancels the first order of it.
 """
 
+from functools import lru_cache
+
 import numpy as np
+from scipy.linalg import hadamard
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.received import Received
 
-SIGNS = {"AB": np.array([1.0, -1.0]), "ABBA": np.array([1.0, -1.0, -1.0, 1.0])}
-"""Sign of the panel's paths in turn, by `ReceiverConfig.order`."""
+
+@lru_cache(maxsize=64)
+def look_signs(order: str, panels: int) -> Floats:
+    """Signs (1 + panels, S) of what meets no panel, and of each panel's paths, in the S looks of an `order`.
+
+    Rows of a Hadamard matrix, so that each sum over the looks with the signs of one panel holds its paths alone. `ABBA`
+    goes through them and back: products of such rows are even about the middle as well, so that what moves evenly
+    leaks to first order neither from the walls to a panel nor from panel to panel.
+    """
+    rows = codes_in_turn(panels)[: 1 + panels]
+    signs = np.concatenate([rows, rows[:, ::-1]], axis=1) if order == "ABBA" else rows
+    signs.flags.writeable = False
+    return signs
 
 
-def slot_weights(doppler: Floats, config: ReceiverConfig) -> tuple[Complexes, Complexes]:
-    """Mean over the slot (N,), plain and with the sign of the code, of paths of Doppler shifts (N,) [Hz].
+def codes_in_turn(panels: int) -> Floats:
+    """(C, C) Hadamard matrix of the C codes that so many panels need: code and twin for one, four codes for two."""
+    return hadamard(2 ** int(np.ceil(np.log2(1 + panels)))).astype(np.float64)
+
+
+def slot_mean(doppler: Floats, signs: Floats, config: ReceiverConfig) -> Complexes:
+    """Mean over the slot (N,), with a sign for every look (S,), of paths of Doppler shifts (N,) [Hz].
 
     Every code is held for the same time, the order repeated until the slot is full; phases are those at its middle.
-    Without alternation the second is zero.
     """
-    if not config.alternation:
-        return np.sinc(doppler * config.slot).astype(np.complex128), np.zeros(len(doppler), dtype=np.complex128)
-    signs = SIGNS[config.order]
     block = config.code_dwell * len(signs) if config.code_dwell else config.slot
     dwell = block / len(signs)
     middle = (np.arange(len(signs)) - (len(signs) - 1) / 2.0) * dwell
@@ -31,16 +46,30 @@ def slot_weights(doppler: Floats, config: ReceiverConfig) -> tuple[Complexes, Co
     repeats = max(round(config.slot / block), 1)
     # the mean of the blocks' phases, a geometric sum
     common = np.sinc(doppler * block * repeats) / np.sinc(doppler * block)
-    return common * turning.mean(axis=1), common * (turning @ signs) / len(signs)
+    mean = turning.mean(axis=1) if (signs > 0.0).all() else (turning @ signs) / len(signs)
+    return np.asarray(common * mean)
+
+
+def slot_weights(doppler: Floats, config: ReceiverConfig) -> tuple[Complexes, ...]:
+    """`slot_mean` plain, and with the signs of each panel.
+
+    Without alternation the mean, and zero.
+    """
+    if not config.alternation:
+        return np.sinc(doppler * config.slot).astype(np.complex128), np.zeros(len(doppler), dtype=np.complex128)
+    return tuple(slot_mean(doppler, signs, config) for signs in look_signs(config.order, config.panels))
 
 
 def split(received: Received, config: ReceiverConfig) -> list[Received]:
-    """The paths as they are in the sum of the codes, and with alternation in the difference, gains over the slot."""
-    plain, signed = slot_weights(received.doppler, config)
+    """The paths as they are in the sum of the codes, and with alternation in each panel's difference."""
     if not config.alternation:
-        return [received._replace(gain=received.gain * plain)]
-    panel = received.from_panel
-    return [
-        received._replace(gain=received.gain * np.where(panel, signed, plain)),
-        received._replace(gain=received.gain * np.where(panel, plain, signed)),
-    ]
+        return [received._replace(gain=received.gain * slot_weights(received.doppler, config)[0])]
+    signs = look_signs(config.order, config.panels)
+    kind = np.minimum(received.panel, config.panels - 1) + 1
+    captures = []
+    for own in signs:
+        weight = np.zeros(len(kind), dtype=np.complex128)
+        for number in np.unique(kind):
+            weight = np.where(kind == number, slot_mean(received.doppler, own * signs[number], config), weight)
+        captures.append(received._replace(gain=received.gain * weight))
+    return captures

@@ -1,7 +1,7 @@
 """The waveform-driven receiver: makes the signal of a cycle, and finds the paths in it again."""
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from rislam_rt.measurement.parts import capped, into_disc
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sides import Found, panel_probability
 from rislam_rt.measurement.signal import num_tones, tones
-from rislam_rt.measurement.slot import split
+from rislam_rt.measurement.slot import codes_in_turn, split
 from rislam_rt.model import Measurement, PathTruth, RadioConfig
 
 
@@ -31,8 +31,9 @@ class Capture(NamedTuple):
     """(L, M) tones [sqrt(J)] at full energy E."""
     noise_psd: float
     """Variance per tone, converters included [J]."""
-    is_difference: bool
-    """Whether it is the difference under alternation, which the panel's paths enter, and what turns within the slot."""
+    number: int
+    """0 for the sum; under alternation 1 + q for the difference of panel q, which that panel's paths enter, and what
+    turns within the slot."""
 
 
 class Components(NamedTuple):
@@ -50,8 +51,8 @@ class Components(NamedTuple):
     """(N, 2)."""
     amplitude_std: Floats
     """(N,)."""
-    in_difference: Booleans
-    """(N,) whether it was found in the difference."""
+    capture: Integers
+    """(N,) number of the capture that it was found in."""
 
 
 def capture(
@@ -67,6 +68,7 @@ def capture(
 
     Sum and difference of the two halves, over sqrt 2, hold the walls' and the panel's paths at the full energy and the
     noise of one sounding: splitting the slot costs nothing but a second code. What turns within the slot is in both.
+    Several panels take as many codes as a Hadamard matrix that has a row for each (`slot.codes_in_turn`).
 
     Parameters
     ----------
@@ -81,16 +83,26 @@ def capture(
     clean = [tones(one, radio, config, elements) for one in heard]
     direct = leakage * np.sqrt(radio.energy / num_tones(radio, config))
     if not config.alternation:
-        return [Capture(*digitise(clean[0], Sent(1.0, direct, swing), radio, config, front_end, rng=rng), False)]
-    sent = Sent(np.sqrt(0.5), np.sqrt(0.5) * direct, swing)
-    (one, noise), (other, more) = (
-        digitise(np.sqrt(0.5) * (clean[0] + sign * clean[1]), sent, radio, config, front_end, rng=rng)
-        for sign in (1.0, -1.0)
-    )
+        return [Capture(*digitise(clean[0], Sent(1.0, direct, swing), radio, config, front_end, rng=rng), 0)]
+    signs = codes_in_turn(config.panels)
+    share = np.sqrt(1.0 / len(signs))
+    sent = Sent(share, share * direct, swing)
+    heard_under = [
+        digitise(share * _signed_sum(clean, code), sent, radio, config, front_end, rng=rng) for code in signs.T
+    ]
+    under = [samples for samples, _ in heard_under]
     if front_end is not None and front_end.correction is not None:
-        other = in_step(other, one)
-    level = 0.5 * (noise + more)
-    return [Capture(np.sqrt(0.5) * (one + other), level, False), Capture(np.sqrt(0.5) * (one - other), level, True)]
+        under[1:] = [in_step(other, under[0]) for other in under[1:]]
+    level = sum(noise for _, noise in heard_under) / len(signs)
+    return [Capture(share * _signed_sum(under, signs[number]), level, number) for number in range(config.num_captures)]
+
+
+def _signed_sum(parts: list[Complexes], signs: Floats) -> Complexes:
+    """Sum of parts, each with its sign."""
+    total = signs[0] * parts[0]
+    for part, sign in zip(parts[1:], signs[1:], strict=False):
+        total = total + sign * part
+    return np.asarray(total)
 
 
 def find_components(
@@ -127,20 +139,20 @@ def true_paths(found: Components, received: Received, radio: RadioConfig, config
     """Column (N,) of the path that each component most likely is, by what its capture holds; -1 for none."""
     path = np.full(len(found.tau), -1)
     for number, heard in enumerate(split(received, config)):
-        mine = found.in_difference == bool(number)
+        mine = found.capture == number
         path[mine] = identify(found.tau[mine], found.cosines[mine], found.gain[mine], heard, radio)
     return path
 
 
 def to_measurement(found: Components, radio: RadioConfig, config: ReceiverConfig) -> Measurement:
     """What the agent gets to see of the components."""
-    over_panel = None
+    told: tuple[Any, ...] = ()
     if config.alternation:
         points, deviation = (
             np.column_stack(pair) for pair in ((found.tau, found.cosines), (found.tau_std, found.cosines_std))
         )
-        seen = Found(points, deviation, found.gain, np.sqrt(2.0) * found.amplitude_std, found.in_difference)
-        over_panel = panel_probability(seen, radio, config)
+        seen = Found(points, deviation, found.gain, np.sqrt(2.0) * found.amplitude_std, found.capture)
+        told = panel_probability(seen, radio, config)
     return Measurement(
         found.tau,
         found.cosines,
@@ -148,7 +160,7 @@ def to_measurement(found: Components, radio: RadioConfig, config: ReceiverConfig
         found.tau_std,
         found.cosines_std,
         found.amplitude_std,
-        over_panel,
+        *told,
     )
 
 
@@ -158,7 +170,8 @@ def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Fl
         return NOTHING
     mine = np.ones(len(previous), dtype=bool)
     if previous.from_panel is not None:
-        mine = (previous.from_panel > 0.5) == one.is_difference
+        number = 0 if previous.panel is None else previous.panel
+        mine = np.where(previous.from_panel > 0.5, 1 + number, 0) == one.number
     return np.column_stack([previous.tau * radio.bandwidth, previous.cosines])[mine]
 
 
@@ -182,7 +195,7 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
         np.sqrt(variance[:, 0]) / radio.bandwidth,
         np.hypot(capped(np.sqrt(variance[:, 1:]), radio), np.sqrt(mirrored)),
         scale * amplitude_std,
-        np.full(len(gain), one.is_difference),
+        np.full(len(gain), one.number),
     )
 
 

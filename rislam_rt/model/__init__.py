@@ -5,7 +5,17 @@ from rislam_rt.model.measurement import Measurement, PathTruth
 from rislam_rt.model.paths import PathKind, Paths, RisLegs
 from rislam_rt.model.radio import RadioConfig, RxArray
 from rislam_rt.model.result import NOTHING, STEPS, SchemeResult, SlamResult
-from rislam_rt.model.ris import RisCode, RisPanel, RisSpec
+from rislam_rt.model.ris import (
+    DataSheet,
+    RisCode,
+    RisPanel,
+    RisPanels,
+    RisSpec,
+    RisSpecs,
+    join_codes,
+    join_panels,
+    join_sheets,
+)
 from rislam_rt.model.scene import Material, Reflector, Scatterer, Scene, Shade
 from rislam_rt.model.sensor import SensorModel, detection_probability, merged_pull
 from rislam_rt.model.trajectory import Body, Trajectory
@@ -14,6 +24,7 @@ __all__ = [
     "NOTHING",
     "STEPS",
     "Body",
+    "DataSheet",
     "MapEstimate",
     "Material",
     "Measurement",
@@ -25,7 +36,9 @@ __all__ = [
     "RisCode",
     "RisLegs",
     "RisPanel",
+    "RisPanels",
     "RisSpec",
+    "RisSpecs",
     "RxArray",
     "Scatterer",
     "Scene",
@@ -38,6 +51,9 @@ __all__ = [
     "Trajectory",
     "detection_probability",
     "empty_map",
+    "join_codes",
+    "join_panels",
+    "join_sheets",
     "merged_pull",
     "pose_estimate",
 ]

@@ -26,7 +26,7 @@ class MapEstimate:
     parent: Integers
     """(N,) row of the parent, -1 for a point."""
     ris_probability: Floats
-    """(N,) probability of being the panel; 0 for images."""
+    """(N,) probability of being the panel, of several the likeliest; 0 for images."""
     strength: Floats
     """(N,) estimated square root of the cross-section [m]; for an image, amplitude ratio to the parent's law."""
     wall_normal: Floats
@@ -35,6 +35,8 @@ class MapEstimate:
     """(W,) [m]: `normal . x = offset`."""
     wall_std: Floats
     """(W, 2) standard deviations of angle [rad] and offset [m]."""
+    panel: Any = None
+    """(N,) number of the panel that `ris_probability` is about; None: 0, the only one."""
 
     def __post_init__(self) -> None:
         count, walls = len(np.asarray(self.ident)), len(np.asarray(self.wall_offset))
@@ -50,19 +52,27 @@ class MapEstimate:
             ("wall_std", np.float64, (walls, 2)),
         ):
             freeze(self, name, dtype, shape)
+        if self.panel is not None:
+            freeze(self, "panel", np.int64, (count,))
 
     def __repr__(self) -> str:
-        points, panel = int(np.sum(self.parent < 0)), "panel known" if self.ris >= 0 else "panel not known"
+        known = int(np.sum(self.ris_probability > 0.5))
+        points, panel = int(np.sum(self.parent < 0)), ("panel not known", "panel known")[known > 0]
+        panel = f"{known} panels known" if known > 1 else panel
         images = len(self.ident) - points
         return f"MapEstimate: {points} landmarks, {images} images, {len(self.wall_offset)} walls, {panel}"
 
     @property
     def ris(self) -> int:
-        """Row of the landmark held for the panel (probability above one half), -1 if none is."""
-        if not len(self.ident):
-            return -1
-        best = int(np.argmax(self.ris_probability))
-        return best if self.ris_probability[best] > 0.5 else -1
+        """Row of the landmark held for the panel, of several for the first: see `panel_row`."""
+        return self.panel_row(0)
+
+    def panel_row(self, panel: int) -> int:
+        """Row of the landmark held for a panel (probability above one half), -1 if none is."""
+        number = np.zeros(len(self.ident)) if self.panel is None else self.panel
+        probability = np.where(number == panel, self.ris_probability, 0.0)
+        best = int(np.argmax(probability)) if len(probability) else -1
+        return best if best >= 0 and probability[best] > 0.5 else -1
 
 
 class Suspect(NamedTuple):
@@ -72,6 +82,8 @@ class Suspect(NamedTuple):
     """(3,) [m]."""
     hits: int
     """How often it was measured."""
+    panel: int = 0
+    """Number of the panel that it may be."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,9 +102,9 @@ class SlamEstimate:
     """(S, 3) positions drawn from the belief [m], equally likely; design averages over them."""
     body: Body
     map: MapEstimate
-    suspect: Suspect | None = None
-    """What may be the panel, while the map holds no landmark for it; None if nothing is suspected, or where no
-    design is to follow (see `slam.predict`)."""
+    suspects: tuple[Suspect, ...] = ()
+    """What may be a panel, for each that the map holds no landmark for, if anything may; empty where no design is to
+    follow (see `slam.predict`)."""
 
     def __post_init__(self) -> None:
         freeze(self, "position", np.float64, (3,))

@@ -13,12 +13,16 @@ ITU_MATERIALS: dict[str, tuple[tuple[float, float, float, float, float, float], 
     "plywood": ((1.0, 40.0, 2.71, 0.0, 0.33, 0.0),),
     "marble": ((1.0, 60.0, 7.074, 0.0, 0.0055, 0.9262),),
     "floorboard": ((50.0, 100.0, 3.66, 0.0, 0.0044, 1.3515),),
+    "vinyl_tile": ((1.0, 40.0, 3.62, 0.0, 0.0051, 0.8422),),
+    "carpet_tile": ((1.0, 40.0, 2.08, 0.0, 0.0009, 0.82),),
+    "asphalt_concrete": ((1.0, 40.0, 4.83, 0.0, 0.0108, 1.3969),),
+    "clear_acrylic": ((110.0, 330.0, 2.58, 0.0, 0.0001, 1.6524),),
     "metal": ((1.0, 100.0, 1.0, 0.0, 1e7, 0.0),),
     "very_dry_ground": ((1.0, 10.0, 3.0, 0.0, 0.00015, 2.52),),
     "medium_dry_ground": ((1.0, 10.0, 15.0, -0.1, 0.035, 1.63),),
     "wet_ground": ((1.0, 10.0, 30.0, -0.4, 0.15, 1.3),),
 }
-"""ITU-R P.2040, table 3: lowest and highest frequency [GHz], a, b, c, d."""
+"""ITU-R P.2040-4, table 3: lowest and highest frequency [GHz], a, b, c, d."""
 
 
 def itu_parameters(name: str, carrier: float) -> tuple[float, float, float, float]:

@@ -31,6 +31,8 @@ class Measurement:
     from_panel: Floats | None = None
     """(M,) probability that it ran over the panel, if a path made it: what is found in the difference of a code and its
     phase-reversed twin did, unless motion within the slot left it there. None where the receiver does not alternate."""
+    panel: Integers | None = None
+    """(M,) number of the panel that `from_panel` is about, the likeliest of several; None where there is one."""
 
     def __post_init__(self) -> None:
         count = len(np.asarray(self.tau))
@@ -45,6 +47,8 @@ class Measurement:
             freeze(self, name, np.float64, shape)
         if self.from_panel is not None:
             freeze(self, "from_panel", np.float64, (count,))
+        if self.panel is not None:
+            freeze(self, "panel", np.int64, (count,))
 
     def __len__(self) -> int:
         return len(self.tau)

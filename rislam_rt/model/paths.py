@@ -24,7 +24,7 @@ class PathKind(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RisLegs:
-    """Per-element response of the legs between the agent's ends and the panel.
+    """Per-element response of the legs between the agent's ends and the panels, 0 at elements of other panels.
 
     With the code's phases xi the gain of the path over Tx leg i and Rx leg j is
     `sum_nm tx[k, i, n, m] exp(-j xi[n, m]) rx[k, j, n, m]`: linear in exp(-j xi), so a new code needs no new trace.
@@ -38,6 +38,8 @@ class RisLegs:
     """(P,) Tx leg of each path, -1 where the path does not meet the panel."""
     rx_leg: Integers
     """(P,) Rx leg of each path, -1 where the path does not meet the panel."""
+    spans: tuple[slice, ...] = (slice(None),)
+    """Where the elements of each panel stand among all, row by row."""
 
     def __post_init__(self) -> None:
         freeze(self, "tx", np.complex128, (None, None, None, None))
@@ -81,6 +83,8 @@ class Paths:
     ris: RisLegs | None = None
     source: str = ""
     """How the set was found: `traced`, `traced, refined` or `image source`, and among which wall sequences."""
+    num_panels: int = 1
+    """Panels of the room, the last of `landmarks`; 1 without one, where it plays no part."""
 
     def __post_init__(self) -> None:
         cycles, paths = np.shape(self.valid)
@@ -125,6 +129,13 @@ class Paths:
     def aoa(self) -> tuple[Floats, Floats]:
         """theta_r, phi_r (K, P) [rad]."""
         return angles_from_direction(self.arrival)
+
+    @property
+    def panel(self) -> Integers:
+        """(P,) number of the panel that each path meets, -1 for none."""
+        over_panel = (self.kind == PathKind.RIS) | (self.kind == PathKind.VRIS)
+        first = len(self.landmarks) - self.num_panels if self.num_panels > 1 else self.landmark
+        return np.where(over_panel, self.landmark - first, -1)
 
     def identity(self, path: int) -> tuple[int, int, tuple[int, ...], tuple[int, ...]]:
         """(kind, landmark, tx_walls, rx_walls) of a column, without padding."""

@@ -24,6 +24,8 @@ class SchemeResult:
     """One scheme over K cycles; P path identities, I landmarks ever held, up to M components a cycle."""
 
     scheme: str
+    time: Floats
+    """(K,) [s] of the cycle's measurement."""
     position: Floats
     """(K, 3) estimated [m]."""
     velocity: Floats
@@ -63,10 +65,19 @@ class SchemeResult:
     """(K,) how each cycle went, in the filter's words."""
     map: MapEstimate
     """After the last cycle."""
+    panel: Any = None
+    """(K, I) which of several panels `ris_probability` is about; None: there is one."""
+    smoothed: Any = None
+    """(K, 3) positions with hindsight [m], of filters that look back (`slam.filter = "window"`: 40 cycles, fewer at the
+    end); None of others, and of runs in slices."""
+    given: Any = None
+    """What the estimator was given, cycle by cycle, and the seed that it drew from (`rislam_rt.pipeline.record.Given`);
+    None where the result was read from a file: it lies in one of its own."""
 
     def __post_init__(self) -> None:
         cycles, held = np.shape(self.position)[0], len(np.asarray(self.ident))
         for name, dtype, shape in (
+            ("time", np.float64, (cycles,)),
             ("position", np.float64, (cycles, 3)),
             ("velocity", np.float64, (cycles, 3)),
             ("heading", np.float64, (cycles,)),
@@ -84,6 +95,14 @@ class SchemeResult:
             ("seconds", np.float64, (cycles, len(STEPS))),
         ):
             freeze(self, name, dtype, shape)
+        if self.panel is not None:
+            freeze(self, "panel", np.int64, (cycles, held))
+        if self.smoothed is not None:
+            freeze(self, "smoothed", np.float64, (cycles, 3))
+
+    def named(self, panel: int) -> Booleans:
+        """(K, I) whether the landmark was held for a panel."""
+        return (self.ris_probability > 0.5) & (panel == (0 if self.panel is None else self.panel))
 
     def __repr__(self) -> str:
         ended = self.outcome[-1] if self.outcome else "before it began"

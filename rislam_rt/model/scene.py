@@ -1,4 +1,4 @@
-"""A room: reflecting meshes, point scatterers, at most one panel, and the agent's true motion."""
+"""A room: reflecting meshes, point scatterers, panels, and the agent's true motion."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -8,13 +8,19 @@ import numpy as np
 from rislam_rt.arrays import Floats, freeze, show_point
 from rislam_rt.errors import SceneError
 from rislam_rt.model.picture import Plan, html_with, outline
-from rislam_rt.model.ris import RisPanel
+from rislam_rt.model.ris import RisPanel, RisPanels
 from rislam_rt.model.trajectory import Trajectory
+
+BODY_THICKNESS, BODY_LOSS, BODY_LEAST = 10.0, 0.1, 2e-3
+"""What stands for a constant R: its thickness [m]; the conductivity [S/m] that, times its refractive index, keeps the
+back of it from being seen; and the least 1 - R."""
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """Either a constant reflection coefficient at every angle, or a slab of an ITU-R P.2040 material."""
+    """One of four: a constant reflection coefficient at every angle, one for each polarisation, a slab of an ITU-R
+    P.2040 material, or a slab of a permittivity and conductivity of one's own.
+    """
 
     reflection: float | None = None
     """R in (0, 1]: amplitude, the same for every angle and polarisation."""
@@ -22,14 +28,80 @@ class Material:
     """Name in ITU-R P.2040, e.g. `concrete`."""
     thickness: float = 0.1
     """Thickness [m] of the slab; unused with a constant R."""
+    permittivity: float | None = None
+    """Real part of the relative permittivity, at least 1, the same at every carrier."""
+    conductivity: float = 0.0
+    """[S/m] beside `permittivity`."""
+    reflection_te: float | None = None
+    """Coefficient in [-1, 1] of the field across the plane of incidence, the same at every angle,"""
+    reflection_tm: float | None = None
+    """...and of the field in that plane; signs as Fresnel's: of a dense dielectric near normal incidence, TE is
+    negative and TM positive."""
+    scattering: float = 0.0
+    """S in [0, 1): share of the reflected field that the surface scatters in all directions; the mirrored ray keeps
+    `sqrt(1 - S^2)` of its field."""
 
     def __post_init__(self) -> None:
-        if (self.reflection is None) == (self.itu is None):
-            raise SceneError("material: give either 'reflection' or 'itu'")
+        if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity, self.reflection_te)) != 1:
+            raise SceneError("material: give one of 'reflection', 'itu', 'permittivity' and 'reflection_te'")
+        if (self.reflection_te is None) != (self.reflection_tm is None):
+            raise SceneError("material: give 'reflection_te' and 'reflection_tm' together")
+        for name in ("reflection_te", "reflection_tm"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < abs(value) <= 1.0:
+                raise SceneError(f"material.{name}: {value} received; give a number in [-1, 1], and not 0")
         if self.reflection is not None and not 0.0 < self.reflection <= 1.0:
             raise SceneError(f"material.reflection: {self.reflection} received; give a number in (0, 1]")
         if not self.thickness > 0.0:
             raise SceneError(f"material.thickness_m: {self.thickness} received; give a positive length")
+        if self.permittivity is not None and not 1.0 <= self.permittivity < np.inf:
+            raise SceneError(f"material.permittivity: {self.permittivity} received; give a number of at least 1")
+        if self.permittivity == 1.0 and self.conductivity == 0.0:
+            raise SceneError("material.permittivity: 1 without conductivity is air; give more of either, or no mesh")
+        if not 0.0 <= self.conductivity < np.inf or (self.conductivity > 0.0 and self.permittivity is None):
+            raise SceneError(
+                f"material.conductivity_s_m: {self.conductivity} received; give 0 or more, and 'permittivity' beside it"
+            )
+        if not 0.0 <= self.scattering < 1.0:
+            raise SceneError(f"material.scattering: {self.scattering} received; give a number in [0, 1)")
+
+    @property
+    def is_slab(self) -> bool:
+        """Whether it treats the fields across and in the plane of incidence apart, as a slab does."""
+        return self.reflection is None
+
+    @property
+    def level(self) -> float | None:
+        """Constant |R|, in the mean of both polarisations; None for a slab, whose own depends on the angle."""
+        if self.reflection_te is not None and self.reflection_tm is not None:
+            return 0.5 * (abs(self.reflection_te) + abs(self.reflection_tm))
+        return self.reflection
+
+    @property
+    def specular_share(self) -> float:
+        """Share of the reflected field that stays in the mirrored ray."""
+        return float(np.sqrt(1.0 - self.scattering**2))
+
+    def as_body(self) -> "Material":
+        """The face of a thick, slightly lossy body with this |R| at normal incidence (0.998 at most); a slab stays.
+
+        `permittivity = ((1 + R) / (1 - R))^2`; elsewhere it follows Fresnel's law.
+        """
+        if self.level is None:
+            return self
+        index = (1.0 + self.level) / max(1.0 - self.level, BODY_LEAST)
+        return Material(
+            permittivity=index**2, conductivity=BODY_LOSS * index, thickness=BODY_THICKNESS, scattering=self.scattering
+        )
+
+    @property
+    def words(self) -> str:
+        """What it is, in few words."""
+        if self.reflection is not None:
+            return f"R = {self.reflection:g}"
+        if self.reflection_te is not None:
+            return f"TE {self.reflection_te:g}, TM {self.reflection_tm:g}"
+        return self.itu or f"permittivity {self.permittivity:g}, {self.conductivity:g} S/m"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,9 +132,11 @@ class Shade:
     """(V, 3) [m]."""
     faces: Any
     """(F, 3) indices into `vertices`."""
+    name: str = ""
+    """What it is called where it stands alone; one of a scatterer has the scatterer's name."""
 
     def __post_init__(self) -> None:
-        _freeze_mesh(self, "shade")
+        _freeze_mesh(self, f"shade '{self.name}'" if self.name else "shade")
 
     @property
     def triangles(self) -> Floats:
@@ -114,18 +188,22 @@ class Scene:
     name: str
     reflectors: tuple[Reflector, ...]
     scatterers: tuple[Scatterer, ...]
-    ris: RisPanel | None
+    ris: RisPanel | RisPanels | None
+    """The panel, or several of them (`join_panels`)."""
     agent: Trajectory
     digest: str = ""
     """SHA-256 over the scene file and its meshes; empty for a scene built in memory."""
+    shades: tuple[Shade, ...] = ()
+    """What hides and is neither wall nor landmark: clutter too small or too round to reflect like a plane."""
 
     def __repr__(self) -> str:
         size = " x ".join(f"{length:.3g}" for length in self.bounds[1] - self.bounds[0])
-        panel = "no panel"
-        if self.ris is not None:
-            spec = self.ris.spec
-            panel = f"panel of {spec.rows} x {spec.cols} elements at {show_point(self.ris.center)} m"
-        counts = f"{len(self.reflectors)} reflectors, {len(self.scatterers)} scatterers, {panel}"
+        each = (
+            f"panel of {panel.spec.rows} x {panel.spec.cols} elements at {show_point(panel.center)} m"
+            for panel in self.panels
+        )
+        panels = ", ".join(each) or "no panel"
+        counts = f"{len(self.reflectors)} reflectors, {len(self.scatterers)} scatterers, {panels}"
         return f"Scene '{self.name}': {size} m, {counts}, {len(self.agent)} cycles"
 
     def _repr_html_(self) -> str:
@@ -137,15 +215,24 @@ class Scene:
         return Plan(self.bounds, edges, list(zip(self.landmarks, self.landmark_positions, strict=True)), ways)
 
     @property
+    def panels(self) -> tuple[RisPanel, ...]:
+        """All panels, in the order of the code's elements; empty without one."""
+        return self.ris.panels if self.ris is not None else ()
+
+    @property
     def landmarks(self) -> tuple[str, ...]:
-        """Names in the order of landmark numbers: scatterers first, then the panel."""
-        return tuple(s.name for s in self.scatterers) + ((self.ris.name,) if self.ris else ())
+        """Names in the order of landmark numbers: scatterers first, then the panels."""
+        return tuple(s.name for s in self.scatterers) + tuple(panel.name for panel in self.panels)
 
     @property
     def landmark_positions(self) -> Floats:
         """(num_landmarks, 3) [m], in the order of `landmarks`."""
-        points = [s.position for s in self.scatterers] + ([self.ris.center] if self.ris else [])
+        points = [s.position for s in self.scatterers] + [panel.center for panel in self.panels]
         return np.array(points, dtype=np.float64).reshape(-1, 3)
+
+    def panel_number(self, landmark: int) -> int:
+        """Which of the panels a landmark is, -1 for a scatterer."""
+        return max(landmark - len(self.scatterers), -1)
 
     @property
     def bounds(self) -> Floats:

@@ -69,6 +69,11 @@ class Trajectory:
         )
 
     @property
+    def elapsed(self) -> Floats:
+        """Times (K,) [s] since the first cycle: time stamps may count from the epoch."""
+        return np.asarray(self.time - self.time[:1])
+
+    @property
     def tx(self) -> Floats:
         """Tx positions (K, 3) [m]."""
         return self.body.ends(self.position, self.heading)[0]

@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.triangles import distance_to_triangles
-from rislam_rt.model import RisPanel, Scatterer, Scene
+from rislam_rt.model import RisPanel, Scatterer, Scene, join_panels
 from rislam_rt.pipeline.spec import RoomSection
 
 RADIUS = 0.05
@@ -28,15 +28,16 @@ def change_room(scene: Scene, room: RoomSection, *, rng: np.random.Generator) ->
     ConfigError
         There is no panel to change, or no place for so many scatterers.
     """
-    panel = scene.ris
+    panels = scene.panels
     if room.panel_rows or room.panel_cols or room.panel_levels:
-        if panel is None:
+        if not panels:
             raise ConfigError(f"room.panel_rows: scene '{scene.name}' has no panel to change; leave it out")
-        panel = _changed(panel, room)
+        panels = tuple(_changed(panel, room) for panel in panels)
     scatterers = scene.scatterers
     if room.scatterers is not None:
         scatterers = _scatterers(scene, room.scatterers, rng=rng)
-    return replace(scene, ris=panel, scatterers=scatterers)
+    ris = scene.ris if panels is scene.panels else join_panels(panels)
+    return replace(scene, ris=ris, scatterers=scatterers)
 
 
 def _changed(panel: RisPanel, room: RoomSection) -> RisPanel:

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.design import design_code, designer, problem_from_paths
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import prior_from_covariance
-from rislam_rt.model import RisCode, RisSpec, SlamEstimate
+from rislam_rt.model import DataSheet, RisCode, SlamEstimate
 from rislam_rt.pipeline.cycle import Designer, Room
 from rislam_rt.pipeline.own_methods import is_own, own_code
 from rislam_rt.pipeline.schemes import Scheme
@@ -15,7 +15,7 @@ from rislam_rt.pipeline.spec import PipelineSpec, Settings
 from rislam_rt.pipeline.told import Told
 
 
-def build_designer(scheme: Scheme, panel: RisSpec, spec: PipelineSpec, settings: Settings, told: Told) -> Designer:
+def build_designer(scheme: Scheme, panel: DataSheet, spec: PipelineSpec, settings: Settings, told: Told) -> Designer:
     """The designer of a scheme that has a panel: true panel and settings serve the one that knows the truth."""
     method = spec.design.method if scheme.method == "spec" else str(scheme.method)
     return _on_truth(method, panel, spec, settings) if scheme.on_truth else _on_belief(method, spec, told)
@@ -43,7 +43,7 @@ def _on_belief(method: str, spec: PipelineSpec, told: Told) -> Designer:
     return choose
 
 
-def _on_truth(method: str, panel: RisSpec, spec: PipelineSpec, settings: Settings) -> Designer:
+def _on_truth(method: str, panel: DataSheet, spec: PipelineSpec, settings: Settings) -> Designer:
     """The genie: true paths of the cycle in which the code will take effect, and the belief's own prior."""
 
     def choose(belief: Callable[[], SlamEstimate], cycle: int, room: Room, *, rng: np.random.Generator) -> RisCode:

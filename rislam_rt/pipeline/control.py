@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.model import RisCode, RisSpec
+from rislam_rt.model import DataSheet, RisCode
 from rislam_rt.pipeline.spec import ControlSection
 from rislam_rt.ris import flip_bits, zero_code
 
@@ -21,7 +21,7 @@ class Link(NamedTuple):
     """Codes on their way, oldest first, and what will arrive of each; None if nothing will."""
 
 
-def open_link(spec: RisSpec) -> Link:
+def open_link(spec: DataSheet) -> Link:
     """A panel at level 0, nothing on its way."""
     start = zero_code(spec)
     return Link(start, start)
@@ -55,13 +55,13 @@ def quantise(code: RisCode, levels: int | None) -> RisCode:
     return RisCode((np.rint(code.index / step).astype(np.int64) % levels) * step, code.levels)
 
 
-def message_seconds(spec: RisSpec, control: ControlSection) -> float:
+def message_seconds(spec: DataSheet, control: ControlSection) -> float:
     """Air time [s] of one message: so many bits an element as its levels need."""
     bits = spec.num_elements * int(np.ceil(np.log2(control.levels or spec.levels)))
     return bits / control.rate_bits_s
 
 
-def check_control(spec: RisSpec, control: ControlSection, bit_flip: float = 0.0) -> None:
+def check_control(spec: DataSheet, control: ControlSection, bit_flip: float = 0.0) -> None:
     """Check the message against the panel.
 
     Raises

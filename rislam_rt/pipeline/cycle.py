@@ -13,7 +13,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.measurement import FrontEnd, measure
-from rislam_rt.model import Measurement, Paths, PathTruth, RisCode, RisSpec, SlamEstimate, Trajectory
+from rislam_rt.model import DataSheet, Measurement, Paths, PathTruth, RisCode, SlamEstimate, Trajectory
 from rislam_rt.pipeline.control import Link, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.spec import PipelineSpec, Settings
@@ -63,7 +63,7 @@ class Agent(NamedTuple):
 class Means(NamedTuple):
     """What leads a scheme through its cycles, the same in all of them."""
 
-    panel: RisSpec | None
+    panel: DataSheet | None
     designer: "Designer | None"
     estimator: Estimator
     spec: PipelineSpec
@@ -85,6 +85,8 @@ class Cycle(NamedTuple):
     sent: RisCode | None
     applied: RisCode | None
     seconds: tuple[float, float, float, float]
+    believed: RisCode | None = None
+    """What the agent holds to be applied."""
 
 
 class Designer(Protocol):
@@ -106,7 +108,7 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
 
     link, sent = agent.link, None
     if link is not None and means.designer is not None:
-        ahead = dt + control.delay_cycles * _nominal_step(told.time)
+        ahead = dt + control.delay_cycles * usual_step(told.time)
         sent = means.designer(partial(estimator.predict, agent.state, ahead, config), cycle, room, rng=rng.design)
     clock.append(perf_counter())
 
@@ -136,11 +138,11 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
     optimise, communicate, acquire, localise = np.diff(clock)
     outcome = Cycle(
         belief, info, reported, truth, paths.gain[0], sent, applied,
-        (optimise, communicate + air, acquire, localise),
+        (optimise, communicate + air, acquire, localise), believed,
     )  # fmt: skip
     return Agent(state, link, measurement), outcome
 
 
-def _nominal_step(time: Floats) -> float:
-    """Cycle time [s] of times (K,)."""
-    return float(time[1] - time[0]) if len(time) > 1 else 0.0
+def usual_step(time: Floats) -> float:
+    """Cycle time [s] of times (K,), which a recording's clock keeps only nearly: the median; 0 for a single cycle."""
+    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rislam_rt.errors import ResultError, StoreError
-from rislam_rt.model import MapEstimate, Paths, SchemeResult, Trajectory
+from rislam_rt.model import MapEstimate, PathKind, Paths, SchemeResult, Trajectory
+from rislam_rt.model.result import STEPS
 from rislam_rt.pipeline.files import write_atomic
 from rislam_rt.pipeline.seal import SCHEMA
 
@@ -20,56 +21,69 @@ Entry = tuple[tuple[str, ...], str, str]
 """Dimensions, unit, meaning."""
 
 TRAJECTORY: dict[str, Entry] = {
-    "time": (("cycle",), "s", "time of the cycle's measurement"),
-    "true_position": (("cycle", "xyz"), "m", "true midpoint of Tx and Rx"),
-    "true_velocity": (("cycle", "xyz"), "m/s", "true velocity"),
-    "true_heading": (("cycle",), "rad", "true heading about z"),
+    "time": (("time",), "s", "time of the cycle's measurement"),
+    "true_position": (("time", "xyz"), "m", "true midpoint of Tx and Rx"),
+    "true_velocity": (("time", "xyz"), "m/s", "true velocity"),
+    "true_heading": (("time",), "rad", "true heading about z"),
 }
 PATHS: dict[str, Entry] = {
     "kind": (("path",), "1", "0 LOS, 1 VT, 2 PS, 3 VS, 4 RIS, 5 VRIS"),
     "landmark": (("path",), "1", "index into attribute 'landmarks', -1 for LOS and VT"),
     "tx_walls": (("path", "bounce"), "1", "walls between Tx and landmark, index into attribute 'walls', -1 padding"),
     "rx_walls": (("path", "bounce"), "1", "walls between landmark and Rx, likewise"),
-    "valid": (("cycle", "path"), "1", "whether the path exists; other entries mean nothing where it does not"),
-    "tau": (("cycle", "path"), "s", "delay"),
-    "departure": (("cycle", "path", "xyz"), "1", "unit vector away from the Tx"),
-    "arrival": (("cycle", "path", "xyz"), "1", "unit vector from the Rx towards the arriving ray"),
-    "gain": (("cycle", "path"), "1", "complex gain, carrier phase included, panel at level 0"),
-    "vertices": (("cycle", "path", "vertex", "xyz"), "m", "interaction points in the order of travel"),
+    "valid": (("time", "path"), "1", "whether the path exists; other entries mean nothing where it does not"),
+    "tau": (("time", "path"), "s", "delay"),
+    "departure": (("time", "path", "xyz"), "1", "unit vector away from the Tx"),
+    "arrival": (("time", "path", "xyz"), "1", "unit vector from the Rx towards the arriving ray"),
+    "gain": (("time", "path"), "1", "complex gain, carrier phase included, panel at level 0"),
+    "vertices": (("time", "path", "vertex", "xyz"), "m", "interaction points in the order of travel"),
     "num_vertices": (("path",), "1", "number of interaction points that count"),
 }
 SCHEME: dict[str, Entry] = {
-    "position": (("cycle", "xyz"), "m", "estimated midpoint of Tx and Rx"),
-    "velocity": (("cycle", "xyz"), "m/s", "estimated velocity"),
-    "heading": (("cycle",), "rad", "heading about z"),
-    "covariance": (("cycle", "state", "state_"), "m, m/s", "believed covariance of position and velocity"),
-    "sent": (("cycle", "row", "col"), "1", "phase levels that the agent sent"),
-    "applied": (("cycle", "row", "col"), "1", "phase levels while the signals were taken"),
-    "gain": (("cycle", "path"), "1", "true complex gain under the applied code"),
-    "component_path": (("cycle", "component"), "1", "truth: path of each component, -1 clutter, -9 no component"),
+    "time": (("time",), "s", "time of the cycle's measurement"),
+    "position": (("time", "xyz"), "m", "estimated midpoint of Tx and Rx"),
+    "velocity": (("time", "xyz"), "m/s", "estimated velocity"),
+    "heading": (("time",), "rad", "heading about z"),
+    "covariance": (("time", "state", "state_"), "m, m/s", "believed covariance of position and velocity"),
+    "sent": (("time", "row", "col"), "1", "phase levels that the agent sent"),
+    "applied": (("time", "row", "col"), "1", "phase levels while the signals were taken"),
+    "gain": (("time", "path"), "1", "true complex gain under the applied code"),
+    "component_path": (("time", "component"), "1", "truth: path of each component, -1 clutter, -9 no component"),
     "component_landmark": (
-        ("cycle", "component"),
+        ("time", "component"),
         "1",
         "landmark taken for it, -1 unused, -2 removed, -9 no component",
     ),
     "ident": (("landmark",), "1", "number of each landmark ever held"),
     "parent": (("landmark",), "1", "number of the landmark whose mirror image this is, -1 for a point"),
-    "held": (("cycle", "landmark"), "1", "whether the landmark was in the map"),
-    "landmark_position": (("cycle", "landmark", "xyz"), "m", "its estimated position"),
-    "ris_probability": (("cycle", "landmark"), "1", "probability of being the panel"),
-    "seconds": (("cycle", "step"), "s", "time taken by optimise, communicate, measure, localise"),
+    "held": (("time", "landmark"), "1", "whether the landmark was in the map"),
+    "landmark_position": (("time", "landmark", "xyz"), "m", "its estimated position"),
+    "ris_probability": (("time", "landmark"), "1", "probability of being the panel, of several the likeliest"),
+    "panel": (("time", "landmark"), "1", "number of that panel; left out where there is one"),
+    "seconds": (("time", "step"), "s", "time taken by optimise, communicate, measure, localise"),
 }
+SMOOTHED: dict[str, Entry] = {"smoothed": (("time", "xyz"), "m", "position with hindsight")}
+"""Of filters that look back."""
 MAP: dict[str, Entry] = {
     "ident": (("feature",), "1", "number of the landmark or image"),
     "position": (("feature", "xyz"), "m", "estimated position"),
     "covariance": (("feature", "xyz", "xyz_"), "m2", "believed covariance"),
     "parent": (("feature",), "1", "row of the landmark whose image this is, -1 for none"),
-    "ris_probability": (("feature",), "1", "probability of being the panel"),
+    "ris_probability": (("feature",), "1", "probability of being the panel, of several the likeliest"),
+    "panel": (("feature",), "1", "number of that panel; left out where there is one"),
     "strength": (("feature",), "m", "root of the cross-section; for an image, amplitude ratio of the wall"),
     "wall_normal": (("wall", "xyz"), "1", "unit normal, away from the agent"),
     "wall_offset": (("wall",), "m", "normal . x = offset"),
     "wall_std": (("wall", "angle_offset"), "rad, m", "standard deviations of angle and offset"),
 }
+
+AXES: dict[str, list[str]] = {
+    "xyz": ["x", "y", "z"],
+    "cosine": ["x", "y"],
+    "state": ["x", "y", "z", "vx", "vy", "vz"],
+    "step": list(STEPS),
+}
+"""Labels along axes, for `.sel`."""
 
 
 def paths_to_dataset(paths: Paths, motion: Trajectory) -> "xr.Dataset":
@@ -77,30 +91,44 @@ def paths_to_dataset(paths: Paths, motion: Trajectory) -> "xr.Dataset":
     content = _arrays(paths, PATHS, "")
     truth = {"true_position": motion.position, "true_velocity": motion.velocity, "true_heading": motion.heading}
     content |= _entries({"time": motion.time, **truth}, TRAJECTORY, "")
+    names = np.array([*paths.landmarks, ""], dtype=object)
+    coords = {
+        "path": (
+            ("path",),
+            [paths.label(path) for path in range(paths.num_paths)],
+            {"long_name": "path, Rx walls last"},
+        ),
+        "kind_name": (("path",), [PathKind(int(kind)).name for kind in paths.kind], {"long_name": "class of the path"}),
+        "landmark_name": (("path",), names[paths.landmark], {"long_name": "landmark, empty for LOS and VT"}),
+    }
     attributes = {"walls": list(paths.walls), "landmarks": list(paths.landmarks), "source": paths.source}
-    return _dataset(content, attributes)
+    return _dataset(content, attributes | ({"panels": paths.num_panels} if paths.num_panels > 1 else {}), coords)
 
 
 def dataset_to_paths(data: "xr.Dataset") -> Paths:
     """The inverse of `paths_to_dataset`."""
-    walls, landmarks = (_names(data.attrs[name]) for name in ("walls", "landmarks"))
-    return Paths(**_values(data, PATHS, ""), walls=walls, landmarks=landmarks, source=str(data.attrs["source"]))
+    walls, landmarks = (names_of(data.attrs[name]) for name in ("walls", "landmarks"))
+    about: dict[str, Any] = {"source": str(data.attrs["source"]), "num_panels": int(data.attrs.get("panels", 1))}
+    return Paths(**_values(data, PATHS, ""), walls=walls, landmarks=landmarks, **about)
 
 
 def scheme_to_dataset(result: SchemeResult) -> "xr.Dataset":
     """One scheme, with the filter's diagnostics as `info_...` and its last map as `map_...`."""
     content = _arrays(result, SCHEME, "") | _arrays(result.map, MAP, "map_")
     for name, values in result.info.items():
-        content[f"info_{name}"] = (("cycle",), values, {"long_name": f"filter diagnostic {name}"})
+        content[f"info_{name}"] = (("time",), values, {"long_name": f"filter diagnostic {name}"})
     outcomes = sorted(set(result.outcome))
     codes = np.array([outcomes.index(outcome) for outcome in result.outcome], dtype=np.int64)
-    content["outcome"] = (("cycle",), codes, {"long_name": "how the cycle went, index into attribute 'outcomes'"})
-    return _dataset(content, {"scheme": result.scheme, "levels": result.levels, "outcomes": outcomes})
+    if result.smoothed is not None:
+        content |= _entries({"smoothed": result.smoothed}, SMOOTHED, "")
+    content["outcome"] = (("time",), codes, {"long_name": "how the cycle went, index into attribute 'outcomes'"})
+    coords = {"landmark": (("landmark",), result.ident, {"long_name": "number of each landmark ever held"})}
+    return _dataset(content, {"scheme": result.scheme, "levels": result.levels, "outcomes": outcomes}, coords)
 
 
 def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
     """The inverse of `scheme_to_dataset`."""
-    outcomes = _names(data.attrs["outcomes"])
+    outcomes = names_of(data.attrs["outcomes"])
     return SchemeResult(
         scheme=str(data.attrs["scheme"]),
         levels=int(data.attrs["levels"]),
@@ -108,12 +136,13 @@ def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
         info={str(n).removeprefix("info_"): data[n].to_numpy() for n in data.data_vars if str(n).startswith("info_")},
         outcome=tuple(outcomes[code] for code in data["outcome"].to_numpy()),
         map=MapEstimate(**_values(data, MAP, "map_")),
+        smoothed=_values(data, SMOOTHED, "")["smoothed"] if "smoothed" in data else None,
     )
 
 
 def seal_dataset(data: "xr.Dataset", **about: str) -> "xr.Dataset":
     """The data set with `about`, the schema's version, the number of cycles, and a checksum over all there is in it."""
-    found = data.assign_attrs(about, schema=SCHEMA, cycles=int(data.sizes["cycle"]))
+    found = data.assign_attrs(about, schema=SCHEMA, cycles=int(data.sizes["time"]))
     return found.assign_attrs(checksum=_checksum(found))
 
 
@@ -125,7 +154,7 @@ def check_dataset(data: "xr.Dataset", path: Path, **about: str | int) -> None:
     ResultError
         It is not. One line.
     """
-    expected = {"schema": SCHEMA, "cycles": data.sizes.get("cycle"), **about, "checksum": _checksum(data)}
+    expected = {"schema": SCHEMA, "cycles": data.sizes.get("time"), **about, "checksum": _checksum(data)}
     for name, value in expected.items():
         found = data.attrs.get(name)
         if found is None or str(found) != str(value):
@@ -138,9 +167,10 @@ def _checksum(data: "xr.Dataset") -> str:
     for name in sorted(map(str, data.variables)):
         variable = data.variables[name]
         values = np.ascontiguousarray(variable.to_numpy())
-        head = [name, variable.dims, values.shape, values.dtype.str, _plain(variable.attrs)]
+        words = values.dtype.kind in "OUT"  # text comes back as another type of text
+        head = [name, variable.dims, values.shape, "text" if words else values.dtype.str, _plain(variable.attrs)]
         digest.update(json.dumps(head).encode())
-        digest.update(values.tobytes())
+        digest.update(json.dumps([str(word) for word in values.flat]).encode() if words else values.tobytes())
     attributes = {name: value for name, value in data.attrs.items() if name != "checksum"}
     digest.update(json.dumps(_plain(attributes)).encode())
     return digest.hexdigest()
@@ -194,21 +224,27 @@ def read_dataset(path: Path) -> "xr.Dataset":
 
 def _arrays(record: Any, table: dict[str, Entry], prefix: str) -> dict[str, Any]:
     names = {f.name for f in fields(record)}
-    return _entries({name: getattr(record, name) for name in table if name in names}, table, prefix)
+    found = {name: getattr(record, name) for name in table if name in names}
+    return _entries({name: value for name, value in found.items() if value is not None}, table, prefix)
 
 
 def _entries(values: dict[str, Any], table: dict[str, Entry], prefix: str) -> dict[str, Any]:
     """Variables with their attributes; NetCDF has no complex numbers, so those become two variables."""
     content: dict[str, Any] = {}
     for name, value in values.items():
-        dims, unit, meaning = table[name]
+        dims = table[name][0]
         dims = tuple(prefix + d if prefix and not d.startswith("xyz") else d for d in dims)
         parts = [("", value)]
         if np.iscomplexobj(value):
             parts = [("_real", np.real(value)), ("_imag", np.imag(value))]
         for suffix, part in parts:
-            content[prefix + name + suffix] = (dims, part, {"units": unit, "long_name": meaning})
+            content[prefix + name + suffix] = (dims, part, told(table[name]))
     return content
+
+
+def told(entry: Entry) -> dict[str, str]:
+    """Unit and meaning as attributes."""
+    return {"units": entry[1], "long_name": entry[2]}
 
 
 def _values(data: "xr.Dataset", table: dict[str, Entry], prefix: str) -> dict[str, Any]:
@@ -218,17 +254,19 @@ def _values(data: "xr.Dataset", table: dict[str, Entry], prefix: str) -> dict[st
         key = prefix + name
         if f"{key}_real" in data:
             values[name] = data[f"{key}_real"].to_numpy() + 1j * data[f"{key}_imag"].to_numpy()
-        else:
+        elif key in data or name != "panel":  # the one variable that may be left out
             values[name] = data[key].to_numpy()
     return values
 
 
-def _dataset(content: dict[str, Any], attributes: dict[str, Any]) -> "xr.Dataset":
+def _dataset(content: dict[str, Any], attributes: dict[str, Any], coords: dict[str, Any]) -> "xr.Dataset":
     import xarray as xr
 
-    return xr.Dataset(content, attrs={"Conventions": "CF-1.11", **attributes})
+    used = {axis for dims, _, _ in content.values() for axis in dims}
+    labels = {axis: names for axis, names in AXES.items() if axis in used}
+    return xr.Dataset(content, {**coords, **labels}, {"Conventions": "CF-1.11", **attributes})
 
 
-def _names(value: Any) -> tuple[str, ...]:
+def names_of(value: Any) -> tuple[str, ...]:
     """Names from an attribute, which NetCDF gives back as one string if there is only one."""
     return (value,) if isinstance(value, str) else tuple(str(item) for item in value)

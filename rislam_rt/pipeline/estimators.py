@@ -9,7 +9,7 @@ from rislam_rt import slam
 from rislam_rt.arrays import Integers
 from rislam_rt.errors import ConfigError, expect
 from rislam_rt.information.landmarks import Unknown
-from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel, SlamEstimate
+from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.pipeline.own_methods import at_work, load_own
 from rislam_rt.pipeline.spec import Settings
 from rislam_rt.slam import StartPrior
@@ -33,6 +33,8 @@ class Estimator(NamedTuple):
     """Whether it uses angles of arrival, or delays alone: what its posterior bound may count."""
     walls: Unknown = "planes"
     """How its bound holds mirror images: `planes`, tied to walls; `images`, each a point of its own."""
+    smoothed: Callable[..., Any] = lambda state: None
+    """Positions (K, 3) of all cycles with hindsight; None of an estimator that does not look back."""
 
 
 class Outcomes(NamedTuple):
@@ -54,7 +56,7 @@ def own_estimator(name: str) -> Estimator:
             raise ConfigError(f"'{name}': {what}: a position of {far:g} m returned; give one up to {FARTHEST:g} m")
         return found
 
-    def init(start: StartPrior, body: Body, panel: RisSpec | None, sensor: SensorModel, config: Any,
+    def init(start: StartPrior, body: Body, panel: DataSheet | None, sensor: SensorModel, config: Any,
              *, rng: np.random.Generator) -> Any:  # fmt: skip
         with at_work(name):
             return own.init(start, body, panel, sensor, rng=rng)
@@ -90,7 +92,9 @@ class Estimators(dict[str, Estimator]):
 
 
 ESTIMATORS = Estimators({
-    "slam": Estimator(slam.init, slam.predict, slam.step, slam.estimate, lambda settings: settings.slam),
+    "slam": Estimator(
+        slam.init, slam.predict, slam.step, slam.estimate, lambda settings: settings.slam, smoothed=slam.smoothed
+    ),
     "bp_slam": Estimator(
         bp_slam.init, bp_slam.predict, bp_slam.step, bp_slam.estimate, lambda settings: settings.bp_slam,
         angles=False, walls="images",

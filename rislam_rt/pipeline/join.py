@@ -39,8 +39,11 @@ def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> Schem
     parent = np.full(len(ident), -1)
     for part, place in zip(parts, places, strict=True):
         parent[place] = np.where(part.parent >= 0, part.parent, parent[place])
-    plain = ("position", "velocity", "heading", "covariance", "sent", "applied", "seconds")
-    held = ("held", "landmark_position", "ris_probability")
+    plain = ("time", "position", "velocity", "heading", "covariance", "sent", "applied", "seconds")
+    held = ["held", "landmark_position", "ris_probability"]
+    if any(part.panel is not None for part in parts):
+        parts = [replace(p, panel=np.zeros(p.held.shape, int)) if p.panel is None else p for p in parts]
+        held.append("panel")
     course: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in plain}
     course |= {name: _spread([getattr(part, name) for part in parts], places, len(ident)) for name in held}
     return replace(
@@ -53,6 +56,7 @@ def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> Schem
         parent=parent,
         info={name: np.concatenate([part.info[name] for part in parts]) for name in parts[0].info},
         outcome=tuple(outcome for part in parts for outcome in part.outcome),
+        given=None,
     )
 
 
@@ -64,13 +68,15 @@ def thinned_paths(paths: Paths, rows: Integers) -> Paths:
 
 def thinned_scheme(scheme: SchemeResult, rows: Integers) -> SchemeResult:
     """Some cycles alone."""
-    names = ("position", "velocity", "heading", "covariance", "sent", "applied", "gain", "component_path",
-             "component_landmark", "held", "landmark_position", "ris_probability", "seconds")  # fmt: skip
+    names = ("time", "position", "velocity", "heading", "covariance", "sent", "applied", "gain", "component_path",
+             "component_landmark", "held", "landmark_position", "ris_probability", "seconds", "panel")  # fmt: skip
     return replace(
         scheme,
-        **{name: getattr(scheme, name)[rows] for name in names},
+        **{name: getattr(scheme, name)[rows] for name in names if getattr(scheme, name) is not None},
         info={name: values[rows] for name, values in scheme.info.items()},
+        smoothed=None if scheme.smoothed is None else scheme.smoothed[rows],
         outcome=tuple(scheme.outcome[row] for row in rows),
+        given=None,
     )
 
 

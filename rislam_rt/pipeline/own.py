@@ -13,9 +13,9 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.information import amplitude_std, measurement_std
 from rislam_rt.model import Body, Measurement, RadioConfig
 from rislam_rt.pipeline.dataset import read_dataset
+from rislam_rt.pipeline.inputs import Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.spec import PipelineSpec
-from rislam_rt.pipeline.studies.unseen.file import dataset_to_inputs
-from rislam_rt.pipeline.studies.unseen.recording import Answers, Inputs, replay
+from rislam_rt.pipeline.studies.unseen.recording import Answers, replay
 from rislam_rt.slam import StartPrior
 
 COLUMNS: dict[str, tuple[str, str]] = {
@@ -57,6 +57,17 @@ def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator) ->
     return replay(inputs, spec.model_dump(), spec.schemes[0], rng=rng)
 
 
+def run_rng(file: str | Path) -> np.random.Generator | None:
+    """What the filter of a run drew from, if the file holds a run's measurements: led by the same numbers, it gives the
+    same estimate to the bit.
+    """
+    return marked_rng(read_dataset(Path(file))) if _is_netcdf(Path(file)) else None
+
+
+def _is_netcdf(file: Path) -> bool:
+    return file.suffix.lower() in (".nc", ".h5", ".hdf5")
+
+
 def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, body: Body | None = None) -> Inputs:
     """The measurements of a CSV file (`COLUMNS`) or of a NetCDF file (as recordings are written).
 
@@ -73,13 +84,13 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
         The file cannot be read, or a value is of a wrong unit or range; the line says which.
     """
     file = Path(file)
-    if file.suffix.lower() in (".nc", ".h5", ".hdf5"):
+    if _is_netcdf(file):
         data = read_dataset(file)
         try:
             return checked(dataset_to_inputs(data), str(file))
         except (KeyError, ValueError, TypeError) as error:
             raise ConfigError(
-                f"{file}: {type(error).__name__} {str(error)[:80]}; give a file as `unseen` writes"
+                f"{file}: {type(error).__name__} {str(error)[:80]}; give one as a run folder's measurements_<scheme>.nc"
             ) from None
     if start is None:
         raise ConfigError(f"{file}: a CSV file does not say where the agent starts; give --start X,Y,Z")

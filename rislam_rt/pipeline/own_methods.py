@@ -22,11 +22,11 @@ from numpy.typing import ArrayLike
 from rislam_rt.errors import ConfigError, RislamError, expect
 from rislam_rt.model import (
     Body,
+    DataSheet,
     Measurement,
     Paths,
     RadioConfig,
     RisCode,
-    RisSpec,
     Scene,
     SensorModel,
     SlamEstimate,
@@ -43,7 +43,7 @@ class OwnDesigner(Protocol):
     """A phase designer: a function."""
 
     def __call__(
-        self, belief: SlamEstimate, panel: RisSpec, radio: RadioConfig, *, rng: np.random.Generator
+        self, belief: SlamEstimate, panel: DataSheet, radio: RadioConfig, *, rng: np.random.Generator
     ) -> ArrayLike:
         """Levels (N, M), whole numbers from 0 to H - 1, from the belief predicted to the cycle in which they act."""
         ...
@@ -53,7 +53,7 @@ class OwnEstimator(Protocol):
     """A filter: an object, or a class without arguments."""
 
     def init(
-        self, start: StartPrior, body: Body, panel: RisSpec | None, sensor: SensorModel, *, rng: np.random.Generator
+        self, start: StartPrior, body: Body, panel: DataSheet | None, sensor: SensorModel, *, rng: np.random.Generator
     ) -> Any:
         """The first state, whatever it is; states are not changed afterwards."""
 
@@ -134,7 +134,7 @@ def own_digests(names: Iterable[str]) -> dict[str, str]:
 
 
 def own_code(
-    name: str, belief: SlamEstimate, panel: RisSpec, radio: RadioConfig, *, rng: np.random.Generator
+    name: str, belief: SlamEstimate, panel: DataSheet, radio: RadioConfig, *, rng: np.random.Generator
 ) -> RisCode:
     """The code of a designer of one's own.
 

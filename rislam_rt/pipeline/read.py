@@ -77,15 +77,17 @@ def build_spec(table: Table, model: type[Spec], check: Callable[[Spec], object])
     Raises
     ------
     ConfigError
-        A key is unknown, a value of the wrong type or out of range. One line that names file and field.
+        A key is unknown, a value of the wrong type or out of range. A line for each that names file and field.
     """
     path, content, changed = table.path, table.content, table.changed
     try:
         spec = model.model_validate(content)
     except ValidationError as error:
         items = error.errors(include_url=False, include_context=False)
-        more = f" (and {len(items) - 1} more)" if len(items) > 1 else ""
-        raise ConfigError(f"{_source(path, _place(items[0]), changed)}: {_remark(items[0], model)}{more}") from None
+        items = [item for item in items if item["loc"] == ("kind",)] or items  # a file of another kind has other keys
+        raise ConfigError(
+            *(f"{_source(path, _place(item), changed)}: {_remark(item, model)}" for item in items)
+        ) from None
     try:
         check(spec)
     except ConfigError as error:
@@ -162,20 +164,32 @@ def _remark(item: Any, model: type[BaseModel]) -> str:
     if item["type"] == "missing":
         return f"{place}: missing; add it"
     if item["type"] == "extra_forbidden":
-        near = get_close_matches(str(item["loc"][-1]), _keys(model), n=1)
-        return f"{place}: unknown key; " + (f"did you mean '{near[0]}'?" if near else "remove it or mend its name")
+        near = _near_key([str(part) for part in item["loc"]], model)
+        return f"{place}: unknown key; " + (f"did you mean '{near}'?" if near else "remove it or mend its name")
     message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
     if isinstance(item["input"], dict):
         return f"{place}: {message}" if place else message
     return f"{place}: {str(item['input'])[:60]!r} received; {message[:1].lower()}{message[1:]}"
 
 
-def _keys(section: type[BaseModel]) -> list[str]:
-    """Every key of a section and of those below it."""
+def _near_key(words: list[str], model: type[BaseModel]) -> str | None:
+    """What an unknown key was meant to be: one of the same table, or else the key of that name of another."""
+    keys = _keys(model)
+    table = ".".join(word for word in words[:-1] if not word.isdigit())
+    own = [key.rpartition(".")[2] for key in keys if key.rpartition(".")[0] == table]
+    near = get_close_matches(words[-1], own, n=1)
+    if near:
+        return near[0]
+    names = {key.rpartition(".")[2]: key for key in reversed(keys)}  # of several tables the first
+    return names.get(words[-1])
+
+
+def _keys(section: type[BaseModel], above: str = "") -> list[str]:
+    """Every key of a section and of those below it, dotted."""
     keys = []
     for name, field in section.model_fields.items():
-        keys.append(name)
+        keys.append(f"{above}{name}")
         for part in (field.annotation, *get_args(field.annotation)):
             if isinstance(part, type) and issubclass(part, BaseModel):
-                keys += _keys(part)
+                keys += _keys(part, f"{above}{name}.")
     return keys

@@ -1,17 +1,29 @@
 """From a list of cycles to arrays over all cycles."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import NOTHING, RisCode, SchemeResult
 from rislam_rt.pipeline.cycle import Cycle
+from rislam_rt.pipeline.inputs import Inputs, inputs_to_dataset, seed_marks
+from rislam_rt.pipeline.told import Told
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
-def gather(scheme: str, cycles: Sequence[Cycle], levels: int) -> SchemeResult:
-    """All cycles of a scheme as one record."""
+class Given(NamedTuple):
+    """What an estimator was given over some cycles, and what it drew from."""
+
+    inputs: Inputs
+    seed: np.random.SeedSequence
+
+
+def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, given: Given) -> SchemeResult:
+    """All cycles of a scheme, whose times (K,) [s] these are, as one record."""
     estimates = [cycle.estimate for cycle in cycles]
     maps = [estimate.map for estimate in estimates]
     ident = np.unique(np.concatenate([m.ident for m in maps]))
@@ -19,14 +31,19 @@ def gather(scheme: str, cycles: Sequence[Cycle], levels: int) -> SchemeResult:
     held = np.zeros((len(cycles), len(ident)), dtype=np.bool_)
     landmark = np.zeros((len(cycles), len(ident), 3))
     ris_probability = np.zeros((len(cycles), len(ident)))
+    several = any(m.panel is not None for m in maps)
+    panel = np.zeros(held.shape, dtype=np.int64) if several else None
     for row, m in enumerate(maps):
         column = np.searchsorted(ident, m.ident)
         held[row, column], landmark[row, column] = True, m.position
         image = np.flatnonzero(m.parent >= 0)
         parent[column[image]] = m.ident[m.parent[image]]
         ris_probability[row, column] = m.ris_probability
+        if panel is not None and m.panel is not None:  # an empty map has none
+            panel[row, column] = m.panel
     return SchemeResult(
         scheme=scheme,
+        time=time,
         position=np.array([estimate.position for estimate in estimates]),
         velocity=np.array([estimate.velocity for estimate in estimates]),
         heading=np.array([estimate.heading for estimate in estimates]),
@@ -46,7 +63,24 @@ def gather(scheme: str, cycles: Sequence[Cycle], levels: int) -> SchemeResult:
         info=_diagnostics([cycle.info for cycle in cycles]),
         outcome=tuple(str(cycle.info.outcome) for cycle in cycles),
         map=maps[-1],
+        panel=panel,
+        given=given,
     )
+
+
+def given_of(told: Told, first: int, cycles: Sequence[Cycle], seed: np.random.SeedSequence) -> Given:
+    """What the estimator was given from cycle `first` on."""
+    span = slice(first, first + len(cycles))
+    time, heading = told.time[span] - told.time[0], told.heading[span]
+    measurements = tuple(cycle.measurement for cycle in cycles)
+    codes = tuple(cycle.believed for cycle in cycles)
+    return Given(Inputs(told.start, told.body, told.panel, time, heading, measurements, codes), seed)
+
+
+def given_to_dataset(result: SchemeResult) -> "xr.Dataset":
+    """What a scheme's estimator was given, as `rislam-rt slam` reads it: nothing in it is of the truth."""
+    inputs, seed = result.given
+    return inputs_to_dataset(inputs, scheme=result.scheme, **seed_marks(seed))
 
 
 def _codes(codes: Sequence[RisCode | None]) -> Integers:

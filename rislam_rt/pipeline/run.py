@@ -15,6 +15,7 @@ from rislam_rt.errors import ConfigError, RislamError, expect
 from rislam_rt.model import Body, Paths, RadioConfig, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.change import change_room
 from rislam_rt.pipeline.control import check_control
+from rislam_rt.pipeline.cycle import usual_step
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.motion import draw_motion
 from rislam_rt.pipeline.own_methods import OwnChannel
@@ -27,6 +28,7 @@ from rislam_rt.pipeline.workers import run_side_by_side
 from rislam_rt.ris import delay_spread_warnings
 from rislam_rt.scene.check import material_errors
 from rislam_rt.scene.findings import raise_errors
+from rislam_rt.slam.inputs import lone_panel
 
 Progress = Callable[[str, int, int], None]
 """Told the stage (`trace` or a scheme), how much of it is done, and how much there is."""
@@ -37,6 +39,8 @@ LIBRARIES = ("numpy", "scipy", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-c
 
 IN_ONE_PIECE = 50_000
 """Most cycles that are traced and held at once: 5 GB in the paper's room."""
+SAME_CYCLE = 0.01
+"""Share of its cycle by which the scene's may differ from the budget: what clocks and their time stamps leave open."""
 CYCLE_BYTES = 100_000
 """Of a cycle while it is traced, in the paper's room with two bounces."""
 
@@ -187,15 +191,20 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     if spec.cycles is not None and spec.cycles > len(motion):
         raise ConfigError(f"cycles: {spec.cycles} received; the scene has {len(motion)}, give no more")
     total = budget.optimise_s + budget.communicate_s + budget.measure_s + budget.localise_s
-    step = float(motion.time[1] - motion.time[0]) if len(motion) > 1 else total
-    if abs(total - step) > 1e-9:
-        raise ConfigError(f"budget: the four steps sum to {total:g} s; make them the scene's cycle of {step:g} s")
+    step = usual_step(motion.time) if len(motion) > 1 else total
+    if abs(total - step) > SAME_CYCLE * step:
+        raise ConfigError(
+            f"budget: the four steps sum to {total:g} s; make them the scene's cycle of {step:g} s, or give "
+            f"agent.cycle_s = {total:g} in the scene, to which a recording is interpolated"
+        )
     if scene.ris is None:
         need = [name for name in spec.schemes if SCHEMES[name].panel]
         if need:
             raise ConfigError(f"schemes: '{need[0]}' needs a panel and scene '{scene.name}' has none; give 'no_ris'")
-    else:
-        check_control(scene.ris.spec, spec.control, spec.panel.bit_flip)
+        return
+    check_control(scene.ris.spec, spec.control, spec.panel.bit_flip)
+    if spec.slam.filter == "window" and any(SCHEMES[n].panel and SCHEMES[n].estimator == "slam" for n in spec.schemes):
+        lone_panel(scene.ris.spec)
 
 
 def prepare_channel(kind: str) -> None:
@@ -234,10 +243,11 @@ def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
     Gains are element by element, so that the far field's limit binds nothing; a path over the panel is one delay, which
     a panel larger than the band resolves would not be.
     """
-    if scene.ris is None or not any(SCHEMES[name].panel for name in spec.schemes):
+    if not any(SCHEMES[name].panel for name in spec.schemes):
         return ()
-    bandwidth = spec.radio.bandwidth_ghz * 1e9
-    return delay_spread_warnings(scene.ris.spec, scene.ris.center, scene.agent.tx, scene.agent.rx, bandwidth)
+    bandwidth, agent = spec.radio.bandwidth_ghz * 1e9, scene.agent
+    each = (delay_spread_warnings(panel.spec, panel.center, agent.tx, agent.rx, bandwidth) for panel in scene.panels)
+    return tuple(line for lines in each for line in lines)
 
 
 def library_versions() -> dict[str, str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from rislam_rt.design import exact_code
+from rislam_rt.design import focus_codes
 from rislam_rt.errors import ConfigError, StoreError
 from rislam_rt.measurement import NO_COMPONENT, ReceiverConfig, num_tones, signals_dataset, twin
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene
@@ -67,15 +67,15 @@ def load_signals_spec(overrides: Sequence[str]) -> SignalsSpec:
     return build_spec(table, SignalsSpec, signal_settings)
 
 
-def signal_settings(spec: SignalsSpec) -> tuple[RadioConfig, ReceiverConfig]:
-    """Radio and receiver in SI units and linear ratios.
+def signal_settings(spec: SignalsSpec, scene: Scene | None = None) -> tuple[RadioConfig, ReceiverConfig]:
+    """Radio and receiver in SI units and linear ratios, told how many panels a scene has that take turns.
 
     Raises
     ------
     ConfigError
         A value is out of the range that the record itself checks, or the receiver makes no samples.
     """
-    receiver = ReceiverConfig(**spec.receiver.model_dump())
+    receiver = ReceiverConfig(**spec.receiver.model_dump(), panels=max(len(scene.panels), 1) if scene else 1)
     if receiver.estimator != "waveform":
         raise ConfigError(f"receiver.estimator: '{receiver.estimator}' received; samples need 'waveform'")
     return build_radio(spec.radio), receiver
@@ -83,9 +83,8 @@ def signal_settings(spec: SignalsSpec) -> tuple[RadioConfig, ReceiverConfig]:
 
 def signals_size(scene: Scene, spec: SignalsSpec) -> SignalsSize:
     """How large the samples will be."""
-    radio, receiver = signal_settings(spec)
-    captures = 1 + int(receiver.alternation)
-    return SignalsSize(len(scene.agent), captures, radio.array.num_antennas, num_tones(radio, receiver))
+    radio, receiver = signal_settings(spec, scene)
+    return SignalsSize(len(scene.agent), receiver.num_captures, radio.array.num_antennas, num_tones(radio, receiver))
 
 
 def check_space(file: Path, size: SignalsSize) -> None:
@@ -115,7 +114,7 @@ def coded_paths(scene: Scene, channel: str, depth: int, spec: SignalsSpec, *, rn
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
-    radio, receiver = signal_settings(spec)
+    radio, receiver = signal_settings(spec, scene)
     if scene.ris is not None and receiver.alternation:
         twin(RisCode(np.zeros((1, 1), dtype=np.int64), scene.ris.spec.levels))
     tracer = build_channel(channel, scene, radio, depth)
@@ -130,20 +129,16 @@ def panel_codes(scene: Scene, paths: Paths, kind: str, *, rng: np.random.Generat
         return None
     panel = scene.ris.spec
     shape = (paths.num_cycles, panel.rows, panel.cols)
-    direct = np.flatnonzero(paths.kind == PathKind.RIS)
-    if kind == "random" or paths.ris is None or not len(direct):
+    if kind == "random" or paths.ris is None or not (paths.kind == PathKind.RIS).any():
         return RisCode(rng.integers(panel.levels, size=shape), panel.levels)
-    legs, row = paths.ris, int(direct[0])
-    response = legs.tx[:, legs.tx_leg[row]] * legs.rx[:, legs.rx_leg[row]]
-    index, _ = exact_code(response.reshape(paths.num_cycles, -1), panel.levels)
-    return RisCode(index.reshape(shape), panel.levels)
+    return focus_codes(paths, panel.levels)
 
 
 def build_signals(
     scene: Scene, paths: Paths, spec: SignalsSpec, *, rng: np.random.Generator, on_cycle: Callable[[], None]
 ) -> "xr.Dataset":
     """True trajectory and paths, samples, and what the receiver found in them, in one data set."""
-    radio, receiver = signal_settings(spec)
+    radio, receiver = signal_settings(spec, scene)
     signals = signals_dataset(paths, scene.agent, radio, receiver, rng=rng, on_cycle=on_cycle)
     truth = paths_to_dataset(paths, scene.agent)
     for part in ("gain_real", "gain_imag"):
@@ -154,4 +149,4 @@ def build_signals(
 
 def mean_components(data: "xr.Dataset") -> float:
     """Components a cycle."""
-    return float((data["found_path"] != NO_COMPONENT).sum()) / max(data.sizes["cycle"], 1)
+    return float((data["found_path"] != NO_COMPONENT).sum()) / max(data.sizes["time"], 1)

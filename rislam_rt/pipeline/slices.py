@@ -26,6 +26,7 @@ from rislam_rt.pipeline.dataset import (
     write_dataset,
 )
 from rislam_rt.pipeline.join import join_paths, join_schemes, thinned_paths, thinned_scheme
+from rislam_rt.pipeline.record import given_to_dataset
 from rislam_rt.pipeline.run import Progress, build_channel
 from rislam_rt.pipeline.seeds import Seeds
 from rislam_rt.pipeline.spec import PipelineSpec, build_radio
@@ -88,6 +89,7 @@ def run_slices(
         for file, data in (
             (slice_file(folder, number, PATHS_FILE), paths_to_dataset(own, scene.agent[first:last])),
             (slice_file(folder, number, f"scheme_{name}.nc"), scheme_to_dataset(part)),
+            (slice_file(folder, number, f"measurements_{name}.nc"), given_to_dataset(part)),
         ):
             write_dataset(seal_dataset(data, run=run, slice=str(number)), file)
     return seconds
@@ -97,7 +99,9 @@ def slice_files(name: str, cycles: int) -> list[str]:
     """Names below the run's folder of all files that a scheme in slices leaves."""
     count = len(slice_bounds(cycles))
     return [
-        str(slice_file(Path(), number, file)) for number in range(count) for file in (PATHS_FILE, f"scheme_{name}.nc")
+        str(slice_file(Path(), number, file))
+        for number in range(count)
+        for file in (PATHS_FILE, f"scheme_{name}.nc", f"measurements_{name}.nc")
     ]
 
 

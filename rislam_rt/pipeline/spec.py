@@ -44,7 +44,7 @@ def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()
 
 
 _Filter = _section("_Filter", SlamConfig, "Fields of `SlamConfig`.")
-_Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.", without=("slot",))
+_Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.", without=("slot", "panels"))
 _BpSlam = _section("_BpSlam", BpSlamConfig, "Fields of `BpSlamConfig`.")
 _ChannelSlam = _section("_ChannelSlam", ChannelSlamConfig, "Fields of `ChannelSlamConfig`.")
 _Designers = _section("_Designers", DesignConfig, "Fields of `DesignConfig`.", without=("certify",))
@@ -66,7 +66,7 @@ class ChannelSlamSection(_ChannelSlam):  # type: ignore[misc, valid-type]
 
 
 class ReceiverSection(_Receiver):  # type: ignore[misc, valid-type]
-    """The receiver's settings, SI units; its slot is `budget.measure_s`."""
+    """The receiver's settings, SI units; its slot is `budget.measure_s`, its panels the room's."""
 
 
 class HardwareSection(_Hardware):  # type: ignore[misc, valid-type]
@@ -315,15 +315,16 @@ class Settings(NamedTuple):
     """What the front end does wrong."""
 
 
-def build_settings(spec: PipelineSpec) -> Settings:
-    """Radio, receiver and filter settings in SI units and linear ratios.
+def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
+    """Radio, receiver and filter settings in SI units and linear ratios, in a room of so many panels.
 
     Raises
     ------
     ConfigError
         A value is out of the range that the record itself checks.
     """
-    radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump(), slot=spec.budget.measure_s)
+    own = {"slot": spec.budget.measure_s, "panels": panels}
+    radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump() | own)
     return Settings(
         radio,
         receiver,

@@ -29,6 +29,7 @@ from rislam_rt.pipeline.dataset import (
 from rislam_rt.pipeline.files import TEMPORARY, make_folders, remove_empty, remove_temporaries, write_atomic
 from rislam_rt.pipeline.identity import Identity
 from rislam_rt.pipeline.lock import LOCK_FILE, hold
+from rislam_rt.pipeline.record import given_to_dataset
 from rislam_rt.pipeline.seal import file_digest, read_sealed, seal
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.write import scene_files, toml_bytes, tum_bytes
@@ -60,6 +61,9 @@ class RunFolder(MutableMapping[str, SchemeResult]):
 
     def __setitem__(self, name: str, result: SchemeResult) -> None:
         data = seal_dataset(scheme_to_dataset(result), **self._stamp())
+        if result.given is not None:
+            given = seal_dataset(given_to_dataset(result), **self._stamp())
+            self._write(given_file(self.folder, name).name, dataset_bytes(given))
         self._write(scheme_file(self.folder, name).name, dataset_bytes(data))
         self.mark(RUNNING)
 
@@ -257,6 +261,11 @@ def scheme_file(folder: Path, name: str) -> Path:
     return folder / f"scheme_{name}.nc"
 
 
+def given_file(folder: Path, name: str) -> Path:
+    """Where what a scheme's estimator was given lies."""
+    return folder / f"measurements_{name}.nc"
+
+
 def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, bytes]:
     """Trajectories, maps, room, configuration and summary: name -> content."""
     motion = result.scene.agent
@@ -333,6 +342,7 @@ def map_table(estimate: MapEstimate) -> dict[str, Any]:
             "std_m": std[row].tolist(),
             "image_of": int(estimate.ident[estimate.parent[row]]) if estimate.parent[row] >= 0 else None,
             "ris_probability": float(estimate.ris_probability[row]),
+            **({} if estimate.panel is None else {"panel": int(estimate.panel[row])}),
             "strength": float(estimate.strength[row]),
         }
         for row in range(len(estimate.ident))

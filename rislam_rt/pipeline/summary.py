@@ -165,8 +165,8 @@ def landmark_scores(scene: Scene, scheme: SchemeResult, least: SchemeBound | Non
             "bound_m": least.landmarks.get(name) if least else None,
             "cycles_held": len(cycles),
         }
-        if scene.ris is not None and number == len(scene.landmarks) - 1:
-            entry["cycles_identified"] = int(np.sum(scheme.ris_probability[cycles, column[cycles]] > 0.5))
+        if (panel := scene.panel_number(number)) >= 0:
+            entry["cycles_identified"] = int(np.sum(scheme.named(panel)[cycles, column[cycles]]))
         scores[name] = entry
     return scores
 

@@ -37,7 +37,7 @@ class Tally:
         self.pairs: Counter[tuple[int, Any]] = Counter()
         self.seconds = np.zeros(len(STEPS))
         count = len(scene.landmarks)
-        self.landmark_square, self.held, self.identified = np.zeros(count), np.zeros(count, int), 0
+        self.landmark_square, self.held, self.identified = np.zeros(count), np.zeros(count, int), np.zeros(count, int)
         self.landmark_final = np.full(count, np.nan)
         self.overlap = _Overlap()
         self.map: Any = None
@@ -94,10 +94,11 @@ class Tally:
         self.landmark_square += np.nansum(track.error**2, axis=0)
         self.held += (track.column >= 0).sum(axis=0)
         self.landmark_final = track.error[-1]
-        if self.scene.ris is not None:
-            column = track.column[:, -1]
+        for panel in range(len(self.scene.panels)):
+            number = len(self.scene.scatterers) + panel
+            column = track.column[:, number]
             rows = np.flatnonzero(column >= 0)
-            self.identified += int(np.sum(part.scheme.ris_probability[rows, column[rows]] > 0.5))
+            self.identified[number] += int(np.sum(part.scheme.named(panel)[rows, column[rows]]))
 
     def _landmarks(self) -> dict[str, dict[str, Any]]:
         found: dict[str, dict[str, Any]] = {}
@@ -109,8 +110,8 @@ class Tally:
                 "bound_m": None,
                 "cycles_held": held,
             }
-            if self.scene.ris is not None and number == len(self.scene.landmarks) - 1:
-                found[name]["cycles_identified"] = self.identified
+            if self.scene.panel_number(number) >= 0:
+                found[name]["cycles_identified"] = int(self.identified[number])
         return found
 
     def _count_components(self, part: Part) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.model import Body, Measurement, Paths, RadioConfig, RisSpec, Trajectory
+from rislam_rt.model import Body, DataSheet, Measurement, Paths, RadioConfig, RisSpec, RisSpecs, Trajectory
 from rislam_rt.pipeline.mistold import ToldSection
 from rislam_rt.pipeline.spec import ESTIMATOR_SECTIONS, PipelineSpec, Settings, StartSection
 from rislam_rt.slam import StartPrior
@@ -23,7 +23,7 @@ class Told(NamedTuple):
     start: StartPrior
     body: Body
     """Where Tx and Rx sit on the agent."""
-    panel: RisSpec | None
+    panel: DataSheet | None
     """Data sheet; None without a panel."""
     settings: Settings
     """Radio and settings of the estimators, as they are told; what concerns the receiver alone is the truth's."""
@@ -34,7 +34,7 @@ class Told(NamedTuple):
 
 
 def tell_belief(
-    motion: Trajectory, body: Body, panel: RisSpec | None, spec: PipelineSpec, settings: Settings,
+    motion: Trajectory, body: Body, panel: DataSheet | None, spec: PipelineSpec, settings: Settings,
     *, start: np.random.Generator, compass: np.random.Generator,
 ) -> Told:  # fmt: skip
     """What a run's belief is told of the truth.
@@ -83,8 +83,14 @@ def tell_start(
     )
 
 
-def tell_panel(panel: RisSpec, told: ToldSection) -> RisSpec:
-    """The panel's data sheet, its orientation included."""
+def tell_panel(panel: DataSheet, told: ToldSection) -> DataSheet:
+    """The data sheet of the panel, or of each of them, its orientation included."""
+    if isinstance(panel, RisSpecs):
+        return RisSpecs(tuple(_tell_one(one, told) for one in panel.panels))
+    return _tell_one(panel, told)
+
+
+def _tell_one(panel: RisSpec, told: ToldSection) -> RisSpec:
     tilt, turn = np.radians(told.panel_tilt_deg), np.radians(told.panel_turn_deg)
     normal, up = panel.normal, panel.up
     if turn:

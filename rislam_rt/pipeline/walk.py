@@ -13,7 +13,7 @@ from rislam_rt.pipeline.control import open_link
 from rislam_rt.pipeline.cycle import Agent, Cycle, Means, Rng, Room, run_cycle
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.front_end import prepare_front_end
-from rislam_rt.pipeline.record import gather
+from rislam_rt.pipeline.record import gather, given_of
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, child
 from rislam_rt.pipeline.spec import PipelineSpec, build_settings
@@ -32,10 +32,11 @@ class Walk:
     def __init__(
         self, name: str, scene: Scene, body: Body, spec: PipelineSpec, seeds: Seeds, estimator: Estimator | None = None
     ) -> None:
-        settings, self.scheme, self.name, self.seeds = build_settings(spec), SCHEMES[name], name, seeds
+        self.scheme, self.name, self.seeds = SCHEMES[name], name, seeds
         self.motion, self.body = scene.agent, body
         self.front_end: FrontEnd | None = None
         panel = scene.ris.spec if scene.ris is not None and self.scheme.panel else None
+        settings = build_settings(spec, 1 if panel is None else len(panel.panels))
         compass, self.sway = (child(seeds.told, number) for number in range(2))
         start = np.random.default_rng(seeds.start)
         told = tell_belief(self.motion, body, panel, spec, settings, start=start, compass=compass)
@@ -76,7 +77,12 @@ class Walk:
             self.agent, outcome = run_cycle(self.agent, room, cycle, self.means, rng=rng)
             cycles.append(outcome)
             tell(self.name, cycle + 1, len(self.motion))
-        return gather(self.name, cycles, self.means.panel.levels if self.means.panel is not None else 0)
+        given = given_of(self.means.told, first, cycles, self.seeds.filter)
+        levels = self.means.panel.levels if self.means.panel is not None else 0
+        found = gather(self.name, self.motion.time[first:last], cycles, levels, given)
+        # a slice does not know what later ones tell of its end
+        whole = first == 0 and last == len(self.motion)
+        return replace(found, smoothed=self.means.estimator.smoothed(self.agent.state)) if whole else found
 
 
 def without_panel(paths: Paths) -> Paths:

@@ -118,8 +118,8 @@ def _draw_plan(axis: Axes, certificate: Certificate) -> None:
         axis.plot(edge[:, 0], edge[:, 1], color=WALL, lw=1.6, solid_capstyle="round", zorder=2)
     for scatterer in scene.scatterers:
         axis.plot(*scatterer.position[:2], "o", ms=9, mfc="none", mec=TRUTH, mew=1.5, zorder=8)
-    if scene.ris is not None:
-        axis.plot(*scene.ris.center[:2], "s", ms=9, mfc="none", mec=TRUTH, mew=1.5, zorder=8)
+    for panel in scene.panels:
+        axis.plot(*panel.center[:2], "s", ms=9, mfc="none", mec=TRUTH, mew=1.5, zorder=8)
     axis.plot(*scene.agent.position[0, :2], "*", color=TRUTH, ms=11, zorder=9)
     axis.set_aspect("equal")
     axis.grid(False)

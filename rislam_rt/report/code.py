@@ -1,6 +1,6 @@
-"""The panel's codes as pictures."""
+"""Codes as pictures."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from rislam_rt.arrays import Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.design import Design
-from rislam_rt.model import PathKind, SlamResult
+from rislam_rt.model import DataSheet, PathKind, RisCode, RisSpecs, SlamResult
 from rislam_rt.report.room import middle_cycles
 from rislam_rt.report.style import save_figure, styled
 
@@ -23,6 +23,7 @@ def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
     schemes = [scheme for scheme in result.schemes.values() if scheme.applied.shape[1]]
     if not schemes:
         return None
+    sheet = result.scene.ris.spec if result.scene.ris is not None else None
     cycles = middle_cycles(len(result.scene.agent), number)
     direct = np.flatnonzero(result.paths.kind == PathKind.RIS)
     with styled():
@@ -30,17 +31,17 @@ def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
         axes = figure.subplots(len(schemes), number, squeeze=False)
         for row, scheme in zip(axes, schemes, strict=True):
             for axis, cycle in zip(row, cycles, strict=True):
-                _draw_code(axis, scheme.applied[cycle], scheme.levels)
+                _draw_code(axis, scheme.applied[cycle], scheme.levels, sheet)
                 gain = np.abs(scheme.gain[cycle, direct]).max(initial=0.0)
                 level = f"{20.0 * np.log10(gain):.1f} dB" if gain > 0.0 else "not seen"
-                axis.set_title(f"t = {result.scene.agent.time[cycle]:.0f} s, {level}", fontsize=9)
+                axis.set_title(f"t = {result.scene.agent.elapsed[cycle]:.0f} s, {level}", fontsize=9)
             row[0].set_ylabel(scheme.scheme, weight="bold")
         _colour_bar(figure, axes, schemes[0].levels)
     return figure
 
 
-def draw_codes(designs: Mapping[str, Design], path: Path) -> Path:
-    """The codes of several designs, with the gain of the direct path; returns the file."""
+def draw_codes(designs: Mapping[str, Design], path: Path, sheet: DataSheet | None = None) -> Path:
+    """The codes of several designs, with the gain of the direct path; returns the file. `sheet`: of several panels."""
     with styled():
         columns = (len(designs) + 1) // 2
         figure = Figure(figsize=(2.4 * columns + 0.8, 5.4))
@@ -48,19 +49,21 @@ def draw_codes(designs: Mapping[str, Design], path: Path) -> Path:
         for axis in axes.flat[len(designs) :]:
             axis.set_visible(False)
         for axis, (name, design) in zip(axes.flat, designs.items(), strict=False):
-            _draw_code(axis, design.code.index, design.code.levels)
+            _draw_code(axis, design.code.index, design.code.levels, sheet)
             axis.set_title(f"{name}\n{design.gain_db:.1f} dB", fontsize=9)
         _colour_bar(figure, axes, next(iter(designs.values())).code.levels)
         return save_figure(figure, path)
 
 
-def _draw_code(axis: Axes, index: Integers, levels: int) -> None:
-    """Levels of an (N, M) panel, row 0 at the bottom (rows run along `up`)."""
+def _draw_code(axis: Axes, index: Integers | Floats, levels: int, sheet: DataSheet | None = None) -> None:
+    """Levels of an (N, M) panel, row 0 at the bottom (rows run along `up`); several panels side by side."""
+    if isinstance(sheet, RisSpecs):
+        index = _side_by_side([part.index for part in sheet.parts(RisCode(index, levels))])
     axis.imshow(index, cmap=_colours(levels), vmin=-0.5, vmax=levels - 0.5, origin="lower", interpolation="nearest")
     axis.set_xticks([])
     axis.set_yticks([])
     axis.grid(False)
-    if max(index.shape) <= MAX_LABELLED:
+    if max(index.shape) <= MAX_LABELLED and np.isfinite(index).all():
         for (row, col), level in np.ndenumerate(index):
             dark = _brightness(int(level), levels) < 0.5
             axis.text(col, row, str(level), ha="center", va="center", fontsize=7, color="white" if dark else "black")
@@ -87,3 +90,13 @@ def _colour_bar(figure: Figure, axes: "np.ndarray[tuple[int, ...], np.dtype[np.o
     bar = figure.colorbar(scale, ax=axes, ticks=ticks, fraction=0.02, pad=0.02, aspect=30)
     bar.ax.set_yticklabels([f"{360.0 * level / levels:.0f}°" for level in ticks])
     bar.set_label("phase shift ξ")
+
+
+def _side_by_side(parts: Sequence[Integers]) -> Floats:
+    """Codes of several panels as one, NaN where no element is, a column between them."""
+    rows, cols = max(len(part) for part in parts), sum(part.shape[1] for part in parts) + len(parts) - 1
+    whole, first = np.full((rows, cols), np.nan), 0
+    for part in parts:
+        whole[: len(part), first : first + part.shape[1]] = part
+        first += part.shape[1] + 1
+    return whole

@@ -13,7 +13,7 @@ from rislam_rt.report.style import KIND, scheme_colour, styled
 
 def draw_agent_error(result: SlamResult) -> Figure:
     """Distance between true and estimated position, with the believed standard deviation as a band."""
-    time = result.scene.agent.time
+    time = result.scene.agent.elapsed
     with styled():
         figure = Figure(figsize=(8.6, 4.1))
         axis = figure.subplots()
@@ -37,7 +37,7 @@ def draw_agent_error(result: SlamResult) -> Figure:
 
 def draw_landmark_errors(result: SlamResult) -> Figure:
     """Distance between each true landmark and the estimate that stands for it."""
-    scene, time = result.scene, result.scene.agent.time
+    scene, time = result.scene, result.scene.agent.elapsed
     tracks = {name: landmark_track(scene, scheme).error for name, scheme in result.schemes.items()}
     with styled():
         figure = Figure(figsize=(8.6, 3.9))
@@ -69,7 +69,7 @@ def draw_levels(result: SlamResult, detection_snr_db: float, snr_per_gain_db: fl
     snr_per_gain_db
         Integrated SNR of a path with gain 0 dB.
     """
-    time, paths = result.scene.agent.time, result.paths
+    time, paths = result.scene.agent.elapsed, result.paths
     with styled():
         figure = Figure(figsize=(8.6, 4.8))
         axis = figure.subplots()

@@ -19,6 +19,8 @@ from rislam_rt.report.style import to_png
 from rislam_rt.report.tables import summary_rows
 from rislam_rt.report.timing import draw_timing
 from rislam_rt.report.verdict import judge_run
+from rislam_rt.report.view.page import view_fragment, view_script, view_style
+from rislam_rt.report.view.run_data import run_data
 
 PAGE = "report.html"
 
@@ -37,12 +39,15 @@ STYLE = """
 .verdict { font-size: 1.25rem; font-weight: 600; margin: 0.6rem 0; } .scroll { overflow-x: auto; }
 ul { margin: 0.3rem 0; padding-left: 1.2rem; }
 body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 1080px; margin: 2rem auto; padding: 0 1rem; }
+body { overflow-wrap: anywhere; }
 h1 { font-size: 1.5rem; margin-bottom: 0.2rem; } h2 { font-size: 1.1rem; margin-top: 2.2rem; }
 img { max-width: 100%; height: auto; } figure { margin: 1.5rem 0; }
 figcaption, .note { color: #555; font-size: 0.9rem; }
 table { border-collapse: collapse; }
 th, td { padding: 0.25rem 1rem 0.25rem 0; text-align: left; border-bottom: 1px solid #ddd; }
 td:not(:first-child), th:not(:first-child) { text-align: right; }
+td, th { overflow-wrap: normal; }
+@media (max-width: 700px) { body > figure { overflow-x: auto; } body > figure img { max-width: none; width: 44rem; } }
 """
 
 
@@ -71,7 +76,7 @@ def draw_figures(result: SlamResult) -> dict[str, bytes]:
     budget = spec.budget
     cycle = len(result.scene.agent) // 2
     first = next(iter(result.schemes.values()))
-    time = result.scene.agent.time[cycle]
+    time = result.scene.agent.elapsed[cycle]
     figures = {
         "room": draw_above(result),
         "error": draw_agent_error(result),
@@ -113,11 +118,12 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{html.escape(title)}</title><style>{STYLE}</style></head><body>
+<title>{html.escape(title)}</title><style>{STYLE}{view_style()}</style></head><body>
 <h1>{html.escape(title)}</h1>
 <p class="verdict">{html.escape(said.headline)}</p>
 <ul>{sentences}</ul>
-<p class="note">{html.escape(about)}</p>
+{view_fragment(run_data(result))}
+<p class="note">{html.escape(about)} The map: what each agent believed at a time; its codes; drag to turn.</p>
 {warnings}{figures}
 <h2>RMSE</h2>
 <div class="scroll"><table><tr><th></th>{head}</tr>{rows}</table></div>
@@ -128,6 +134,7 @@ cut off at 1 m.</p>
 <h2>To repeat it</h2>
 <p class="note">{html.escape(versions)}; scene SHA-256 {html.escape(result.scene.digest)}.
 The folder's <code>config.toml</code> and <code>scene/</code> hold everything.</p>
+<script>{view_script()}</script>
 </body></html>
 """
 

@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.walls import build_walls
+from rislam_rt.constants import COPLANAR_OFFSET
 from rislam_rt.model import PathKind, Paths, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.summary import landmark_track, match_walls
 from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace, section
@@ -17,6 +18,9 @@ from rislam_rt.report.style import KIND, TRUTH, WALL, save_figure, scheme_colour
 
 ZOOM = 0.25
 """Half the width [m] of the close-up of the path's end, unless the error is larger."""
+
+WALL_NAME, MOST_NAMES = "#54606e", 40
+"""Colour of walls' names, and how many are written at most."""
 
 LABEL = np.array([0.02, 0.0, 0.014])
 """From an object to its name in the three-dimensional picture, in sizes of the room."""
@@ -33,7 +37,7 @@ def draw_above(result: SlamResult) -> Figure:
         final = [scheme.position[-1, :2] - result.scene.agent.position[-1, :2] for scheme in schemes]
         half = max(ZOOM, 2.5 * float(np.linalg.norm(final, axis=1).max()))
         for axis, scheme in zip(axes, schemes, strict=True):
-            _draw_truth(axis, result.scene)
+            draw_plan(axis, result.scene)
             _draw_estimate(axis, result.scene, scheme)
             _draw_close_up(axis, result.scene, scheme, half)
             error = np.sqrt(np.mean(np.sum((scheme.position - result.scene.agent.position) ** 2, axis=1)))
@@ -67,17 +71,21 @@ def draw_scene(scene: Scene, path: Path) -> Path:
     with styled():
         figure = Figure(figsize=(11.0, 5.0))
         flat = figure.add_subplot(1, 2, 1)
-        _draw_truth(flat, scene)
+        draw_plan(flat, scene)
+        _name_walls(flat, scene)
         flat.set_xlabel("x [m]")
         flat.set_ylabel("y [m]")
         flat.set_title(f"{scene.name} from above", weight="bold")
         axis: Any = figure.add_subplot(1, 2, 2, projection="3d", computed_zorder=False)
         _draw_room_3d(axis, scene)
+        axis.set_box_aspect(scene.bounds[1] - scene.bounds[0], zoom=0.9)
+        for name, point in wall_places(scene):
+            axis.text(*point, name, fontsize=7, color=WALL_NAME, ha="center", zorder=4)
         _draw_objects_3d(axis, scene, 0)
         return save_figure(figure, path)
 
 
-def _draw_truth(axis: Axes, scene: Scene) -> None:
+def draw_plan(axis: Axes, scene: Scene) -> None:
     """Walls (thick where they stand at the agent's height), path and landmarks as they are."""
     walls, path = build_walls(scene), scene.agent.position
     for edge in outline_edges(walls):
@@ -89,10 +97,40 @@ def _draw_truth(axis: Axes, scene: Scene) -> None:
     axis.annotate("start", (path[0, 0], path[0, 1]), (6, -10), textcoords="offset points", fontsize=9)
     for scatterer in scene.scatterers:
         _mark(axis, scatterer.position, scatterer.name, "o")
-    if scene.ris is not None:
-        _mark(axis, scene.ris.center, scene.ris.name, "s")
+    for panel in scene.panels:
+        _mark(axis, panel.center, panel.name, "s")
     axis.set_aspect("equal")
     axis.grid(False)
+
+
+def wall_places(scene: Scene) -> list[tuple[str, Floats]]:
+    """Names of the reflectors, and the middle (3,) [m] of the largest wall of each; not of all, if they are many."""
+    named = [(reflector.name, largest_middle(reflector.triangles)) for reflector in scene.reflectors]
+    return named[:MOST_NAMES]
+
+
+def largest_middle(triangles: Floats) -> Floats:
+    """Centroid (3,) [m] of the largest of triangles (T, 3, 3), with those that share its plane."""
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    area = np.linalg.norm(across, axis=1)
+    normal = across[np.argmax(area)] / max(float(area.max()), 1e-300)
+    height = (triangles - triangles[np.argmax(area), 0]) @ normal
+    same = np.abs(height).max(axis=1) < COPLANAR_OFFSET
+    return np.asarray(np.average(triangles[same].mean(axis=1), axis=0, weights=area[same]))
+
+
+def _name_walls(axis: Axes, scene: Scene) -> None:
+    """Names at walls that stand up, along them; a floor or a ceiling has none from above."""
+    paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
+    for (name, point), reflector in zip(wall_places(scene), scene.reflectors, strict=False):
+        extent = np.ptp(reflector.vertices, axis=0)
+        if extent[2] < 0.2 * extent[:2].max():
+            continue
+        turn = 90.0 if extent[1] > 2.0 * extent[0] else 0.0
+        x, y, _ = point.tolist()
+        axis.text(
+            x, y, name, fontsize=7, color=WALL_NAME, ha="center", va="center", rotation=turn, zorder=3, bbox=paper
+        )
 
 
 def _mark(axis: Axes, point: Floats, name: str, marker: str) -> None:
@@ -203,9 +241,9 @@ def _draw_objects_3d(axis: Any, scene: Scene, cycle: int) -> None:
     for scatterer in scene.scatterers:
         axis.plot(*scatterer.position, "o", color=KIND[PathKind.PS], mec=TRUTH, ms=9, zorder=9)
         axis.text(*(scatterer.position + label), scatterer.name, fontsize=9, zorder=10)
-    if scene.ris is not None:
-        axis.plot(*scene.ris.center, "s", color=KIND[PathKind.RIS], mec=TRUTH, ms=10, zorder=9)
-        axis.text(*(scene.ris.center + label), scene.ris.name, fontsize=9, zorder=10)
+    for panel in scene.panels:
+        axis.plot(*panel.center, "s", color=KIND[PathKind.RIS], mec=TRUTH, ms=10, zorder=9)
+        axis.text(*(panel.center + label), panel.name, fontsize=9, zorder=10)
 
 
 def _draw_class(axis: Any, scene: Scene, paths: Paths, gain: Floats, cycle: int, kind: PathKind) -> Line2D | None:

@@ -86,6 +86,20 @@ def to_png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
+def picture_kind(path: Path) -> str:
+    """Format of a picture by its file's ending.
+
+    Raises
+    ------
+    ConfigError
+        It is none that can be drawn.
+    """
+    kind = path.suffix.lstrip(".").lower()
+    if kind not in ("png", "svg", "pdf"):
+        raise ConfigError(f"{path}: no picture of that ending; give a name that ends in .png, .svg or .pdf")
+    return kind
+
+
 def save_figure(figure: Figure, path: Path) -> Path:
     """Write a figure, its format by the file's ending, whole or not at all.
 
@@ -96,9 +110,7 @@ def save_figure(figure: Figure, path: Path) -> Path:
     StoreError
         The disk refused.
     """
-    kind = path.suffix.lstrip(".").lower()
-    if kind not in ("png", "svg", "pdf"):
-        raise ConfigError(f"{path}: no picture of that ending; give a name that ends in .png, .svg or .pdf")
+    kind = picture_kind(path)
     buffer = io.BytesIO()
     _save(figure, buffer, format=kind, dpi=DPI)
     write_atomic(path, buffer.getvalue())

@@ -168,15 +168,13 @@ def print_scene(scene: Scene) -> None:
     table = Table("what", "name", "where \\[m]")
     for reflector in scene.reflectors:
         material = reflector.material
-        kind = f"R = {material.reflection:g}" if material.reflection is not None else f"{material.itu}"
+        kind = material.words
         table.add_row("reflector", reflector.name, f"{len(reflector.faces)} triangles, {kind}")
     for scatterer in scene.scatterers:
         table.add_row("scatterer", scatterer.name, f"{_point(scatterer.position)}, {scatterer.rcs:.3g} m2")
-    if scene.ris is not None:
-        spec = scene.ris.spec
-        table.add_row(
-            "panel", scene.ris.name, f"{_point(scene.ris.center)}, {spec.rows} x {spec.cols}, {spec.levels} levels"
-        )
+    for panel in scene.panels:
+        spec = panel.spec
+        table.add_row("panel", panel.name, f"{_point(panel.center)}, {spec.rows} x {spec.cols}, {spec.levels} levels")
     path = scene.agent.position
     table.add_row("agent", f"{len(path)} cycles", f"{_point(path[0])} to {_point(path[-1])}")
     table.add_row("bounds", "", f"{_point(low)} to {_point(high)}")

@@ -53,9 +53,10 @@ def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) 
     over = scores["over_bound"]
     bound = f"{_centimetres(scores['bound_m'])} would be possible" if scores["bound_m"] else "no bound"
     parts = [f"{_centimetres(scores['rmse_m'])}, " + ("at the bound" if over and over <= AT_BOUND else bound)]
-    panel = panel_found_at(result, scheme)
-    if scheme.levels:
-        parts.append("panel not found" if panel is None else f"panel found after {panel:.1f} s")
+    panels = result.scene.panels if scheme.levels else ()
+    for number, panel in enumerate(panels):
+        found, name = panel_found_at(result, scheme, number), "panel" if len(panels) == 1 else panel.name
+        parts.append(f"{name} not found" if found is None else f"{name} found after {found:.1f} s")
     names = [name for name in scores["landmarks"] if "cycles_identified" not in scores["landmarks"][name]]
     held = sum(scores["landmarks"][name]["final_m"] is not None for name in names)
     walls = [wall for wall in scores["walls"].values() if wall["bound_deg"] is not None]
@@ -64,15 +65,15 @@ def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) 
     return "; ".join(parts)
 
 
-def panel_found_at(result: SlamResult, scheme: SchemeResult) -> float | None:
-    """Time [s] from which on the map holds the panel as the panel to the end; None if it does not."""
-    if result.scene.ris is None:
+def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> float | None:
+    """Time [s] from which on the map holds a panel as that panel to the end; None if it does not."""
+    if panel >= len(result.scene.panels):
         return None
-    column = landmark_track(result.scene, scheme).column[:, -1]
+    column = landmark_track(result.scene, scheme).column[:, len(result.scene.scatterers) + panel]
     rows = np.arange(len(column))
     if not len(column) or column[-1] < 0:
         return None
-    known = (column >= 0) & (scheme.ris_probability[rows, column] > 0.5)
+    known = (column >= 0) & scheme.named(panel)[rows, column]
     if not known[-1]:
         return None
     gaps = np.flatnonzero(~known)

@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, freeze
 from rislam_rt.errors import ConfigError
-from rislam_rt.model.ris import RisCode, RisSpec
+from rislam_rt.model.ris import DataSheet, RisCode
 
 FREE = -1
 """Level of an element that is not stuck."""
@@ -37,7 +37,7 @@ class PanelTolerance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PanelErrors:
-    """One panel as it came out of the factory, element by element (N, M)."""
+    """The panel as it came out of the factory, element by element (N, M); of several all elements, (1, E)."""
 
     amplitude: Floats
     """Factor on the data sheet's amplitude, 0 or more."""
@@ -66,14 +66,14 @@ class PanelErrors:
         return RisCode(np.where(self.stuck == FREE, code.index, self.stuck), code.levels)
 
 
-def perfect_panel(spec: RisSpec) -> PanelErrors:
-    """A panel that does what its data sheet says."""
+def perfect_panel(spec: DataSheet) -> PanelErrors:
+    """A panel that does what its data sheet says, or several."""
     shape = spec.rows, spec.cols
     return PanelErrors(np.ones(shape), np.zeros(shape), np.zeros(shape, dtype=np.bool_), np.full(shape, FREE))
 
 
-def draw_panel(spec: RisSpec, tolerance: PanelTolerance, *, rng: np.random.Generator) -> PanelErrors:
-    """A panel with errors drawn independently for each element.
+def draw_panel(spec: DataSheet, tolerance: PanelTolerance, *, rng: np.random.Generator) -> PanelErrors:
+    """A panel, or several, with errors drawn independently for each element.
 
     Every kind of error has a draw of its own, so that changing one tolerance leaves the other errors as they are.
     """

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats
-from rislam_rt.model.ris import RisCode, RisSpec
+from rislam_rt.model.ris import DataSheet, RisCode, RisSpec
 from rislam_rt.ris.element import element_gain_area, element_pattern
 
 
@@ -52,7 +52,7 @@ def far_field_response(
     return (np.asarray(coefficient) * amplitude)[..., None, None] * phase
 
 
-def zero_code(spec: RisSpec) -> RisCode:
+def zero_code(spec: DataSheet) -> RisCode:
     """The code with every element at level 0."""
     return RisCode(np.zeros((spec.rows, spec.cols), dtype=np.int64), spec.levels)
 

@@ -40,20 +40,33 @@ class Fault(SceneError):
         return Finding("error", file, field, self.message, self.mend)
 
 
+class Faults(Fault):
+    """Several things wrong in one file."""
+
+    def __init__(self, faults: list[Fault]) -> None:
+        super().__init__(faults[0].message, faults[0].mend)
+        self.args = tuple(str(fault) for fault in faults)
+        self.faults = faults
+
+
+def panel_key(number: int, panels: int) -> str:
+    """Key of a panel in the scene file: `ris` of one, `ris[number]` of several."""
+    return "ris" if panels == 1 else f"ris[{number}]"
+
+
 def one_line(text: str) -> str:
     """Text without line breaks and other control characters (names in hostile files may hold both)."""
     return "".join(c if c.isprintable() else " " for c in " ".join(text.split()))
 
 
 def raise_errors(findings: list[Finding]) -> None:
-    """Raise the first error, saying how many more there are.
+    """Raise the errors, each a line of one exception.
 
     Raises
     ------
     SceneError
         There is at least one error.
     """
-    errors = [f for f in findings if f.severity == "error"]
+    errors = [f.line for f in findings if f.severity == "error"]
     if errors:
-        more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-        raise SceneError(errors[0].line + more)
+        raise SceneError(*errors)

@@ -1,30 +1,38 @@
 """From a scene folder to a `Scene`."""
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from rislam_rt.arrays import Floats
 from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade
+from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade, join_panels
 from rislam_rt.scene.check import find_errors, find_warnings, material_errors
+from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
 from rislam_rt.scene.containers import too_many_faces
-from rislam_rt.scene.findings import Fault, Finding, raise_errors
-from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, read_inside
+from rislam_rt.scene.findings import Fault, Faults, Finding, panel_key, raise_errors
+from rislam_rt.scene.lying import UNITS, place_mesh
+from rislam_rt.scene.meshes import MAX_COORDINATE, MAX_MESH_BYTES, Mesh, MeshReader, read_inside
 from rislam_rt.scene.motion import build_motion
 from rislam_rt.scene.schema import (
+    MAX_SCENE_BYTES,
     LimitsSection,
     MaterialSection,
+    MeshesSection,
     ReflectorSection,
     RisSection,
     ScattererSection,
     SceneSpec,
+    ShadeSection,
     read_spec,
 )
 from rislam_rt.scene.solids import solid_mesh
 from rislam_rt.shipped import find_room
+from rislam_rt.toml import parse_toml
 
 SCENE_FILE = "scene.toml"
 
@@ -35,6 +43,8 @@ class Draft(NamedTuple):
     file: str
     scene: Scene | None
     findings: list[Finding]
+    bounds: Floats | None = None
+    """(2, 3) [m] of the meshes that could be read."""
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -57,16 +67,32 @@ def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> 
     """Everything wrong (errors), suspicious (warnings) or worth knowing (notes) about a scene, or a scene folder.
 
     A bad scene is an answer, not an exception. Materials are held against the carrier of a radio that is given;
-    warnings about the panel depend on the radio too, the default one if none is given. Where there are errors, warnings
-    are not looked for.
+    warnings about the panel depend on the radio too, the default one if none is given. Where there are errors, of the
+    warnings only those about units are looked for: such a mistake often is what the errors come from.
     """
-    draft = Draft(scene.name, scene, []) if isinstance(scene, Scene) else read_draft(scene)
-    if draft.scene is None:
-        return draft.findings
-    errors = find_errors(draft.scene, draft.file)
+    if isinstance(scene, Scene):
+        return _look_at(scene, scene.name, radio)
+    draft = read_draft(scene)
+    findings = draft.findings if draft.scene is None else _look_at(draft.scene, draft.file, radio)
+    units = list(unit_warnings(draft.file, _plain_table(Path(draft.file)), draft.bounds))
+    if any(finding.severity == "error" for finding in findings):
+        return findings + units
+    return findings + [finding for finding in units if finding.field != SPEED_FIELD]  # the motion's own warning says it
+
+
+def _look_at(scene: Scene, file: str, radio: RadioConfig | None) -> list[Finding]:
+    errors = find_errors(scene, file)
     if radio is not None:
-        errors += material_errors(draft.scene, draft.file, radio)
-    return errors or find_warnings(draft.scene, draft.file, radio or RadioConfig())
+        errors += material_errors(scene, file, radio)
+    return errors or find_warnings(scene, file, radio or RadioConfig())
+
+
+def _plain_table(file: Path) -> dict[str, Any]:
+    """The scene file as TOML gives it; empty if it is none."""
+    try:
+        return parse_toml(file.read_bytes()[: MAX_SCENE_BYTES + 1].decode())
+    except (OSError, ValueError):
+        return {}
 
 
 def read_draft(path: str | Path) -> Draft:
@@ -74,6 +100,8 @@ def read_draft(path: str | Path) -> Draft:
     file = scene_file(path)
     try:
         spec, content = read_spec(file)
+    except Faults as faults:
+        return Draft(str(file), None, [fault.at(str(file), "") for fault in faults.faults])
     except Fault as fault:
         return Draft(str(file), None, [fault.at(str(file), "")])
     return assemble(spec, file, content)
@@ -87,7 +115,7 @@ def scene_file(path: str | Path) -> Path:
 
 def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
     """Read what a specification names and put the scene together."""
-    shelf, findings = Shelf(file.parent, spec.limits), []
+    shelf, findings = Shelf(file.parent, spec.limits, spec.meshes), []
     reflectors = []
     for number, section in enumerate(spec.reflector):
         try:
@@ -100,58 +128,77 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
             scatterers.append(_scatterer(scatterer, shelf))
         except Fault as fault:
             findings.append(fault.at(str(file), f"scatterer[{number}].mesh ({scatterer.name})"))
-    panel = None
+    shades = []
+    for number, shade in enumerate(spec.shade):
+        try:
+            mesh = shelf.mesh(shade.mesh, shade)
+            shades.append(Shade(mesh.vertices, mesh.faces, shade.name))
+        except Fault as fault:
+            findings.append(fault.at(str(file), f"shade[{number}].mesh ({shade.name})"))
+    panels = _panels(spec.ris, str(file), findings)
     try:
-        panel = _panel(spec.ris) if spec.ris else None
-    except Fault as fault:
-        findings.append(fault.at(str(file), "ris.up"))
-    try:
-        agent, shelf.contents["trajectory"] = build_motion(spec.agent, file.parent)
+        if not (findings and spec.agent.random_walk):  # which needs the whole room
+            surfaces = _surfaces(reflectors, [*shades, *(s.shade for s in scatterers if s.shade)])
+            agent, shelf.contents["trajectory"] = build_motion(spec.agent, file.parent, surfaces)
     except Fault as fault:
         findings.append(fault.at(str(file), "agent"))
+    corners = np.concatenate([np.zeros((0, 3)), *(reflector.vertices for reflector in reflectors)])
+    bounds = np.stack([corners.min(axis=0), corners.max(axis=0)]) if len(corners) else None
     if findings:
-        return Draft(str(file), None, findings)
-    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), panel, agent, _digest(content, shelf.contents))
-    return Draft(str(file), scene, [])
+        return Draft(str(file), None, findings, bounds)
+    ris = join_panels(panels)
+    digest = _digest(content, shelf.contents)
+    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(shades))
+    return Draft(str(file), scene, [], bounds)
+
+
+def _surfaces(reflectors: Sequence[Reflector], shades: Sequence[Shade]) -> Floats:
+    """(T, 3, 3) [m] of all that stands in an agent's way."""
+    return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in shades)])
 
 
 class Shelf:
     """The mesh files of a scene: each is read once and kept for the digest, and together they have so many faces."""
 
-    def __init__(self, folder: Path, limits: LimitsSection) -> None:
-        self.folder, self.limits = folder, limits
+    def __init__(self, folder: Path, limits: LimitsSection, lying: MeshesSection) -> None:
+        self.folder, self.limits, self.lying = folder, limits, lying
         self.contents: dict[str, bytes] = {}
         self.reader = MeshReader()
         self.faces = 0
 
-    def mesh(self, place: str, up_axis: str) -> Mesh:
-        """The mesh `file` or `file#node`."""
+    def mesh(self, place: str, section: ReflectorSection | ScattererSection | ShadeSection) -> Mesh:
+        """The mesh `file` or `file#node`, placed as its section says, or else all meshes of the scene."""
         name, _, node = place.partition("#")
         if name not in self.contents:
             self.contents[name] = read_inside(self.folder, name, MAX_MESH_BYTES)
         most = self.limits.faces
-        mesh = self.reader.parse(self.contents[name], name, node or None, most, self.limits.nodes)
+        up, unit = section.up_axis or self.lying.up, UNITS[section.units or self.lying.units]
+        reach = MAX_COORDINATE / unit
+        mesh = self.reader.parse(self.contents[name], name, node or None, most, self.limits.nodes, reach)
         self.faces += len(mesh.faces)
         if self.faces > most:
             raise too_many_faces(self.faces, most)
-        return _z_up(mesh) if up_axis == "y" else mesh
+        origin = self.lying.origin if section.origin is None else section.origin
+        return place_mesh(mesh, up, unit, np.array(origin))
 
 
 def _reflector(section: ReflectorSection, shelf: Shelf) -> Reflector:
-    mesh = shelf.mesh(section.mesh, section.up_axis)
+    mesh = shelf.mesh(section.mesh, section)
     return Reflector(section.name, mesh.vertices, mesh.faces, _material(section.material))
 
 
-def _z_up(mesh: Mesh) -> Mesh:
-    """A quarter turn about x that brings the file's y axis up."""
-    x, y, z = mesh.vertices.T
-    return Mesh(np.stack([x, -z, y], axis=-1), mesh.faces)
-
-
 def _material(section: MaterialSection) -> Material:
-    if section.itu is None or section.thickness_m is None:
-        return Material(section.reflection, section.itu)
-    return Material(section.reflection, section.itu, section.thickness_m)
+    given = {} if section.thickness_m is None else {"thickness": section.thickness_m}
+    return Material(
+        section.reflection,
+        section.itu,
+        permittivity=section.permittivity,
+        conductivity=section.conductivity_s_m or 0.0,
+        reflection_te=section.reflection_te,
+        reflection_tm=section.reflection_tm,
+        scattering=section.scattering,
+        **given,
+    )
 
 
 def _scatterer(section: ScattererSection, shelf: Shelf) -> Scatterer:
@@ -168,14 +215,32 @@ def _scatterer(section: ScattererSection, shelf: Shelf) -> Scatterer:
         rcs = np.pi * (radius or 0.0) ** 2
     mesh = None
     if section.mesh is not None:
-        mesh = shelf.mesh(section.mesh, section.up_axis)
+        mesh = shelf.mesh(section.mesh, section)
     elif section.shadow:
         mesh = solid_mesh(position, radius or 0.0, height, axis)
     shade = None if mesh is None else Shade(mesh.vertices, mesh.faces)
     return Scatterer(section.name, position, rcs, radius, law, height, axis, shade)
 
 
-def _panel(section: RisSection) -> RisPanel:
+def _panels(sections: list[RisSection], file: str, findings: list[Finding]) -> tuple[RisPanel, ...]:
+    """The panels that can be made; what is wrong with the others goes to the findings."""
+    panels = []
+    for number, section in enumerate(sections):
+        try:
+            panels.append(build_panel(section))
+        except Fault as fault:
+            findings.append(fault.at(file, f"{panel_key(number, len(sections))}.up"))
+    return tuple(panels)
+
+
+def build_panel(section: RisSection) -> RisPanel:
+    """The panel of a section.
+
+    Raises
+    ------
+    Fault
+        Its directions have no length, or are not at right angles.
+    """
     normal, up = unit(np.array(section.normal)), unit(np.array(section.up))
     if not normal.any() or not up.any():
         raise Fault("ris.normal or ris.up has no length", "give two directions")

@@ -19,6 +19,8 @@ FORMATS = (".ply", ".obj", ".stl", ".glb")
 MAX_MESH_BYTES = 200_000_000
 MAX_FACES = 50_000
 """What check and trace serve within minutes; a scene file can raise it."""
+MAX_COORDINATE = 1e5
+"""[m]."""
 MAX_NODES = 1_000
 """Of a GLB file: reading takes time in proportion to their square."""
 
@@ -86,10 +88,16 @@ class MeshReader:
         self._loaded: Any = None
 
     def parse(
-        self, content: bytes, name: str, node: str | None = None, max_faces: int = MAX_FACES, max_nodes: int = MAX_NODES
+        self,
+        content: bytes,
+        name: str,
+        node: str | None = None,
+        max_faces: int = MAX_FACES,
+        max_nodes: int = MAX_NODES,
+        reach: float = MAX_COORDINATE,
     ) -> Mesh:
         """See `parse_mesh`. What is too large is refused before it is unfolded: a GLB file may name one mesh in
-        thousands of nodes.
+        thousands of nodes. `reach` is the largest coordinate in the file's unit.
         """
         suffix = PurePosixPath(name).suffix.lower()
         if suffix not in FORMATS:
@@ -103,25 +111,29 @@ class MeshReader:
         elif suffix == ".glb":
             check_glb(content, max_faces, max_nodes)
         mesh = _own_ply(content) if suffix == ".ply" else None
-        return _checked(mesh or self._by_trimesh(content, suffix[1:], node), max_faces)
+        return sound_mesh(mesh or self._by_trimesh(content, suffix[1:], node), max_faces, reach)
 
     def _by_trimesh(self, content: bytes, file_type: str, node: str | None) -> Mesh:
-        """Any format trimesh reads. It gets bytes, not a path, so it can follow no reference to another file."""
-        import trimesh
+        """Any format trimesh reads."""
+        if self._key != (file_type, content):
+            self._loaded = unfold(content, file_type)
+            self._key = (file_type, content)
+        with _one_answer(file_type):
+            return _flatten(self._loaded, node)
 
-        # A damaged file makes trimesh raise nearly anything and numpy warn; here every cause has the same answer.
-        try:
-            with warnings.catch_warnings(), np.errstate(all="ignore"), _silence():
-                warnings.simplefilter("ignore")
-                if self._key != (file_type, content):
-                    self._loaded = trimesh.load_scene(io.BytesIO(content), file_type=file_type, process=False)
-                    self._key = (file_type, content)
-                return _flatten(self._loaded, node)
-        except Fault:
-            raise
-        except Exception as error:
-            cause = f"{type(error).__name__} {one_line(str(error))[:80]}".strip()
-            raise Fault(f"not a readable {file_type.upper()} mesh ({cause})", "export the mesh again") from None
+
+def unfold(content: bytes, file_type: str) -> Any:
+    """A file's content as trimesh's scene. It gets bytes, not a path, so it can follow no reference to another file.
+
+    Raises
+    ------
+    Fault
+        It cannot be read.
+    """
+    import trimesh
+
+    with _one_answer(file_type):
+        return trimesh.load_scene(io.BytesIO(content), file_type=file_type, process=False)
 
 
 def ply_bytes(vertices: Floats, faces: Integers) -> bytes:
@@ -152,6 +164,20 @@ def _own_ply(content: bytes) -> Mesh | None:
     if (rows["count"] != 3).any():
         return None
     return Mesh(vertices.astype(np.float64), rows["corner"].astype(np.int64))
+
+
+@contextmanager
+def _one_answer(file_type: str) -> Iterator[None]:
+    """A damaged file makes trimesh raise nearly anything and numpy warn; here every cause has the same answer."""
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"), _silence():
+            warnings.simplefilter("ignore")
+            yield
+    except Fault:
+        raise
+    except Exception as error:
+        cause = f"{type(error).__name__} {one_line(str(error))[:80]}".strip()
+        raise Fault(f"not a readable {file_type.upper()} mesh ({cause})", "export the mesh again") from None
 
 
 @contextmanager
@@ -187,8 +213,14 @@ def _flatten(loaded: Any, node: str | None) -> Mesh:
     return Mesh(np.concatenate(vertices), np.concatenate(faces))
 
 
-def _checked(mesh: Mesh, max_faces: int) -> Mesh:
-    """The mesh without unused vertices (they would widen the room), if its numbers make sense on their own."""
+def sound_mesh(mesh: Mesh, max_faces: int, reach: float) -> Mesh:
+    """The mesh without unused vertices (they would widen the room), if its numbers make sense on their own.
+
+    Raises
+    ------
+    Fault
+        No faces or too many, a vertex that is not there or not finite, or a coordinate beyond `reach`.
+    """
     vertices, faces = mesh
     if len(faces) == 0:
         raise Fault("the mesh has no faces", "export a mesh with triangles")
@@ -200,7 +232,8 @@ def _checked(mesh: Mesh, max_faces: int) -> Mesh:
     bad = ~np.isfinite(vertices).all(axis=1)
     if bad.any():
         raise Fault(f"vertex {int(np.argmax(bad))} is not finite", "export the mesh again")
-    if np.abs(vertices).max() > 1e5:
-        raise Fault(f"a coordinate of {np.abs(vertices).max():.3g} m", "give metres, near the origin")
     used, compact = np.unique(faces, return_inverse=True)
+    largest = float(np.abs(vertices[used]).max())
+    if largest > reach:
+        raise Fault(f"a coordinate of {largest:.3g}, and {reach:.3g} is the most", "give 'units', near the origin")
     return Mesh(vertices[used], compact.reshape(faces.shape).astype(np.int64))

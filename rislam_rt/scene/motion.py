@@ -1,4 +1,4 @@
-"""The agent's true motion: a straight line, or a TUM file (`timestamp x y z qx qy qz qw`, one pose a line)."""
+"""The agent's true motion: a straight line, a recording (TUM or CSV), a way along waypoints, or a walk at random."""
 
 from pathlib import Path
 from typing import Any
@@ -10,41 +10,51 @@ from rislam_rt.errors import GeometryError
 from rislam_rt.model import Body, Trajectory
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.meshes import read_inside
-from rislam_rt.scene.schema import SMALLEST, AgentSection
+from rislam_rt.scene.random_walk import draw_walk
+from rislam_rt.scene.recorded import Recording, parse_csv, parse_tum
+from rislam_rt.scene.schema import AgentSection
+from rislam_rt.scene.waypoints import Way, round_corners
 
 MAX_TUM_BYTES = 100_000_000
-MAX_TIME = 1e11
-"""[s] From the epoch on, three thousand years: a recording's clock, and float64 still tells microseconds apart."""
-MAX_STEP = 1e6
-"""[s] Twelve days: longer gaps lie between recordings, not within one."""
-MAX_TILT = 1e-3
-"""Largest angle [rad] of a pose's z axis from the room's: the body turns about z only."""
+MAX_CYCLES = 1_000_000
+SAME_STEP = 1e-6
+"""[s] Steps this near to the cycle are the cycle; time stamps from the epoch on are no finer."""
+LONGEST_GAP = 5.0
+"""[s] Over a longer gap in a recording nothing is interpolated: where the agent went is not known."""
 
 
-def build_motion(agent: AgentSection, folder: Path) -> tuple[Trajectory, bytes]:
-    """The trajectory of a scene file's agent section, and the bytes of its TUM file (empty without one).
+def build_motion(agent: AgentSection, folder: Path, triangles: Floats) -> tuple[Trajectory, bytes]:
+    """The trajectory of a scene file's agent section, and the bytes of its recording (empty without one).
+
+    Parameters
+    ----------
+    triangles
+        (T, 3, 3) [m] of all that a random walk keeps away from.
 
     Raises
     ------
     Fault
-        Tx and Rx coincide, or the TUM file is missing, damaged or contradicts the section.
+        Tx and Rx coincide, the recording is missing, damaged or contradicts the section, or no such way exists.
     """
     body = _body(agent)
-    if agent.trajectory is None:
+    if agent.velocity is not None:
         return straight_motion(agent.start, agent.velocity, agent.cycles or 0, agent.cycle_s or 0.0, body), b""
-    content = read_inside(folder, agent.trajectory, MAX_TUM_BYTES)
-    time, position, heading = parse_tum(content)
-    if agent.cycles is not None:
-        if agent.cycles > len(time):
-            raise Fault(
-                f"{agent.cycles} cycles wanted, {len(time)} poses in '{agent.trajectory}'", "lower agent.cycles"
-            )
-        time, position, heading = time[: agent.cycles], position[: agent.cycles], heading[: agent.cycles]
-    if agent.cycle_s is not None and np.abs(np.diff(time) - agent.cycle_s).max(initial=0.0) > 1e-6:
-        raise Fault(f"time steps of '{agent.trajectory}' differ from agent.cycle_s = {agent.cycle_s}", "mend either")
-    if agent.start is not None and np.linalg.norm(position[0] - agent.start) > 1e-3:
-        raise Fault(f"first pose {position[0].tolist()} is not agent.start {agent.start}", "leave agent.start out")
-    return Trajectory(time, position, _velocity(time, position), heading, body), content
+    if agent.trajectory is not None:
+        content = read_inside(folder, agent.trajectory, MAX_TUM_BYTES)
+        return _recorded_motion(agent, content, body), content
+    assert agent.speed_m_s is not None
+    assert agent.cycle_s is not None
+    radius = agent.speed_m_s**2 / agent.acceleration_m_s2
+    if agent.waypoints is not None:
+        way = round_corners(np.array(agent.waypoints, dtype=np.float64), radius)
+    else:
+        assert agent.random_walk is not None
+        assert agent.cycles is not None
+        length = agent.speed_m_s * agent.cycle_s * (agent.cycles - 1)
+        rng = np.random.default_rng(agent.random_walk.seed)
+        start = np.array(agent.start, dtype=np.float64)
+        way = draw_walk(start, length, radius, agent.random_walk.clearance_m, triangles, rng=rng)
+    return travel(way, agent.speed_m_s, agent.cycle_s, agent.cycles, body), b""
 
 
 def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body: Body) -> Trajectory:
@@ -56,48 +66,85 @@ def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body
     return Trajectory(time, position, np.tile(speed, (cycles, 1)), np.full(cycles, heading), body)
 
 
-def parse_tum(content: bytes) -> tuple[Floats, Floats, Floats]:
-    """Time (K,) [s], position (K, 3) [m] and heading (K,) [rad] of a TUM file; `#` starts a comment.
+def travel(way: Way, speed: float, cycle_s: float, cycles: int | None, body: Body) -> Trajectory:
+    """Along a way at constant speed [m/s], heading along it; to its end, or for so many cycles.
 
     Raises
     ------
     Fault
-        A line is not eight finite numbers, time does not grow, or a pose is tilted.
+        The way is too short for the cycles, or too long.
     """
-    rows = []
-    for number, line in enumerate(content.decode("utf-8", errors="replace").splitlines(), start=1):
-        words = line.split("#")[0].split()
-        if words:
-            rows.append(_pose(words, number))
-    if not rows:
-        raise Fault("the trajectory file holds no pose", "give lines 'timestamp x y z qx qy qz qw'")
-    table = np.array(rows)
-    time, position, q = table[:, 0], table[:, 1:4], table[:, 4:]
-    if np.abs(time).max() > MAX_TIME:
-        raise Fault(f"a time of {time[np.argmax(np.abs(time))]:.3g} s in the trajectory", "give seconds")
+    most = int(way.total / (speed * cycle_s) + 1e-9) + 1
+    if cycles is not None and cycles > most:
+        raise Fault(
+            f"{cycles} cycles wanted, the way of {way.total:.3g} m ends after {most}",
+            "lower agent.cycles, or lead the way on",
+        )
+    if (cycles or most) > MAX_CYCLES:
+        raise Fault(f"the way of {way.total:.3g} m takes {most} cycles", f"give at most {MAX_CYCLES}: agent.cycles")
+    time = np.arange(cycles or most, dtype=np.float64) * cycle_s
+    position, along = way.at(speed * time)
+    return Trajectory(time, position, speed * along, along_heading(along), body)
+
+
+def along_heading(course: Floats) -> Floats:
+    """(K,) [rad] of courses (K, 3); where one has no horizontal part, that of the one before, or after."""
+    level = np.hypot(course[:, 0], course[:, 1]) > 1e-9 * np.maximum(np.linalg.norm(course, axis=1), 1e-300)
+    if not level.any():
+        return np.zeros(len(course))
+    last = np.maximum.accumulate(np.where(level, np.arange(len(course)), -1))
+    row = np.where(last >= 0, last, int(np.argmax(level)))
+    return np.asarray(np.arctan2(course[row, 1], course[row, 0]))
+
+
+def at_cycles(recording: Recording, cycle_s: float) -> Recording:
+    """A recording at even times, from its first on: monotone cubics through the places, straight lines through angles.
+
+    Raises
+    ------
+    Fault
+        A gap is longer than `LONGEST_GAP`, or there would be too many cycles.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    time = recording.time - recording.time[0]
     step = np.diff(time)
-    if (step <= 0.0).any():
-        pose = int(np.argmax(step <= 0.0)) + 1
-        raise Fault(f"time does not grow at pose {pose} ({time[pose]} s)", "sort the poses and drop repeated ones")
-    odd = (step < SMALLEST) | (step > MAX_STEP)
-    if odd.any():
-        pose = int(np.argmax(odd)) + 1
+    if step.max(initial=0.0) > max(LONGEST_GAP, cycle_s):
+        pose = int(np.argmax(step))
         raise Fault(
-            f"{step[pose - 1]:.3g} s from the pose before to pose {pose}",
-            f"give steps of {SMALLEST:g} to {MAX_STEP:g} s: cut the file at a gap, thin it out where it is too dense",
+            f"{step[pose]:.3g} s without a pose after pose {pose}, over which agent.cycle_s would have to interpolate",
+            "cut the file there",
         )
-    if np.abs(position).max() > 1e5:
-        raise Fault(f"a coordinate of {np.abs(position).max():.3g} m in the trajectory", "give metres")
-    length = np.linalg.norm(np.clip(q, -2.0, 2.0), axis=1)  # a wrong length stays one, and no square overflows
-    if (np.abs(length - 1.0) > 1e-3).any():
-        raise Fault(
-            f"quaternion of pose {int(np.argmax(np.abs(length - 1.0) > 1e-3))} has not length 1", "normalise it"
-        )
-    x, y, z, w = (q / length[:, None]).T
-    tilt = 2.0 * np.hypot(x, y)
-    if (tilt > MAX_TILT).any():
-        raise Fault(f"pose {int(np.argmax(tilt > MAX_TILT))} is tilted", "give rotations about z only (qx = qy = 0)")
-    return time, position, 2.0 * np.arctan2(z, w)
+    count = int(time[-1] / cycle_s + 1e-6) + 1
+    if count > MAX_CYCLES:
+        raise Fault(f"{count} cycles of {cycle_s:g} s in the trajectory", f"give at most {MAX_CYCLES}")
+    even = np.minimum(np.arange(count) * cycle_s, time[-1])
+    position = PchipInterpolator(time, recording.position, axis=0)(even) if len(time) > 1 else recording.position
+    heading = None if recording.heading is None else np.interp(even, time, np.unwrap(recording.heading))
+    return Recording(recording.time[0] + np.arange(count) * cycle_s, position, heading)
+
+
+def _recorded_motion(agent: AgentSection, content: bytes, body: Body) -> Trajectory:
+    assert agent.trajectory is not None
+    named = agent.columns or {}
+    is_csv = agent.trajectory.lower().endswith(".csv")
+    if named and not is_csv:
+        raise Fault(f"'{agent.trajectory}' is no CSV file, and agent.columns is given", "leave agent.columns out")
+    found = parse_csv(content, named) if is_csv else Recording(*parse_tum(content))
+    if agent.start is not None and np.linalg.norm(found.position[0] - agent.start) > 1e-3:
+        raise Fault(f"first pose {found.position[0].tolist()} is not agent.start {agent.start}", "leave it out")
+    if agent.cycle_s is not None and np.abs(np.diff(found.time) - agent.cycle_s).max(initial=0.0) > SAME_STEP:
+        found = at_cycles(found, agent.cycle_s)
+    time, position, heading = found
+    if agent.cycles is not None:
+        if agent.cycles > len(time):
+            raise Fault(
+                f"{agent.cycles} cycles wanted, {len(time)} poses in '{agent.trajectory}'", "lower agent.cycles"
+            )
+        time, position = time[: agent.cycles], position[: agent.cycles]
+        heading = None if heading is None else heading[: agent.cycles]
+    velocity = _velocity(time, position)
+    return Trajectory(time, position, velocity, along_heading(velocity) if heading is None else heading, body)
 
 
 def _velocity(time: Floats, position: Floats) -> Floats:
@@ -105,18 +152,6 @@ def _velocity(time: Floats, position: Floats) -> Floats:
     if len(time) < 2:
         return np.zeros_like(position)
     return np.asarray(np.gradient(position, time, axis=0), dtype=np.float64)
-
-
-def _pose(words: list[str], number: int) -> list[float]:
-    try:
-        row = [float(word) for word in words]
-    except ValueError:
-        row = []
-    if len(row) != 8 or not np.isfinite(row).all():
-        raise Fault(
-            f"line {number} of the trajectory is not eight finite numbers", "give 'timestamp x y z qx qy qz qw'"
-        )
-    return row
 
 
 def _body(agent: AgentSection) -> Body:

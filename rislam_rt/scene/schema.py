@@ -5,9 +5,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.scene.findings import Fault, Faults, one_line
 from rislam_rt.toml import parse_toml
 
 MAX_SCENE_BYTES = 4_000_000
@@ -28,9 +28,13 @@ Name = Annotated[
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 ItuMaterial = Literal[
-    "brick", "ceiling_board", "chipboard", "concrete", "floorboard", "glass", "marble", "medium_dry_ground", "metal",
-    "plasterboard", "plywood", "very_dry_ground", "wet_ground", "wood",
+    "asphalt_concrete", "brick", "carpet_tile", "ceiling_board", "chipboard", "clear_acrylic", "concrete", "floorboard",
+    "glass", "marble", "medium_dry_ground", "metal", "plasterboard", "plywood", "very_dry_ground", "vinyl_tile",
+    "wet_ground", "wood",
 ]  # fmt: skip
+
+
+Units = Literal["mm", "cm", "m", "in"]
 
 
 class Section(BaseModel):
@@ -40,31 +44,71 @@ class Section(BaseModel):
 
 
 class MaterialSection(Section):
-    """Either `reflection` (the same at every angle) or `itu`, a slab of an ITU-R P.2040 material."""
+    """One of `reflection` (the same at every angle), `reflection_te` with `reflection_tm` (one for each polarisation),
+    `itu`, a slab of an ITU-R P.2040 material, and `permittivity` (relative, with `conductivity_s_m`), a slab of one's
+    own. `scattering` takes a share from the mirrored ray.
+    """
 
     reflection: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
     itu: ItuMaterial | None = None
+    permittivity: Annotated[float, Field(ge=1.0, le=1e6, allow_inf_nan=False)] | None = None
+    conductivity_s_m: Annotated[float, Field(ge=0.0, le=1e9, allow_inf_nan=False)] | None = None
     thickness_m: Length | None = None
+    reflection_te: Annotated[float, Field(ge=-1.0, le=1.0)] | None = None
+    reflection_tm: Annotated[float, Field(ge=-1.0, le=1.0)] | None = None
+    scattering: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
 
     @model_validator(mode="after")
     def _one_kind(self) -> "MaterialSection":
-        if (self.reflection is None) == (self.itu is None):
-            raise ValueError("give either 'reflection' or 'itu'")
-        if self.itu is None and self.thickness_m is not None:
-            raise ValueError("'thickness_m' has a meaning with 'itu' only")
+        if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity, self.reflection_te)) != 1:
+            raise ValueError("give one of 'reflection', 'itu', 'permittivity' and 'reflection_te'")
+        if (self.reflection_te is None) != (self.reflection_tm is None) or 0.0 in (
+            self.reflection_te, self.reflection_tm
+        ):  # fmt: skip
+            raise ValueError("give 'reflection_te' and 'reflection_tm' together, neither of them 0")
+        if self.itu is None and self.permittivity is None and self.thickness_m is not None:
+            raise ValueError("'thickness_m' has a meaning with 'itu' or 'permittivity' only")
+        if self.permittivity is None and self.conductivity_s_m is not None:
+            raise ValueError("'conductivity_s_m' has a meaning with 'permittivity' only")
+        if self.permittivity == 1.0 and not self.conductivity_s_m:
+            raise ValueError("a permittivity of 1 without 'conductivity_s_m' is air; give more of either, or no mesh")
         return self
 
 
 class ReflectorSection(Section):
     """A smooth mesh. `mesh = "room.glb#node"` takes one named node of a GLB file, with its transform applied.
 
-    `up_axis = "y"` turns a file whose y axis points up (as glTF's standard says) into the room's frame with z up.
+    `up_axis = "y"` turns a file whose y axis points up (as glTF's standard says) into the room's frame with z up,
+    `units` and `origin` are those of `[meshes]`, for this mesh alone.
     """
 
     name: Name
     mesh: str
     material: MaterialSection
-    up_axis: Literal["y", "z"] = "z"
+    up_axis: Literal["y", "z"] | None = None
+    units: Units | None = None
+    origin: Vector | None = None
+
+
+class ShadeSection(Section):
+    """A mesh that hides what lies behind it and reflects nothing: clutter too small or too round to be a mirror."""
+
+    name: Name
+    mesh: str
+    up_axis: Literal["y", "z"] | None = None
+    units: Units | None = None
+    origin: Vector | None = None
+
+
+class MeshesSection(Section):
+    """How the mesh files of the scene lie, unless a mesh says otherwise."""
+
+    up: Literal["y", "z"] = "z"
+    """The axis of the file that points up."""
+    units: Units = "m"
+    """What a unit of the file is."""
+    origin: Vector = [0.0, 0.0, 0.0]
+    """[m] The point, z up, that becomes the room's zero."""
 
 
 class ScattererSection(Section):
@@ -84,7 +128,9 @@ class ScattererSection(Section):
     axis: Vector | None = None
     shadow: bool = False
     mesh: str | None = None
-    up_axis: Literal["y", "z"] = "z"
+    up_axis: Literal["y", "z"] | None = None
+    units: Units | None = None
+    origin: Vector | None = None
 
     @model_validator(mode="after")
     def _one_size(self) -> "ScattererSection":
@@ -117,12 +163,28 @@ class RisSection(Section):
     host: Name | None = None
 
 
+class WalkSection(Section):
+    """A walk at random through the room, level, from the agent's start."""
+
+    seed: Annotated[int, Field(ge=0, lt=2**63)]
+    clearance_m: Length = 0.4
+    """Least distance from every surface."""
+
+
 class AgentSection(Section):
-    """The agent's true motion: straight from `start` with `velocity`, or along a TUM file `trajectory`."""
+    """The agent's true motion, one of four: straight from `start` with `velocity`; recorded, `trajectory`, a TUM or CSV
+    file; along `waypoints`; or a `random_walk`."""
 
     start: Vector | None = None
     velocity: Vector | None = None
     trajectory: str | None = None
+    columns: dict[str, str] | None = None
+    """What the columns of a CSV file are called, where not as `recorded.COLUMNS`."""
+    waypoints: Annotated[list[Vector], Field(min_length=2, max_length=10_000)] | None = None
+    random_walk: WalkSection | None = None
+    speed_m_s: Length | None = None
+    acceleration_m_s2: Length = 0.5
+    """At the corners of a way: their arcs have the radius speed squared over this."""
     cycles: Count | None = None
     cycle_s: Length | None = None
     tx_offset_m: Vector | None = None
@@ -130,12 +192,30 @@ class AgentSection(Section):
 
     @model_validator(mode="after")
     def _one_motion(self) -> "AgentSection":
-        if (self.velocity is None) == (self.trajectory is None):
-            raise ValueError("give either 'velocity' or 'trajectory'")
-        straight = (self.start, self.cycles, self.cycle_s)
-        if self.velocity is not None and any(value is None for value in straight):
-            raise ValueError("'velocity' needs 'start', 'cycles' and 'cycle_s' beside it")
+        given = [name for name in MOTIONS if getattr(self, name) is not None]
+        if len(given) != 1:
+            received = f"{' and '.join(map(repr, given))} given; " if given else ""
+            raise ValueError(f"{received}give one of {', '.join(map(repr, MOTIONS))}")
+        missing = [name for name in MOTIONS[given[0]] if getattr(self, name) is None]
+        if missing:
+            raise ValueError(f"'{given[0]}' needs {', '.join(map(repr, missing))} beside it")
+        if self.waypoints is not None and self.start is not None:
+            raise ValueError("the first waypoint is the start; leave 'start' out")
+        if self.speed_m_s is not None and given[0] not in ("waypoints", "random_walk"):
+            raise ValueError(f"'speed_m_s' means nothing with '{given[0]}'; leave it out")
+        unknown = set(self.columns or ()) - {"time", "x", "y", "z", "heading", "qx", "qy", "qz", "qw"}
+        if unknown:
+            raise ValueError(f"columns: '{min(unknown)[:20]}' is none of time, x, y, z, heading, qx, qy, qz, qw")
         return self
+
+
+MOTIONS = {
+    "velocity": ("start", "cycles", "cycle_s"),
+    "trajectory": (),
+    "waypoints": ("speed_m_s", "cycle_s"),
+    "random_walk": ("start", "speed_m_s", "cycles", "cycle_s"),
+}
+"""Keys of a motion, one of which is given, and what each needs beside it."""
 
 
 class LimitsSection(Section):
@@ -149,13 +229,21 @@ class LimitsSection(Section):
     """Each is traced on its own, with every wall on both legs."""
 
 
+def _listed(value: Any) -> Any:
+    """One table `[ris]` as a list of one."""
+    return [value] if isinstance(value, dict) else value
+
+
 class SceneSpec(Section):
     """A whole scene file."""
 
     name: Name
     reflector: Annotated[list[ReflectorSection], Field(min_length=1, max_length=10_000)]
     scatterer: list[ScattererSection] = []
-    ris: RisSection | None = None
+    shade: Annotated[list[ShadeSection], Field(max_length=10_000)] = []
+    meshes: MeshesSection = MeshesSection()
+    ris: Annotated[list[RisSection], BeforeValidator(_listed), Field(max_length=100)] = []
+    """`[ris]` for one panel, `[[ris]]` for several."""
     agent: AgentSection
     limits: LimitsSection = LimitsSection()
 
@@ -166,6 +254,16 @@ class SceneSpec(Section):
                 f"{len(self.scatterer)} scatterers, of which each is traced on its own; "
                 f"take fewer, or raise limits.scatterers = {self.limits.scatterers}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _panels_told_apart(self) -> "SceneSpec":
+        names = [panel.name for panel in self.ris]
+        if len(set(names)) < len(names):
+            raise ValueError(f"ris.name: {', '.join(names)} received; give every panel a name of its own")
+        levels = [panel.levels for panel in self.ris]
+        if len(set(levels)) > 1:
+            raise ValueError(f"ris.levels: {levels} received; give all panels the same number of phase levels")
         return self
 
 
@@ -193,14 +291,15 @@ def validate_spec(table: dict[str, Any]) -> SceneSpec:
 
     Raises
     ------
-    Fault
-        Fields are missing, unknown or out of range; all of them in one line.
+    Faults
+        Fields are missing, unknown or out of range: one fault a field.
     """
     try:
         return SceneSpec.model_validate(table)
     except ValidationError as error:
-        remarks = [_remark(item) for item in error.errors(include_url=False, include_context=False)]
-    raise Fault("; ".join(remarks[:8]), f"mend these {len(remarks)} fields" if len(remarks) > 1 else "mend this field")
+        lone = isinstance(table.get("ris"), dict)
+        remarks = [_remark(item, lone) for item in error.errors(include_url=False, include_context=False)]
+    raise Faults([Fault(remark, "mend this field") for remark in remarks])
 
 
 def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
@@ -208,7 +307,7 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
 
     Raises
     ------
-    Fault
+    Fault, Faults
         The file cannot be read or its content is not a scene.
     """
     if not path.is_file():
@@ -221,9 +320,12 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
     return parse_spec(content), content
 
 
-def _remark(item: Any) -> str:
+def _remark(item: Any, lone_panel: bool) -> str:
     """One bad field: where, what was received, what is wanted."""
-    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"]).lstrip(".")
+    where = item["loc"]
+    if lone_panel and where[:2] == ("ris", 0):  # the file has `[ris]`
+        where = ("ris", *where[2:])
+    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).lstrip(".")
     place = _short(place, 80)
     if item["type"] == "missing":
         return f"{place}: missing"
@@ -239,8 +341,8 @@ def _remark(item: Any) -> str:
 
 
 def _known_keys() -> list[str]:
-    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, RisSection, AgentSection,
-                LimitsSection)  # fmt: skip
+    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, ShadeSection, MeshesSection,
+                RisSection, AgentSection, WalkSection, LimitsSection)  # fmt: skip
     return [key for section in sections for key in section.model_fields]
 
 

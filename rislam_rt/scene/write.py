@@ -13,7 +13,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError, StoreError
-from rislam_rt.model import Material, Scatterer, Scene, Trajectory
+from rislam_rt.model import Material, RisPanel, Scatterer, Scene, Trajectory
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
 from rislam_rt.scene.names import safe_name
@@ -37,10 +37,12 @@ def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) ->
 
 def scene_files(scene: Scene) -> dict[str, bytes]:
     """A scene as files, name -> content: `scene.toml`, one PLY mesh a reflector, the agent's path unless straight."""
-    files = {_mesh_file(r.name): ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
+    files = {mesh_file(r.name): ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
     for scatterer in scene.scatterers:
         if scatterer.shade is not None and not _has_own_shadow(scatterer):
             files[_shade_file(scatterer)] = ply_bytes(scatterer.shade.vertices, scatterer.shade.faces)
+    for shade in scene.shades:
+        files[mesh_file(shade.name)] = ply_bytes(shade.vertices, shade.faces)
     agent = _agent_table(scene.agent)
     if "trajectory" in agent:
         files[TRAJECTORY_FILE] = tum_bytes(scene.agent.time, scene.agent.position, scene.agent.heading)
@@ -145,18 +147,22 @@ def _toml_key(key: str) -> str:
 def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
     table: dict[str, Any] = {"name": scene.name}
     table["reflector"] = [
-        {"name": r.name, "mesh": _mesh_file(r.name), "material": _material_table(r.material)} for r in scene.reflectors
+        {"name": r.name, "mesh": mesh_file(r.name), "material": _material_table(r.material)} for r in scene.reflectors
     ]
     table["scatterer"] = [_scatterer_table(scatterer) for scatterer in scene.scatterers]
-    if scene.ris is not None:
-        spec = scene.ris.spec
-        table["ris"] = {"name": scene.ris.name, "center": scene.ris.center.tolist()}
-        table["ris"] |= {"normal": spec.normal.tolist(), "up": spec.up.tolist()}
-        table["ris"] |= {"rows": spec.rows, "cols": spec.cols, "spacing_m": spec.spacing.tolist()}
-        table["ris"] |= {"levels": spec.levels, "element": spec.element, "amplitude": spec.amplitude}
-        table["ris"] |= {"host": scene.ris.host} if scene.ris.host else {}
+    table["shade"] = [{"name": shade.name, "mesh": mesh_file(shade.name)} for shade in scene.shades]
+    panels = [_panel_table(panel) for panel in scene.panels]
+    table["ris"] = panels[0] if len(panels) == 1 else panels
     table["agent"] = agent
     return {key: value for key, value in table.items() if value != []}
+
+
+def _panel_table(panel: RisPanel) -> dict[str, Any]:
+    spec, table = panel.spec, {"name": panel.name, "center": panel.center.tolist()}
+    table |= {"normal": spec.normal.tolist(), "up": spec.up.tolist()}
+    table |= {"rows": spec.rows, "cols": spec.cols, "spacing_m": spec.spacing.tolist()}
+    table |= {"levels": spec.levels, "element": spec.element, "amplitude": spec.amplitude}
+    return table | ({"host": panel.host} if panel.host else {})
 
 
 def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
@@ -186,17 +192,24 @@ def _has_own_shadow(scatterer: Scatterer) -> bool:
 
 
 def _shade_file(scatterer: Scatterer) -> str:
-    return _mesh_file(scatterer.name)
+    return mesh_file(scatterer.name)
 
 
-def _mesh_file(name: str) -> str:
+def mesh_file(name: str) -> str:
+    """Where the mesh of a part lies in a scene folder."""
     return f"meshes/{safe_name(name)}.ply"
 
 
 def _material_table(material: Material) -> dict[str, Any]:
-    if material.itu is None:
-        return {"reflection": material.reflection}
-    return {"itu": material.itu, "thickness_m": material.thickness}
+    rough = {"scattering": material.scattering} if material.scattering > 0.0 else {}
+    if material.reflection is not None:
+        return {"reflection": material.reflection} | rough
+    if material.itu is not None:
+        return {"itu": material.itu, "thickness_m": material.thickness} | rough
+    if material.reflection_te is not None:
+        return {"reflection_te": material.reflection_te, "reflection_tm": material.reflection_tm} | rough
+    own = {"permittivity": material.permittivity, "conductivity_s_m": material.conductivity}
+    return own | {"thickness_m": material.thickness} | rough
 
 
 def _agent_table(agent: Trajectory) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Floor 5: localisation and mapping. The belief never reads truth: nothing here sees a channel or a scene."""
 
 from rislam_rt.slam.config import SlamConfig, StartPrior
-from rislam_rt.slam.estimator import estimate, init, predict, step
+from rislam_rt.slam.estimator import estimate, init, predict, smoothed, step
 from rislam_rt.slam.filter import FilterState, Outcome, StepInfo, revisit
 
 __all__ = [
@@ -14,5 +14,6 @@ __all__ = [
     "init",
     "predict",
     "revisit",
+    "smoothed",
     "step",
 ]

@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Body
 from rislam_rt.slam.associate import squared_distance
-from rislam_rt.slam.book import Book, enter, named_panel
+from rislam_rt.slam.book import Book, enter
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.hypotheses import (
     IMAGE,
@@ -105,8 +105,8 @@ class Birth(NamedTuple):
     """(K, 3)."""
     log_grid: Floats | None = None
     """(G,) what its amplitudes told of its strength; None if they were not weighed."""
-    log_ris: float = 0.0
-    """Log odds of its being the panel."""
+    log_ris: Floats | float = 0.0
+    """(Q,) log odds of its being each of the panels."""
 
     @property
     def prior(self) -> Floats:
@@ -156,8 +156,9 @@ def examine(
         history, slots = track_history(tracks, row, past, doubt, free_space, threshold)
         if is_explained(tracks, row, history, scene):
             continue
-        if not named_panel(book):
-            history = history._replace(panel=panel_surplus(float(tracks.log_ris[row])))
+        unknown = [panel for panel, holder in enumerate(book.holders) if holder < 0]
+        if unknown:
+            history = history._replace(panel=panel_surplus(float(tracks.log_ris[row, unknown].max())))
         verdict = None if tracks.specular[row] else judge(history, scene)
         if verdict is not None and verdict.kind is MOVING:
             moving[row] = True
@@ -166,8 +167,8 @@ def examine(
         if verdict is None or (verdict.kind is MOVING and not _sharp(verdict)):
             continue
         birth = Birth(
-            verdict, scene.anchor, slots, history.seen, history.std, tracks.log_grid[row], float(tracks.log_ris[row])
-        )  # fmt: skip
+            verdict, scene.anchor, slots, history.seen, history.std, tracks.log_grid[row], tracks.log_ris[row]
+        )
         return int(row), tracks._replace(moving=moving), birth
     return -1, tracks._replace(moving=moving), None
 
@@ -286,12 +287,12 @@ def _worst_std(verdict: Verdict) -> float:
 def _points(history: History, scene: Scene) -> list[Verdict]:
     """A static point, and a moving image; over the panel there are no moving images, and it is one point alone."""
     verdicts = []
-    if history.side != PANEL or not named_panel(scene.book):
+    if history.side < PANEL or scene.book.holders[history.side - PANEL] < 0:
         start = first_guess(POINT, None, scene.anchor, history)
         if start is not None:
             fit = fit_feature(POINT, start, None, scene.anchor, history, 6)
             verdicts.append(Verdict(POINT, -1, fit._replace(cost=fit.cost - history.panel)))
-    start = first_guess(MOVING, None, scene.anchor, history) if history.side != PANEL else None
+    start = first_guess(MOVING, None, scene.anchor, history) if history.side < PANEL else None
     if start is not None:
         single = fit_feature(MOVING, start, None, scene.anchor, history, 6)
         fits = [single._replace(cost=single.cost + _dimness(history, 1))]
@@ -309,10 +310,8 @@ def _images(history: History, scene: Scene) -> list[Verdict]:
     """The image of each known point in a new wall on the Rx leg."""
     verdicts = []
     for kind in (IMAGE, TWIN):
-        starts = {
-            int(p): first_guess(kind, scene.features[p], scene.anchor, history)
-            for p in _sources(scene.book, history.side)
-        }
+        sources = _sources(scene.book, history.side)
+        starts = {int(p): first_guess(kind, scene.features[p], scene.anchor, history) for p in sources}
         good = {p: start for p, start in starts.items() if start is not None}
         if kind is TWIN:  # a wall far from throwing both into one cell is not worth a fit
             good = {p: start for p, start in good.items() if _one_cell(start, scene.features[p], scene, history, 2.0)}
@@ -327,11 +326,11 @@ def _images(history: History, scene: Scene) -> list[Verdict]:
 
 
 def _sources(book: Book, side: int) -> Integers:
-    """Points whose paths are on one side: those that may be the panel, or may not."""
-    points = book.points
-    if side == UNTOLD or not named_panel(book):
-        return points[:0] if side == PANEL else points
-    return points[(points == int(np.argmax(book.log_ris))) == (side == PANEL)]
+    """Points whose paths are on one side: those that may be the panel, or may be none."""
+    points, held = book.points, book.holders
+    if side == UNTOLD:
+        return points
+    return points[points == held[side - PANEL]] if side >= PANEL else points[~np.isin(points, held)]
 
 
 def _one_cell(wall: Floats, parent: Floats, scene: Scene, history: History, cells: float) -> bool:

@@ -36,10 +36,10 @@ class Book(NamedTuple):
     log_grid: Floats
     """(F, G) log posterior of the strength on the grid; unused for walls."""
     log_ris: Floats
-    """(F,) log odds of panel against scatterer, from amplitudes."""
+    """(F, Q) log odds of each of Q panels against scatterer, from amplitudes."""
     hidden: Floats
-    """(F, 2) probability that something stands in the way of a point since it last showed, were it the panel, or a
-    scatterer."""
+    """(F, Q + 1) probability that something stands in the way of a point since it last showed, were it each of the
+    panels, or a scatterer."""
     ratio: Floats
     """(F,) log amplitude ratio of a wall's reflection."""
     ratio_variance: Floats
@@ -62,10 +62,19 @@ class Book(NamedTuple):
 
     @property
     def ris_probability(self) -> Floats:
-        """(F,) 0 for walls."""
-        probability, points = np.zeros(len(self.ident)), self.points
+        """(F, Q) of being each panel; 0 for walls."""
+        probability, points = np.zeros(self.log_ris.shape), self.points
         probability[points] = panel_probabilities(self.log_ris[points])
         return probability
+
+    @property
+    def holders(self) -> tuple[int, ...]:
+        """(Q,) row of the landmark held for each panel (probability above one half), -1 where none is."""
+        probability = self.ris_probability
+        if not len(probability):
+            return (-1,) * probability.shape[1]
+        rows = np.argmax(probability, axis=0)
+        return tuple(int(row) if probability[row, panel] > 0.5 else -1 for panel, row in enumerate(rows))
 
     @property
     def log_strength(self) -> tuple[Floats, Floats]:
@@ -73,8 +82,8 @@ class Book(NamedTuple):
         return strength_moments(self.log_grid)
 
 
-def empty_book() -> Book:
-    """No landmarks yet."""
+def empty_book(panels: int = 1) -> Book:
+    """No landmarks yet, in a room of so many panels."""
     return Book(
         np.zeros(0, dtype=np.int64),
         np.zeros(0, dtype=np.bool_),
@@ -84,19 +93,14 @@ def empty_book() -> Book:
         np.zeros((0, 2)),
         np.zeros((0, 3)),
         np.zeros((0, len(STRENGTHS))),
-        np.zeros(0),
-        np.zeros((0, 2)),
+        np.zeros((0, panels)),
+        np.zeros((0, panels + 1)),
         np.zeros(0),
         np.zeros(0),
         np.zeros((0, 3), dtype=np.int64),
         np.zeros(0, dtype=np.int64),
         0,
     )
-
-
-def named_panel(book: Book) -> bool:
-    """Whether a landmark is held for the panel: its probability is above one half."""
-    return bool((book.ris_probability > 0.5).any())
 
 
 def enter(book: Book, is_wall: bool, anchor: Floats, founder: int) -> Book:
@@ -111,8 +115,8 @@ def enter(book: Book, is_wall: bool, anchor: Floats, founder: int) -> Book:
         shown=np.concatenate([book.shown, np.ones((1, 2))]),
         drift=np.concatenate([book.drift, np.zeros((1, 3))]),
         log_grid=np.concatenate([book.log_grid, flat]),
-        log_ris=np.append(book.log_ris, -np.inf if is_wall else 0.0),
-        hidden=np.concatenate([book.hidden, np.zeros((1, 2))]),
+        log_ris=np.concatenate([book.log_ris, np.full((1, book.log_ris.shape[1]), -np.inf if is_wall else 0.0)]),
+        hidden=np.concatenate([book.hidden, np.zeros((1, book.hidden.shape[1]))]),
         ratio=np.append(book.ratio, UNSEEN_RATIO),
         ratio_variance=np.append(book.ratio_variance, RATIO_SPREAD**2),
         next_ident=book.next_ident + 1,

@@ -4,20 +4,23 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel, SlamEstimate
+from rislam_rt.arrays import Floats
+from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam import filter as cycle
 from rislam_rt.slam import mapping, window
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.filter import StepInfo
+from rislam_rt.slam.inputs import lone_panel
 
 
 def init(
-    start: StartPrior, body: Body, ris: RisSpec | None, sensor: SensorModel, config: SlamConfig,
+    start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> Any:  # fmt: skip
     """The start prior, and an empty map."""
-    begin = window.init if config.filter == "window" else cycle.init
-    return begin(start, body, ris, sensor, config, rng=rng)
+    if config.filter == "window":
+        return window.init(start, body, lone_panel(ris), sensor, config, rng=rng)
+    return cycle.init(start, body, ris, sensor, config, rng=rng)
 
 
 def step(
@@ -33,6 +36,11 @@ def predict(state: Any, dt: float, config: SlamConfig) -> SlamEstimate:
     """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent."""
     ahead = window.predict if isinstance(state, window.WindowState) else mapping.predict
     return ahead(state, dt, config)
+
+
+def smoothed(state: Any) -> Floats | None:
+    """Positions (K, 3) [m] of all cycles with the hindsight of the window; None of a filter that does not look back."""
+    return window.smoothed(state) if isinstance(state, window.WindowState) else None
 
 
 def estimate(state: Any, config: SlamConfig) -> SlamEstimate:

@@ -8,7 +8,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.information import amplitude_std
-from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec, SensorModel
+from rislam_rt.model import Body, DataSheet, RadioConfig, RisCode, RisSpec, SensorModel
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.slam.book import Book
 from rislam_rt.slam.identity import point_amplitude
@@ -55,7 +55,7 @@ class Belief(NamedTuple):
     poses: Poses
     body: Body
     sensor: SensorModel
-    ris: RisSpec | None
+    ris: DataSheet | None
 
     @property
     def radio(self) -> RadioConfig:
@@ -162,23 +162,23 @@ def predicted_amplitudes(belief: Belief, returns: Returns, sight: Sight, code: R
     free = radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * sight.rx_length)
     amplitude = np.where(moving, free * np.exp(log_ratio), amplitude)
     spread = np.sqrt(np.where(moving, 0.0, strength_std[point] ** 2) + variance)
-    probability = book.ris_probability
-    panel = int(np.argmax(probability))
-    if belief.ris is not None and code is not None and probability[panel] > 0.5:
-        rows = (point == panel).nonzero()[0]
-        amplitude[rows] = _panel_amplitudes(belief, Returns(returns.legs, returns.tx[rows], returns.rx[rows]), code)
-        amplitude[rows] *= np.exp(log_ratio[rows])
-        spread[rows] = np.sqrt(PANEL_AMPLITUDE_STD**2 + variance[rows])
+    if belief.ris is None or code is None:
+        return amplitude, spread
+    for holder, sheet, part in zip(book.holders, belief.ris.panels, belief.ris.parts(code), strict=True):
+        rows = (point == holder).nonzero()[0] if holder >= 0 else []
+        if len(rows):
+            own = Returns(returns.legs, returns.tx[rows], returns.rx[rows])
+            amplitude[rows] = _panel_amplitudes(belief, own, sheet, part) * np.exp(log_ratio[rows])
+            spread[rows] = np.sqrt(PANEL_AMPLITUDE_STD**2 + variance[rows])
     return amplitude, spread
 
 
-def _panel_amplitudes(belief: Belief, returns: Returns, code: RisCode) -> Floats:
-    """|gain| (R,) of the panel's returns with perfect walls."""
-    assert belief.ris is not None
+def _panel_amplitudes(belief: Belief, returns: Returns, sheet: RisSpec, code: RisCode) -> Floats:
+    """|gain| (R,) of a panel's returns with perfect walls."""
     radio, returns = belief.radio, compact(returns, np.arange(len(returns.tx)))
     center, legs = belief.features[returns.legs[:, 0]], returns.legs
     tx, rx = (
-        leg_response(belief.ris, center, _unfolded(belief, legs, device), np.sqrt(gain), radio.wavelength)
+        leg_response(sheet, center, _unfolded(belief, legs, device), np.sqrt(gain), radio.wavelength)
         for device, gain in ((belief.poses.tx, radio.tx_gain), (belief.poses.rx, radio.rx_gain))
     )
     return np.abs(panel_gain(tx[returns.tx], rx[returns.rx], code))

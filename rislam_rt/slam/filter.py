@@ -8,15 +8,15 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import wrap
-from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec, SensorModel
+from rislam_rt.model import Body, DataSheet, Measurement, RadioConfig, RisCode, SensorModel
 from rislam_rt.slam.associate import associate
 from rislam_rt.slam.birth import Past, examine
-from rislam_rt.slam.book import Book, empty_book, named_panel, strike
+from rislam_rt.slam.book import Book, empty_book, strike
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.engine import Told, engine_of
 from rislam_rt.slam.expect import Belief, expected_returns, shown_share
 from rislam_rt.slam.health import Health, check
-from rislam_rt.slam.inputs import check_step
+from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.learn import Hits, learn
 from rislam_rt.slam.match import Outlook, candidates, hidden_tracks, look_ahead
 from rislam_rt.slam.moments import POSE, Moments, poses_of
@@ -62,7 +62,7 @@ class FilterState(NamedTuple):
     """(W,) times [s] of the last W cycles."""
     health: Health
     body: Body
-    ris: RisSpec | None
+    ris: DataSheet | None
     sensor: SensorModel
     """What the agent is told of its receiver."""
 
@@ -91,19 +91,20 @@ class StepInfo(NamedTuple):
 def init(
     start: StartPrior,
     body: Body,
-    ris: RisSpec | None,
+    ris: DataSheet | None,
     sensor: SensorModel,
     config: SlamConfig,
     *,
     rng: np.random.Generator,
 ) -> FilterState:
     """Particles drawn from the start prior, and an empty map."""
+    panels = 1 if ris is None else len(ris.panels)
     return FilterState(
         0,
         config,
         engine_of(config).begin(start, config, rng=rng),
-        empty_book(),
-        no_tracks(config.window),
+        empty_book(panels),
+        no_tracks(config.window, panels),
         np.zeros(config.window),
         Health(),
         body,
@@ -139,9 +140,10 @@ def step(
     Raises
     ------
     ConfigError
-        One of them is no number, or not of the panel.
+        One of them is no number, or not of the panel; or a component's panel is not named.
     """
     check_step(dt, heading, code, state.ris)
+    check_sides(measurement, state.ris)
     state = _move(state, dt, heading, config, rng=rng)
     glance = glance_of(measurement, state.radio)
     landmark = np.where(is_los(glance, state.body), REMOVED, UNUSED)
@@ -170,7 +172,7 @@ def step(
     landmark[free[taken]] = names
     tracks, removed = _follow(state, _rates(moments), tracks, glance, picks, num_returns, config)
     landmark[free[removed]] = REMOVED
-    if not named_panel(book):  # once it is known, no track needs to be it
+    if min(book.holders) < 0:  # once it is known, no track needs to be it
         tracks = weigh_tracks(tracks, belief, code)
     state = _tidy(state._replace(tracks=tracks, book=book), outlook, belief, config, rng=rng)
 
@@ -248,7 +250,7 @@ def _follow(
     config: SlamConfig,
 ) -> tuple[Tracks, Integers]:
     """Tracks extended, begun and ended; and which measurements were taken for wall returns."""
-    bright = (glance.ratio > config.specular_ratio) & (glance.sides != PANEL)
+    bright = (glance.ratio > config.specular_ratio) & (glance.sides < PANEL)
     kept = (picks[num_returns:] >= 0).nonzero()[0]
     used = picks[num_returns:][kept]
     tracks = extend(tracks, kept, glance, used, bright, state.cycle)
@@ -277,7 +279,8 @@ def glance_of(measurement: Measurement, radio: RadioConfig) -> Glance:
         np.minimum(measurement.amplitude_std / amplitude, 1.0),
         np.clip(measurement.amplitude_std, 1e-30, 1e30),
         amplitude / free,
-        *side_of(measurement.from_panel),
+        *side_of(measurement.from_panel, measurement.panel),
+        measurement.panel,
     )
 
 
@@ -291,15 +294,15 @@ def stranger_density(glance: Glance, sensor: SensorModel, new_density: float) ->
     return new_density + false * 2.0 * snr * sensor.false_alarm_snr_density(snr)
 
 
-def side_of(probability: Floats | None) -> tuple[Integers | None, Floats | None]:
-    """Side (M,) of components that ran over the panel with a probability (M,), and its log odds; None without them.
+def side_of(probability: Floats | None, panel: Integers | None = None) -> tuple[Integers | None, Floats | None]:
+    """Side (M,) of components that ran over a panel with a probability (M,), and its log odds; None without them.
 
-    What may be either is left open.
+    What may be either is left open. `panel` (M,): which of several panels that is.
     """
     if probability is None:
         return None, None
     odds = np.log(probability / (1.0 - probability))
-    return np.where(odds > SIDED, PANEL, np.where(odds < -SIDED, OTHER, UNTOLD)), odds
+    return np.where(odds > SIDED, PANEL + (0 if panel is None else panel), np.where(odds < -SIDED, OTHER, UNTOLD)), odds
 
 
 def free_space(radio: RadioConfig) -> float:

@@ -102,24 +102,28 @@ def strength_moments(log_grid: Floats) -> tuple[Floats, Floats]:
 
 
 def add_evidence(log_grid: Floats, log_ris: Floats, scatterer: Floats, panel: Floats) -> tuple[Floats, Floats]:
-    """One cycle's amplitudes for P points: new grids (P, G), and new log odds (P,) of panel against scatterer."""
+    """One cycle's amplitudes for P points: new grids (P, G), and new log odds of panel against scatterer.
+
+    The odds, and what `panel` says of them, are (P,), or (P, Q) for Q panels.
+    """
     before = np.logaddexp.reduce(log_grid, axis=1)
     grid = log_grid + scatterer
     after = np.logaddexp.reduce(grid, axis=1)
-    ratio = np.clip(panel - (after - before), -DOUBT, DOUBT)
+    surplus = (after - before).reshape(len(panel), *np.ones(panel.ndim - 1, dtype=np.int64))
+    ratio = np.clip(panel - surplus, -DOUBT, DOUBT)
     return grid - after[:, None], log_ris + ratio
 
 
 def weigh_silence(hidden: Floats, missed: Floats) -> tuple[Floats, Floats]:
-    """One more silent cycle of P points that are the panel, or a scatterer.
+    """One more silent cycle of P points that are one of Q panels, or a scatterer.
 
-    `missed` (P, 2) is the probability of silence while nothing is in the way, `hidden` (P, 2) that something is. What
-    is blocked is silent whatever it is: a gap tells as much as its first cycles, not more with each.
-    Returns the new `hidden`, and what to add to the log odds (P,).
+    `missed` (P, Q + 1) is the probability of silence while nothing is in the way, `hidden` (P, Q + 1) that something
+    is, the scatterer's last. What is blocked is silent whatever it is: a gap tells as much as its first cycles, not
+    more with each. Returns the new `hidden`, and what to add to the log odds (P, Q).
     """
     before = hidden + BLOCKED * (1.0 - hidden)
     silence = before + (1.0 - before) * missed
-    surplus = np.log(silence[:, 0]) - np.log(silence[:, 1])
+    surplus = np.log(silence[:, :-1]) - np.log(silence[:, -1:])
     return before / silence, np.clip(surplus, -DOUBT, DOUBT)
 
 
@@ -132,10 +136,35 @@ def panel_surplus(log_ris: float) -> float:
 
 
 def panel_probabilities(log_ris: Floats) -> Floats:
-    """Probability (P,) of each point of being the one panel; "none of these" competes with prior one point's worth."""
+    """Probability of each of P points of being each panel, from log odds (P, Q) against scatterer; for one (P,) alike.
+
+    A panel is one of the points or none of them, which competes with prior one point's worth; a point is one panel at
+    most. Exact, over all ways to give each panel a point of its own or none.
+    """
     if not len(log_ris):
-        return np.zeros(0)
-    return np.exp(log_ris - np.logaddexp(np.logaddexp.reduce(log_ris), 0.0))
+        return np.zeros(log_ris.shape)
+    table = log_ris.reshape(len(log_ris), -1)
+    before, after = _log_ways(table), _log_ways(table[::-1])[::-1]
+    total = np.logaddexp.reduce(before[-1, ::-1])
+    probability = np.empty(table.shape)
+    for panel in range(table.shape[1]):
+        # the others' points lie before this one or behind it
+        sets = range(before.shape[1])
+        apart = [(a, b) for a in sets for b in sets if not (a & b or (a | b) >> panel & 1)]
+        rest = np.logaddexp.reduce([before[:-1, a] + after[1:, b] for a, b in apart], axis=0)
+        probability[:, panel] = np.exp(table[:, panel] + rest - total)
+    return probability.reshape(log_ris.shape)
+
+
+def _log_ways(table: Floats) -> Floats:
+    """(P + 1, 2^Q) log weight of giving the panels of each set (as bits) different ones of the first points."""
+    points, panels = table.shape
+    ways = np.full((points + 1, 2**panels), -np.inf)
+    ways[:, 0] = 0.0
+    for held in range(1, 2**panels):
+        last = [ways[:-1, held - (1 << panel)] + table[:, panel] for panel in range(panels) if held >> panel & 1]
+        ways[1:, held] = np.logaddexp.accumulate(np.logaddexp.reduce(last, axis=0))
+    return ways
 
 
 def _spread(std: Floats, mean: Floats) -> Floats:

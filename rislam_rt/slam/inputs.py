@@ -3,13 +3,43 @@
 import math
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.model import RisCode, RisSpec
+from rislam_rt.model import DataSheet, Measurement, RisCode, RisSpec, RisSpecs
 
 MAX_STEP = 1e6
 """[s] Twelve days; the squares of longer steps leave nothing of what was known."""
 
 
-def check_step(dt: float, heading: float, code: RisCode | None = None, ris: RisSpec | None = None) -> None:
+def lone_panel(ris: DataSheet | None) -> RisSpec | None:
+    """The data sheet, for the window filter, which knows one panel.
+
+    Raises
+    ------
+    ConfigError
+        There are several panels.
+    """
+    if isinstance(ris, RisSpecs):
+        raise ConfigError(
+            f"slam.filter: 'window' received, which knows one panel, in a room of {len(ris.panels)}; "
+            "give 'rao_blackwellised'"
+        )
+    return ris
+
+
+def check_sides(measurement: Measurement, ris: DataSheet | None) -> None:
+    """Check that a measurement which tells the panels' components says which of several they ran over.
+
+    Raises
+    ------
+    ConfigError
+        It does not.
+    """
+    if measurement.from_panel is not None and measurement.panel is None and isinstance(ris, RisSpecs):
+        raise ConfigError(
+            f"measurement.panel: missing, with from_panel and {len(ris.panels)} panels; give both or none"
+        )
+
+
+def check_step(dt: float, heading: float, code: RisCode | None = None, ris: DataSheet | None = None) -> None:
     """Check time step [s], heading [rad] and code before a cycle.
 
     Raises

@@ -79,7 +79,7 @@ def learn(
         direct = compact(expected.returns, hits.row[plain])
         pick = hits.pick[plain]
         amplitude = np.exp(glance.log_amplitude[pick])
-        told = glance.odds[pick]
+        told = glance.odds_of(book.log_ris.shape[1])[pick]
         book = _weigh(book, belief, moments, direct, amplitude, glance.amplitude_std[pick], told, code, rng=rng)
     silent = (expected.bounces == 0) & ~outlook.merger.outshone & (outlook.merger.partner < 0)
     silent[hits.row] = False
@@ -127,14 +127,14 @@ def _weigh(
     *,
     rng: np.random.Generator,
 ) -> Book:
-    """Amplitudes of direct returns weighed for every strength, and for the panel, by its odds as `told` (P,)."""
+    """Amplitudes of direct returns weighed for every strength, and for each panel, by its odds as `told` (P, Q)."""
     points = direct.point
     sight = observe(direct, belief.features, book.anchor, belief.poses)
     scatterer = log_scatterer(amplitude, std, sight.tx_length, sight.rx_length, belief.radio)
-    panel: Floats = np.full(len(points), -np.inf)
+    panel: Floats = np.full(told.shape, -np.inf)
     if belief.ris is not None and code is not None:
-        gain = _sampled_gains(belief, moments, points, code, rng=rng)
-        panel = log_panel(amplitude, std, gain) + np.minimum(told, 0.0)
+        gains = _sampled_gains(belief, moments, points, code, rng=rng)
+        panel = np.stack([log_panel(amplitude, std, gain) for gain in gains], axis=1) + np.minimum(told, 0.0)
     grid, log_ris = add_evidence(book.log_grid[points], book.log_ris[points], scatterer, panel)
     log_ris += np.clip(told, 0.0, TOLD)
     grids, all_ris = book.log_grid.copy(), book.log_ris.copy()
@@ -153,15 +153,16 @@ def _weigh_silent(
     *,
     rng: np.random.Generator,
 ) -> Book:
-    """Silence of direct returns weighed for the panel. Strengths stay: something may stand in the way for long."""
+    """Silence of direct returns weighed for the panels. Strengths stay: something may stand in the way for long."""
     points = direct.point
     sight = observe(direct, belief.features, book.anchor, belief.poses)
     std = np.full(len(points), amplitude_std(belief.radio))
     threshold = belief.threshold
     scatterer = log_scatterer_missed(std, sight.tx_length, sight.rx_length, belief.radio, threshold)
-    panel = log_panel_missed(std, _sampled_gains(belief, moments, points, code, rng=rng), threshold)
+    gains = _sampled_gains(belief, moments, points, code, rng=rng)
+    panels = [np.exp(log_panel_missed(std, gain, threshold)) for gain in gains]
     weight = np.exp(book.log_grid[points])
-    missed = np.stack([np.exp(panel), np.sum(weight * np.exp(scatterer), axis=1) / weight.sum(axis=1)], axis=1)
+    missed = np.stack([*panels, np.sum(weight * np.exp(scatterer), axis=1) / weight.sum(axis=1)], axis=1)
     hidden, log_ris = book.hidden.copy(), book.log_ris.copy()
     hidden[points], surplus = weigh_silence(book.hidden[points], missed)
     log_ris[points] = np.clip(log_ris[points] + surplus, -CERTAIN, CERTAIN)
@@ -170,12 +171,15 @@ def _weigh_silent(
 
 def _sampled_gains(
     belief: Belief, moments: Moments, points: Sequence[int] | Integers, code: RisCode, *, rng: np.random.Generator
-) -> Complexes:
-    """The panel's gain (P, S) if it were at each of the points, over samples of pose and map together."""
+) -> list[Complexes]:
+    """The gain (P, S) of each panel if it were at each of the points, over samples of pose and map together."""
     assert belief.ris is not None
     columns = np.concatenate([np.arange(3), moments.columns(np.asarray(points))])
     root = square_root(moments.covariance[np.ix_(columns, columns)])
     draws = moments.mean[columns] + rng.standard_normal((BELIEF_SAMPLES, root.shape[1])) @ root.T
     poses = poses_of(draws[:, :3], belief.poses.heading, belief.body)
     centers = np.swapaxes(draws[:, 3:].reshape(BELIEF_SAMPLES, -1, 3), 0, 1)
-    return predicted_panel_gain(belief.ris, code, centers, poses.tx[None], poses.rx[None], np.ones(1), belief.radio)
+    return [
+        predicted_panel_gain(sheet, part, centers, poses.tx[None], poses.rx[None], np.ones(1), belief.radio)
+        for sheet, part in zip(belief.ris.panels, belief.ris.parts(code), strict=True)
+    ]

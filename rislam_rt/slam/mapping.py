@@ -1,12 +1,13 @@
 """From moments to the estimate that others read: pose, landmarks, images, walls."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
-from rislam_rt.slam.book import RATIO_SPREAD, Book, named_panel
+from rislam_rt.slam.book import RATIO_SPREAD, Book
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.filter import FilterState, believed
 from rislam_rt.slam.moments import POSE, Moments, even_draws, square_root
@@ -29,9 +30,11 @@ def predict(state: FilterState, dt: float, config: SlamConfig) -> SlamEstimate:
     mean[:3] += dt * moments.velocity
     moments = moments._replace(mean=mean)
     ahead = estimate(state, config, moments)
-    if state.ris is None or named_panel(state.book):
+    if state.ris is None:
         return ahead
-    return replace(ahead, suspect=find_suspect(state.tracks, state.book, moments, state.body))
+    unknown = [panel for panel, row in enumerate(state.book.holders) if row < 0]
+    found = [find_suspect(state.tracks, state.book, moments, state.body, panel) for panel in unknown]
+    return replace(ahead, suspects=tuple(suspect for suspect in found if suspect is not None))
 
 
 def estimate(state: FilterState, config: SlamConfig, moments: Moments | None = None) -> SlamEstimate:
@@ -67,17 +70,25 @@ def build_map(moments: Moments, book: Book) -> MapEstimate:
     normal, offset, std = wall_planes(mean, covariance, book.anchor, book.walls)
     known = (book.ratio_variance[book.walls] < RATIO_SPREAD**2) & (book.hits[book.walls] >= WALL_HITS)
     known &= np.sqrt(2.0) * std[:, 0] < MAX_LEAN
+    probability = book.ris_probability[points]
+    named = None if probability.shape[1] == 1 else _padded(np.argmax(probability, axis=1), len(images))
     return MapEstimate(
         np.concatenate([book.ident[points], images[:, 2]]),
         np.concatenate([mean[points], image]),
         np.concatenate([_blocks(covariance, points), spread]),
         np.concatenate([np.full(len(points), -1), np.searchsorted(points, parent)]),
-        np.concatenate([book.ris_probability[points], np.zeros(len(images))]),
+        _padded(probability.max(axis=1), len(images)),
         np.concatenate([strength, ratio]),
         normal[known],
         offset[known],
         std[known],
+        named,
     )
+
+
+def _padded(values: Any, count: int) -> Any:
+    """Values (P,) of points, then a 0 for each of `count` images."""
+    return np.concatenate([values, np.zeros(count, dtype=values.dtype)])
 
 
 def wall_planes(mean: Floats, covariance: Floats, anchor: Floats, rows: Integers) -> tuple[Floats, Floats, Floats]:

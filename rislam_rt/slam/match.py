@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import merged_pull
 from rislam_rt.slam.associate import DIAGONAL, Candidates, near_pairs, squared_distance
-from rislam_rt.slam.book import Book, named_panel
+from rislam_rt.slam.book import Book
 from rislam_rt.slam.expect import Belief, Expected
 from rislam_rt.slam.moments import POSE, Moments
 from rislam_rt.slam.returns import TX, Returns, linearise
@@ -85,11 +85,17 @@ def look_ahead(belief: Belief, expected: Expected, moments: Moments, tracks: Tra
 
 
 def return_sides(returns: Returns, book: Book, odds: float) -> Integers:
-    """(R,) which returns run over the panel, once that is named and its log odds are above `odds`."""
+    """(R,) which returns run over a panel, once that is named and its log odds are above `odds`.
+
+    Those of no panel are known for that once all panels are.
+    """
     point = returns.point
-    if not (named_panel(book) and book.log_ris.max() > odds):
-        return np.where(point == TX, OTHER, UNTOLD)
-    return np.where(point == int(np.argmax(book.log_ris)), PANEL, OTHER)
+    sure = [row for panel, row in enumerate(book.holders) if row >= 0 and book.log_ris[row, panel] > odds]
+    sides = np.where((point == TX) | (len(sure) == book.log_ris.shape[1]), OTHER, UNTOLD)
+    for panel, row in enumerate(book.holders):
+        if row in sure:
+            sides[point == row] = PANEL + panel
+    return sides
 
 
 def merge_returns(seen: Floats, expected: Expected, tracks: Tracks, cell: Floats, side: Integers) -> Merger:

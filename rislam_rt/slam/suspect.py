@@ -23,7 +23,7 @@ from rislam_rt.slam.identity import (
 from rislam_rt.slam.mirrors import is_behind_mirror, mirror_images, rays
 from rislam_rt.slam.moments import Moments, even_draws, poses_of
 from rislam_rt.slam.returns import Poses
-from rislam_rt.slam.tracks import OTHER, PANEL, Tracks
+from rislam_rt.slam.tracks import PANEL, UNTOLD, Tracks
 
 DRAWS = 12
 """Places of a track over which the panel's predicted gain is averaged."""
@@ -48,7 +48,7 @@ def places(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:
 
 
 def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None) -> Tracks:
-    """The tracks after what this cycle tells of each: is it the panel?"""
+    """The tracks after what this cycle tells of each: is it one of the panels?"""
     rows = np.flatnonzero(~tracks.specular)
     if belief.ris is None or code is None or not len(rows):
         return tracks
@@ -56,15 +56,17 @@ def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None) -> Tracks
     spread = np.sqrt(tracks.covariance[rows][..., 0, 0])
     looks = tracks.mean[rows, None, :, 0] + even_draws(DRAWS, 3) * spread[:, None]
     center, _ = places(looks, belief.poses)
-    gain = predicted_panel_gain(belief.ris, code, center, belief.poses.tx, belief.poses.rx, np.ones(1), radio)
     _, rx_length = places(tracks.mean[rows, :, 0], belief.poses)
     tx_length = np.maximum(tracks.mean[rows, 0, 0] - rx_length, 1e-3)
     std = np.full(len(rows), amplitude_std(radio))
     threshold = belief.threshold
     here = tracks.misses[rows] == 0
     amplitude = np.exp(tracks.log_amplitude[rows])
-    panel = np.where(here, log_panel(amplitude, std, gain), log_panel_missed(std, gain, threshold))
-    panel[here & (tracks.side[rows] == OTHER)] = -np.inf
+    panel, side = np.empty((len(rows), len(belief.ris.panels))), tracks.side[rows]
+    for number, (sheet, part) in enumerate(zip(belief.ris.panels, belief.ris.parts(code), strict=True)):
+        gain = predicted_panel_gain(sheet, part, center, belief.poses.tx, belief.poses.rx, np.ones(1), radio)
+        panel[:, number] = np.where(here, log_panel(amplitude, std, gain), log_panel_missed(std, gain, threshold))
+        panel[here & (side != UNTOLD) & (side != PANEL + number), number] = -np.inf
     scatterer = np.where(
         here[:, None],
         log_scatterer(amplitude, std, tx_length, rx_length, radio),
@@ -72,28 +74,29 @@ def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None) -> Tracks
     )
     log_grid, log_ris = tracks.log_grid.copy(), tracks.log_ris.copy()
     log_grid[rows], log_ris[rows] = add_evidence(log_grid[rows], log_ris[rows], scatterer, panel)
-    log_ris[rows] += np.where(here & (tracks.side[rows] == PANEL), TOLD, 0.0)
+    log_ris[rows] += np.where(here[:, None] & (side[:, None] == PANEL + np.arange(panel.shape[1])), TOLD, 0.0)
     return tracks._replace(log_grid=log_grid, log_ris=log_ris)
 
 
-def find_suspect(tracks: Tracks, book: Book, moments: Moments, body: Body) -> Suspect | None:
-    """The landmark or track that is the likeliest to be the panel; None if nothing is likelier the panel than not.
+def find_suspect(tracks: Tracks, book: Book, moments: Moments, body: Body, panel: int = 0) -> Suspect | None:
+    """The landmark or track that is the likeliest to be a panel; None if nothing is likelier the panel than not.
 
     A track that seems to come from behind a mirror may be the panel over walls: aiming there would miss it.
     """
-    points, poses = book.points, poses_of(moments.position, np.asarray(moments.heading), body)
+    points = book.points[~np.isin(book.points, book.holders)]  # what is another panel is not this one
+    poses = poses_of(moments.position, np.asarray(moments.heading), body)
     least = np.where(tracks.length > 1, DISMISSAL, 0.0)
     alive = tracks.misses <= np.minimum(tracks.length - 1, PATIENCE)
-    rows = np.flatnonzero(~tracks.specular & alive & (tracks.log_ris > least))
+    rows = np.flatnonzero(~tracks.specular & alive & (tracks.log_ris[:, panel] > least))
     if len(rows):
         mirrored = mirror_images(tracks, moments, book, body)
         spots = places(tracks.mean[rows, :, 0], poses)[0]
         seen = [not is_behind_mirror(spot, moments.position, mirrored, DEEP) for spot in spots]
         rows, spots = rows[seen], spots[seen]
-    odds = np.concatenate([book.log_ris[points], tracks.log_ris[rows]])
+    odds = np.concatenate([book.log_ris[points, panel], tracks.log_ris[rows, panel]])
     if not len(odds) or odds.max() <= DISMISSAL:
         return None
     best = int(np.argmax(odds))
     if best < len(points):
-        return Suspect(moments.features[points[best]], int(book.hits[points[best]]))
-    return Suspect(spots[best - len(points)], int(tracks.length[rows[best - len(points)]]))
+        return Suspect(moments.features[points[best]], int(book.hits[points[best]]), panel)
+    return Suspect(spots[best - len(points)], int(tracks.length[rows[best - len(points)]]), panel)

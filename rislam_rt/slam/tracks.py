@@ -18,7 +18,8 @@ FAINTEST = 0.1
 """Least share of cycles from which the strength of a path is reckoned."""
 
 UNTOLD, OTHER, PANEL = -1, 0, 1
-"""Which side a component is on, where the receiver sets the panel's paths apart by alternating codes."""
+"""Which side a component is on, where the receiver sets the panel's paths apart by alternating codes; `PANEL` + q for
+panel q of several."""
 
 
 class Glance(NamedTuple):
@@ -39,7 +40,9 @@ class Glance(NamedTuple):
     side: Integers | None = None
     """(M,) `PANEL`, `OTHER` or, where either may be, `UNTOLD`; None where the receiver does not tell."""
     panel_odds: Floats | None = None
-    """(M,) log odds of having run over the panel, likewise."""
+    """(M,) log odds of having run over the panel, of several the likeliest, likewise."""
+    panel: Integers | None = None
+    """(M,) which panel that is; None where there is one."""
 
     @property
     def sides(self) -> Integers:
@@ -50,6 +53,11 @@ class Glance(NamedTuple):
     def odds(self) -> Floats:
         """(M,) log odds of having run over the panel, 0 where the receiver does not tell."""
         return np.zeros(len(self.ratio)) if self.panel_odds is None else self.panel_odds
+
+    def odds_of(self, panels: int) -> Floats:
+        """(M, Q) log odds of having run over each of the panels; over those that are not the likeliest: no better."""
+        number = np.zeros(len(self.ratio), dtype=np.int64) if self.panel is None else self.panel
+        return np.where(number[:, None] == np.arange(panels), self.odds[:, None], -np.abs(self.odds)[:, None])
 
     def take(self, rows: Integers) -> "Glance":
         """Only some of the measurements."""
@@ -86,7 +94,7 @@ class Tracks(NamedTuple):
     log_grid: Floats
     """(T, G) log posterior of its strength, were it a scatterer (see `identity`)."""
     log_ris: Floats
-    """(T,) log odds of panel against scatterer."""
+    """(T, Q) log odds of each panel against scatterer."""
     side: Integers
     """(T,) that of its measurements."""
 
@@ -150,8 +158,8 @@ def overstatement(tracks: Tracks, cycle: int, threshold: float) -> Floats:
     return np.asarray(1.0 + np.exp(-0.5 * quantile**2) / np.sqrt(2.0 * np.pi) / share / mean)
 
 
-def no_tracks(window: int) -> Tracks:
-    """Nothing seen yet."""
+def no_tracks(window: int, panels: int = 1) -> Tracks:
+    """Nothing seen yet, in a room of so many panels."""
     return Tracks(
         np.zeros((0, 3, 2)),
         np.zeros((0, 3, 2, 2)),
@@ -166,7 +174,7 @@ def no_tracks(window: int) -> Tracks:
         np.zeros(0),
         np.zeros(0, dtype=np.int64),
         np.zeros((0, len(STRENGTHS))),
-        np.zeros(0),
+        np.zeros((0, panels)),
         np.zeros(0, dtype=np.int64),
     )
 
@@ -241,7 +249,7 @@ def begin(tracks: Tracks, glance: Glance, picks: Integers, bright: Booleans, rat
         np.zeros(count),
         np.zeros(count, dtype=np.int64),
         np.full((count, len(STRENGTHS)), -np.log(len(STRENGTHS))),
-        np.zeros(count),
+        np.zeros((count, tracks.log_ris.shape[1])),
         glance.sides[picks],
     )
     return Tracks._make(np.concatenate([old, new]) for old, new in zip(tracks, fresh, strict=True))

@@ -179,3 +179,23 @@ def test_the_tracer_sees_the_same_shadows(rooms, refine):
     # a ray within 0.1 mm of an outline may be seen either way: 1e-4 of a shadow some 0.3 m wide
     assert sum(report.explained.values()) <= 2
     assert report.length_error.max() <= (1e-9 if refine else 2e-5)
+
+
+def test_a_shade_alone_hides_like_a_scatterers_and_is_no_landmark(rooms):
+    """Against the same shade about a scatterer: the same paths, those of that scatterer apart; both channels agree."""
+    owned = shaded(rooms, BALL)
+    alone = replace(owned, scatterers=(), shades=(replace(BALL.shade, name="heap"),))
+    poses = random_poses(alone, 20, rng=np.random.default_rng(5))
+    with_ball, without = (ImageSourceChannel(scene, RADIO, 2).paths(poses) for scene in (owned, alone))
+    assert alone.landmarks == ("ris",)
+    landmark = with_ball.landmark - (with_ball.landmark > 0)  # the panel moves up to number 0
+    rest = with_ball.landmark != 0
+    keys = [
+        {(int(k), int(mark[p]), *map(int, [*paths.tx_walls[p], *paths.rx_walls[p]])) for k, p in np.argwhere(valid)}
+        for paths, mark, valid in (
+            (with_ball, landmark, with_ball.valid & rest), (without, without.landmark, without.valid),
+        )
+    ]  # fmt: skip
+    assert keys[0] == keys[1]
+    assert len(keys[1]) < ImageSourceChannel(replace(alone, shades=()), RADIO, 2).paths(poses).valid.sum()
+    assert compare_channels(alone, RADIO, poses=20, depth=2, rng=np.random.default_rng(6), refine=True).passed

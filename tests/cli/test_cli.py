@@ -73,6 +73,8 @@ def test_help_and_version_import_nothing_heavy():
         ["compare", SCENE, "--poses", "0"],
         ["run", PIPELINE, "--colour"],
         ["trace", SCENE, "--channel", "magic"],
+        ["trace", SCENE, "--deepmimo", "Upper"],
+        ["trace", SCENE, "--deepmimo", ROOT / "docs"],
         ["design", SCENE],
         ["design", SCENE, "--at", "1,2"],
         ["design", SCENE, "--at", "1,2,nan"],
@@ -129,7 +131,7 @@ def test_missing_library_is_one_line_and_exit_3(tmp_path):
     environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(tmp_path / "libLLVM.so")}
     for words in (["doctor"], ["run", PIPELINE], ["trace", SCENE]):
         done = subprocess.run(
-            [sys.executable, "-m", "rislam_rt.cli", *map(str, words)],
+            [sys.executable, "-m", "rislam_rt", *map(str, words)],
             capture_output=True, text=True, cwd=tmp_path, env=environment, check=False,
         )  # fmt: skip
         assert done.returncode == 3
@@ -144,7 +146,16 @@ def test_unwritable_file_is_exit_4(run):
     assert "/proc/none/check.json" in err
 
 
-def test_run_report_and_json(run, tmp_path):
+def test_a_trace_is_written_for_deepmimo(run, tmp_path):
+    words = ("trace", SCENE, "--channel", "image_source", "--depth", 1, "--stride", 300, "--deepmimo", "s/room")
+    assert run(*words)[0] == 0
+    assert sorted(path.name for path in (tmp_path / "s" / "room").iterdir()) == [
+        "params.json", "scene_00000", "scene_00001",
+    ]  # fmt: skip
+    assert run(*words)[0] == 2
+
+
+def test_run_report_and_json(run, tmp_path, monkeypatch):
     one = ("--set", 'schemes=["random"]')
     code, out, _ = run("run", PIPELINE, *SHORT, *one, "--json", "run.json", "--out", "mine")
     assert code == 0
@@ -157,6 +168,10 @@ def test_run_report_and_json(run, tmp_path):
     page = tmp_path / "mine" / "report.html"
     first = page.read_bytes()
     assert len(list((tmp_path / "mine" / "figures").glob("*.png"))) == 7
+    monkeypatch.setitem(sys.modules, "rerun", None)  # as where the extra is not installed
+    code, _, err = run("report", "mine", "--rerun", "mine.rrd")
+    assert code == 3
+    assert "rislam-rt[viz]" in err
     code, again, _ = run("report", "mine")
     assert code == 0
     assert page.read_bytes() == first
@@ -233,7 +248,9 @@ def test_interrupted_run_goes_on(run, tmp_path, monkeypatch, blow):
     assert err.splitlines()[-1] == "interrupted: 1 schemes kept; the same command goes on from there"
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     (folder,) = (tmp_path / "runs").iterdir()
-    assert sorted(path.name for path in folder.iterdir()) == ["run.json", "scheme_optimized.nc"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "measurements_optimized.nc", "run.json", "scheme_optimized.nc",
+    ]  # fmt: skip
     assert run("report", folder)[0] == 2
     assert run("run", PIPELINE, *SHORT, "--no-report", "--jobs", 1)[0] == 0
     assert seen == ["optimized", "random", "random"]

@@ -59,7 +59,7 @@ def test_samples_are_those_of_the_true_paths_in_noise(run, tmp_path, alternation
     data = load_signals(tmp_path / "paper_room-signals.nc")
     plain = xr.load_dataset(tmp_path / "paper_room-signals.nc", engine="h5netcdf")
     np.testing.assert_array_equal(plain["samples_real"] + 1j * plain["samples_imag"], data["samples"])
-    assert data["samples"].dims == ("cycle", "capture", "antenna", "tone")
+    assert data["samples"].dims == ("time", "capture", "antenna", "tone")
     assert data["samples"].shape == (3, 1 + alternation, 16, 128)
     assert np.iscomplexobj(data["samples"])
     # sum and difference of the two codes have the walls' and the panel's paths
@@ -89,7 +89,7 @@ def test_estimates_lie_at_the_true_paths_that_they_name(run, tmp_path):
     paths = dataset_to_paths(read_dataset(tmp_path / "few.nc"))
     cycle, component = np.nonzero(data["found_path"].values >= 0)
     path = data["found_path"].values[cycle, component]
-    found = data.isel(cycle=xr.DataArray(cycle), component=xr.DataArray(component))
+    found = data.isel(time=xr.DataArray(cycle), component=xr.DataArray(component))
     walls = paths.kind[path] == PathKind.VT
     assert walls.sum() > 10
     # walls stand 20 dB and more above the threshold: a fiftieth of a cell, and most within three deviations

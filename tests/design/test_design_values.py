@@ -158,7 +158,11 @@ def test_changes_are_tried_in_powers_of_two():
 def test_a_settled_suspect_is_doubted_beam_by_beam(make_belief, make_spec, radio, rng):
     """Every `LOOK_ROUND` codes the next beam of the sweep, round and round."""
     spec, beams = make_spec(), sweep_codes(make_spec(), radio.wavelength)
-    belief = replace(make_belief(POSITION, rng), map=empty_map(), suspect=Suspect(np.array([3.0, 3.0, 3.0]), SETTLED))
+    belief = replace(
+        make_belief(POSITION, rng),
+        map=empty_map(),
+        suspects=(Suspect(np.array([3.0, 3.0, 3.0]), SETTLED),),
+    )
     last = RisCode(np.zeros((6, 6), dtype=np.int64), 4)
     for turn in (1, 5, len(beams) + 3):
         found = search_code(belief, spec, radio, turn * LOOK_ROUND, last)

@@ -62,7 +62,7 @@ def test_a_suspect_is_held_then_aimed_at_and_then_doubted(make_belief, make_spec
     last = RisCode(rng.integers(4, size=(6, 6)), 4)
 
     def sent(hits: int, number: int) -> np.ndarray:
-        belief = replace(blind, suspect=Suspect(place, hits))
+        belief = replace(blind, suspects=(Suspect(place, hits),))
         return search_code(belief, spec, radio, number, last).index
 
     for number in range(LOOK_ROUND):

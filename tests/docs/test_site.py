@@ -1,14 +1,26 @@
 """The documentation builds as a site without a warning: every page is reached, every link leads somewhere."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
+import rislam_rt
 from rislam_rt.pipeline.settings import list_settings
 from rislam_rt.pipeline.spec import PipelineSpec
 
 ROOT = Path(__file__).parents[2]
+
+
+def test_the_public_names_are_those_of_the_page_and_explained() -> None:
+    page = re.findall(r"^::: ([\w.]+)\.(\w+)$", (ROOT / "docs" / "reference" / "api.md").read_text(), re.MULTILINE)
+    listed = {name: home for home, name in page if name != "errors"}
+    assert listed == rislam_rt._PUBLIC
+    for name in rislam_rt._PUBLIC:
+        found = getattr(rislam_rt, name)
+        assert (found.__doc__ or "").strip(), name
+        assert found.__name__ == name
 
 
 def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:

@@ -5,13 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from rislam_rt.errors import ResultError
 from rislam_rt.model import SlamResult
 from rislam_rt.pipeline import load_spec, slices
+from rislam_rt.pipeline.dataset import read_dataset
 from rislam_rt.pipeline.identity import run_identity
+from rislam_rt.pipeline.inputs import PADDING, dataset_to_inputs
 from rislam_rt.pipeline.join import join_paths, join_schemes
 from rislam_rt.pipeline.long import is_long, read_any, run_long
+from rislam_rt.pipeline.own import localise, run_rng
 from rislam_rt.pipeline.store import open_run
 from rislam_rt.pipeline.summary import summarise_scheme
 
@@ -68,6 +72,16 @@ def test_scores_counted_slice_by_slice_are_those_of_the_whole(room, spec, done):
             for key in entry.keys() - BOUND:
                 value = scores["landmarks"][landmark][key]
                 assert value == (None if entry[key] is None else pytest.approx(entry[key], rel=1e-9))
+    measurements_of_all_slices_give_the_estimate_again(folder, spec, scheme)
+
+
+def measurements_of_all_slices_give_the_estimate_again(folder, spec, scheme):
+    files = sorted((folder / "slices").glob(f"*/measurements_{scheme.scheme}.nc"))
+    parts = [read_dataset(file) for file in files]
+    how = {"data_vars": "minimal", "combine_attrs": "drop_conflicts", "join": "outer", "fill_value": PADDING}
+    inputs = dataset_to_inputs(xr.concat(parts, "time", **how))
+    answers = localise(inputs, spec, rng=run_rng(files[0]))
+    np.testing.assert_array_equal([one.position for one in answers.estimates], scheme.position)
 
 
 def _cut(room):
@@ -84,7 +98,7 @@ def test_a_stopped_run_goes_on_and_leaves_the_same(room, spec, done, tmp_path):
     again = tmp_path / "again"
     with pytest.raises(KeyboardInterrupt):
         lead(room, spec, again, stop)
-    assert {f.name for f in again.rglob("*.nc")} == {"paths.nc", "scheme_random.nc"}
+    assert {f.name for f in again.rglob("*.nc")} == {"paths.nc", "scheme_random.nc", "measurements_random.nc"}
     told = []
     lead(room, spec, again, lambda stage, *_: told.append(stage))
     assert set(told) == {"no_ris"}

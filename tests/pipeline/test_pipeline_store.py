@@ -19,6 +19,7 @@ from rislam_rt.pipeline.dataset import (
     PATHS,
     SCHEME,
     check_dataset,
+    dataset_to_scheme,
     read_dataset,
     scheme_to_dataset,
     seal_dataset,
@@ -76,7 +77,7 @@ def test_reads_back_to_the_last_bit(stored, short_result):
 
 
 def test_every_array_of_a_result_is_stored():
-    other = {"scheme", "levels", "info", "outcome", "map"}
+    other = {"scheme", "levels", "info", "outcome", "map", "given", "smoothed"}
     assert {f.name for f in fields(SchemeResult)} - other == set(SCHEME)
     assert {f.name for f in fields(MapEstimate)} == set(MAP)
 
@@ -85,7 +86,7 @@ def test_folder_holds_plain_files(stored, short_result):
     names = {path.name for path in stored.iterdir()}
     assert names >= {"paths.nc", "truth.tum", "map.json", "config.toml", "summary.json", "run.json", "scene"}
     for name in short_result.schemes:
-        assert {f"scheme_{name}.nc", f"estimate_{name}.tum"} <= names
+        assert {f"scheme_{name}.nc", f"measurements_{name}.nc", f"estimate_{name}.tum"} <= names
     assert not {name for name in names if name.startswith(".")}
     assert [path.name for path in stored.parent.iterdir()] == ["one"]
     rows = np.loadtxt(stored / "truth.tum")
@@ -97,7 +98,7 @@ def test_folder_holds_plain_files(stored, short_result):
 def test_every_variable_has_a_unit(stored):
     import xarray as xr
 
-    for file in ("paths.nc", "scheme_random.nc"):
+    for file in ("paths.nc", "scheme_random.nc", "measurements_random.nc"):
         data = xr.load_dataset(stored / file, engine="h5netcdf")
         plain = [n for n in data.data_vars if not str(n).startswith("info_") and n != "outcome"]
         assert all(data[name].attrs["units"] and data[name].attrs["long_name"] for name in plain)
@@ -165,10 +166,10 @@ def test_a_changed_value_does_not_fit_the_files_own_checksum(short_result, tmp_p
     write_dataset(data, file)
     check_dataset(read_dataset(file), file, run="a", scheme="random")
     for name in data.variables:
-        changed = data.copy(deep=True)
-        values = changed[name].to_numpy()
+        values = np.array(data[name].to_numpy())
         if values.size:
             values.reshape(-1).view(np.uint8)[0] ^= 1
+            changed = data.assign({name: (data[name].dims, values, data[name].attrs)})
             with pytest.raises(ResultError, match="checksum is"):
                 check_dataset(changed, file)
     for name in ("outcomes", "levels", "scheme"):
@@ -179,6 +180,14 @@ def test_a_changed_value_does_not_fit_the_files_own_checksum(short_result, tmp_p
     write_dataset(changed, file)  # as one would with the library that wrote it
     with pytest.raises(ResultError, match="checksum is"):
         check_dataset(read_dataset(file), file)
+
+
+def test_hindsight_comes_back_if_there_is_any(short_result):
+    scheme = short_result.schemes["random"]
+    assert dataset_to_scheme(scheme_to_dataset(scheme)).smoothed is None
+    looked_back = replace(scheme, smoothed=scheme.position + 0.1)
+    found = dataset_to_scheme(scheme_to_dataset(looked_back)).smoothed
+    np.testing.assert_array_equal(found, looked_back.smoothed)
 
 
 def test_a_stopped_run_goes_on(begun, identity, short_result):

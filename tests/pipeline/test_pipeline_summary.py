@@ -20,7 +20,11 @@ from rislam_rt.pipeline.summary import (
     wall_scores,
 )
 
-PER_CYCLE = [name for name, (dims, _, _) in SCHEME.items() if dims[0] == "cycle" and not name.startswith("component")]
+PER_CYCLE = [
+    name
+    for name, (dims, _, _) in SCHEME.items()
+    if dims[0] == "time" and not name.startswith("component") and name != "panel"  # of several panels alone
+]
 
 
 def map_of_walls(normal, offset):

@@ -39,6 +39,8 @@ ONLY_IN = {
     "cloudpickle": (),
     "random": (),
     "evo": (),
+    "deepmimo": (),
+    "rerun": ("report/recording.py",),
 }
 """Where a foreign package may be imported inside the package: the tracer in one folder, evo (GPL) nowhere."""
 

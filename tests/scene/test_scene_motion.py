@@ -10,7 +10,8 @@ from rislam_rt.errors import SceneError
 from rislam_rt.model import Body
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.meshes import parse_mesh, ply_bytes
-from rislam_rt.scene.motion import parse_tum, straight_motion
+from rislam_rt.scene.motion import straight_motion
+from rislam_rt.scene.recorded import parse_tum
 from rislam_rt.scene.rooms.paths import smooth_path
 from rislam_rt.scene.rooms.shapes import block
 from rislam_rt.scene.write import tum_bytes
@@ -50,8 +51,8 @@ def test_smooth_path_has_the_arc_length_asked_for() -> None:
 
 @pytest.mark.parametrize(
     ("extra", "says"),
-    [("cycles = 3", ""), ("cycles = 4", "4 cycles wanted, 3 poses"), ("cycle_s = 0.2", "time steps of 'path.tum'"),
-     ("cycle_s = 0.1", ""), ("start = [1.0, 1.0, 1.1]", "is not agent.start"), ("start = [1.0, 1.0, 1.0]", "")],
+    [("cycles = 3", ""), ("cycles = 4", "4 cycles wanted, 3 poses"), ("cycle_s = 0.1", ""),
+     ("start = [1.0, 1.0, 1.1]", "is not agent.start"), ("start = [1.0, 1.0, 1.0]", "")],
 )  # fmt: skip
 def test_section_beside_a_path_must_agree(damaged: Callable[[str, str], Path], extra: str, says: str) -> None:
     damaged("start = [0.5, 0.7, 0.5]\n", "")

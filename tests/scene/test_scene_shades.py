@@ -219,3 +219,16 @@ def test_records_refuse_what_makes_no_sense() -> None:
         Scatterer("s", CENTER, 1.0, 0.1, "cylinder", 0.2, np.array([0.0, 0.0, 2.0]))
     with pytest.raises(SceneError, match="shade: the mesh has no faces"):
         Shade(np.zeros((3, 3)), np.zeros((0, 3), dtype=int))
+
+
+def test_shades_alone_are_written_read_and_checked(room: Path, tmp_path: Path) -> None:
+    scene = load_scene(room)
+    heap = Shade(*block([2.9, 2.9, 0.2], [3.1, 3.1, 0.4]), name="heap")
+    again = load_scene(write_scene(replace(scene, shades=(heap,)), tmp_path / "again"))
+    assert [shade.name for shade in again.shades] == ["heap"]
+    assert np.array_equal(again.shades[0].triangles, heap.triangles)
+    around = Shade(*block([0.2, 0.2, 0.1], [1.0, 1.0, 0.9]), name="heap")
+    inside = [f.line for f in check_scene(replace(scene, shades=(around,)))]
+    assert any("the agent is inside it at or after cycle 0" in line and "shade[0]" in line for line in inside)
+    twice = [f.line for f in check_scene(replace(scene, shades=(replace(heap, name="floor"),)))]
+    assert any("called 'floor'" in line for line in twice)

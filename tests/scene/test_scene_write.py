@@ -25,12 +25,12 @@ def assert_equal(a: Scene, b: Scene) -> None:
     for one, other in zip(a.scatterers, b.scatterers, strict=True):
         assert np.array_equal(one.position, other.position)
         assert (one.rcs, one.radius) == (other.rcs, other.radius)
-    if a.ris is not None and b.ris is not None:
-        assert np.array_equal(a.ris.center, b.ris.center)
-        assert a.ris.host == b.ris.host
+    for one, other in zip(a.panels, b.panels, strict=True):
+        assert np.array_equal(one.center, other.center)
+        assert (one.name, one.host) == (other.name, other.host)
         # normal and up are brought to length 1 once more on reading
-        assert np.allclose(a.ris.spec.offsets(), b.ris.spec.offsets(), rtol=0, atol=1e-15)
-        assert (a.ris.spec.levels, a.ris.spec.element) == (b.ris.spec.levels, b.ris.spec.element)
+        assert np.allclose(one.spec.offsets(), other.spec.offsets(), rtol=0, atol=1e-15)
+        assert (one.spec.levels, one.spec.element) == (other.spec.levels, other.spec.element)
     # TUM files have nine digits
     assert np.allclose(a.agent.position, b.agent.position, rtol=0, atol=1e-8)
     assert np.allclose(a.agent.heading, b.agent.heading, rtol=0, atol=1e-8)

@@ -155,8 +155,8 @@ def test_a_long_gap_tells_no_more_than_its_beginning():
     hidden, odds, missed = np.zeros((1, 2)), [0.0], np.array([[1.0, 0.1]])
     for _ in range(200):
         hidden, surplus = weigh_silence(hidden, missed)
-        odds.append(odds[-1] + float(surplus[0]))
+        odds.append(odds[-1] + float(surplus[0, 0]))
     assert odds[1] == pytest.approx(-np.log(BLOCKED + (1.0 - BLOCKED) * 0.1))
     assert odds[100] == pytest.approx(odds[-1], abs=1e-6)
     assert odds[-1] < -np.log(BLOCKED)
-    assert weigh_silence(np.zeros((1, 2)), np.array([[0.3, 0.3]]))[1] == pytest.approx(0.0)
+    assert weigh_silence(np.zeros((1, 2)), np.array([[0.3, 0.3]]))[1][0, 0] == pytest.approx(0.0)

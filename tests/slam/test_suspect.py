@@ -95,7 +95,7 @@ def test_the_likelier_track_is_suspected_and_none_without_evidence(rng: np.rando
     assert suspect is not None
     np.testing.assert_allclose(suspect.position, SPOTS[0], atol=0.05)  # 20 looks of 0.02 in cosines, 2.7 m away
     assert suspect.hits == int(tracks.length[0])
-    doubted = tracks._replace(log_ris=np.full(2, -10.0))
+    doubted = tracks._replace(log_ris=np.full((2, 1), -10.0))
     assert find_suspect(doubted, empty_book(), AGENT, BODY) is None
     assert find_suspect(no_tracks(4), empty_book(), AGENT, BODY) is None
 
@@ -118,7 +118,7 @@ def test_nothing_deep_behind_a_mirror_is_suspected(rng: np.random.Generator) -> 
             tracks = advance(tracks, 0.1, cycle, np.full(3, 1e-3))
             tracks = extend(tracks, np.array([0]), overhead, rows, bright, cycle)
             tracks = extend(tracks, np.array([1]), mine, rows, ~bright, cycle)
-        return find_suspect(tracks._replace(log_ris=np.full(2, 5.0)), empty_book(), AGENT, BODY) is not None
+        return find_suspect(tracks._replace(log_ris=np.full((2, 1), 5.0)), empty_book(), AGENT, BODY) is not None
 
     assert suspected(3.0)
     assert not suspected(3.0 + 2.0 * DEEP)

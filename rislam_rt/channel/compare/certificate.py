@@ -7,6 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.facets import Facets, build_facets
+from rislam_rt.channel.shades import ALONE
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit
@@ -60,6 +61,8 @@ class Leg(NamedTuple):
     bounce do not lie on the same side: then there is no such reflection."""
     shift: Floats
     """(d + 1,) [m] how far beside each segment its ray may run in float32."""
+    panel: int
+    """The panel at its end, -1 for none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +85,8 @@ class Certifier:
     """(W,) [rad] what float32 corners do to the normal of each wall's largest triangle, which the tracer mirrors in."""
     center: Floats
     """(3,) [m] middle of the room, from which the tracer's coordinates count."""
-    host: int
+    hosts: tuple[int, ...]
+    """The wall behind each panel, -1 without one."""
 
     @classmethod
     def of(cls, scene: Scene, trajectory: Trajectory, depth: int, shortest: float) -> "Certifier":
@@ -94,7 +98,7 @@ class Certifier:
         edges = np.concatenate([np.zeros((0, 2, 3)), *outlines])
         center = scene.bounds.mean(axis=0)
         tilt = _tilts(facets, center)
-        return cls(scene, trajectory, depth, shortest, walls.names, facets, edges, owner, tilt, center, walls.host)
+        return cls(scene, trajectory, depth, shortest, walls.names, facets, edges, owner, tilt, center, walls.hosts)
 
     def label(self, identity: Identity) -> str:
         """An identity for people; Rx walls after the bar."""
@@ -136,10 +140,11 @@ class Certifier:
         tx, rx = self.trajectory.tx[cycle], self.trajectory.rx[cycle]
         if not landmark:
             return [self._unfolded(tx_walls, tx, rx)]
-        point = self.scene.landmark_positions[self.scene.landmarks.index(landmark)]
-        return [self._unfolded(tx_walls, tx, point), self._unfolded(rx_walls[::-1], rx, point)]
+        number = self.scene.landmarks.index(landmark)
+        point, panel = self.scene.landmark_positions[number], self.scene.panel_number(number)
+        return [self._unfolded(tx_walls, tx, point, panel), self._unfolded(rx_walls[::-1], rx, point, panel)]
 
-    def _unfolded(self, walls: list[int], device: Floats, far: Floats) -> Leg:
+    def _unfolded(self, walls: list[int], device: Floats, far: Floats, panel: int = -1) -> Leg:
         """Draw a leg on unbounded planes by mirroring the far end."""
         facets, images = self.facets, [far]
         for wall in walls[::-1]:
@@ -153,7 +158,7 @@ class Certifier:
             points.append(points[-1] + fraction * (image - points[-1]))
         drawn = np.array([*points, far])
         shift = self._shifts(drawn, np.array(images[::-1]), walls)
-        return Leg(drawn, np.array(walls, dtype=np.int64), float(clearance), shift)
+        return Leg(drawn, np.array(walls, dtype=np.int64), float(clearance), shift, panel)
 
     def _shifts(self, points: Floats, images: Floats, walls: list[int]) -> Floats:
         """How far beside each segment the tracer's ray may run: (d + 1,) [m].
@@ -184,8 +189,8 @@ class Certifier:
             found += self._on_wall(leg, number)
         for number in range(len(leg.points) - 1):
             found += self._free(leg, number)
-        panel = self.scene.ris
-        if panel is not None and np.array_equal(leg.points[-1], panel.center):
+        if leg.panel >= 0:
+            panel = self.scene.panels[leg.panel]
             height = float((leg.points[-2] - leg.points[-1]) @ panel.spec.normal)
             found.append(Condition("in a face", f"{height:.2e} m in front of the panel's plane", height, reach))
         return found
@@ -211,7 +216,8 @@ class Certifier:
         a, b = self.facets.distance(np.stack([start, end]))
         least = np.minimum(np.abs(a), np.abs(b))
         own = {int(self.facets.plane[w]) for w in leg.walls[max(number - 1, 0) : number + 1]}
-        own |= {int(self.facets.plane[self.host])} if number == len(leg.walls) and self.host >= 0 else set()
+        if number == len(leg.walls) and leg.panel >= 0 and self.hosts[leg.panel] >= 0:
+            own.add(int(self.facets.plane[self.hosts[leg.panel]]))
         found = []
         for wall in np.flatnonzero((a * b < 0.0) | (least < reach)):
             if int(self.facets.plane[wall]) in own:
@@ -230,13 +236,14 @@ class Certifier:
         return found + self._unshaded(leg, number)
 
     def _unshaded(self, leg: Leg, number: int) -> list[Condition]:
-        """No scatterer's shade stands across segment `number`; the far end's own does not hide it."""
+        """No shade stands across segment `number`; the far end's own does not hide it."""
         shades, found = self.facets.shades, []
         for shade, landmark in enumerate(shades.landmark):
-            if number == len(leg.walls) and np.array_equal(leg.points[-1], self.scene.landmark_positions[landmark]):
+            last = number == len(leg.walls) and landmark != ALONE
+            if last and np.array_equal(leg.points[-1], self.scene.landmark_positions[landmark]):
                 continue
             margin = shades.margin(leg.points[number], leg.points[number + 1], shade)
-            text = f"shade of {self.scene.landmarks[landmark]}, {abs(margin):.2e} m {'in' if margin < 0 else 'out'}side"
+            text = f"shade of {shades.names[shade]}, {abs(margin):.2e} m {'in' if margin < 0 else 'out'}side"
             found.append(Condition("occluded", text, margin, float(leg.shift[number])))
         return found
 

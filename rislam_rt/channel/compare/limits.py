@@ -21,11 +21,11 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.cross_section import cross_section
-from rislam_rt.channel.image_source.fresnel import relative_permittivity, slab_coefficients
+from rislam_rt.channel.image_source.fresnel import slab_coefficients, slab_permittivity
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import Material, PathKind, Paths, RadioConfig, Scene, Trajectory
+from rislam_rt.model import Material, Paths, RadioConfig, Scene, Trajectory
 
 SINGLE, DOUBLE = 2.0**-24, 2.0**-53
 """Unit roundoff of float32 and float64."""
@@ -140,13 +140,12 @@ class Precision:
             if scatterer.law == "cylinder" and scatterer.height is not None:
                 rows = paths.landmark[path] == number
                 error[rows] = wavenumber * scatterer.height * turn[rows].sum(axis=1)
-        if self.scene.ris is None:
-            return error
-        spec, rows = self.scene.ris.spec, np.flatnonzero(np.isin(paths.kind[path], [PathKind.RIS, PathKind.VRIS]))
-        for leg, toward in enumerate(_landmark_directions(paths, cycle[rows], path[rows], trajectory)):
-            error[rows] += 0.5 * wavenumber * spec.diagonal * turn[rows, leg]
-            # the element's pattern, at most cos^(3/2) in amplitude
-            error[rows] += (1.0 + _ratio(turn[rows, leg], np.abs(toward @ spec.normal))) ** 2 - 1.0
+        for number, panel in enumerate(self.scene.panels):
+            rows = np.flatnonzero(paths.panel[path] == number)
+            for leg, toward in enumerate(_landmark_directions(paths, cycle[rows], path[rows], trajectory)):
+                error[rows] += 0.5 * wavenumber * panel.spec.diagonal * turn[rows, leg]
+                # the element's pattern, at most cos^(3/2) in amplitude
+                error[rows] += (1.0 + _ratio(turn[rows, leg], np.abs(toward @ panel.spec.normal))) ** 2 - 1.0
         return error
 
 
@@ -181,11 +180,11 @@ def coherent_scale(
 
 def with_mirrors(scene: Scene) -> Scene | None:
     """The scene with perfect mirrors in place of its slabs, or nothing if it has none."""
-    if all(reflector.material.itu is None for reflector in scene.reflectors):
+    if not any(reflector.material.is_slab for reflector in scene.reflectors):
         return None
     mirror = Material(reflection=1.0)
     return replace(
-        scene, reflectors=tuple(replace(r, material=mirror) if r.material.itu else r for r in scene.reflectors)
+        scene, reflectors=tuple(replace(r, material=mirror) if r.material.is_slab else r for r in scene.reflectors)
     )
 
 
@@ -259,10 +258,10 @@ def field_error(material: Material, carrier: float) -> float:
     are the measure, at the worst angle and polarisation. The root's imaginary part besides comes from `|z| - Re z`,
     which cancels in a slab of little loss: the root is off by `u |z| / (2 Im sqrt(z))`, at most by sqrt(u |z|).
     """
-    if material.itu is None:
+    if material.level is not None:
         return FIELD_STEPS * SINGLE
     cosine, step = np.linspace(1e-3, 1.0, 4001), 1e-6
-    permittivity = relative_permittivity(material.itu, carrier)
+    permittivity = slab_permittivity(material, carrier)
 
     def slope(by_depth: float, by_permittivity: float) -> Floats:
         sides = [
@@ -278,7 +277,8 @@ def field_error(material: Material, carrier: float) -> float:
 
     z = permittivity - (1.0 - cosine**2)
     root = np.sqrt(z)
-    off = np.minimum(np.abs(z) / (2.0 * np.abs(root.imag)), np.sqrt(np.abs(z) / SINGLE))
+    loss = np.maximum(np.abs(root.imag), np.finfo(np.float64).tiny)
+    off = np.minimum(np.abs(z) / (2.0 * loss), np.sqrt(np.abs(z) / SINGLE))
     steps = SLAB_STEPS + 2.0 * np.abs(root) * off / abs(permittivity)
     worst = (slope(step, 0.0) * SLAB_STEPS + slope(0.0, step) * steps).max()
     return float((FIELD_STEPS + SLAB_STEPS + worst) * SINGLE)

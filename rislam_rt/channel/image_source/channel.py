@@ -75,11 +75,12 @@ class ImageSourceChannel:
         return rephase(paths, code)
 
     def _landmark_legs(self, device: Floats, number: int) -> Legs:
-        """Legs from device positions (K, 3) to a landmark; those to the panel arrive at its front."""
-        panel = self.scene.ris if number == len(self.scene.scatterers) else None
+        """Legs from device positions (K, 3) to a landmark; those to a panel arrive at its front."""
+        panel = self.scene.panel_number(number)
         point = self.scene.landmark_positions[number : number + 1]
-        if panel is None:
+        if panel < 0:
             return find_legs(self.looked, self.coatings, device, point, self.depth, landmark=number)
+        front = self.scene.panels[panel].spec.normal
         return find_legs(
-            self.looked, self.coatings, device, point, self.depth, host=self.walls.host, front=panel.spec.normal
+            self.looked, self.coatings, device, point, self.depth, host=self.walls.hosts[panel], front=front
         )

@@ -27,6 +27,21 @@ def relative_permittivity(name: str, carrier: float) -> complex:
     return complex(a * ghz**b, -c * ghz**d / (2.0 * np.pi * carrier * VACUUM_PERMITTIVITY))
 
 
+def slab_permittivity(material: Material, carrier: float) -> complex:
+    """Complex relative permittivity of a slab, ITU's or one's own, at the carrier [Hz]; 1 for a constant R.
+
+    Raises
+    ------
+    SceneError
+        An ITU material is not specified at the carrier.
+    """
+    if material.itu is not None:
+        return relative_permittivity(material.itu, carrier)
+    if material.permittivity is None:
+        return 1.0 + 0.0j
+    return complex(material.permittivity, -material.conductivity / (2.0 * np.pi * carrier * VACUUM_PERMITTIVITY))
+
+
 def slab_coefficients(
     cos_theta: Floats, permittivity: Complexes, thickness: Floats, carrier: float
 ) -> tuple[Complexes, Complexes]:
@@ -71,6 +86,12 @@ class Coatings:
     """(W,) complex relative permittivity, 1 for a constant reflection coefficient."""
     thickness: Floats
     """(W,) [m] of the slab."""
+    specular: Floats
+    """(W,) share of the reflected field that is not scattered."""
+    te: Floats
+    """(W,) constant coefficient across the plane of incidence, NaN where it follows from the angle,"""
+    tm: Floats
+    """(W,) ...and in it."""
 
     def coefficient(self, walls: Integers, normals: Floats, direction: Floats) -> Complexes:
         """Reflection coefficients (N,) of rays that leave along `direction` (N, 3) and meet `walls` (N, d).
@@ -88,7 +109,7 @@ class Coatings:
             field = self._reflect(field, incident, reflected, normal, wall)
             incident = reflected
         constant[rows] = np.sum(field * polarisation_basis(incident)[0], axis=-1)
-        return constant
+        return np.asarray(constant * np.prod(self.specular[walls], axis=1))
 
     def _reflect(
         self, field: Complexes, incident: Floats, reflected: Floats, normal: Floats, wall: Integers
@@ -100,6 +121,8 @@ class Coatings:
         """
         cos_theta = np.abs(np.sum(incident * normal, axis=-1))
         te, tm = slab_coefficients(cos_theta, self.permittivity[wall], self.thickness[wall], self.carrier)
+        te = np.where(np.isnan(self.te[wall]), te, self.te[wall])
+        tm = np.where(np.isnan(self.tm[wall]), tm, self.tm[wall])
         across, along_in, along_out = _incidence_basis(incident, reflected, normal)
         slab = _turned(field, across, across, te) + _turned(field, along_in, along_out, tm)
         before, after = polarisation_basis(incident), polarisation_basis(reflected)
@@ -120,8 +143,11 @@ def build_coatings(materials: tuple[Material, ...], carrier: float) -> Coatings:
     return Coatings(
         carrier,
         np.array([m.reflection or 0.0 for m in materials], dtype=np.float64),
-        np.array([relative_permittivity(m.itu, carrier) if m.itu else 1.0 for m in materials], dtype=np.complex128),
+        np.array([slab_permittivity(m, carrier) for m in materials], dtype=np.complex128),
         np.array([m.thickness for m in materials], dtype=np.float64),
+        np.array([m.specular_share for m in materials], dtype=np.float64),
+        np.array([np.nan if m.reflection_te is None else m.reflection_te for m in materials], dtype=np.float64),
+        np.array([np.nan if m.reflection_tm is None else m.reflection_tm for m in materials], dtype=np.float64),
     )
 
 

@@ -2,8 +2,11 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.shades import ALONE
 from rislam_rt.channel.traced.antennas import Antennas
 from rislam_rt.channel.traced.course import refined_course, traced_course
 from rislam_rt.channel.traced.extras import ExtraConfig, ExtraPaths, trace_extras
@@ -63,6 +66,8 @@ class TracedChannel:
         self.walls = build_walls(scene)
         self._sides = wall_sides(self.walls)
         shades = {n: s.shade.triangles for n, s in enumerate(scene.scatterers) if s.shade is not None}
+        if scene.shades:
+            shades[ALONE] = np.concatenate([shade.triangles for shade in scene.shades])
         self.stage = build_stage(self.walls, radio.carrier, room_center(scene), shades)
 
     def paths(self, trajectory: Trajectory) -> Paths:
@@ -71,8 +76,9 @@ class TracedChannel:
         tx, rx, heading = trajectory.tx, trajectory.rx, trajectory.heading
         problems = [Problem(tx, rx, heading, to_rx=True)]
         for number, point in enumerate(self.scene.landmark_positions):
-            panel = self.scene.ris if number == len(self.scene.scatterers) else None
-            behind, front = (self.walls.host, panel.spec.normal) if panel is not None else (-1, None)
+            panel, behind, front = self.scene.panel_number(number), -1, None
+            if panel >= 0:
+                behind, front = self.walls.hosts[panel], self.scene.panels[panel].spec.normal
             spared = number if number in self.stage.shades else -1
             for from_rx, device in ((False, tx), (True, rx)):
                 problems.append(Problem(device, point[None], heading, from_rx, False, behind, front, spared))

@@ -135,6 +135,9 @@ def _rough_stage(scene: Scene, carrier: float, origin: Floats, scattering: float
         if scatterer.shade is not None:
             mesh = build_mesh(f"shade-{scatterer.name}", scatterer.shade.triangles - origin)
             objects.append(rt.SceneObject(mesh, f"shade-{scatterer.name}", radio_material=absorber))
+    for index, shade in enumerate(scene.shades):
+        mesh = build_mesh(f"shade-alone-{index}", shade.triangles - origin)
+        objects.append(rt.SceneObject(mesh, f"shade-alone-{index}", radio_material=absorber))
     for number, material in enumerate(dict.fromkeys(walls.material)):
         wanted = np.array([m == material for m in walls.material])[walls.wall_of_triangle]
         mesh = build_mesh(f"walls-{number}", walls.triangles[wanted] - origin)

@@ -9,9 +9,6 @@ from rislam_rt.channel.traced.material import kept_components
 from rislam_rt.errors import SceneError
 from rislam_rt.model import Material
 
-_LOSS = 0.1
-"""[S/m] Conductivity that keeps the back of a 10 m slab from being seen."""
-
 
 class RoughConstantReflection(rt.RadioMaterial):  # type: ignore[misc]
     """A wall of constant R with Sionna's scattering and diffraction.
@@ -21,14 +18,7 @@ class RoughConstantReflection(rt.RadioMaterial):  # type: ignore[misc]
     """
 
     def __init__(self, name: str, reflection: float, scattering: float) -> None:
-        index = (1.0 + reflection) / max(1.0 - reflection, 1e-4)
-        super().__init__(
-            name,
-            thickness=10.0,
-            relative_permittivity=index**2,
-            conductivity=_LOSS * index,
-            scattering_coefficient=scattering,
-        )
+        super().__init__(name, **_slab(Material(reflection).as_body(), scattering))
         self._reflection = reflection
 
     def _event_probabilities(self, r_te: Any, r_tm: Any, t_te: Any, t_tm: Any, enabled_interactions: Any) -> Any:
@@ -41,10 +31,55 @@ class RoughConstantReflection(rt.RadioMaterial):  # type: ignore[misc]
         return kept_components(mi.Float(self._reflection), to_world @ ki_local, to_world @ ko_local)
 
 
+class PolarisedReflection(rt.RadioMaterial):  # type: ignore[misc]
+    """A wall with one constant coefficient across the plane of incidence and another one in it, on Sionna's own bases.
+
+    Edges diffract like those of a body whose |R| at normal incidence is the mean of both.
+    """
+
+    def __init__(self, name: str, material: Material, scattering: float) -> None:
+        super().__init__(name, **_slab(material.as_body(), scattering))
+        self._te, self._tm = material.reflection_te, material.reflection_tm
+
+    def _event_probabilities(self, r_te: Any, r_tm: Any, t_te: Any, t_tm: Any, enabled_interactions: Any) -> Any:
+        """Nothing passes; the rest is Sionna's."""
+        te, tm, none = (mi.Complex2f(value) for value in (self._te, self._tm, 0.0))  # type: ignore[operator]
+        return super()._event_probabilities(te, tm, none, none, enabled_interactions)
+
+    def _specular_reflection_transmission_matrix(
+        self, to_world: Any, ki_local: Any, ko_local: Any, reflection: Any, *_: Any
+    ) -> Any:
+        """Sionna's own matrix, of these coefficients."""
+        te, tm, none = (mi.Complex2f(value) for value in (self._te, self._tm, 0.0))  # type: ignore[operator]
+        return super()._specular_reflection_transmission_matrix(
+            to_world, ki_local, ko_local, reflection, te, tm, none, none
+        )
+
+
+def slab_of_ones_own(name: str, material: Material, scattering: float) -> rt.RadioMaterial:
+    """Sionna's slab of a given permittivity and conductivity."""
+    return rt.RadioMaterial(name, **_slab(material, scattering))
+
+
+def _slab(material: Material, scattering: float) -> dict[str, Any]:
+    """What Sionna's `RadioMaterial` is told of a slab."""
+    return {
+        "thickness": material.thickness,
+        "relative_permittivity": material.permittivity,
+        "conductivity": material.conductivity,
+        "scattering_coefficient": scattering,
+    }
+
+
 def rough_material(material: Material, number: int, scattering: float) -> rt.RadioMaterialBase:
-    """The radio material of a wall with scattering coefficient S in [0, 1]."""
+    """The radio material of a wall with scattering coefficient S in [0, 1]; a material's own S goes before it."""
+    scattering = material.scattering or scattering
     if material.reflection is not None:
         return RoughConstantReflection(f"rough-{number}", material.reflection, scattering)
+    if material.reflection_te is not None:
+        return PolarisedReflection(f"rough-{number}", material, scattering)
+    if material.permittivity is not None:
+        return slab_of_ones_own(f"slab-{number}", material, scattering)
     try:
         return rt.ITURadioMaterial(f"itu-{number}", material.itu, material.thickness, scattering_coefficient=scattering)
     except ValueError as error:

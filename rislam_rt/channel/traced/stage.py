@@ -9,7 +9,9 @@ import numpy as np
 import sionna.rt as rt
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.shades import ALONE
 from rislam_rt.channel.traced.material import ConstantReflection
+from rislam_rt.channel.traced.rough import PolarisedReflection, slab_of_ones_own
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
@@ -108,7 +110,7 @@ def build_stage(walls: Walls, carrier: float, origin: Floats, shades: Mapping[in
     Parameters
     ----------
     shades
-        Triangles (T, 3, 3) [m] of what hides and reflects nothing, by the number of its scatterer.
+        Triangles (T, 3, 3) [m] of what hides and reflects nothing, by the number of its scatterer, or `ALONE`.
 
     Raises
     ------
@@ -135,7 +137,8 @@ def build_stage(walls: Walls, carrier: float, origin: Floats, shades: Mapping[in
     except ValueError as error:
         raise SceneError(f"material: {error}; give an ITU material that is specified at {carrier:g} Hz") from None
     ids = np.array([int(o.object_id) for o in objects], dtype=np.int64)
-    views = {number: _part([*objects, *(o for n, o in dark.items() if n != number)]) for number in dark}
+    removable = [number for number in dark if number != ALONE]  # the others are nobody's own
+    views = {number: _part([*objects, *(o for n, o in dark.items() if n != number)]) for number in removable}
     alone = {number: _part([shade]) for number, shade in dark.items()}
     views = {NO_SHADE: scene.mi_scene} | views
     return _numbered(scene, origin, walls, ids, members, (radio_materials, material_of_wall), views, alone)
@@ -220,10 +223,16 @@ def build_mesh(name: str, triangles: Floats) -> mi.Mesh:
 
 
 def _material(material: Material, number: int) -> rt.RadioMaterialBase:
-    """The radio material of a wall: a constant R of ours, or Sionna's own slab of an ITU-R P.2040 material."""
+    """The radio material of a wall: a constant R of ours, or Sionna's own slab."""
     if material.reflection is not None:
-        return ConstantReflection(f"constant-{number}", material.reflection)
+        return ConstantReflection(f"constant-{number}", material.reflection * material.specular_share)
+    if material.reflection_te is not None:
+        return PolarisedReflection(f"polarised-{number}", material, material.scattering)
+    if material.permittivity is not None:
+        return slab_of_ones_own(f"slab-{number}", material, material.scattering)
     try:
-        return rt.ITURadioMaterial(f"itu-{number}", material.itu, material.thickness)
+        return rt.ITURadioMaterial(
+            f"itu-{number}", material.itu, material.thickness, scattering_coefficient=material.scattering
+        )
     except ValueError as error:
         raise SceneError(f"material.itu: '{material.itu}' received; {error}") from None

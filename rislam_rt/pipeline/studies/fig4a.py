@@ -39,13 +39,25 @@ def check_fig4a(scene: Scene, spec: Fig4aSpec) -> None:
     Raises
     ------
     ConfigError
-        The scene has no panel, or the agent starts too near to it.
+        The scene has no panel or several, or the agent starts too near to it.
     """
-    if scene.ris is None:
-        raise ConfigError(f"scene: '{scene.name}' has no panel; give one that has a [ris] section")
-    reach = float(np.linalg.norm(scene.ris.center[:2] - scene.agent.position[0, :2]))
+    reach = float(np.linalg.norm(lone_panel(scene).center[:2] - scene.agent.position[0, :2]))
     if spec.closest_m >= reach:
         raise ConfigError(f"closest_m: {spec.closest_m:g} received; the path starts {reach:.3g} m away, give less")
+
+
+def lone_panel(scene: Scene) -> RisPanel:
+    """The room's one panel.
+
+    Raises
+    ------
+    ConfigError
+        There is none, or there are several.
+    """
+    if not isinstance(scene.ris, RisPanel):
+        count = len(scene.panels) or "no"
+        raise ConfigError(f"scene: '{scene.name}' has {count} panels; give one that has one [ris] section")
+    return scene.ris
 
 
 def run_fig4a(scene: Scene, spec: Fig4aSpec, *, rng: np.random.Generator, progress: Progress | None = None) -> Fig4a:
@@ -59,8 +71,7 @@ def run_fig4a(scene: Scene, spec: Fig4aSpec, *, rng: np.random.Generator, progre
         The traced channel failed, or the machine lacks what it needs.
     """
     check_fig4a(scene, spec)
-    panel = scene.ris
-    assert panel is not None
+    panel = lone_panel(scene)
     tell = progress or (lambda stage, at, total: None)
     radio, motion = build_radio(spec.radio), walk_to_panel(scene, spec.places, spec.closest_m)
     radius = spec.sphere_radius_m or 0.5 * longer_side(panel)
@@ -86,9 +97,8 @@ def run_fig4a(scene: Scene, spec: Fig4aSpec, *, rng: np.random.Generator, progre
 
 def walk_to_panel(scene: Scene, places: int, closest: float) -> Trajectory:
     """Places on the straight line from the trajectory's start to `closest` [m] short of the panel, at one height."""
-    assert scene.ris is not None
     start = scene.agent.position[0]
-    way = np.append(scene.ris.center[:2] - start[:2], 0.0)
+    way = np.append(lone_panel(scene).center[:2] - start[:2], 0.0)
     reach = float(np.linalg.norm(way))
     position = start + np.linspace(0.0, 1.0 - closest / reach, places)[:, None] * way
     heading = np.full(places, np.arctan2(way[1], way[0]))
@@ -99,8 +109,8 @@ def place_problems(
     scene: Scene, motion: Trajectory, radio: RadioConfig, element: str, channel: str
 ) -> list[DesignProblem]:
     """The design problem of the direct panel path at every place, for one element pattern."""
-    assert scene.ris is not None
-    panel = replace(scene.ris, spec=replace(scene.ris.spec, element=element))
+    panel = lone_panel(scene)
+    panel = replace(panel, spec=replace(panel.spec, element=element))
     paths = build_channel(channel, replace(scene, ris=panel), radio, 0).paths(motion)
     _check_seen(paths, scene.landmarks.index(panel.name), motion)
     return [
@@ -111,8 +121,7 @@ def place_problems(
 
 def sphere_gain(scene: Scene, motion: Trajectory, radio: RadioConfig, radius: float, channel: str) -> Floats:
     """Gain (K,) [dB] of a sphere in the panel's place, its centre a radius in front of the panel's plane."""
-    panel = scene.ris
-    assert panel is not None
+    panel = lone_panel(scene)
     center = panel.center + radius * panel.spec.normal
     ball = Scatterer(panel.name, center, np.pi * radius**2, radius)
     changed = replace(scene, scatterers=(*scene.scatterers, ball), ris=None)

@@ -117,10 +117,15 @@ def trouble(groups: Sequence[Group]) -> list[str]:
 
 
 def panel_of(group: Group, scheme: str) -> str | None:
-    """Name of the landmark that is the panel."""
-    names = group.parts(scheme, "landmarks")
-    known = [name for name in names if not np.isnan(group.column(scheme, "landmarks", name, "cycles_identified")).all()]
+    """Name of the landmark that is the panel, of several the first."""
+    known = _panels_of(group, scheme)
     return known[0] if known else None
+
+
+def _panels_of(group: Group, scheme: str) -> list[str]:
+    """Names of the landmarks that are panels."""
+    names = group.parts(scheme, "landmarks")
+    return [name for name in names if not np.isnan(group.column(scheme, "landmarks", name, "cycles_identified")).all()]
 
 
 def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
@@ -128,11 +133,11 @@ def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
 
     None where there is nothing to be found.
     """
-    panel = panel_of(group, scheme)
+    panels = _panels_of(group, scheme)
     names = group.parts(scheme, "landmarks")
-    own = [panel] if panel is not None and SCHEMES[scheme].panel else []
+    own = panels if SCHEMES[scheme].panel else []
     found: dict[str, float | None] = {}
-    for kind, members in (("ris", own), ("scatterer", [name for name in names if name != panel])):
+    for kind, members in (("ris", own), ("scatterer", [name for name in names if name not in panels])):
         error, bound = (_pooled(group, scheme, "landmarks", members, part) for part in ("final_m", "bound_m"))
         found |= {f"{kind}_m": _rms(error), f"{kind}_bound_m": bound_beside(bound, error)}
         found[f"{kind}_found"] = _share(error)

@@ -13,6 +13,7 @@ from rislam_rt.scene.findings import Finding
 def name_errors(soup: Soup) -> Iterator[Finding]:
     """Two parts of one name."""
     names = [r.name for r in soup.scene.reflectors] + list(soup.scene.landmarks)
+    names += [shade.name for shade in soup.scene.shades]
     for name, count in Counter(names).items():
         if count > 1:
             yield soup.error("name", f"{count} parts are called '{name}'", "give every part a name of its own")

@@ -1,6 +1,7 @@
-"""Scene check, the panel's part: on its host, facing the room, physically plausible for the radio."""
+"""Scene check, the panels' part: on their hosts, facing the room, clear of each other, plausible for the radio."""
 
 from collections.abc import Iterator
+from itertools import combinations
 
 import numpy as np
 
@@ -9,80 +10,109 @@ from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.model import RadioConfig, RisPanel
 from rislam_rt.scene.check.probe import ray_hits, touching
 from rislam_rt.scene.check.soup import MIN_CLEARANCE, Soup
-from rislam_rt.scene.findings import Finding
+from rislam_rt.scene.findings import Finding, panel_key
 
 MAX_TURN = 1e-2
 """[rad] Largest angle between panel and host."""
 
 
 def panel_errors(soup: Soup) -> Iterator[Finding]:
-    """Outside the bounds, off its host, or facing out of the room."""
-    panel = soup.scene.ris
-    if panel is None:
-        return
-    at = panel.center
-    tolerant = soup._replace(bounds=soup.bounds + MIN_CLEARANCE * np.array([[-1.0], [1.0]]))
-    if len(tolerant.outside(at[None])):
-        low, high = np.round(soup.bounds, 3).tolist()
-        message = f"{at.tolist()} lies outside the meshes' bounds {low} to {high}"
-        yield soup.error("ris.center", message, "move the panel onto its host")
-        return
-    findings = list(_on_host(soup, panel))
-    yield from findings
-    if not findings:
-        yield from _facing(soup, panel)
+    """Outside the bounds, off its host, facing out of the room, or over another panel."""
+    for panel, key in _keyed(soup):
+        at = panel.center
+        tolerant = soup._replace(bounds=soup.bounds + MIN_CLEARANCE * np.array([[-1.0], [1.0]]))
+        if len(tolerant.outside(at[None])):
+            low, high = np.round(soup.bounds, 3).tolist()
+            message = f"{at.tolist()} lies outside the meshes' bounds {low} to {high}"
+            yield soup.error(f"{key}.center", message, "move the panel onto its host")
+            continue
+        findings = list(_on_host(soup, panel, key))
+        yield from findings
+        if not findings:
+            yield from _facing(soup, panel, key)
+    for (one, _), (other, key) in combinations(_keyed(soup), 2):
+        if _overlap(one, other):
+            message = f"'{other.name}' covers a part of '{one.name}'"
+            yield soup.error(f"{key}.center", message, "move the panels apart")
 
 
 def panel_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
     """Never seen from the front; reflecting more than a plate; ambiguous; delay spread above 1 / B."""
-    panel = soup.scene.ris
-    if panel is None:
-        return
-    spec, motion = panel.spec, soup.scene.agent
-    if ((motion.position - panel.center) @ spec.normal <= 0.0).all():
-        yield soup.warning("ris.normal", "the agent is never in front of the panel", "turn the panel or the path")
+    for panel, key in _keyed(soup):
+        spec, motion = panel.spec, soup.scene.agent
+        if ((motion.position - panel.center) @ spec.normal <= 0.0).all():
+            yield soup.warning(
+                f"{key}.normal", "the agent is never in front of the panel", "turn the panel or the path"
+            )
+        yield from _implausible(soup, panel, key, radio)
+        spread = _delay_spread(soup, panel)
+        if spread * radio.bandwidth > 1.0:
+            message = f"delays over the panel spread by up to {spread * 1e9:.2f} ns, more than 1/B"
+            yield soup.warning(f"{key}.rows", message, "take a smaller panel or a smaller bandwidth")
+
+
+def _keyed(soup: Soup) -> list[tuple[RisPanel, str]]:
+    """The panels, each with its key in the scene file."""
+    panels = soup.scene.panels
+    return [(panel, panel_key(number, len(panels))) for number, panel in enumerate(panels)]
+
+
+def _overlap(one: RisPanel, other: RisPanel) -> bool:
+    """Whether two panels look the same way from one plane and share a part of it: no axis of either separates them."""
+    gap = other.center - one.center
+    if one.spec.normal @ other.spec.normal < np.cos(MAX_TURN) or abs(gap @ one.spec.normal) > MIN_CLEARANCE:
+        return False
+    halves = [
+        0.5 * spec.spacing * [spec.cols, spec.rows] * np.stack([spec.right, spec.up]).T
+        for spec in (one.spec, other.spec)
+    ]
+    axes = [one.spec.right, one.spec.up, other.spec.right, other.spec.up]
+    return all(abs(gap @ axis) < sum(np.abs(axis @ half).sum() for half in halves) - MIN_CLEARANCE for axis in axes)
+
+
+def _implausible(soup: Soup, panel: RisPanel, key: str, radio: RadioConfig) -> Iterator[Finding]:
+    """Reflecting more than a plate; elements so far apart that their beams are ambiguous."""
+    spec = panel.spec
     area = float(spec.spacing[0] * spec.spacing[1])
     excess = 10.0 * np.log10(2.0 * radio.wavelength**2 / (np.pi * area))
     if spec.element == "tang" and excess > 0.5:
         message = f"at {radio.carrier / 1e9:g} GHz 'tang' elements reflect {excess:.2f} dB more than a perfect plate"
-        yield soup.warning("ris.element", message, "take 'energy', unless the paper's model is wanted")
+        yield soup.warning(f"{key}.element", message, "take 'energy', unless the paper's model is wanted")
     widest = max((float(d) for d, n in zip(spec.spacing, (spec.cols, spec.rows), strict=True) if n > 1), default=0.0)
     if widest >= radio.wavelength:
         message = (
             f"elements {widest:g} m apart, a wavelength or more ({radio.wavelength:.4g} m at "
             f"{radio.carrier / 1e9:g} GHz): whatever the code, another direction is met as strongly"
         )
-        yield soup.warning("ris.spacing_m", message, "take half a wavelength or less")
-    spread = _delay_spread(soup, panel)
-    if spread * radio.bandwidth > 1.0:
-        message = f"delays over the panel spread by up to {spread * 1e9:.2f} ns, more than 1/B"
-        yield soup.warning("ris.rows", message, "take a smaller panel or a smaller bandwidth")
+        yield soup.warning(f"{key}.spacing_m", message, "take half a wavelength or less")
 
 
-def _on_host(soup: Soup, panel: RisPanel) -> Iterator[Finding]:
+def _on_host(soup: Soup, panel: RisPanel, key: str) -> Iterator[Finding]:
     names = [r.name for r in soup.scene.reflectors]
     _, near = touching(panel.center[None], soup.triangles, MIN_CLEARANCE)
     behind = sorted({soup.name(int(t)) for t in near})
     if panel.host is None:
         if behind:
-            yield soup.error("ris.host", f"missing, and the panel lies on '{behind[0]}'", f'add host = "{behind[0]}"')
+            yield soup.error(
+                f"{key}.host", f"missing, and the panel lies on '{behind[0]}'", f'add host = "{behind[0]}"'
+            )
         return
     if panel.host not in names:
-        yield soup.error("ris.host", f"'{panel.host}' is no reflector", f"give one of {', '.join(names[:12])}")
+        yield soup.error(f"{key}.host", f"'{panel.host}' is no reflector", f"give one of {', '.join(names[:12])}")
         return
     if panel.host not in behind:
         gap = _gap(soup, panel)
         message = f"{panel.center.tolist()} is {gap * 1e3:.3g} mm off '{panel.host}'" if gap > MIN_CLEARANCE else (
             f"{panel.center.tolist()} lies beside '{panel.host}', in its plane"
         )  # fmt: skip
-        yield soup.error("ris.center", message, "move the panel onto its host")
+        yield soup.error(f"{key}.center", message, "move the panel onto its host")
         return
     normal, _ = triangle_planes(soup.triangles[[t for t in near if soup.name(int(t)) == panel.host]])
     turn = np.linalg.norm(np.cross(normal, panel.spec.normal), axis=-1).min()
     if turn > MAX_TURN:
         angle = np.degrees(np.arcsin(min(turn, 1.0)))
         yield soup.error(
-            "ris.normal", f"{angle:.2f} degrees from the normal of '{panel.host}'", "lay it flat on its host"
+            f"{key}.normal", f"{angle:.2f} degrees from the normal of '{panel.host}'", "lay it flat on its host"
         )
 
 
@@ -93,15 +123,18 @@ def _gap(soup: Soup, panel: RisPanel) -> float:
     return float(np.abs(normal @ panel.center - offset).min())
 
 
-def _facing(soup: Soup, panel: RisPanel) -> Iterator[Finding]:
-    """The room is where rays hit something: a panel with nothing before and something behind it looks out."""
+def _facing(soup: Soup, panel: RisPanel, key: str) -> Iterator[Finding]:
+    """The room is where rays hit something: a panel with nothing before and something behind it looks out; unless the
+    agent is before it, in a room that is open there (a street).
+    """
     ahead, behind = (
         ray_hits(panel.center + side * 2.0 * MIN_CLEARANCE * panel.spec.normal, np.array([side * panel.spec.normal]),
                  soup.triangles)[0] >= 0
         for side in (1.0, -1.0)
     )  # fmt: skip
-    if behind and not ahead:
-        yield soup.error("ris.normal", f"{panel.spec.normal.tolist()} points out of the room", "reverse it")
+    before = ((soup.scene.agent.position - panel.center) @ panel.spec.normal > 0.0).any()
+    if behind and not ahead and not before:
+        yield soup.error(f"{key}.normal", f"{panel.spec.normal.tolist()} points out of the room", "reverse it")
 
 
 def _delay_spread(soup: Soup, panel: RisPanel) -> float:

@@ -25,11 +25,12 @@ def shade_errors(soup: Soup) -> Iterator[Finding]:
     marks, motion = soup.scene.landmark_positions, soup.scene.agent
     for field, number, shade in _shades(soup):
         inside = _inside(marks, shade)
-        if not inside[number]:
+        if number is not None and not inside[number]:
             message = f"it does not enclose the scatterer's position {marks[number].tolist()}"
             yield soup.error(field, message, "give a closed mesh in the room's frame, about the position")
             continue
-        inside[number] = False
+        if number is not None:
+            inside[number] = False
         if inside.any():
             message = f"'{soup.scene.landmarks[int(np.argmax(inside))]}' lies inside it, where no ray reaches it"
             yield soup.error(field, message, "move one of the two")
@@ -55,11 +56,13 @@ def cylinder_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
             )
 
 
-def _shades(soup: Soup) -> Iterator[tuple[str, int, Shade]]:
-    """Field, number and shade of every scatterer that has one."""
+def _shades(soup: Soup) -> Iterator[tuple[str, int | None, Shade]]:
+    """Field and shade of every scatterer that has one, with its number, and of those that stand alone."""
     for number, scatterer in enumerate(soup.scene.scatterers):
         if scatterer.shade is not None:
             yield f"scatterer[{number}].mesh ({scatterer.name})", number, scatterer.shade
+    for number, shade in enumerate(soup.scene.shades):
+        yield f"shade[{number}].mesh ({shade.name})", None, shade
 
 
 def _inside(points: Floats, shade: Shade) -> Booleans:

@@ -164,9 +164,9 @@ def scene_digest(scene: Scene) -> str:
         take(f"{reflector.name} {reflector.material}", reflector.vertices, reflector.faces)
     for scatterer in scene.scatterers:
         take(f"{scatterer.name} {scatterer.rcs!r}", scatterer.position)
-    if scene.ris is not None:
-        spec = scene.ris.spec
-        take(f"{spec.rows} {spec.cols} {spec.levels} {spec.element} {scene.ris.host}", scene.ris.center)
+    for panel in scene.panels:
+        spec = panel.spec
+        take(f"{spec.rows} {spec.cols} {spec.levels} {spec.element} {panel.host}", panel.center)
         take("panel", spec.normal, spec.up, spec.spacing)
     agent: Trajectory = scene.agent
     take("agent", agent.time, agent.position, agent.velocity, agent.heading)

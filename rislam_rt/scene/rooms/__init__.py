@@ -5,7 +5,7 @@ from collections.abc import Callable
 from rislam_rt.scene.rooms.angled import l_room, tilted_room
 from rislam_rt.scene.rooms.furnished import imported_glb, office
 from rislam_rt.scene.rooms.hall import large_hall
-from rislam_rt.scene.rooms.plain import empty_box, itu_room, paper_room, two_scatterers
+from rislam_rt.scene.rooms.plain import empty_box, itu_room, paper_room, two_panels, two_scatterers
 from rislam_rt.scene.rooms.room import Room
 from rislam_rt.scene.rooms.shaded import shaded_room
 
@@ -18,6 +18,7 @@ ROOMS: dict[str, Callable[[], Room]] = {
         tilted_room,
         office,
         two_scatterers,
+        two_panels,
         itu_room,
         large_hall,
         imported_glb,

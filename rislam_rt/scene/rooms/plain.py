@@ -56,6 +56,27 @@ def two_scatterers() -> Room:
     return Room(table, meshes, readme, files)
 
 
+def two_panels() -> Room:
+    """A box with a panel on the ceiling, a larger one on a wall, and a sphere; the agent walks a bow."""
+    meshes = box_walls(7.0, 5.0, 3.0)
+    agent, files = curved_agent([[1.2, 1.0, 0.6], [3.0, 1.3, 0.6], [4.9, 2.0, 0.6], [5.0, 3.4, 0.6], [3.6, 4.0, 0.6]])
+    above = {"name": "above"} | panel([3.0, 2.6, 3.0], DOWN, NORTH)
+    beside = {"name": "beside"} | panel([7.0, 2.9, 1.9], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], "wall_x7", 8)
+    table = {
+        "name": "two_panels",
+        "reflector": [reflector(name) for name in meshes],
+        "scatterer": [sphere("sphere", [2.4, 3.4, 1.4], 0.08)],
+        "ris": [above, beside],
+        "agent": agent,
+    }
+    readme = (
+        "A box of 7 x 5 x 3 m with two panels of different size: 6 x 6 elements on the ceiling (`above`) and 8 x 8 on "
+        "wall_x7 (`beside`), and a sphere of 8 cm. The agent walks a bow under the one and past the other. One "
+        "controller sets both panels with one code; what the agent has to find out is which landmark is which of them."
+    )
+    return Room(table, meshes, readme, files)
+
+
 def itu_room() -> Room:
     """A box of real materials, whose reflection depends on angle and polarisation."""
     meshes = box_walls(6.0, 5.0, 3.0)

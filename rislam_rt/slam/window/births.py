@@ -40,10 +40,10 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.book, mean[:3])
     histories = digest(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
     told = explanations(context, rows, histories, expected, groups, mean, covariance)
+    panel = context.book.panel
     lonely = _missing_legs(context, histories, mean)
-    verdicts, shares = judge(
-        histories, known, context.book, context.scene, [(row, value) for row, value, _ in told], lonely
-    )  # fmt: skip
+    over = [(row, value, 0 <= panel == int(forms[0, 0])) for row, value, forms in told]
+    verdicts, shares = judge(context, ats, histories, known, over, lonely)
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked = context.tracks.looked.copy()
     for (row, _, forms), share in zip(told, shares, strict=True):
@@ -185,7 +185,7 @@ def _enter(context: Context, at: Integers, verdict: Verdict, histories: Digest, 
     new = len(context.book.ident)
     holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))
     window = gauss.add_feature(context.window, verdict.place, holds)
-    book = enter(context.book, verdict.is_wall, histories.middle, len(at), 5.0)
+    book = enter(context.book, verdict.is_wall, histories.middle, len(at), 5.0, verdict.identity)
     forms = np.full((2, 5), UNKNOWN)
     forms[0] = [new if part == NEW else part for part in verdict.form]
     if verdict.kind == BESIDE:

@@ -7,6 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.identity import STRENGTHS, panel_probabilities, strength_moments
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.panel import Identity
 
 
 class Book(NamedTuple):
@@ -29,7 +30,9 @@ class Book(NamedTuple):
     log_grid: Floats
     """(F, G) log posterior of a point's strength (see `identity`)."""
     log_ris: Floats
-    """(F,) log odds of panel against scatterer; minus infinity for walls."""
+    """(F,) log odds of panel against scatterer; of no meaning for walls."""
+    hidden: Floats
+    """(F, 2) probability that something stands in its way, were it the panel, and a scatterer."""
     next_ident: int
 
     @property
@@ -48,6 +51,11 @@ class Book(NamedTuple):
         probability, points = np.zeros(len(self.ident)), self.points
         probability[points] = panel_probabilities(self.log_ris[points])
         return probability
+
+    @property
+    def identity(self) -> Identity:
+        """(F,) what points are held to be."""
+        return Identity(self.log_grid, self.log_ris, self.hidden)
 
     @property
     def panel(self) -> int:
@@ -71,13 +79,12 @@ def empty_book() -> Book:
     none, count = np.zeros(0), np.zeros(0, dtype=np.int64)
     return Book(
         count, np.zeros(0, dtype=np.bool_), np.zeros((0, 3)), count, none, none, none,
-        np.zeros((0, len(STRENGTHS))), none, 0,
+        np.zeros((0, len(STRENGTHS))), none, np.zeros((0, 2)), 0,
     )  # fmt: skip
 
 
-def enter(book: Book, is_wall: bool, anchor: Floats, hits: int, log_odds: float) -> Book:
-    """The book with one more feature, in the last row."""
-    flat = STRENGTH_PRIOR[None]
+def enter(book: Book, is_wall: bool, anchor: Floats, hits: int, log_odds: float, identity: Identity) -> Book:
+    """The book with one more feature, in the last row; `identity` (1,) of a point."""
     return book._replace(
         ident=np.append(book.ident, book.next_ident),
         is_wall=np.append(book.is_wall, is_wall),
@@ -86,8 +93,7 @@ def enter(book: Book, is_wall: bool, anchor: Floats, hits: int, log_odds: float)
         log_odds=np.append(book.log_odds, log_odds),
         ratio=np.append(book.ratio, LEVELS.wall_ratio if is_wall else 0.0),
         ratio_variance=np.append(book.ratio_variance, LEVELS.wall_ratio_std**2 if is_wall else 0.0),
-        log_grid=np.concatenate([book.log_grid, flat]),
-        log_ris=np.append(book.log_ris, -np.inf if is_wall else 0.0),
+        **book.identity.join(identity)._asdict(),
         next_ident=book.next_ident + 1,
     )
 
@@ -97,6 +103,11 @@ def idents(book: Book, forms: Integers) -> Integers:
     if not len(book.ident):
         return forms
     return np.where(forms >= 0, book.ident[np.maximum(forms, 0)], forms)
+
+
+def image_ident(point: Integers, wall: Integers) -> Integers:
+    """Numbers (...,) of the images of points in walls, from the numbers of both."""
+    return np.asarray(10_000 + 1000 * point + wall)
 
 
 def strike(book: Book, keep: Booleans) -> Book:
@@ -112,12 +123,3 @@ def learn_ratio(book: Book, wall: int, log_ratio: float) -> Book:
     ratio[wall] += gain * (log_ratio - ratio[wall])
     variance[wall] = max((1.0 - gain) * variance[wall], LEVELS.fading**2 / 10.0)
     return book._replace(ratio=ratio, ratio_variance=variance)
-
-
-def _strength_prior() -> Floats:
-    log = -0.5 * ((STRENGTHS - np.log(LEVELS.strength)) / LEVELS.strength_std) ** 2
-    return np.asarray(log - np.logaddexp.reduce(log))
-
-
-STRENGTH_PRIOR = _strength_prior()
-"""(G,) log probability of a point's strength beforehand."""

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.model import RisCode
 from rislam_rt.slam.window import gauss
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.expect import Scene
@@ -25,6 +26,7 @@ class Context(NamedTuple):
     scene: Scene
     cycle: int
     sights: Sights
+    codes: tuple[RisCode | None, ...]
 
 
 def resolve(context: Context, steps: int) -> tuple[Window, Residuals]:

@@ -11,6 +11,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.tracks import PANEL
 from rislam_rt.slam.window.gauss import Window, now, poses
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log
@@ -75,7 +76,10 @@ def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: 
     # what the others show is what a short history has yet to show; it counts as much as four measurements
     crowd = max(LEVELS.crowd, float(np.mean(np.minimum(scatter, 10.0) ** 2)))
     number = np.array([len(at) for at in rows])[:, None]
-    scatter = np.sqrt((4.0 * crowd + number * scatter**2) / (4.0 + number))
+    # the difference of two alternated codes holds the panel's paths and nothing of the others
+    pure = np.array([bool((log.side[at] == PANEL).all()) for at in rows])[:, None]
+    around = np.where(pure, 1.0, crowd)
+    scatter = np.sqrt((4.0 * around + number * scatter**2) / (4.0 + number))
     count = len(rows)
     found = Digest(
         np.zeros((count, POINTS, 3)), np.zeros((count, POINTS, 3)), np.zeros((count, POINTS)),

@@ -11,7 +11,7 @@ from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of,
 from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window import gauss, motion, tracks
 from rislam_rt.slam.window.births import births
-from rislam_rt.slam.window.book import Book, empty_book, idents
+from rislam_rt.slam.window.book import Book, empty_book, idents, image_ident
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, conditioned_share
 from rislam_rt.slam.window.gauss import Window
@@ -20,6 +20,7 @@ from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.look import Look, echoes, look
 from rislam_rt.slam.window.retract import condemned, release
+from rislam_rt.slam.window.suspect import weigh_tracks
 from rislam_rt.slam.window.tracks import Tracks
 
 REFRESH = 5
@@ -47,6 +48,8 @@ class WindowState(NamedTuple):
     scene: Scene
     doubt: float
     """Running log odds that the map explains nothing of what is heard."""
+    codes: tuple[RisCode | None, ...]
+    """(K,) as the agent believes they were applied."""
     passed: Floats
     """(P, 3) [m] positions that left the window, each with the hindsight of its whole length."""
 
@@ -64,7 +67,7 @@ def init(
     gait = np.stack([motion.first_gait(config.sigma_a), motion.first_gait(0.0)])
     return WindowState(
         0, config, window, empty_book(), empty_log(), tracks.no_tracks(), no_sights(), gait, gait,
-        np.array([start.heading]), start.position_std * free, scene, 0.0, np.zeros((0, 3)),
+        np.array([start.heading]), start.position_std * free, scene, 0.0, (None,), np.zeros((0, 3)),
     )  # fmt: skip
 
 
@@ -75,6 +78,7 @@ def step(
     """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied."""
     turn = heading - state.heading[-1]
     state = _move(state, dt, heading)
+    state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
     scene, book = state.scene, state.book
     glance = glance_of(measurement, scene.radio)
     landmark = np.where(is_los(glance, scene.body), REMOVED, UNUSED)
@@ -102,6 +106,8 @@ def step(
     taken[pick] = True
     followed = _follow(state, mean, glance, (~taken).nonzero()[0], dt, turn, bend)
     state = state._replace(tracks=followed.tracks, log=followed.log)
+    if book.panel < 0:  # once it is known, no track needs to be it
+        state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, poses, scene, code))
     sights, book = learn(
         state.sights, book, state.window, expected, groups, shows, row, pick, raw, glance, poses, scene, code
     )
@@ -109,7 +115,7 @@ def step(
     landmark[free[pick]] = _names(state.book, expected, groups, row)
 
     context = Context(
-        state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle, state.sights
+        state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle, state.sights, state.codes
     )  # fmt: skip
     if state.cycle % REFRESH == 0 and len(book.ident):
         gone = condemned(context.book, left, context.log, expected, gauss.now(context.window)[1])
@@ -281,10 +287,14 @@ def _follow(
 
 
 def _names(book: Book, expected: Expected, groups: Clusters, row: Integers) -> Integers:
-    """Ident of the feature that each of the clusters `row` (A,) speaks about first."""
+    """Ident of what each of the clusters `row` (A,) came over first: a point, its image in a wall, a wall."""
+    if not len(row):
+        return np.zeros(0, dtype=np.int64)
     forms = expected.forms[groups.leader[row]]
-    first = np.where(forms[:, 0] >= 0, forms[:, 0], forms[:, 3])
-    return book.ident[first] if len(row) else np.zeros(0, dtype=np.int64)
+    wall = np.where(forms[:, 3] >= 0, forms[:, 3], forms[:, 1])
+    own = book.ident[np.where(forms[:, 0] >= 0, forms[:, 0], wall)]
+    image = (forms[:, 0] >= 0) & (wall >= 0)
+    return np.where(image, image_ident(own, book.ident[wall]), own)
 
 
 def _outcome(heard: int, features: int, doubt: float) -> Outcome:

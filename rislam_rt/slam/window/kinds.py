@@ -4,10 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.identity import point_amplitude
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.book import Book
+from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.digest import Digest
 from rislam_rt.slam.window.expect import Scene
 from rislam_rt.slam.window.gauss import Holds, no_holds
@@ -25,13 +26,17 @@ from rislam_rt.slam.window.guesses import (
     Known,
     hypotheses,
 )
+from rislam_rt.slam.window.identify import identify
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.panel import Identity, unknown
 from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
 
 LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15]))
 """Log prior of each kind; over known walls, of all walls together."""
 LOG_NONE = np.log(0.05)
 """Of a path of no kind here: over walls that the map lacks."""
+OVER_PANEL = 0.2
+"""Share of such paths that run over the panel, where there is one."""
 LOG_VOLUME = float(np.log(4.0 / 3.0 * np.pi * LEVELS.size**3))
 BEHIND = -4.0
 """Log probability of a thing behind a wall that stands between it and the agent, or of a wall that stands before known
@@ -58,6 +63,8 @@ class Verdict(NamedTuple):
     """Of the edge with the known wall in its place, where it comes out as one with that."""
     misfit: float
     """Standard deviations by which it costs more than noise makes it."""
+    identity: Identity
+    """(1,) who it is, if it is a point."""
 
     @property
     def form(self) -> tuple[int, int, int, int, int]:
@@ -85,12 +92,17 @@ _TEMPLATES = (
 
 
 def judge(
-    digest: Digest, known: Known, book: Book, scene: Scene, explained: list[tuple[int, float]], lonely: Floats
-) -> tuple[list[Verdict], Floats]:
-    """Verdicts of T tracks, and the posterior (E,) of each of the explanations (track, log evidence) by the map.
+    context: Context, ats: list[Integers], digest: Digest, known: Known, told: list[tuple[int, float, bool]],
+    lonely: Floats,
+) -> tuple[list[Verdict], Floats]:  # fmt: skip
+    """Verdicts of T tracks, and the posterior (E,) of each of the explanations by the map.
 
-    `lonely` (T,) is the log probability that two walls throw so few single returns beside it.
+    Of these `told` gives track, log evidence, and whether they run over the panel.
+
+    `ats` are the tracks' rows of the log; `lonely` (T,) is the log probability that two walls throw so few single
+    returns beside it.
     """
+    book, scene = context.book, context.scene
     table = hypotheses(digest, known, book)
     fits = try_all(table.trials, digest)
     track = table.trials.track
@@ -101,22 +113,26 @@ def judge(
     evidence += _beside(table, digest, known, book, scene)
     gain = _upright(table, fits, digest, known, book)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
+    over = identify(context, ats, table, fits, evidence)
+    evidence += over.gain
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
     none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LOG_VOLUME + LOG_NONE
+    none += np.logaddexp(np.log(1.0 - OVER_PANEL), np.log(OVER_PANEL) + over.elsewhere)
+    explained = [(row, value + over.elsewhere[row] * panel) for row, value, panel in told]
     evidence += _shared(table, fits, evidence, none, explained)
     verdicts, shares = [], np.zeros(len(explained))
     for row in range(len(digest.seen)):
         own = (track == row).nonzero()[0]
-        told = [i for i, (which, _) in enumerate(explained) if which == row]
-        weight = np.concatenate([[none[row]], evidence[own], [explained[i][1] for i in told]])
+        own_told = [i for i, (which, _) in enumerate(explained) if which == row]
+        weight = np.concatenate([[none[row]], evidence[own], [explained[i][1] for i in own_told]])
         total = np.logaddexp.reduce(weight)
-        shares[told] = np.exp(weight[1 + len(own) :] - total)
+        shares[own_told] = np.exp(weight[1 + len(own) :] - total)
         best = int(np.argmax(weight[: 1 + len(own)]))
         probability = float(np.exp(weight[best] - total))
         if best == 0:
-            verdicts.append(Verdict(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0))
+            verdicts.append(Verdict(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, unknown(1)))
             continue
         at = own[best - 1]
         count = int((digest.weight[row, :, 0] > 0.0).sum())
@@ -125,7 +141,7 @@ def judge(
             Verdict(
                 int(table.kind[at]), probability, int(table.known[at]), fits.place[at], fits.held[at],
                 beliefs(fits.place[at], digest, known, book) if table.trials.is_wall[at] else no_holds(),
-                float(fits.share[at]), float(misfit),
+                float(fits.share[at]), float(misfit), over.identity.take(np.array([at])),
             )
         )  # fmt: skip
     return verdicts, shares

@@ -4,31 +4,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats, Integers
-from rislam_rt.information import amplitude_std
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RisCode
-from rislam_rt.slam.filter import SIDED
-from rislam_rt.slam.identity import (
-    TOLD,
-    add_evidence,
-    log_panel,
-    log_panel_missed,
-    log_scatterer,
-    log_scatterer_missed,
-    predicted_panel_gain,
-)
-from rislam_rt.slam.moments import even_draws, square_root
 from rislam_rt.slam.returns import NONE, TX, Poses
-from rislam_rt.slam.tracks import Glance
+from rislam_rt.slam.tracks import UNTOLD, Glance
 from rislam_rt.slam.window.book import Book, learn_ratio
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene
 from rislam_rt.slam.window.gauss import HEAD, Window
 from rislam_rt.slam.window.levels import LEVELS
-
-DRAWS = 16
-"""Places of the belief over which the panel's predicted gain is averaged."""
-CERTAIN = 30.0
-"""Log odds beyond which a point's identity is no longer in question."""
+from rislam_rt.slam.window.panel import Sight, gains, spread_places, weigh
 
 
 class Sights(NamedTuple):
@@ -140,7 +124,7 @@ def _strengths(
     book: Book, window: Window, expected: Expected, groups: Clusters, row: Integers, pick: Integers, glance: Glance,
     poses: Poses, scene: Scene, code: RisCode | None,
 ) -> Book:  # fmt: skip
-    """Walls' losses and points' strengths from components that came out alone; silence speaks for the panel too."""
+    """Walls' losses, and who the points are, from components that came out alone."""
     lead, alone = groups.leader[row], groups.partner[row] < 0
     quiet = (groups.disturbance[row] < 0.25 * scene.sensor.cell_length**2).all(axis=1)
     for place in (alone & quiet).nonzero()[0]:
@@ -149,67 +133,29 @@ def _strengths(
         if len(walls) == 1 and (form[0] == TX or expected.log_amplitude_std[lead[place]] < 0.5):
             surplus = glance.log_amplitude[pick[place]] - expected.log_amplitude[lead[place]]
             book = learn_ratio(book, int(walls[0]), float(np.clip(book.ratio[walls[0]] + surplus, -3.0, 0.1)))
-    direct = alone & (expected.bounces[lead] == 0)
-    told: list[tuple[int, float, float, float]] = [
-        (int(expected.forms[lead[i], 0]), float(np.exp(glance.log_amplitude[pick[i]])),
-         float(glance.amplitude_std[pick[i]]), float(glance.odds[pick[i]]))
-        for i in direct.nonzero()[0]
-    ]  # fmt: skip
-    if told:
-        book = _weigh(book, window, told, poses, scene, code)
-    if scene.ris is not None and code is not None:
-        seen = np.isin(np.arange(len(groups.leader)), row)
-        silent = ~seen & (groups.partner < 0) & (groups.by_itself == 1.0) & (expected.bounces[groups.leader] == 0)
-        points = expected.forms[groups.leader[silent], 0]
-        if len(points):
-            book = _weigh_silent(book, window, points, poses, scene, code)
-    return book
+    return _identities(book, window, expected, groups, row, pick, glance, poses, scene, code)
 
 
-def _weigh(
-    book: Book, window: Window, told: list[tuple[int, float, float, float]], poses: Poses, scene: Scene,
-    code: RisCode | None,
+def _identities(
+    book: Book, window: Window, expected: Expected, groups: Clusters, row: Integers, pick: Integers, glance: Glance,
+    poses: Poses, scene: Scene, code: RisCode | None,
 ) -> Book:  # fmt: skip
-    points = np.array([entry[0] for entry in told])
-    amplitude, std = np.array([entry[1] for entry in told]), np.array([entry[2] for entry in told])
-    side = np.array([entry[3] for entry in told])
-    place = window.features[points]
-    first, second = np.linalg.norm(place - poses.tx, axis=1), np.linalg.norm(place - poses.rx, axis=1)
-    scatterer = log_scatterer(amplitude, std, first, second, scene.radio)
-    panel = np.full(len(points), -np.inf)
-    if scene.ris is not None and code is not None:
-        panel = np.where(side < -SIDED, -np.inf, log_panel(amplitude, std, _gains(window, points, poses, scene, code)))
-    grid, log_ris = add_evidence(book.log_grid[points], book.log_ris[points], scatterer, panel)
-    log_ris += np.clip(side, 0.0, TOLD)
-    grids, every = book.log_grid.copy(), book.log_ris.copy()
-    grids[points] = grid
-    every[points] = np.clip(log_ris, -CERTAIN, CERTAIN) if scene.ris is not None else -np.inf
-    return book._replace(log_grid=grids, log_ris=every)
-
-
-def _weigh_silent(book: Book, window: Window, points: Integers, poses: Poses, scene: Scene, code: RisCode) -> Book:
-    """Silence of points that nothing hides: as likely for a scatterer as for the panel?"""
-    std = np.full(len(points), amplitude_std(scene.radio))
-    threshold = float(np.sqrt(2.0 * scene.sensor.threshold) * std[0])
-    place = window.features[points]
-    first, second = np.linalg.norm(place - poses.tx, axis=1), np.linalg.norm(place - poses.rx, axis=1)
-    each = log_scatterer_missed(std, first, second, scene.radio, threshold)
-    weight = np.exp(book.log_grid[points])
-    scatterer = np.sum(weight * np.exp(each), axis=1) / weight.sum(axis=1)
-    panel = np.exp(log_panel_missed(std, _gains(window, points, poses, scene, code), threshold))
-    # what is hidden is silent whatever it is: half of the silences, so that a long one decides nothing
-    surplus = np.log(0.5 + 0.5 * panel) - np.log(0.5 + 0.5 * scatterer)
-    every = book.log_ris.copy()
-    every[points] = np.clip(every[points] + surplus, -CERTAIN, CERTAIN)
-    return book._replace(log_ris=every)
-
-
-def _gains(window: Window, points: Integers, poses: Poses, scene: Scene, code: RisCode) -> Complexes:
-    """The panel's gain (P, S) if it were at each of the points, over places of the belief."""
-    assert scene.ris is not None
-    centers = []
-    for point in points:
-        at = slice(HEAD + 3 * int(point), HEAD + 3 * int(point) + 3)
-        root = square_root(window.covariance[at, at])
-        centers.append(window.head[at] + even_draws(DRAWS, root.shape[1]) @ root.T)
-    return predicted_panel_gain(scene.ris, code, np.array(centers), poses.tx, poses.rx, np.ones(1), scene.radio)
+    """What amplitude or silence of points that come straight, and alone, tells of who they are."""
+    component = np.full(len(groups.leader), -1)
+    component[row] = pick
+    lead = groups.leader
+    alone = (groups.partner < 0) & (groups.by_itself == 1.0) & (expected.bounces[lead] == 0)
+    points, heard = expected.forms[lead[alone], 0], component[alone]
+    if not len(points):
+        return book
+    rows = HEAD + 3 * points[:, None] + np.arange(3)
+    blocks = window.covariance[rows[:, :, None], rows[:, None, :]]
+    count = len(points)
+    amplitude, side = np.append(np.exp(glance.log_amplitude), 1.0), np.append(glance.sides, UNTOLD)
+    sight = Sight(
+        spread_places(window.features[points], blocks), np.tile(poses.tx, (count, 1)), np.tile(poses.rx, (count, 1)),
+        np.ones(count), amplitude[heard], side[heard], heard >= 0,
+    )  # fmt: skip
+    gain = gains(sight, scene.ris, code, scene.radio)
+    fresh = weigh(book.identity.take(points), sight, gain, scene.sensor).settled()
+    return book._replace(**book.identity.put(points, fresh)._asdict())

@@ -24,6 +24,8 @@ class Levels(NamedTuple):
     """Median root of a scatterer's cross-section [m]: a sphere of 0.08 m radius."""
     strength_std: float = 1.2
     """Spread of its logarithm."""
+    panels: float = 0.1
+    """Panels per scatterer, where there is a panel at all: one in a room, among what is found in it."""
     lean: float = 0.01
     """Standard deviation [rad] of an upright wall's lean: building tolerance, as level returns do not tell it."""
     square: float = 0.7

@@ -1,21 +1,30 @@
 """From the window's belief to the estimate that others read."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.mapping import MAX_LEAN, images_in, wall_planes
-from rislam_rt.slam.moments import even_draws, square_root
+from rislam_rt.slam.moments import even_draws, poses_of, square_root
 from rislam_rt.slam.window import gauss
-from rislam_rt.slam.window.book import Book
+from rislam_rt.slam.window.book import Book, image_ident
 from rislam_rt.slam.window.filter import WindowState
 from rislam_rt.slam.window.gauss import HEAD
+from rislam_rt.slam.window.suspect import find_suspect
 
 
 def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
-    """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent."""
-    return estimate(state, config, dt)
+    """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent; with the suspect."""
+    ahead = estimate(state, config, dt)
+    if state.scene.ris is None or ahead.map.ris >= 0:
+        return ahead
+    mean, _ = gauss.now(state.window)
+    poses = poses_of(mean[:3], np.asarray(state.heading[-1] + mean[6]), state.scene.body)
+    suspect = find_suspect(state.tracks, state.book, mean, state.cycle - 1, poses)
+    return replace(ahead, suspects=() if suspect is None else (suspect,))
 
 
 def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> SlamEstimate:
@@ -49,7 +58,7 @@ def build_map(features: Floats, covariance: Floats, book: Book, shift: Floats) -
     known = np.sqrt(2.0) * std[:, 0] < MAX_LEAN
     strength, ratio = np.exp(book.log_strength[0][points]), np.exp(book.ratio[wall])
     return MapEstimate(
-        np.concatenate([book.ident[points], 10_000 + 1000 * book.ident[parent] + book.ident[wall]]),
+        np.concatenate([book.ident[points], image_ident(book.ident[parent], book.ident[wall])]),
         np.concatenate([features[points], place]),
         np.concatenate([covariance[columns[:, :, None], columns[:, None, :]], spread]),
         np.concatenate([np.full(len(points), -1), np.searchsorted(points, parent)]),

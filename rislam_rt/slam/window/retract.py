@@ -11,6 +11,7 @@ from rislam_rt.slam.window.expect import Expected
 from rislam_rt.slam.window.forms import UNKNOWN
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals
+from rislam_rt.slam.window.panel import unknown
 from rislam_rt.slam.window.tracks import Tracks
 
 RECENT = 5
@@ -25,7 +26,7 @@ def release(context: Context, keep: Booleans) -> Context:
         return context
     book, log = context.book, context.log
     lost: Booleans = np.asarray(np.isin(log.form, book.ident[~keep]).any(axis=(1, 2)))
-    tracks, log = _resume(context.tracks, log, lost, context.cycle)
+    tracks, log = _resume(context.tracks, log, lost, context.cycle, context.window.step)
     form = log.form.copy()
     form[lost] = UNKNOWN
     log = log._replace(form=form)
@@ -34,26 +35,27 @@ def release(context: Context, keep: Booleans) -> Context:
     return context._replace(window=resolve(context, 2)[0])
 
 
-def _resume(tracks: Tracks, log: Log, lost: Booleans, cycle: int) -> tuple[Tracks, Log]:
+def _resume(tracks: Tracks, log: Log, lost: Booleans, cycle: int, step: Floats) -> tuple[Tracks, Log]:
     """One track for each form among the lost rows that was seen lately."""
     forms, which = np.unique(log.form[:, 0], axis=0, return_inverse=True)
     track = log.track.copy()
     fresh: list[tuple[object, ...]] = []
-    ident = tracks.next_ident
+    ident, time = tracks.next_ident, np.concatenate([[0.0], np.cumsum(step)])
     for number in np.unique(which[lost]):
         rows = (lost & (which == number)).nonzero()[0]
         if len(rows) < 4 or log.cycle[rows[-1]] < cycle - RECENT or forms[number][0] == UNKNOWN:
             continue
         late = rows[-8:]
-        time = 0.1 * (log.cycle[late] - log.cycle[late[-1]])
-        design = np.stack([np.ones(len(late)), time], axis=1)
+        when = time[log.cycle[late] - cycle - 1]
+        when = when - when[-1]
+        design = np.stack([np.ones(len(late)), when], axis=1)
         best, *_ = np.linalg.lstsq(design, log.seen[late], rcond=None)
         spread = np.zeros((3, 2, 2))
         spread[:, 0, 0], spread[:, 1, 1] = 4.0 * log.std[late[-1]] ** 2, (0.1 * np.array([1.0, 0.3, 0.3])) ** 2
         track[rows] = ident
         fresh.append((
             ident, best.T, spread, log.log_amplitude[late[-1]], log.side[late[-1]], log.cycle[rows[0]],
-            log.cycle[late[-1]], len(rows), 0,
+            log.cycle[late[-1]], len(rows), 0, *(field[0] for field in unknown(1)),
         ))  # fmt: skip
         ident += 1
     if not fresh:

@@ -9,6 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.associate import Candidates, pair_costs
 from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.panel import Identity, unknown
 
 WANDER = 1.0
 """Spread of an unexplained path's log amplitude from cycle to cycle: a panel's code may change."""
@@ -35,7 +36,18 @@ class Tracks(NamedTuple):
     """(T,)."""
     looked: Integers
     """(T,) hits at the last examination."""
+    log_grid: Floats
+    """(T, G) log posterior of its strength, were it a scatterer that it comes straight from (see `panel`)."""
+    log_ris: Floats
+    """(T,) log odds of panel against scatterer."""
+    hidden: Floats
+    """(T, 2) probability that something stands in its way, were it the panel, and a scatterer."""
     next_ident: int
+
+    @property
+    def identity(self) -> Identity:
+        """(T,) what the tracks would be, were they points."""
+        return Identity(self.log_grid, self.log_ris, self.hidden)
 
     def keep(self, rows: Booleans) -> "Tracks":
         """Only some of the tracks."""
@@ -45,7 +57,9 @@ class Tracks(NamedTuple):
 def no_tracks() -> Tracks:
     """Nothing seen yet."""
     none = np.zeros(0, dtype=np.int64)
-    return Tracks(none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none, 0)
+    return Tracks(
+        none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none, *unknown(0), 0
+    )
 
 
 def advance(tracks: Tracks, dt: float, turn: float, bend: Floats) -> Tracks:
@@ -65,7 +79,7 @@ def match(tracks: Tracks, glance: Glance, free: Integers, cycle: int) -> tuple[I
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     spread = np.zeros((count, 3, 3))
     spread[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
-    share = (tracks.hits + 1.0) / (cycle - tracks.born + 2.0)
+    share = np.minimum((tracks.hits + 1.0) / (cycle - tracks.born + 2.0), 1.0)
     odds = np.log(share / (1.02 - share))
     candidates = Candidates(
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
@@ -98,16 +112,20 @@ def start(tracks: Tracks, glance: Glance, picks: Integers, rate: Floats, cycle: 
     fresh = (
         ident, np.stack([glance.seen[picks], np.zeros((count, 3))], axis=-1), covariance, glance.log_amplitude[picks],
         glance.sides[picks], np.full(count, cycle), np.full(count, cycle), np.ones(count, dtype=np.int64),
-        np.zeros(count, dtype=np.int64),
+        np.zeros(count, dtype=np.int64), *unknown(count),
     )  # fmt: skip
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))
     return Tracks._make([*joined, tracks.next_ident + count]), ident
 
 
 def alive(tracks: Tracks, cycle: int) -> Booleans:
-    """(T,) not silent for longer than their past lets expect: 4 cycles, more for what comes and goes."""
+    """(T,) not silent for longer than their past lets expect: 4 cycles, more for what comes and goes.
+
+    What is likelier the panel than not may be silent for long: its codes make it so.
+    """
     share = (tracks.hits + 1.0) / (tracks.last - tracks.born + 3.0)
     patience = np.where(tracks.hits >= 4, np.log(0.01) / np.log(np.clip(1.0 - share, 1e-6, 0.999)), 3.0)
+    patience = np.where((tracks.log_ris > 0.0) & (tracks.hits >= 2), LEVELS.window, patience)
     return np.asarray(cycle - tracks.last <= np.clip(patience, 3.0, LEVELS.window))
 
 

@@ -102,7 +102,7 @@ def test_brute_force_finds_the_same_paths(rooms, name):
     for cycle, (tx, rx) in enumerate(zip(trajectory.tx, trajectory.rx, strict=True)):
         want = {(-1, s, ()) for s in brute_force(walls, tx, rx, depth)}
         for number, point in enumerate(scene.landmark_positions):
-            host = walls.host if number == len(scene.scatterers) else -1
+            host = walls.hosts[0] if number == len(scene.scatterers) else -1
             out = brute_force(walls, tx, point, depth, host)
             back = brute_force(walls, rx, point, depth, host)
             want |= {(number, a, b[::-1]) for a in out for b in back if len(a) + len(b) <= depth}

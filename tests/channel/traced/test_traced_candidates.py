@@ -39,9 +39,9 @@ def test_all_sequences_of_a_box(rooms, depth, count):
     assert table.shape == (count, depth)
     assert len(np.unique(table, axis=0)) == count
     if depth > 1:
-        hosted, _ = possible_sequences(wall_sides(walls), inner, inner, depth, walls.beside(walls.host))
-        assert walls.host not in turned_round(hosted)[:, 0]
-        assert walls.host in hosted
+        hosted, _ = possible_sequences(wall_sides(walls), inner, inner, depth, walls.beside(walls.hosts[0]))
+        assert walls.hosts[0] not in turned_round(hosted)[:, 0]
+        assert walls.hosts[0] in hosted
 
 
 def test_turning_round_keeps_padding_last():

@@ -37,11 +37,11 @@ def run():
         dt = 0.1 if cycle else 0.0
         state, info = slam.step(state, heard, None, dt, float(motion.heading[cycle]), CONFIG, rng=rng)
         found.append((slam.estimate(state, CONFIG), info))
-    return found, motion, shift
+    return found, motion, shift, slam.smoothed(state)
 
 
 def test_walls_are_found_and_nothing_else_is_a_wall(run):
-    found, _, _ = run
+    found, *_ = run
     last = found[-1][0].map
     true = {(1, 0, 0): 6.0, (-1, 0, 0): 0.0, (0, 1, 0): 6.0, (0, -1, 0): 0.0, (0, 0, 1): 3.0, (0, 0, -1): 0.0}
     assert len(last.wall_offset) >= 4
@@ -53,7 +53,7 @@ def test_walls_are_found_and_nothing_else_is_a_wall(run):
 
 
 def test_scatterer_is_found_and_is_no_panel(run):
-    found, _, shift = run
+    found, _, shift, _ = run
     last = found[-1][0].map
     points = last.position[last.parent < 0]
     assert len(points) >= 1
@@ -62,7 +62,7 @@ def test_scatterer_is_found_and_is_no_panel(run):
 
 
 def test_error_relative_to_the_start_is_millimetres_and_told(run):
-    found, motion, shift = run
+    found, motion, shift, _ = run
     error = np.array([estimate.position for estimate, _ in found]) - motion.position - shift
     late = error[30:, :2]
     assert np.sqrt(np.mean(np.sum(late**2, axis=1))) < 3e-3
@@ -72,9 +72,20 @@ def test_error_relative_to_the_start_is_millimetres_and_told(run):
     assert 0.01 < np.mean(nees) < 4.0
 
 
+def test_hindsight_is_no_worse_and_ends_where_the_filter_does(run):
+    found, motion, shift, smoothed = run
+    causal = np.array([estimate.position for estimate, _ in found])
+    assert smoothed.shape == causal.shape
+    np.testing.assert_allclose(smoothed[-1], causal[-1], atol=1e-9)
+    # before the walls were known the causal estimate had the start's speed alone
+    early = slice(2, 30)
+    off = [np.linalg.norm((way - motion.position - shift)[early, :2], axis=1) for way in (smoothed, causal)]
+    assert np.sqrt(np.mean(off[0] ** 2)) < np.sqrt(np.mean(off[1] ** 2))
+
+
 @pytest.mark.slow
 def test_start_error_stays_in_the_covariance(run):
-    found, _, _ = run
+    found, *_ = run
     # nothing that is measured tells where the start was
     for estimate, _ in (found[5], found[-1]):
         assert np.sqrt(np.diag(estimate.covariance)[:2]).min() >= 0.01

@@ -7,9 +7,9 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.design.single import exact_code
+from rislam_rt.design import focus_codes
 from rislam_rt.measurement import ReceiverConfig, TrackingConfig, init_tracks, measure, step_tracks
-from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, RisSpec, Trajectory
+from rislam_rt.model import DataSheet, PathKind, Paths, RadioConfig, RisCode, Trajectory
 from rislam_rt.ris import rephase
 from rislam_rt.slam.classify import Sightings, track_features
 
@@ -61,24 +61,15 @@ def join(parts: list[Examples]) -> Examples:
     return Examples._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
 
 
-def set_codes(paths: Paths, panel: RisSpec | None, policy: str, *, rng: np.random.Generator) -> Paths:
+def set_codes(paths: Paths, panel: DataSheet | None, policy: str, *, rng: np.random.Generator) -> Paths:
     """The paths of a walk under the codes of a policy."""
     if panel is None or paths.ris is None:
         return paths
     shape = (paths.num_cycles, panel.rows, panel.cols)
     if policy == "exact" and np.any(paths.kind == PathKind.RIS):
-        return rephase(paths, RisCode(_best_codes(paths, panel), panel.levels))
+        return rephase(paths, focus_codes(paths, panel.levels))
     index = rng.integers(panel.levels, size=shape if policy == "random" else shape[1:])
     return rephase(paths, RisCode(index, panel.levels))
-
-
-def _best_codes(paths: Paths, panel: RisSpec) -> Integers:
-    """(K, N, M) codes of largest gain for the direct path; zero where it is hidden."""
-    assert paths.ris is not None
-    column = int(np.flatnonzero(paths.kind == PathKind.RIS)[0])
-    tx, rx = paths.ris.tx[:, paths.ris.tx_leg[column]], paths.ris.rx[:, paths.ris.rx_leg[column]]
-    response = (tx * rx).reshape(len(tx), -1)
-    return exact_code(response, panel.levels)[0].reshape(tx.shape)
 
 
 def gather_walk(

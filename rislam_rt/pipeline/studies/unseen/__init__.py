@@ -1,7 +1,8 @@
 """Rooms that no estimator was built on: run one in many of them, score it, and leave its inputs for others."""
 
+from rislam_rt.pipeline.inputs import Inputs
 from rislam_rt.pipeline.studies.unseen.file import Recording, read_recording, write_recording
-from rislam_rt.pipeline.studies.unseen.recording import Answers, Inputs, Recorder, answers_from_arrays, replay
+from rislam_rt.pipeline.studies.unseen.recording import Answers, Recorder, answers_from_arrays, replay
 from rislam_rt.pipeline.studies.unseen.score import score_run
 from rislam_rt.pipeline.studies.unseen.spec import TEST, UnseenSpec
 from rislam_rt.pipeline.studies.unseen.sweep import build_unseen, code_digest, count_tests

@@ -7,30 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.model import Body, MapEstimate, Measurement, RisCode, RisSpec, SlamEstimate, empty_map
+from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SlamEstimate, empty_map
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
+from rislam_rt.pipeline.inputs import Inputs
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.sweeps.axes import put
 from rislam_rt.pipeline.told import tell_settings
 from rislam_rt.slam import StartPrior
-
-
-class Inputs(NamedTuple):
-    """All that an estimator gets over K cycles."""
-
-    start: StartPrior
-    body: Body
-    panel: RisSpec | None
-    """Data sheet; None without a panel."""
-    time: Floats
-    """(K,) [s] since the first cycle."""
-    heading: Floats
-    """(K,) [rad], of the compass."""
-    measurements: tuple[Measurement, ...]
-    """(K,)."""
-    codes: tuple[RisCode | None, ...]
-    """(K,) what the agent holds the panel to be set to; None without a panel."""
 
 
 class Answers(NamedTuple):
@@ -96,7 +80,7 @@ class Recorder:
 
     def __init__(self, inner: Estimator) -> None:
         self.inner = inner
-        self.begin: tuple[StartPrior, Body, RisSpec | None]
+        self.begin: tuple[StartPrior, Body, DataSheet | None]
         self.steps: list[tuple[Measurement, RisCode | None, float, float]] = []
         self.estimates: list[SlamEstimate] = []
         self.infos: list[Any] = []
@@ -119,7 +103,7 @@ class Recorder:
         return Answers(tuple(self.estimates), tuple(self.infos), self.seconds / max(len(self.steps), 1))
 
     def _init(
-        self, start: StartPrior, body: Body, panel: RisSpec | None, *settings: Any, rng: np.random.Generator
+        self, start: StartPrior, body: Body, panel: DataSheet | None, *settings: Any, rng: np.random.Generator
     ) -> Any:
         self.begin = (start, body, panel)
         return self.inner.init(start, body, panel, *settings, rng=rng)

@@ -8,7 +8,8 @@ from scipy.optimize import linear_sum_assignment
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.evaluate import gospa, match_points, normalised_squares, root_mean_square
 from rislam_rt.model import NOTHING, MapEstimate, PathKind
-from rislam_rt.pipeline.studies.unseen.recording import Answers, Inputs
+from rislam_rt.pipeline.inputs import Inputs
+from rislam_rt.pipeline.studies.unseen.recording import Answers
 from rislam_rt.pipeline.studies.unseen.truth import Truth
 
 SETTLED = 10.0

@@ -14,7 +14,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel, SlamEstimate
+from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los
 from rislam_rt.slam.inputs import check_step
@@ -63,7 +63,7 @@ class ChannelSlamState(NamedTuple):
 
 
 def init(
-    start: StartPrior, body: Body, ris: RisSpec | None, sensor: SensorModel, config: ChannelSlamConfig, *,
+    start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: ChannelSlamConfig, *,
     rng: np.random.Generator,
 ) -> ChannelSlamState:  # fmt: skip
     """The start prior, and no paths. `ris` is taken for the interface and not used; nothing is drawn."""

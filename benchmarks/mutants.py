@@ -1,0 +1,216 @@
+"""Do the tests notice when the software no longer does its work? Acts of sabotage, and the tests that each breaks.
+
+Each mutant changes one place of a copy of the package: the pose is no longer updated, the codes are random ones, a run
+never says that it diverged, a bound is half of what it is. The tests run on the copy until at least `--least` of them
+have failed in `--files` files, or to their end. `nothing` changes a comment only and must break none. Unlike
+`mutation.py`, which asks whether single operators are tested, this asks whether what users rely on is.
+Run: `python benchmarks/mutants.py [--only NAME ...] [--workers 2] [--least 5] [--files 3] [--tests PATH ...]`.
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PARTS = ("rislam_rt", "tests", "pipelines", "scenes", "benchmarks", "docs", "README.md", "CHANGELOG.md", "Makefile")
+ALSO = ("pyproject.toml", "mkdocs.yml", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "requirements.lock")
+
+
+class Mutant(NamedTuple):
+    """One place, as it is and as it must not be."""
+
+    name: str
+    file: str
+    """Below `rislam_rt/`."""
+    before: str
+    """Stands there exactly once."""
+    after: str
+
+
+MUTANTS = (
+    Mutant("nothing", "constants.py", "", ""),
+    Mutant(
+        "no update of the pose", "slam/gaussian/update.py",
+        "        mean[n] += root.T @ scaled\n        covariance[n] -= root.T @ root\n",
+        "        mean[n, 7:] += (root.T @ scaled)[7:]\n        covariance[n] -= root.T @ root\n",
+    ),
+    Mutant(
+        "no update of the pose (window)", "slam/window/gauss.py",
+        "        accel=window.accel + change[size:].reshape(window.accel.shape),",
+        "        accel=window.accel,",
+    ),
+    Mutant(
+        "half the deviations", "slam/mapping.py",
+        "        moments.covariance[:6, :6],\n", "        0.25 * moments.covariance[:6, :6],\n",
+    ),
+    Mutant(
+        "half the deviations (window)", "slam/window/mapping.py",
+        "        spread[:6, :6],\n", "        0.25 * spread[:6, :6],\n",
+    ),
+    Mutant(
+        "random codes for optimised ones", "pipeline/choose.py",
+        '        if method == "random":  # looks at no belief', "        if not is_own(method):",
+    ),
+    Mutant(
+        "never diverged", "slam/filter.py",
+        "    return Outcome.DIVERGED if health.diverged else Outcome.OK", "    return Outcome.OK",
+    ),
+    Mutant(
+        "never diverged (window)", "slam/window/filter.py",
+        "        return Outcome.DIVERGED\n", "        return Outcome.OK\n",
+    ),
+    Mutant(
+        "every second birth of a wrong kind (window)", "slam/window/births.py",
+        "    forms[0] = [new if part == NEW else part for part in verdict.form]\n",
+        "    forms[0] = [new if part == NEW else part for part in verdict.form]\n"
+        "    if len(book.ident) % 2:\n"
+        "        forms[0] = [-1, -1, -1, new, -1] if not verdict.is_wall else [new, -1, -1, -1, -1]\n",
+    ),
+    Mutant(
+        "half the bound", "information/recursion.py",
+        "        agent[cycle] = spread[: 2 * axes] @ spread[: 2 * axes].T",
+        "        agent[cycle] = 0.25 * spread[: 2 * axes] @ spread[: 2 * axes].T",
+    ),
+    Mutant(
+        "the bound knows the map", "information/recursion.py",
+        "        slope[:, 2 * axes :] = root * measured.unknown", "        slope[:, 2 * axes :] = 0.0",
+    ),
+    Mutant(
+        "the best code is turned by a level", "design/single.py",
+        "(passed < best[..., None]) - turn[..., None]) % levels",
+        "(passed < best[..., None]) - turn[..., None] + (passed % 2)) % levels",
+    ),
+    Mutant(
+        "descent never steps", "design/coordinate.py",
+        "    found = [coordinate_descent(objective, codes[row], problem.levels, max_steps) for row in rank]",
+        "    found = [coordinate_descent(objective, codes[row], problem.levels, 0) for row in rank]",
+    ),
+    Mutant(
+        "the receiver is twice as sure as it may be", "measurement/bound.py",
+        "        found.deviation[:, 0],\n", "        0.5 * found.deviation[:, 0],\n",
+    ),
+    Mutant(
+        "the receiver mirrors a cosine", "measurement/bound.py",
+        "into_disc(blind_axes(found.points[:, 1:], radio))",
+        "into_disc(blind_axes(found.points[:, 1:] * [1.0, -1.0], radio))",
+    ),
+    Mutant(
+        "a sweep's seed hangs on its order", "pipeline/sweeps/axes.py",
+        "            seed = int.from_bytes(_digest([drawn, repetition, sweep.seed])[:8]) >> 1",
+        "            seed = int.from_bytes(_digest([len(cells), sweep.seed])[:8]) >> 1",
+    ),
+    Mutant(
+        "a sweep takes any cell for its own", "pipeline/sweeps/store.py",
+        '        if found["ident"] == cell.ident:', "        if found:",
+    ),
+    Mutant(
+        "a damaged file passes", "pipeline/seal.py",
+        '    if content["checksum"] != checksum({key: value for key, value in content.items() if key != "checksum"}):',
+        '    if not content["checksum"]:',
+    ),
+    Mutant(
+        "another room is the same run", "pipeline/identity.py",
+        '            "scene": {"name": scene.name, "sha256": scene.digest},',
+        '            "scene": {"name": scene.name},',
+    ),
+)  # fmt: skip
+
+
+class Enough:
+    """A pytest plugin: stops when enough tests in enough files have failed, and prints which."""
+
+    def __init__(self, least: int, files: int) -> None:
+        self.least, self.files = least, files
+        self.failed: set[str] = set()
+        self.session: Any = None
+
+    def pytest_sessionstart(self, session: pytest.Session) -> None:
+        """Remember whom to stop."""
+        self.session = session
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Count."""
+        if not report.failed:
+            return
+        if report.nodeid not in self.failed:
+            self.failed.add(report.nodeid)
+            print(f"\nBROKEN {report.nodeid}", flush=True)
+        if len(self.failed) >= self.least and len({name.split("::")[0] for name in self.failed}) >= self.files:
+            self.session.shouldstop = "enough"
+
+
+def run_tests(arguments: argparse.Namespace) -> int:
+    """In the copy: the tests, up to enough failures."""
+    options = ["-q", "-p", "no:cacheprovider", "--tb=no", "-n", str(arguments.workers), "--dist", "worksteal"]
+    return int(pytest.main([*options, *arguments.tests], plugins=[Enough(arguments.least, arguments.files)]))
+
+
+def build_copy(folder: Path, mutant: Mutant) -> None:
+    """The package and its tests under `folder`, with the mutant in it."""
+    for part in (*PARTS, *ALSO):
+        source = ROOT / part
+        if source.is_dir():
+            shutil.copytree(source, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
+        elif source.exists():
+            shutil.copy(source, folder / part)
+    file = folder / "rislam_rt" / mutant.file
+    text = file.read_text()
+    if mutant.name == "nothing":
+        file.write_text(text + "# a comment\n")
+        return
+    assert text.count(mutant.before) == 1, f"{mutant.name}: {mutant.file} has it {text.count(mutant.before)} times"
+    file.write_text(text.replace(mutant.before, mutant.after))
+
+
+def broken_by(mutant: Mutant, arguments: argparse.Namespace) -> list[str]:
+    """The tests that fail on a mutant."""
+    with tempfile.TemporaryDirectory() as name:
+        build_copy(Path(name), mutant)
+        command = [sys.executable, __file__, "--inside", "--workers", str(arguments.workers)]
+        command += ["--least", str(arguments.least), "--files", str(arguments.files), "--tests", *arguments.tests]
+        environment = {**os.environ, "PYTHONPATH": name, "PYTHONDONTWRITEBYTECODE": "1"}
+        done = subprocess.run(command, cwd=name, env=environment, capture_output=True, text=True, check=False)
+    found = sorted(line.split(" ", 1)[1] for line in done.stdout.splitlines() if line.startswith("BROKEN "))
+    assert found or done.returncode in (0, 5), done.stdout[-2000:] + done.stderr[-2000:]
+    return found
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", nargs="*", default=[], choices=[mutant.name for mutant in MUTANTS])
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--least", type=int, default=5)
+    parser.add_argument("--files", type=int, default=3)
+    parser.add_argument("--tests", nargs="*", default=["tests"])
+    parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
+    given = parser.parse_args(arguments)
+    if given.inside:
+        sys.exit(run_tests(given))
+    spared = 0
+    for mutant in MUTANTS:
+        if given.only and mutant.name not in given.only:
+            continue
+        begin = time.perf_counter()
+        broken = broken_by(mutant, given)
+        files = {name.split("::")[0] for name in broken}
+        enough = not broken if mutant.name == "nothing" else len(broken) >= given.least and len(files) >= given.files
+        spared += not enough
+        word = "good" if enough else "TOO FEW" if mutant.name != "nothing" else "BREAKS"
+        seconds = time.perf_counter() - begin
+        print(f"{mutant.name:45s}{len(broken):4d} tests in {len(files):2d} files  {seconds:5.0f} s  {word}", flush=True)
+        for name in broken[:12]:
+            print(f"    {name}", flush=True)
+    sys.exit(spared > 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,150 @@
+"""What an estimator is given, cycle by cycle, as arrays and as a NetCDF file: so that others can be given the same."""
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.model import Body, DataSheet, Measurement, RisCode, RisSpec
+from rislam_rt.model.ris import join_sheets
+from rislam_rt.pipeline.dataset import AXES, Entry, names_of, told
+from rislam_rt.slam import StartPrior
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PADDING = -9.0
+"""Fills cycles that have fewer components than the fullest one."""
+PARTS = ("tau", "cosines", "amplitude", "tau_std", "cosines_std", "amplitude_std")
+"""Fields of a measurement."""
+INPUTS: dict[str, Entry] = {
+    "time": (("time",), "s", "time since the first cycle"),
+    "heading": (("time",), "rad", "compass: heading of the body about z"),
+    "tau": (("time", "component"), "s", "delay, -9 beyond the cycle's components"),
+    "cosines": (("time", "component", "cosine"), "1", "direction cosines of the arriving ray along body x and y"),
+    "amplitude": (("time", "component"), "1", "modulus of the gain"),
+    "tau_std": (("time", "component"), "s", "reported standard deviation of tau"),
+    "cosines_std": (("time", "component", "cosine"), "1", "reported standard deviation of cosines"),
+    "amplitude_std": (("time", "component"), "1", "reported standard deviation of amplitude"),
+    "from_panel": (("time", "component"), "1", "probability that it ran over the panel; left out without alternation"),
+    "which_panel": (("time", "component"), "1", "number of that panel, the likeliest of several; left out with one"),
+    "code": (
+        ("time", "row", "col"),
+        "1",
+        "phase levels that the agent holds the panel to be set to; several: one row",
+    ),
+    "start_position": (("xyz",), "m", "told position at the start"),
+    "start_velocity": (("xyz",), "m/s", "told velocity at the start"),
+    "tx_offset": (("xyz",), "m", "Tx from the agent's position, body frame"),
+    "rx_offset": (("xyz",), "m", "centre of the Rx array from the agent's position, body frame"),
+    "panel_shape": (("panel", "pair"), "1", "rows, columns of elements"),
+    "panel_spacing": (("panel", "pair"), "m", "between columns, between rows"),
+    "panel_normal": (("panel", "xyz"), "1", "unit vector out of the panel's front"),
+    "panel_up": (("panel", "xyz"), "1", "unit vector along a column"),
+    "panel_amplitude": (("panel",), "1", "amplitude of an element"),
+}
+"""What an estimator may see."""
+
+
+class Inputs(NamedTuple):
+    """All that an estimator gets over K cycles."""
+
+    start: StartPrior
+    body: Body
+    panel: DataSheet | None
+    """Data sheet; None without a panel."""
+    time: Floats
+    """(K,) [s] since the first cycle."""
+    heading: Floats
+    """(K,) [rad], of the compass."""
+    measurements: tuple[Measurement, ...]
+    """(K,)."""
+    codes: tuple[RisCode | None, ...]
+    """(K,) what the agent holds the panel to be set to; None without a panel."""
+
+
+def inputs_to_dataset(inputs: Inputs, **about: Any) -> "xr.Dataset":
+    """Variables of `INPUTS`, and attributes: the rest of the start and of the panel's data sheet, and `about`."""
+    import xarray as xr
+
+    values: dict[str, Any] = {name: _padded([getattr(m, name) for m in inputs.measurements]) for name in PARTS}
+    if all(m.from_panel is not None for m in inputs.measurements):
+        values["from_panel"] = _padded([np.asarray(m.from_panel) for m in inputs.measurements])
+    if all(m.panel is not None for m in inputs.measurements):
+        values["which_panel"] = _padded([np.asarray(m.panel) for m in inputs.measurements])
+    values |= {"time": inputs.time, "heading": inputs.heading}
+    values |= {"start_position": inputs.start.position, "start_velocity": inputs.start.velocity}
+    values |= {"tx_offset": inputs.body.tx_offset, "rx_offset": inputs.body.rx_offset}
+    names = ("heading", "position_std", "velocity_std", "heading_std")
+    attributes: dict[str, Any] = {f"start_{name}": getattr(inputs.start, name) for name in names}
+    codes = [code for code in inputs.codes if code is not None]
+    if inputs.panel is not None and len(codes) == len(inputs.codes):
+        values["code"] = np.array([code.index for code in codes])
+        sheets = inputs.panel.panels
+        for name in ("spacing", "normal", "up", "amplitude"):
+            values[f"panel_{name}"] = np.array([getattr(sheet, name) for sheet in sheets])
+        values["panel_shape"] = np.array([(sheet.rows, sheet.cols) for sheet in sheets])
+        attributes |= {"panel_levels": inputs.panel.levels, "panel_element": [sheet.element for sheet in sheets]}
+    content = {name: (INPUTS[name][0], value, told(INPUTS[name])) for name, value in values.items()}
+    coords: dict[str, Any] = {name: AXES[name] for name in ("xyz", "cosine")}
+    coords["component"] = np.arange(values["tau"].shape[1])  # so that files join along time
+    return xr.Dataset(content, coords, {"Conventions": "CF-1.11", **attributes, **about})
+
+
+def dataset_to_inputs(data: "xr.Dataset") -> Inputs:
+    """What an estimator is given, from the variables of `INPUTS` alone: a file of one's own needs no truth."""
+    marks = data.attrs
+    start = StartPrior(
+        data["start_position"].to_numpy(),
+        data["start_velocity"].to_numpy(),
+        *(float(marks[f"start_{name}"]) for name in ("heading", "position_std", "velocity_std", "heading_std")),
+    )
+    panel, codes = _panel(data)
+    body = Body(data["tx_offset"].to_numpy(), data["rx_offset"].to_numpy())
+    time, heading = data["time"].to_numpy(), data["heading"].to_numpy()
+    return Inputs(start, body, panel, time, heading, _measurements(data), codes)
+
+
+def seed_marks(seed: np.random.SeedSequence) -> dict[str, Any]:
+    """A seed as attributes: an estimator that draws from it does again what it did."""
+    return {"filter_entropy": str(seed.entropy), "filter_spawn_key": np.array(seed.spawn_key, dtype=np.int64)}
+
+
+def marked_rng(data: "xr.Dataset") -> np.random.Generator | None:
+    """The generator that the estimator of a run drew from; None in a file of another origin."""
+    if "filter_entropy" not in data.attrs:
+        return None
+    key = tuple(int(part) for part in np.atleast_1d(data.attrs["filter_spawn_key"]))
+    return np.random.default_rng(np.random.SeedSequence(int(data.attrs["filter_entropy"]), spawn_key=key))
+
+
+def _panel(data: "xr.Dataset") -> tuple[DataSheet | None, tuple[RisCode | None, ...]]:
+    """Data sheet, and one code a cycle; None without a panel."""
+    if "code" not in data:
+        return None, (None,) * data.sizes["time"]
+    levels, elements = int(data.attrs["panel_levels"]), names_of(data.attrs["panel_element"])
+    parts = (data[f"panel_{name}"].to_numpy() for name in ("shape", "spacing", "normal", "up", "amplitude"))
+    sheets = tuple(
+        RisSpec(int(rows), int(cols), spacing, normal, up, levels, element, float(amplitude))
+        for (rows, cols), spacing, normal, up, amplitude, element in zip(*parts, elements, strict=True)
+    )
+    return join_sheets(sheets), tuple(RisCode(code, levels) for code in data["code"].to_numpy())
+
+
+def _measurements(data: "xr.Dataset") -> tuple[Measurement, ...]:
+    """One a cycle, without the padding."""
+    fields = {name: name for name in (*PARTS, "from_panel")} | {"which_panel": "panel"}
+    table = {field: data[name].to_numpy() for name, field in fields.items() if name in data}
+    held = table["tau"] != PADDING
+    return tuple(
+        Measurement(**{name: value[cycle, held[cycle]] for name, value in table.items()})
+        for cycle in range(data.sizes["time"])
+    )
+
+
+def _padded(rows: list[Any]) -> Any:
+    longest = max((len(row) for row in rows), default=0)
+    table = np.full((len(rows), longest, *rows[0].shape[1:]), PADDING)
+    for cycle, row in enumerate(rows):
+        table[cycle, : len(row)] = row
+    return table

@@ -1,0 +1,87 @@
+"""The adviser's word on the terminal, and the panel's coverage as a picture."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm
+from matplotlib.figure import Figure
+from rich.console import Console
+from rich.table import Table
+
+from rislam_rt.model import Scene
+from rislam_rt.pipeline.advise.advice import Advice
+from rislam_rt.pipeline.advise.budget import NOTHING_DB, Link
+from rislam_rt.pipeline.advise.cost import cost_words
+from rislam_rt.pipeline.advise.coverage import Coverage
+from rislam_rt.pipeline.advise.remedies import verdict
+from rislam_rt.report.room import draw_plan
+from rislam_rt.report.style import save_figure, styled
+
+STEPS_DB = np.arange(-18.0, 31.0, 6.0)
+"""Of the map's colours; zero, where it begins to be heard, is one of them."""
+UNSEEN = "#d9d9d9"
+
+
+def print_advice(advice: Advice) -> None:
+    """One row a landmark and kind of codes, then what would help, then the cost."""
+    console = Console(highlight=False)
+    table = Table("landmark", "codes", "start", "middle", "end", "heard", "why not")
+    for link in advice.links:
+        cells = (_cell(link, at) for at in link.three)
+        table.add_row(link.landmark, link.code or "any", *cells, f"{link.share:.0%}", _why(link))
+    if advice.links:
+        title = f"SNR of the strongest path over the threshold of {advice.threshold_db:.1f} dB [dB]"
+        console.print(title, style="bold", markup=False)
+        console.print(table)
+    for line in advice.remedies:
+        console.print(line, markup=False, soft_wrap=True)
+    console.print(f"to trace {advice.costs[0].walls} walls: {'; '.join(map(cost_words, advice.costs))}", soft_wrap=True)
+
+
+def draw_coverage(scene: Scene, coverages: Sequence[Coverage], path: Path) -> Path:
+    """A map for each panel over the room's plan, the edge of hearing as a line; returns the file."""
+    low, high = scene.bounds
+    height = float(np.clip(6.0 * (high[1] - low[1]) / (high[0] - low[0]), 2.5, 9.0)) + 1.2
+    with styled():
+        figure = Figure(figsize=(7.6, height * len(coverages)))
+        for axis, coverage in zip(figure.subplots(len(coverages), 1, squeeze=False).flat, coverages, strict=True):
+            _draw_map(figure, axis, scene, coverage)
+        return save_figure(figure, path)
+
+
+def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> None:
+    from matplotlib import colormaps
+
+    colours = colormaps["viridis"].with_extremes(bad=UNSEEN)
+    shown = axis.pcolormesh(
+        coverage.x, coverage.y, coverage.margin_db, cmap=colours, shading="nearest", zorder=-2,
+        norm=BoundaryNorm(STEPS_DB, colours.N, extend="both"),
+    )  # fmt: skip
+    axis.set_facecolor(UNSEEN)
+    level = np.where(np.isfinite(coverage.margin_db), coverage.margin_db, -60.0)
+    if level.min() < 0.0 < level.max():
+        axis.contour(coverage.x, coverage.y, level, levels=[0.0], colors="#d55e00", linewidths=2.0, zorder=1)
+    draw_plan(axis, scene)
+    axis.set_xlabel("x [m]")
+    axis.set_ylabel("y [m]")
+    axis.set_title(
+        f"{coverage.panel} in {scene.name}, agent at z = {coverage.height:.2f} m: heard at "
+        f"{coverage.heard:.0%} of where it is seen", weight="bold",
+    )  # fmt: skip
+    bar = figure.colorbar(shown, ax=axis, fraction=0.05, pad=0.02)
+    bar.set_label("SNR of the direct path under the best code,\nover the threshold [dB]; grey: no such path")
+
+
+def _cell(link: Link, at: int) -> str:
+    """The margin at a place; in brackets where it is not heard all the same."""
+    if link.margin_db[at] <= NOTHING_DB:
+        return "none"
+    text = f"{link.margin_db[at]:+.1f}"
+    return text if link.probability[at] > 0.5 else f"({text})"
+
+
+def _why(link: Link) -> str:
+    said = [reason for reason in link.reason if reason]
+    return "" if verdict(link) == "heard" or not said else max(said, key=said.count)

@@ -1,0 +1,129 @@
+"""A run as a moving picture: the room from above, and beside it the agent in close-up, moment by moment."""
+
+import io
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from rislam_rt.arrays import Floats
+from rislam_rt.model import SchemeResult, SlamResult
+from rislam_rt.report.geometry import ellipse
+from rislam_rt.report.room import draw_plan
+from rislam_rt.report.style import TRUTH, scheme_colour, styled
+from rislam_rt.report.view.room_data import spread
+from rislam_rt.report.view.run_data import KNOWN
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+FRAMES = 80
+"""Moments of a picture."""
+FRAME_MS, LAST_MS = 100, 2500
+"""[ms] that each is shown, and the last."""
+WIDTH, DPI = 8.0, 80
+"""Of the picture: [inch], and dots to the inch."""
+LEAST_HALF = 0.05
+"""[m] Least half width of the close-up."""
+HALVES = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+"""[m] Half widths of the close-up: the least that holds all errors but the largest twentieth."""
+
+
+def gif_bytes(result: SlamResult, tell: Callable[[str, int, int], None] = lambda *_: None) -> bytes:
+    """The content of a GIF file. `tell` is told of every frame."""
+    rows = spread(len(result.scene.agent), FRAMES)
+    pictures: list[Image] = []
+    with styled():
+        figure, room, near = _stage(result)
+        canvas: Any = FigureCanvasAgg(figure)
+        for number, cycle in enumerate(rows):
+            moving = _draw_moment(room, near, result, int(cycle))
+            canvas.draw()
+            pictures.append(_picture(canvas))
+            for artist in moving:
+                artist.remove()
+            tell("frames", number + 1, len(rows))
+    target = io.BytesIO()
+    durations = [FRAME_MS] * (len(pictures) - 1) + [LAST_MS]
+    pictures[0].save(
+        target, format="GIF", save_all=True, append_images=pictures[1:], duration=durations, loop=0, optimize=True
+    )
+    return target.getvalue()
+
+
+def _stage(result: SlamResult) -> tuple[Figure, Axes, Axes]:
+    """The figure with all that stands still, its layout settled."""
+    low, high = result.scene.bounds
+    aspect = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.35, 1.6))
+    figure = Figure(figsize=(WIDTH, 0.6 * WIDTH * aspect + 0.9), dpi=DPI)
+    room, near = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
+    draw_plan(room, result.scene)
+    room.set_xlabel("x [m]")
+    room.set_ylabel("y [m]")
+    room.set_title(" ", weight="bold")
+    for scheme in result.schemes:
+        near.plot([], [], color=scheme_colour(scheme), lw=2.0, label=scheme)
+    near.plot([], [], "o", color=TRUTH, ms=5, label="agent")
+    half = _half_width(result)
+    near.plot(*result.scene.agent.position[:, :2].T, color=TRUTH, lw=5.0, alpha=0.2)
+    near.set_aspect("equal")
+    near.set_xticks([])
+    near.set_yticks([])
+    near.grid(False)
+    near.set_title(f"{200.0 * half:.0f} cm wide", fontsize=9)
+    near.legend(loc="upper center", bbox_to_anchor=(0.5, -0.03), fontsize=9)
+    for spine in near.spines.values():
+        spine.set_visible(True)
+    settled: Any = FigureCanvasAgg(figure)
+    settled.draw()
+    figure.set_layout_engine("none")
+    return figure, room, near
+
+
+def _half_width(result: SlamResult) -> float:
+    truth = result.scene.agent.position
+    errors = [np.linalg.norm(scheme.position - truth, axis=1) for scheme in result.schemes.values()]
+    need = 1.3 * float(np.quantile(np.concatenate(errors), 0.95))
+    return next((half for half in HALVES if half >= max(need, LEAST_HALF)), HALVES[-1])
+
+
+def _draw_moment(room: Axes, near: Axes, result: SlamResult, cycle: int) -> list[Artist]:
+    """All that moves, to be taken off again; the close-up follows the agent."""
+    scene, half = result.scene, _half_width(result)
+    truth = scene.agent.position[cycle, :2]
+    moving: list[Artist] = []
+    for axis in (room, near):
+        moving += axis.plot(*truth, "o", color=TRUTH, ms=6, zorder=8)
+    for scheme in result.schemes.values():
+        moving += _draw_belief(room, near, scheme, cycle)
+    near.set_xlim(truth[0] - half, truth[0] + half)
+    near.set_ylim(truth[1] - half, truth[1] + half)
+    room.set_title(f"{scene.name}, t = {scene.agent.elapsed[cycle]:.1f} s", weight="bold")
+    return moving
+
+
+def _draw_belief(room: Axes, near: Axes, scheme: SchemeResult, cycle: int) -> list[Artist]:
+    colour, done = scheme_colour(scheme.scheme), scheme.position[: cycle + 1, :2]
+    ring = ellipse(done[-1], scheme.covariance[cycle, :2, :2])
+    moving: list[Artist] = []
+    for axis in (room, near):
+        moving += axis.plot(*done.T, color=colour, lw=1.4, zorder=6)
+        moving += axis.plot(*ring.T, color=colour, lw=1.0, zorder=6)
+    moving += near.plot(*done[-1], "o", color=colour, ms=5, zorder=7)
+    points = scheme.held[cycle] & (scheme.parent < 0)
+    known = points & (scheme.ris_probability[cycle] > KNOWN)
+    for shown, marker in ((known, "s"), (points & ~known, "x")):
+        place: Floats = scheme.landmark_position[cycle, shown, :2]
+        moving += room.plot(*place.T, marker, color=colour, mfc="none", ms=8, mew=1.8, zorder=7)
+    return moving
+
+
+def _picture(canvas: Any) -> "Image":
+    """What is drawn, in the 256 colours of a GIF."""
+    from PIL import Image
+
+    return Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()).quantize(64)

@@ -1,0 +1,95 @@
+"""A run as a recording for the Rerun viewer: the room, the true way, and what each scheme held for true, over time."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import to_rgb
+
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.errors import SetupError
+from rislam_rt.model import Scene, SchemeResult, SlamResult
+from rislam_rt.report.geometry import outline_edges
+from rislam_rt.report.style import scheme_colour
+
+TIMELINE = "time"
+TWO_SIGMA = 2.0
+GREY = (90, 90, 90)
+"""Of what is true."""
+
+
+def recording_bytes(result: SlamResult, identity: str) -> bytes:
+    """The content of an `.rrd` file, metres and seconds.
+
+    Parameters
+    ----------
+    identity
+        Names the recording: the viewer holds two files of one name for one.
+
+    Raises
+    ------
+    SetupError
+        The extra `viz` (rerun-sdk) is not installed.
+    """
+    try:
+        import rerun
+    except ImportError:
+        raise SetupError("--rerun: rerun-sdk is not installed; pip install 'rislam-rt[viz]'") from None
+    stream = rerun.RecordingStream("rislam_rt", recording_id=identity)
+    stream.set_log_time_enabled(False)
+    stream.set_log_tick_enabled(False)
+    sink = stream.binary_stream()
+    _log_room(rerun, stream, result.scene)
+    for cycle, time in enumerate(result.scene.agent.time):
+        stream.set_time(TIMELINE, duration=float(time))
+        stream.log("truth/agent", rerun.Points3D([result.scene.agent.position[cycle]], radii=0.03, colors=[GREY]))
+        for name, scheme in result.schemes.items():
+            _log_cycle(rerun, stream, name, scheme, cycle)
+            error = float(np.linalg.norm(scheme.position[cycle] - result.scene.agent.position[cycle]))
+            stream.log(f"error/{name}", rerun.Scalars(error))
+    for name, scheme in result.schemes.items():
+        way = rerun.LineStrips3D([scheme.position], colors=[_colour(name)])
+        stream.log(f"{name}/way", way, static=True)
+    return bytes(sink.read() or b"")
+
+
+def _log_room(rerun: Any, stream: Any, scene: Scene) -> None:
+    """Edges of the walls, true landmarks, true way: the same at all times."""
+    stream.log("/", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    edges = outline_edges(build_walls(scene))
+    stream.log("truth/room", rerun.LineStrips3D(edges, colors=[GREY]), static=True)
+    stream.log("truth/way", rerun.LineStrips3D([scene.agent.position], colors=[GREY]), static=True)
+    marks = rerun.Points3D(scene.landmark_positions, labels=list(scene.landmarks), radii=0.05, colors=[GREY])
+    stream.log("truth/landmarks", marks, static=True)
+
+
+def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: int) -> None:
+    """Estimate with its 2 sigma ellipsoid, and the map as it then was."""
+    size, axes = np.linalg.eigh(scheme.covariance[cycle, :3, :3])
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 0] *= -1.0
+    place = scheme.position[cycle]
+    colour = _colour(name)
+    stream.log(f"{name}/agent", rerun.Points3D([place], radii=0.03, colors=[colour]))
+    ellipsoid = rerun.Ellipsoids3D(
+        centers=[place],
+        half_sizes=[TWO_SIGMA * np.sqrt(np.maximum(size, 0.0))],
+        quaternions=[rerun.Quaternion(xyzw=_quaternion(axes))],
+        colors=[colour],
+    )
+    stream.log(f"{name}/ellipsoid", ellipsoid)
+    held = np.flatnonzero(scheme.held[cycle] & (scheme.parent < 0))
+    number = [""] * len(scheme.ident) if scheme.panel is None else [f" {panel}" for panel in scheme.panel[cycle]]
+    panel = [f" panel{number[i]}" if scheme.ris_probability[cycle, i] > 0.5 else "" for i in held]
+    labels = [f"{scheme.ident[i]}{text}" for i, text in zip(held, panel, strict=True)]
+    points = rerun.Points3D(scheme.landmark_position[cycle, held], labels=labels, radii=0.04, colors=[colour])
+    stream.log(f"{name}/landmarks", points)
+
+
+def _colour(scheme: str) -> tuple[int, ...]:
+    return tuple(round(255 * part) for part in to_rgb(scheme_colour(scheme)))
+
+
+def _quaternion(rotation: Any) -> Any:
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(rotation).as_quat()

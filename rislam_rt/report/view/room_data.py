@@ -1,0 +1,86 @@
+"""A room as data for the view: walls as triangles and outlines, panels, scatterers, the way."""
+
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.geometry.triangles import outline_edges
+from rislam_rt.model import RisPanel, Scene
+
+MOST_TRIANGLES = 8000
+"""Of a view: the walls of the largest surface come first, the rest of a finely meshed room is left out."""
+MOST_NAMES = 60
+WAY_POINTS = 600
+"""Of the way drawn."""
+DIGITS = 3
+"""Of a metre."""
+
+
+def room_data(scene: Scene) -> dict[str, Any]:
+    """Everything of a room but what moves."""
+    way = scene.agent.position
+    walls, left_out = _walls(scene)
+    return {
+        "bounds": rounded(scene.bounds),
+        "walls": walls,
+        "left_out": left_out,
+        "panels": [_panel(panel) for panel in scene.panels],
+        "scatterers": [{"name": s.name, "position": rounded(s.position)} for s in scene.scatterers],
+        "track": rounded(way[spread(len(way), WAY_POINTS)]),
+    }
+
+
+def spread(count: int, most: int) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
+    """Rows spread evenly over `count`, `most` of them at most, with the first and the last."""
+    return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(np.int64))
+
+
+def rounded(points: Floats, digits: int = DIGITS) -> Any:
+    """Nested lists of numbers with so many digits."""
+    return (np.round(points, digits) + 0.0).tolist()
+
+
+def _walls(scene: Scene) -> tuple[list[dict[str, Any]], int]:
+    """The largest walls, and how many are left out."""
+    walls = build_walls(scene)
+    corners = walls.triangles
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    of_wall = np.bincount(walls.wall_of_triangle, weights=area, minlength=len(walls))
+    order = np.argsort(-of_wall, kind="stable")
+    counts = np.bincount(walls.wall_of_triangle, minlength=len(walls))
+    shown = order[np.cumsum(counts[order]) <= MOST_TRIANGLES]
+    named: set[str] = set()
+    found = []
+    for wall in shown:
+        own = corners[walls.wall_of_triangle == wall]
+        reflector = walls.names[wall].partition("#")[0]
+        label = reflector if reflector not in named and len(named) < MOST_NAMES else ""
+        named.add(reflector)
+        found.append(
+            {
+                "name": walls.names[wall],
+                "label": label,
+                "normal": rounded(walls.normal[wall], 5),
+                "offset": round(float(walls.offset[wall]), 5),
+                "center": rounded(np.average(own.mean(axis=1), axis=0, weights=area[walls.wall_of_triangle == wall])),
+                "triangles": rounded(_same_sense(own, walls.normal[wall])),
+                "edges": rounded(outline_edges(own)),
+            }
+        )
+    return found, len(order) - len(shown)
+
+
+def _same_sense(triangles: Floats, normal: Floats) -> Floats:
+    """Triangles (T, 3, 3) all counter-clockwise about a normal, so that no seam shows between neighbours."""
+    sense = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) @ normal
+    return np.where((sense < 0.0)[:, None, None], triangles[:, ::-1], triangles)
+
+
+def _panel(panel: RisPanel) -> dict[str, Any]:
+    spec = panel.spec
+    across = 0.5 * spec.cols * spec.spacing[0] * spec.right
+    along = 0.5 * spec.rows * spec.spacing[1] * spec.up
+    corners = panel.center + np.array([-across - along, across - along, across + along, along - across])
+    return {"name": panel.name, "center": rounded(panel.center), "corners": rounded(corners)}

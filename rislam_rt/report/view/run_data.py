@@ -1,0 +1,82 @@
+"""A run as data for the view: what each scheme's agent believed at some of its cycles."""
+
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.model import SchemeResult, SlamResult
+from rislam_rt.report.style import scheme_colour
+from rislam_rt.report.view.room_data import room_data, rounded, spread
+
+FRAMES = 150
+"""Moments of a view."""
+FINE = 4
+"""Digits of a metre where errors are to be seen."""
+KNOWN = 0.5
+"""Probability of being the panel above which a landmark is held for it."""
+
+
+def run_data(result: SlamResult) -> dict[str, Any]:
+    """Room, truth, and every scheme, at up to `FRAMES` cycles spread evenly."""
+    rows = spread(len(result.scene.agent), FRAMES)
+    return room_data(result.scene) | {
+        "kind": "run",
+        "above": True,
+        "first": len(rows) - 1,
+        "time": rounded(result.scene.agent.elapsed[rows]),
+        "truth": rounded(result.scene.agent.position[rows], FINE),
+        "schemes": [_scheme(result, scheme, rows) for scheme in result.schemes.values()],
+    }
+
+
+def _scheme(result: SlamResult, scheme: SchemeResult, rows: Integers) -> dict[str, Any]:
+    error = np.linalg.norm(scheme.position - result.scene.agent.position, axis=1)[rows]
+    sigma = np.sqrt(np.maximum(np.trace(scheme.covariance[rows, :2, :2], axis1=1, axis2=2), 0.0))
+    data = {
+        "name": scheme.scheme,
+        "colour": scheme_colour(scheme.scheme),
+        "position": rounded(scheme.position[rows], FINE),
+        "ellipse": [_ellipse(scheme.covariance[row, :2, :2]) for row in rows],
+        "error": rounded(np.column_stack([error, sigma]), FINE),
+        "landmarks": [mark for column in range(len(scheme.ident)) if (mark := _landmark(scheme, column, rows))],
+    }
+    spec = result.scene.ris.spec if result.scene.ris is not None else None
+    if scheme.applied.shape[1] and spec is not None:
+        shapes = [[panel.rows, panel.cols] for panel in spec.panels]
+        data |= {"levels": scheme.levels, "shapes": shapes, "codes": [_code(scheme, row, shapes) for row in rows]}
+    return data
+
+
+def _ellipse(covariance: Floats) -> list[float]:
+    """Half axes [m] of the 2 sigma ellipse and the angle [rad] of the first."""
+    value, vector = np.linalg.eigh(covariance)
+    half = 2.0 * np.sqrt(np.maximum(value, 0.0))
+    return [*rounded(half, FINE + 1), round(float(np.arctan2(vector[1, 0], vector[0, 0])), 3)]
+
+
+def _landmark(scheme: SchemeResult, column: int, rows: Integers) -> dict[str, Any] | None:
+    """One landmark from the first moment that it is held to the last; None if it is never."""
+    held = scheme.held[rows, column]
+    if not held.any():
+        return None
+    first, last = int(np.argmax(held)), len(rows) - int(np.argmax(held[::-1]))
+    places = rounded(scheme.landmark_position[rows[first:last], column])
+    known = scheme.ris_probability[rows[first:last], column] > KNOWN
+    return {
+        "id": int(scheme.ident[column]),
+        "image": bool(scheme.parent[column] >= 0),
+        "first": first,
+        "at": [place if there else None for place, there in zip(places, held[first:last], strict=True)],
+        "panel": "".join("1" if one else "0" for one in known),
+    }
+
+
+def _code(scheme: SchemeResult, row: int, shapes: list[list[int]]) -> str:
+    """Levels in base 36, panel by panel, `|` between panels, each with as many digits as the largest level has."""
+    index = scheme.applied[row].ravel()
+    digits = len(np.base_repr(scheme.levels - 1, 36))
+    sizes = [rows * cols for rows, cols in shapes]
+    ends = np.cumsum(sizes)
+    text = [np.base_repr(int(level), 36).lower().zfill(digits) for level in index]
+    return "|".join("".join(text[end - size : end]) for end, size in zip(ends, sizes, strict=True))

@@ -1,0 +1,1 @@
+for (const box of document.querySelectorAll(".rv")) new View(box);

@@ -1,0 +1,121 @@
+"""Scene check, the units' part: numbers too large by the factor between two units, said whatever else is wrong.
+
+It looks at the scene file as a plain table and at whatever meshes could be read, so that a missing key or a start
+outside the room does not hide that the room was drawn in millimetres.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.scene.findings import Finding
+from rislam_rt.scene.lying import UNITS
+
+NAMES = {"millimetres": "mm", "centimetres": "cm", "inches": "in"}
+"""Units that rooms are drawn in, and their names in a scene file."""
+LARGEST_ROOM, SMALLEST_ROOM = 300.0, 1.0
+"""[m] Longest side of the largest hall, and of the smallest box that an agent could move in, taken for meant."""
+USUAL_ROOM = (2.0, 100.0)
+"""[m] Range of the longest side of rooms, to tell which unit was meant."""
+FAR = 3.0
+"""A point this many times the room's size away from it was given in another unit, or is a mistake of another kind."""
+LIMITS = (
+    (("ris", "spacing_m"), 0.5, "m", "millimetres", 1e-3),
+    (("reflector", "material", "thickness_m"), 3.0, "m", "millimetres", 1e-3),
+    (("agent", "cycle_s"), 10.0, "s", "milliseconds", 1e-3),
+    (("agent", "velocity"), 10.0, "m/s", "millimetres a second", 1e-3),
+    (("agent", "speed_m_s"), 10.0, "m/s", "millimetres a second", 1e-3),
+    (("agent", "tx_offset_m"), 2.0, "m", "millimetres", 1e-3),
+    (("agent", "rx_offset_m"), 2.0, "m", "millimetres", 1e-3),
+)
+"""Key, the largest value that is meant indoors, its unit, and what the number would be a usual one in."""
+
+SPEED_FIELD = "agent.velocity"
+"""What the check of the motion itself looks at too, of a scene that has no errors."""
+
+
+def unit_warnings(file: str, table: Mapping[str, Any], bounds: Floats | None) -> Iterator[Finding]:
+    """Every number of a scene file that looks as if it were in another unit.
+
+    Parameters
+    ----------
+    table
+        The file's content as TOML gave it; of values of a wrong type nothing is said.
+    bounds
+        (2, 3) [m] of the meshes that could be read; None if none could.
+    """
+    for path, limit, unit, other, factor in LIMITS:
+        for field, value in _values(table, path):
+            if abs(value) > limit:
+                message = f"{value:g} {unit}; in {other} it would be {value * factor:g} {unit}"
+                yield Finding("warning", file, field, message, "give metres and seconds")
+    if bounds is None:
+        return
+    room = _room_unit(bounds)
+    if room is not None:
+        yield Finding("warning", file, "meshes.units", *room)
+        return  # points in metres lie outside a room in millimetres, or in its corner
+    for path in (("agent", "start"), ("ris", "center"), ("scatterer", "position")):
+        for field, point in _points(table, path):
+            yield from _far_point(file, field, point, bounds)
+
+
+def _room_unit(bounds: Floats) -> tuple[str, str] | None:
+    """What is odd about the room's size, and the mend."""
+    size = bounds[1] - bounds[0]
+    longest, words = float(size.max()), " x ".join(f"{side:.3g}" for side in size)
+    if longest > LARGEST_ROOM:
+        for unit, name in NAMES.items():
+            factor = UNITS[name]
+            if USUAL_ROOM[0] <= longest * factor <= USUAL_ROOM[1]:
+                meant = " x ".join(f"{side * factor:.3g}" for side in size)
+                mend = f'say units = "{name}" in the table [meshes]'
+                return f"the room is {words} m; in {unit} it would be {meant} m", mend
+        return f"the room is {words} m", "give metres"
+    if longest < SMALLEST_ROOM:
+        return f"the room is {words} m", "give metres; a drawing in kilometres or to a scale has to be enlarged"
+    return None
+
+
+def _far_point(file: str, field: str, point: Floats, bounds: Floats) -> Iterator[Finding]:
+    size = float(np.max(bounds[1] - bounds[0]))
+    away = np.maximum(np.maximum(bounds[0] - point, point - bounds[1]), 0.0).max()
+    if away <= FAR * size:
+        return
+    for unit, name in NAMES.items():
+        factor = UNITS[name]
+        meant = point * factor
+        if (meant >= bounds[0]).all() and (meant <= bounds[1]).all():
+            message = f"{point.tolist()} is far outside the room; in {unit} it would be {np.round(meant, 6).tolist()} m"
+            yield Finding("warning", file, field, message, f"give metres: multiply by {factor:g}")
+            return
+
+
+def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, float]]:
+    """Dotted field and largest value of every place that a path of keys leads to; lists of tables count each."""
+    for field, value in _places(table, path, ""):
+        numbers = value if isinstance(value, list) else [value]
+        if numbers and all(_is_number(number) for number in numbers):
+            yield field, float(max(numbers, key=abs))
+
+
+def _points(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, Floats]]:
+    for field, value in _places(table, path, ""):
+        if isinstance(value, list) and len(value) == 3 and all(_is_number(number) for number in value):
+            yield field, np.array(value, dtype=np.float64)
+
+
+def _places(part: Any, path: Sequence[str], field: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(part, list) and path:
+        for number, item in enumerate(part):
+            yield from _places(item, path, f"{field}[{number}]")
+    elif not path:
+        yield field, part
+    elif isinstance(part, Mapping) and path[0] in part:
+        yield from _places(part[path[0]], path[1:], f"{field}.{path[0]}".lstrip("."))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))

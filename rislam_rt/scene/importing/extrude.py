@@ -1,0 +1,276 @@
+"""From a floor plan to walls, floor and ceiling: doors and windows are cut out, and closed where they are."""
+
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.importing.draft import RoomDraft
+from rislam_rt.scene.importing.materials import Palette
+from rislam_rt.scene.importing.options import ImportOptions
+from rislam_rt.scene.importing.pieces import numbered, plain_name
+from rislam_rt.scene.importing.plan import Opening, Plan
+from rislam_rt.scene.importing.polygons import inside_loop, triangulate
+from rislam_rt.scene.importing.thinning import as_mesh
+from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.rooms.shapes import joined, quad
+
+SAME_LINE = 5e-3
+"""[m] Walls whose lines are nearer than this are one."""
+PARALLEL = np.radians(0.2)
+SNAP = 0.05
+"""[m] An end of a wall this near another wall reaches it."""
+THICKEST = 0.6
+"""[m] An opening goes through all walls this near it that run along it: both faces of a thick wall."""
+ALONG = np.radians(5.0)
+_SIDES = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
+
+Spans = list[tuple[float, float]]
+Entry = tuple[str, Mesh, dict[str, Any] | None]
+"""Name, mesh and own material."""
+
+
+class Line(NamedTuple):
+    """A straight line of walls."""
+
+    start: Floats
+    """(2,) [m]."""
+    along: Floats
+    """(2,) unit vector."""
+    spans: Spans
+    """[m] From where to where along the line there is wall."""
+    material: dict[str, Any] | None
+    name: str
+
+    @property
+    def across(self) -> Floats:
+        """(2,) unit vector to its left."""
+        return np.array([-self.along[1], self.along[0]])
+
+    def at(self, place: float, height: float) -> Floats:
+        """(3,) [m]."""
+        return np.append(self.start + place * self.along, height)
+
+    def distance(self, points: Floats) -> Floats:
+        """Signed distances (...,) [m] of points (..., 2), positive to its left."""
+        return np.asarray((points - self.start) @ self.across)
+
+
+def extrude(plan: Plan, height: float, options: ImportOptions) -> RoomDraft:
+    """The room of a plan.
+
+    Raises
+    ------
+    Fault
+        An opening lies on no wall, or a material was given for a name that nothing has.
+    """
+    lines = _wall_lines(plan)
+    cuts = [_cut_lines(opening, lines) for opening in plan.openings]
+    entries: list[Entry] = []
+    flat = _floor_triangles(plan, lines)
+    thresholds: dict[float, list[Mesh]] = {0.0: [], height: []}
+    for opening, cut in zip(plan.openings, cuts, strict=True):
+        if len(cut) > 1:
+            frame = _frame(opening, [lines[n] for n in cut], thresholds)
+            if frame:
+                entries.append((f"{opening.name}_frame", joined(frame), None))
+        if opening.material is not None:
+            line = min((lines[n] for n in cut), key=lambda k: float(np.abs(k.distance(opening.ends)).mean()))
+            low, high = _reach(opening, line)
+            entries.append((opening.name, _panel(line, low, high, opening.bottom, opening.top), opening.material))
+    walls: list[Entry] = []
+    for number, line in enumerate(lines):
+        holes = [o for o, cut in zip(plan.openings, cuts, strict=True) if number in cut]
+        cells = _cells(line, [(*_reach(o, line), o.bottom, o.top) for o in holes], height)
+        if cells:
+            walls.append((_line_name(line, plan), joined(cells), line.material))
+    levels: list[Entry] = []
+    for name, level in (("floor", 0.0), ("ceiling", height)):
+        mesh = joined([_at_height(flat, level), *thresholds[level]])
+        levels.append((name, as_mesh(mesh.vertices[mesh.faces]), None))
+    return _named([*levels, *walls, *entries], plan, options)
+
+
+def _named(entries: list[Entry], plan: Plan, options: ImportOptions) -> RoomDraft:
+    palette = Palette(options.materials, options.rest)
+    names = numbered([plain_name(name) or "wall" for name, _, _ in entries])
+    reflectors = {}
+    for name, (_, mesh, own) in zip(names, entries, strict=True):
+        by_hand = palette.by_hand(name)
+        reflectors[name] = (mesh, by_hand or own or palette.material(name, "", ""))
+    if palette.unused():
+        raise Fault(f"--material {palette.unused()[0]}: nothing has that name", f"give one of: {', '.join(names[:12])}")
+    closed = sum(o.material is not None for o in plan.openings)
+    remarks = [
+        f"floor plan of {len(plan.rooms)} rooms: {len(names)} reflectors, {len(plan.openings) - closed} openings, "
+        f"{closed} closed doors and windows"
+    ]
+    return RoomDraft(reflectors, {}, remarks + palette.remarks())
+
+
+def _wall_lines(plan: Plan) -> list[Line]:
+    """Walls along one line, joined; those drawn by themselves come before the edges of rooms, which yield to them."""
+    drawn = [(line, material, name) for line, material, name in plan.walls]
+    edges = [np.stack([a, b]) for room in plan.rooms for a, b in zip(room, np.roll(room, -1, axis=0), strict=True)]
+    lines: list[Line] = []
+    for ends, material, name in [*drawn, *((edge, None, "") for edge in edges)]:
+        length = float(np.linalg.norm(ends[1] - ends[0]))
+        if length < 1e-3:
+            continue
+        along = (ends[1] - ends[0]) / length
+        mine = [k for k in lines if _is_on(k, ends, along)]
+        places = [(0.0, length)]
+        for other in mine:
+            if other.material == material and other.name == name:
+                continue
+            a, b = sorted(float(x) for x in (other.start + np.outer([s for p in other.spans for s in p], other.along)
+                                             - ends[0]) @ along)[:: max(2 * len(other.spans) - 1, 1)]  # fmt: skip
+            places = _without(places, a, b)
+        same = next((k for k in mine if k.material == material and k.name == name), None)
+        if same is None:
+            if places:
+                lines.append(Line(ends[0], along, places, material, name))
+            continue
+        for low, high in places:
+            ends_on = sorted(float((ends[0] + p * along - same.start) @ same.along) for p in (low, high))
+            same.spans[:] = _joined_spans([*same.spans, (ends_on[0], ends_on[1])])
+    return [line._replace(spans=_snapped(line, lines)) for line in lines]
+
+
+def _is_on(line: Line, ends: Floats, along: Floats) -> bool:
+    turn = abs(float(line.along[0] * along[1] - line.along[1] * along[0]))
+    return turn < PARALLEL and float(np.abs(line.distance(ends)).max()) < SAME_LINE
+
+
+def _joined_spans(spans: Spans) -> Spans:
+    found: Spans = []
+    for low, high in sorted(spans):
+        if found and low <= found[-1][1] + SAME_LINE:
+            found[-1] = (found[-1][0], max(found[-1][1], high))
+        else:
+            found.append((low, high))
+    return found
+
+
+def _without(spans: Spans, low: float, high: float) -> Spans:
+    found: Spans = []
+    for a, b in spans:
+        found += [(x, y) for x, y in ((a, min(b, low)), (max(a, high), b)) if y - x > SAME_LINE]
+    return found
+
+
+def _snapped(line: Line, lines: list[Line]) -> Spans:
+    """Spans whose ends reach the walls that they nearly touch."""
+    meets = []
+    for other in lines:
+        slope = float(line.along @ other.across)
+        if abs(slope) > np.sin(np.radians(5.0)):
+            place = -float(other.distance(line.start)) / slope
+            on = float((line.start + place * line.along - other.start) @ other.along)
+            if any(low - SNAP <= on <= high + SNAP for low, high in other.spans):
+                meets.append(place)
+    near = np.array(meets)
+    found = []
+    for span in line.spans:
+        ends = []
+        for end in span:
+            best = near[np.argmin(np.abs(near - end))] if len(near) else end
+            ends.append(float(best) if abs(best - end) <= SNAP else end)
+        if ends[1] - ends[0] > SAME_LINE:
+            found.append((ends[0], ends[1]))
+    return found
+
+
+def _cut_lines(opening: Opening, lines: list[Line]) -> list[int]:
+    """The lines that an opening goes through."""
+    along = (opening.ends[1] - opening.ends[0]) / np.linalg.norm(opening.ends[1] - opening.ends[0])
+    near = []
+    for number, line in enumerate(lines):
+        turn = abs(float(line.along[0] * along[1] - line.along[1] * along[0]))
+        low, high = _reach(opening, line)
+        meets = any(a < high - 0.01 and low + 0.01 < b for a, b in line.spans)
+        if turn < np.sin(ALONG) and meets:
+            near.append((float(np.abs(line.distance(opening.ends)).max()), number))
+    near = [pair for pair in sorted(near) if pair[0] < THICKEST]
+    if not near:
+        x, y = opening.ends.mean(axis=0)
+        raise Fault(f"'{opening.name[:40]}' at {x:.2f},{y:.2f} m lies on no wall", "draw it along a wall")
+    # a wall has two faces: what is farther than the second belongs to another one
+    return [number for _, number in near[:2]]
+
+
+def _reach(opening: Opening, line: Line) -> tuple[float, float]:
+    low, high = sorted(float(x) for x in (opening.ends - line.start) @ line.along)
+    return low, high
+
+
+def _cells(line: Line, holes: list[tuple[float, float, float, float]], height: float) -> list[Mesh]:
+    """Rectangles of a line of walls about its openings (from, to, bottom, top)."""
+    found = []
+    for low, high in line.spans:
+        cuts = sorted({low, high, *(min(max(x, low), high) for hole in holes for x in hole[:2])})
+        for a, b in pairwise(cuts):
+            if b - a < 1e-6:
+                continue
+            open_here = [hole for hole in holes if hole[0] < 0.5 * (a + b) < hole[1]]
+            solid: Spans = [(0.0, height)]
+            for hole in open_here:
+                solid = _without(solid, hole[2], hole[3])
+            found += [_panel(line, a, b, bottom, top) for bottom, top in solid]
+    return found
+
+
+def _panel(line: Line, low: float, high: float, bottom: float, top: float) -> Mesh:
+    return quad([line.at(low, bottom), line.at(high, bottom), line.at(high, top), line.at(low, top)])
+
+
+def _frame(opening: Opening, lines: list[Line], thresholds: dict[float, list[Mesh]]) -> list[Mesh]:
+    """What joins both faces of a thick wall about an opening; at floor and ceiling it is part of them."""
+    first, second = lines
+    if abs(float(second.distance(first.start + _reach(opening, first)[0] * first.along))) < SAME_LINE:
+        return []
+    places = [opening.ends[n] for n in (0, 1)]
+    edges = [[line.start + float((p - line.start) @ line.along) * line.along for line in lines] for p in places]
+    bottom, top = opening.bottom, opening.top
+    found = [quad([np.append(p, z) for p, z in ((a, bottom), (b, bottom), (b, top), (a, top))]) for a, b in edges]
+    (a, b), (c, d) = edges
+    for level in (bottom, top):
+        part = quad([np.append(p, level) for p in (a, b, d, c)])
+        thresholds[level].append(part) if level in thresholds else found.append(part)
+    return found
+
+
+def _floor_triangles(plan: Plan, lines: list[Line]) -> Floats:
+    """(T, 3, 2) [m] of all rooms; of the rectangle about all walls where no room is drawn."""
+    found = []
+    for room in plan.rooms:
+        triangles = triangulate(room, [])
+        assert triangles is not None  # was tried when the plan was read
+        found.append(room[triangles])
+    if not found:
+        ends = np.array([line.at(p, 0.0)[:2] for line in lines for span in line.spans for p in span])
+        (x0, y0), (x1, y1) = ends.min(axis=0), ends.max(axis=0)
+        if min(x1 - x0, y1 - y0) < 0.5:
+            raise Fault("the walls enclose nothing", "draw rooms as closed shapes, or walls around them")
+        box = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+        found.append(box[np.array([[0, 1, 2], [0, 2, 3]])])
+    return np.concatenate(found)
+
+
+def _at_height(triangles: Floats, height: float) -> Mesh:
+    return as_mesh(np.concatenate([triangles, np.full((*triangles.shape[:2], 1), height)], axis=-1))
+
+
+def _line_name(line: Line, plan: Plan) -> str:
+    """`wall_north` where a room lies on one side only, `partition` between two; the drawn name if there is one."""
+    if line.name:
+        return line.name
+    low, high = line.spans[int(np.argmax([high - low for low, high in line.spans]))]
+    middle = line.start + 0.5 * (low + high) * line.along
+    sides = [any(inside_loop(room, middle + s * 0.02 * line.across) for room in plan.rooms) for s in (1.0, -1.0)]
+    if sides[0] == sides[1]:
+        return "partition"
+    outward = -line.across if sides[0] else line.across
+    return f"wall_{_SIDES[int(np.round(np.degrees(np.arctan2(outward[1], outward[0])) / 45.0)) % 8]}"

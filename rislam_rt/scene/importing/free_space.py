@@ -1,0 +1,150 @@
+"""Where an agent can be in a room that somebody drew: inside, off all surfaces, and on a straight free way."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.angles import unit
+from rislam_rt.geometry.triangles import distance_to_triangles, triangle_planes
+from rislam_rt.scene.check.probe import crossings, ray_hits, sphere_directions
+
+HEIGHTS = (1.0, 1.4, 0.6)
+"""[m] Heights above the floor that are tried: that of a trolley or a hand, then higher, then lower."""
+CLEARANCES = (0.4, 0.25, 0.12)
+"""[m] Least distances of the way from all surfaces, the first that leaves one."""
+LONGEST = 5.0
+"""[m] Of the way that is proposed."""
+OFF_SURFACE = 1e-5
+"""[m] From a surface to where it is looked at: nearer than any two that are drawn apart."""
+ENOUGH = 3
+"""Lines of sight that make a surface seen: a single one may have slipped through the seam of two triangles."""
+_GRID, _RAYS, _STATIONS = 14, 100, 40
+
+
+class Free(NamedTuple):
+    """Free places of a room."""
+
+    stations: Floats
+    """(S, 3) [m] places that chains of free straight lines join, the start of the way first."""
+    way: Floats
+    """(2, 3) [m] start and end of a straight free way."""
+    clearance: float
+    """[m] that the way keeps off all surfaces."""
+    enclosed: float
+    """Share of rays from the start that meet something."""
+
+
+def find_free(triangles: Floats, floor: float) -> Free | None:
+    """Places in a room (T, 3, 3) [m] above its floor [m]; None where nothing is free.
+
+    Of all places of a grid those count from which the fewest rays escape: they are inside. Of these, the longest
+    straight way up to `LONGEST` that keeps off all surfaces is taken.
+    """
+    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    for height in HEIGHTS:
+        z = floor + min(height, 0.5 * (float(high[2]) - floor))
+        across = [low[i] + (np.arange(_GRID) + 0.47) / _GRID * (high[i] - low[i]) for i in (0, 1)]
+        x, y = (axis.ravel() for axis in np.meshgrid(*across))
+        points = np.stack([x, y, np.full(len(x), z)], axis=-1)
+        for clearance in CLEARANCES:
+            free = _free_at(points, triangles, clearance)
+            if free is not None:
+                return free
+    return None
+
+
+def _free_at(points: Floats, triangles: Floats, clearance: float) -> Free | None:
+    gap = distance_to_triangles(points, triangles)
+    points, gap = points[gap >= clearance], gap[gap >= clearance]
+    if len(points) < 2:
+        return None
+    directions = sphere_directions(_RAYS)
+    share = np.array([(ray_hits(p, directions, triangles) >= 0).mean() for p in points])
+    inside = share >= share.max() - 0.02
+    points, gap, share = points[inside], gap[inside], share[inside]
+    best = int(np.argmax(np.minimum(gap, 1.0)))
+    stations = points[reachable(points[best], points, triangles)]
+    way = _longest_way(stations, triangles, clearance)
+    if way is None:
+        return None
+    order = np.argsort(np.linalg.norm(stations - way[0], axis=1), kind="stable")
+    return Free(stations[order], way, clearance, float(share[best]))
+
+
+def reachable(start: Floats, points: Floats, triangles: Floats) -> Booleans:
+    """Which points (N, 3) a chain of free straight lines joins to the start (3,)."""
+    reached, stations = np.zeros(len(points), dtype=np.bool_), [start]
+    while stations and not reached.all():
+        here = stations.pop()
+        rows = np.flatnonzero(~reached)
+        blocked, _ = crossings(np.broadcast_to(here, (len(rows), 3)), points[rows], triangles)
+        rows = np.delete(rows, np.unique(blocked))
+        reached[rows] = True
+        stations += list(points[rows])
+    return reached
+
+
+def _longest_way(stations: Floats, triangles: Floats, clearance: float) -> Floats | None:
+    """(2, 3) the longest way between two stations that keeps clear, cut to `LONGEST`."""
+    chosen = stations[np.linspace(0, len(stations) - 1, min(len(stations), _STATIONS)).astype(int)]
+    i, j = np.triu_indices(len(chosen), 1)
+    length = np.linalg.norm(chosen[i] - chosen[j], axis=1)
+    order = np.argsort(-np.minimum(length, LONGEST), kind="stable")
+    share = np.linspace(0.0, 1.0, 24)[:, None]
+    for start, end in zip(chosen[i[order]], chosen[j[order]], strict=True):
+        end = start + unit(end - start) * min(LONGEST, float(np.linalg.norm(end - start)))
+        if float(np.linalg.norm(end - start)) < 0.3:
+            return None
+        if distance_to_triangles(start + share * (end - start), triangles).min() >= clearance - 1e-9:
+            return np.stack([start, end])
+    return None
+
+
+def is_seen(stations: Floats, groups: list[Floats], triangles: Floats) -> Booleans:
+    """Which groups of triangles (T, 3, 3) anybody at the stations (S, 3) sees, behind all `triangles` (A, 3, 3).
+
+    Looked at are points spread over each group, from some twenty stations and what is freely above and below them: a
+    wall of which but a crack is seen may count as unseen.
+    """
+    eyes = _eyes(stations[np.linspace(0, len(stations) - 1, min(len(stations), 20)).astype(int)], triangles)
+    seen = np.zeros(len(groups), dtype=np.bool_)
+    for number, group in enumerate(groups):
+        points, normal = _spread(group, 16)
+        looks = 0
+        for eye in eyes:
+            side = np.sign(np.einsum("pi,pi->p", eye - points, normal))[:, None]
+            ends = points + OFF_SURFACE * side * normal
+            blocked, _ = crossings(np.broadcast_to(eye, ends.shape), ends, triangles)
+            looks += len(ends) - len(np.unique(blocked))
+            if looks >= ENOUGH:
+                seen[number] = True
+                break
+    return seen
+
+
+def _eyes(stations: Floats, triangles: Floats) -> Floats:
+    """Stations (S, 3), and free places straight above and below them at a tenth, half and nine tenths of the height."""
+    low, high = float(triangles[..., 2].min()), float(triangles[..., 2].max())
+    found = [stations]
+    for share in (0.1, 0.5, 0.9):
+        moved = stations.copy()
+        moved[:, 2] = low + share * (high - low)
+        blocked, _ = crossings(stations, moved, triangles)
+        found.append(np.delete(moved, np.unique(blocked), axis=0))
+    return np.concatenate(found)
+
+
+def _spread(triangles: Floats, count: int) -> tuple[Floats, Floats]:
+    """Points spread over triangles by their area, and the normals there."""
+    edge = triangles[:, 1:] - triangles[:, :1]
+    area = np.cumsum(np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1))
+    chosen: Integers = np.searchsorted(area, (np.arange(count) + 0.5) / count * area[-1])
+    chosen = np.minimum(chosen, len(triangles) - 1)
+    # a lattice of the plane by the roots of x^3 = x + 1 (R2 sequence), folded into the triangle
+    u, v = (0.5 + np.outer([0.7548776662466927, 0.5698402909980532], np.arange(count))) % 1.0
+    u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
+    # a hundredth off the edges, where another surface may begin
+    u, v = 0.97 * u + 0.01, 0.97 * v + 0.01
+    points = triangles[chosen, 0] + u[:, None] * edge[chosen, 0] + v[:, None] * edge[chosen, 1]
+    return points, triangle_planes(triangles[chosen])[0]

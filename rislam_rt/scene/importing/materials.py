@@ -1,0 +1,126 @@
+"""Materials of an imported room: by hand, by the name that the file gives them, or one for all the rest."""
+
+import re
+from fnmatch import fnmatchcase
+from typing import Any, get_args
+
+from rislam_rt.errors import ConfigError
+from rislam_rt.scene.schema import ItuMaterial
+
+THICKNESS = {
+    "asphalt_concrete": 0.05, "brick": 0.12, "carpet_tile": 0.006, "ceiling_board": 0.015, "chipboard": 0.018,
+    "clear_acrylic": 0.005, "concrete": 0.2, "floorboard": 0.02, "glass": 0.006, "marble": 0.02,
+    "medium_dry_ground": 1.0, "metal": 0.002, "plasterboard": 0.0125, "plywood": 0.012, "very_dry_ground": 1.0,
+    "vinyl_tile": 0.003, "wet_ground": 1.0, "wood": 0.03,
+}  # fmt: skip
+"""[m] Thickness of a slab where none is given: usual sizes of trade (boards), of construction (walls)."""
+
+WORDS = {
+    "metal": ("metal", "steel", "iron", "aluminium", "aluminum", "alu", "copper", "chrome", "metall", "stahl"),
+    "glass": ("glass", "window", "glas", "fenster", "mirror", "spiegel"),
+    "brick": ("brick", "masonry", "ziegel"),
+    "plasterboard": ("plasterboard", "drywall", "gypsum", "plaster", "gips"),
+    "ceiling_board": ("ceiling_board", "ceilingboard", "ceiling_tile", "acoustic"),
+    "chipboard": ("chipboard", "mdf", "particleboard", "laminate"),
+    "plywood": ("plywood",),
+    "floorboard": ("floorboard", "parquet", "parkett", "planks"),
+    "wood": ("wood", "oak", "pine", "timber", "holz", "walnut", "door"),
+    "marble": ("marble", "granite", "marmor", "tile", "tiles"),
+    "concrete": ("concrete", "cement", "beton", "stone"),
+    "wet_ground": ("wet_ground",),
+    "medium_dry_ground": ("ground", "soil", "grass"),
+}
+"""Words of a material's or node's name and the ITU-R P.2040 material that they stand for, the first that is found."""
+
+
+def parse_material(text: str) -> dict[str, Any]:
+    """The table of a material written as `itu:concrete`, `itu:concrete:0.2` (thickness [m]) or `reflection:0.8`.
+
+    Raises
+    ------
+    ConfigError
+        It is none of them.
+    """
+    kind, _, rest = text.strip().partition(":")
+    name, _, thickness = rest.partition(":")
+    known = get_args(ItuMaterial)
+    try:
+        if kind == "reflection" and 0.0 < float(rest) <= 1.0:
+            return {"reflection": float(rest)}
+        if kind == "itu" and name in known and (not thickness or 1e-6 <= float(thickness) <= 1e5):
+            return {"itu": name, "thickness_m": float(thickness) if thickness else THICKNESS[name]}
+    except ValueError:
+        pass
+    if kind == "itu" and name not in known:
+        raise ConfigError(f"--material: '{name[:40]}' is no ITU material; give one of {', '.join(known)}")
+    raise ConfigError(
+        f"--material: '{text[:60]}' received; give itu:NAME, itu:NAME:THICKNESS_M or reflection:R with R in (0, 1]"
+    )
+
+
+def parse_choices(texts: list[str]) -> dict[str, dict[str, Any]]:
+    """Materials by hand, `NAME=itu:concrete`: name or pattern (`wall_*`) to table.
+
+    Raises
+    ------
+    ConfigError
+        An entry cannot be read.
+    """
+    choices = {}
+    for text in texts:
+        name, equals, material = text.partition("=")
+        if not equals or not name.strip():
+            raise ConfigError(f"--material: '{text[:60]}' received; give NAME=itu:concrete or NAME=reflection:0.8")
+        choices[name.strip()] = parse_material(material)
+    return choices
+
+
+class Palette:
+    """Answers which material a wall has, and keeps account of what it had to assume."""
+
+    def __init__(self, choices: dict[str, dict[str, Any]], rest: dict[str, Any]) -> None:
+        self.choices, self.rest = choices, rest
+        self.used: set[str] = set()
+        self.assumed: set[str] = set()
+
+    def material(self, wall: str, node: str, material: str) -> dict[str, Any]:
+        """By hand (wall, material or node), by a word in the material's name or the node's, or that of the rest."""
+        chosen = self.by_hand(wall, material, node)
+        if chosen is not None:
+            return chosen
+        for name in (material, node):
+            found = itu_by_word(name)
+            if found is not None:
+                return {"itu": found, "thickness_m": THICKNESS[found]}
+        self.assumed.add(material or wall)
+        return self.rest
+
+    def by_hand(self, *names: str) -> dict[str, Any] | None:
+        """What was given for any of the names."""
+        for pattern, table in self.choices.items():
+            if any(fnmatchcase(name, pattern) for name in names if name):
+                self.used.add(pattern)
+                return table
+        return None
+
+    def remarks(self) -> list[str]:
+        """What was assumed, on one line, if anything."""
+        if not self.assumed:
+            return []
+        names, what = sorted(self.assumed), ", ".join(f"{value}" for value in self.rest.values())
+        more = f" and {len(names) - 8} more" if len(names) > 8 else ""
+        return [f"material unknown, taken as {what}: {', '.join(names[:8])}{more} (--material NAME=...)"]
+
+    def unused(self) -> list[str]:
+        """Patterns that nothing matched."""
+        return sorted(set(self.choices) - self.used)
+
+
+def itu_by_word(name: str) -> str | None:
+    """The ITU material that a name speaks of: `Oak.003` is wood, `itu_concrete` is concrete."""
+    plain = re.sub(r"[^a-z]+", "_", name.lower()).strip("_")
+    for itu in get_args(ItuMaterial):
+        if f"_{itu}_" in f"_{plain}_":
+            return str(itu)
+    words = set(plain.split("_"))
+    return next((itu for itu, known in WORDS.items() if words & set(known)), None)

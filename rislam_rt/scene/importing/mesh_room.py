@@ -1,0 +1,117 @@
+"""A mesh of a whole room, parted into walls, things and clutter."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.importing.account import account
+from rislam_rt.scene.importing.draft import RoomDraft
+from rislam_rt.scene.importing.facets import Facets, find_facets, weld
+from rislam_rt.scene.importing.free_space import find_free, is_seen
+from rislam_rt.scene.importing.materials import Palette, itu_by_word
+from rislam_rt.scene.importing.options import ImportOptions
+from rislam_rt.scene.importing.pieces import Piece, find_pieces, numbered, place_free_name, wall_name
+from rislam_rt.scene.importing.rounded import find_round
+from rislam_rt.scene.importing.scan_room import looks_scanned, sort_scan
+from rislam_rt.scene.importing.size import place_parts
+from rislam_rt.scene.importing.source import Part, read_source
+from rislam_rt.scene.importing.surfaces import Sorted, Surface, sort_regions
+from rislam_rt.scene.importing.thinning import as_mesh
+from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.rooms.shapes import joined
+
+
+def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
+    """The room of a mesh file.
+
+    Raises
+    ------
+    Fault
+        The file cannot be read, is of no room's size, or has nothing that reflects.
+    ConfigError
+        A material was given for a name that nothing has.
+    """
+    parts, notes = read_source(path)
+    placed, more = place_parts(parts, path.suffix.lower(), options)
+    facets = find_facets(weld(placed))
+    if not len(facets.area):
+        raise Fault("no triangle of the file has an area", "export it again")
+    return build_draft(facets, parts, [*notes, *more], options)
+
+
+def build_draft(facets: Facets, parts: list[Part], notes: list[str], options: ImportOptions) -> RoomDraft:
+    """Walls, things and clutter, of flat regions or of the planes of a scan."""
+    if options.scan or (options.scan is None and looks_scanned(facets, options)):
+        found, about = sort_scan(facets.mesh, options)
+        pieces = [Piece("", "", np.zeros(0, dtype=np.int64), True)]
+    else:
+        pieces, about = find_pieces(facets, [part.node for part in parts]), []
+        found = sort_regions(facets, pieces, find_round(facets), options)
+    if not found.surfaces:
+        raise Fault(
+            f"nothing in it is flat and wider than {100 * found.narrow:.2g} cm", "check --units, or lower --detail"
+        )
+    surfaces, unseen = _seen(found)
+    palette = Palette(options.materials, options.rest)
+    reflectors = _reflectors(surfaces, pieces, parts, palette)
+    shades = _shades(found, pieces, list(reflectors))
+    if palette.unused():
+        names = ", ".join([*reflectors, *sorted({p.material for p in parts if p.material})][:12])
+        raise Fault(f"--material {palette.unused()[0]}: nothing has that name", f"give one of: {names}")
+    said = account(facets, found, surfaces, unseen, reflectors, shades, options, scanned=bool(about))
+    remarks = [*notes, *about, *said]
+    return RoomDraft(reflectors, shades, remarks + palette.remarks())
+
+
+def _seen(found: Sorted) -> tuple[list[Surface], float]:
+    """The surfaces that an agent inside can see, and the area [m^2] of the others: outer skins, insides of boards."""
+    triangles = np.concatenate([
+        *(s.mesh.vertices[s.mesh.faces] for s in found.surfaces), *(c.triangles for c in found.clutter)
+    ])  # fmt: skip
+    free = find_free(triangles, float(triangles[..., 2].min()))
+    if free is None:
+        return found.surfaces, 0.0
+    seen = is_seen(free.stations, [s.mesh.vertices[s.mesh.faces] for s in found.surfaces], triangles)
+    hidden = sum(surface.area for surface, visible in zip(found.surfaces, seen, strict=True) if not visible)
+    kept = [surface for surface, visible in zip(found.surfaces, seen, strict=True) if visible]
+    return (kept, hidden) if kept else (found.surfaces, 0.0)
+
+
+def _reflectors(
+    surfaces: list[Surface], pieces: list[Piece], parts: list[Part], palette: Palette
+) -> dict[str, tuple[Mesh, dict[str, Any]]]:
+    """Named meshes with their materials: each wall of the shell by itself, each thing as one."""
+    shell = sorted((s for s in surfaces if s.piece == 0), key=lambda s: -s.area)
+    corners = np.concatenate([s.mesh.vertices for s in surfaces if s.piece == 0 or not shell])
+    room = np.stack([corners.min(axis=0), corners.max(axis=0)])
+    uses = [place_free_name(parts[s.part].node) for s in shell]
+    entries: list[tuple[str, Mesh, int]] = []
+    for surface, node in zip(shell, uses, strict=True):
+        middle = surface.mesh.vertices[surface.mesh.faces].mean(axis=(0, 1))
+        place = wall_name(surface.normal, middle, room)
+        if itu_by_word(parts[surface.part].material) == "glass":
+            place = place.replace("wall", "window")
+        entries.append((node if node and uses.count(node) == 1 else place, surface.mesh, surface.part))
+    for number, piece in enumerate(pieces[1:], start=1):
+        mine = [s for s in surfaces if s.piece == number]
+        for part in sorted({s.part for s in mine}):
+            entries.append((piece.name, joined([s.mesh for s in mine if s.part == part]), part))
+    names = numbered([name for name, _, _ in entries])
+    found = {}
+    for name, (_, mesh, number) in zip(names, entries, strict=True):
+        material = palette.material(name, parts[number].node, parts[number].material)
+        found[name] = (mesh, material)
+    return found
+
+
+def _shades(found: Sorted, pieces: list[Piece], taken: list[str]) -> dict[str, Mesh]:
+    """Clutter by the piece that it belongs to."""
+    by_piece: dict[int, list[Floats]] = {}
+    for clutter in found.clutter:
+        by_piece.setdefault(clutter.piece, []).append(clutter.triangles)
+    names = [f"{pieces[piece].name or 'room'}_clutter" for piece in by_piece]
+    names = numbered([*taken, "ris", *names])[len(taken) + 1 :]
+    return {name: as_mesh(np.concatenate(triangles)) for name, triangles in zip(names, by_piece.values(), strict=True)}

@@ -1,0 +1,98 @@
+"""From a file to a scene folder, checked before it appears."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from rislam_rt.errors import SceneError
+from rislam_rt.model import RadioConfig
+from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.importing.draft import RoomDraft, finish_room
+from rislam_rt.scene.importing.extrude import extrude
+from rislam_rt.scene.importing.mesh_room import import_mesh
+from rislam_rt.scene.importing.options import ImportOptions
+from rislam_rt.scene.importing.plan import build_plan, parse_corners, parse_geojson
+from rislam_rt.scene.importing.size import check_size
+from rislam_rt.scene.importing.source import read_content
+from rislam_rt.scene.importing.svg import parse_svg
+from rislam_rt.scene.load import check_scene
+from rislam_rt.scene.lying import UNITS
+from rislam_rt.scene.templates import room_files, room_name
+from rislam_rt.scene.write import write_files
+
+PLANS = (".svg", ".geojson", ".json")
+MAX_PLAN_BYTES = 10_000_000
+
+
+def import_room(
+    file: Path, folder: Path, options: ImportOptions, *, height: float = 2.7, overwrite: bool = False
+) -> list[str]:
+    """Make a scene folder of a mesh file or a floor plan; returns remarks on what became of it.
+
+    The folder appears whole, and only if its check finds no error. `height` [m] is that of a floor plan's rooms.
+
+    Raises
+    ------
+    SceneError
+        The file cannot be made a room, or the folder exists.
+    StoreError
+        The disk refused.
+    """
+    try:
+        draft = _read_plan(file, options, height) if file.suffix.lower() in PLANS else import_mesh(file, options)
+        return write_room(draft, folder, f"Made from `{file.name}`.", options, overwrite=overwrite)
+    except Fault as fault:
+        raise SceneError(f"{file}: {fault}") from None
+
+
+def import_corners(
+    corners: str, folder: Path, options: ImportOptions, *, height: float = 2.7, overwrite: bool = False
+) -> list[str]:
+    """Make a scene folder of one room from its corners `0,0 4,0 4,3 0,3` [m]; returns remarks.
+
+    Raises
+    ------
+    SceneError
+        The corners enclose nothing, or the folder exists.
+    StoreError
+        The disk refused.
+    """
+    plan = build_plan(parse_corners(corners), UNITS[options.units or "m"], height)
+    draft = extrude(plan, height, options)
+    return write_room(draft, folder, "Made from the corners of a floor plan.", options, overwrite=overwrite)
+
+
+def _read_plan(file: Path, options: ImportOptions, height: float) -> RoomDraft:
+    content = read_content(file, MAX_PLAN_BYTES)
+    shapes = parse_svg(content) if file.suffix.lower() == ".svg" else parse_geojson(content)
+    points = np.concatenate([shape.points for shape in shapes] or [np.zeros((1, 2))])
+    if np.isfinite(points).all():
+        check_size(float(np.linalg.norm(np.ptp(points, axis=0))), options.units)
+    origin = np.array(options.origin[:2])
+    unit = UNITS[options.units or "m"]
+    shapes = [shape._replace(points=shape.points - origin / unit) for shape in shapes]
+    return extrude(build_plan(shapes, unit, height), height, options)
+
+
+def write_room(
+    draft: RoomDraft, folder: Path, origin: str, options: ImportOptions, *, overwrite: bool = False
+) -> list[str]:
+    """Write a draft as a scene folder if its check finds no error; returns its remarks.
+
+    Raises
+    ------
+    Fault
+        There is no place for an agent, or the check finds an error.
+    """
+    room, remarks = finish_room(draft, room_name(folder, "room"), origin)
+    files = room_files(room, "Made by `rislam-rt new --from`: start, way and panel are proposals.")
+    with tempfile.TemporaryDirectory() as place:
+        trial = write_files(files, Path(place) / "room")
+        carrier = 1e9 * options.carrier_ghz
+        errors = [f for f in check_scene(trial, RadioConfig(carrier=carrier, bandwidth=min(1e9, carrier)))
+                  if f.severity == "error"]  # fmt: skip
+    if errors:
+        raise Fault(f"the room would not pass its check: {errors[0].field}: {errors[0].message}", errors[0].mend)
+    write_files(files, folder, overwrite=overwrite)
+    return remarks

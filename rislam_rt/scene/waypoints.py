@@ -1,0 +1,94 @@
+"""A way along waypoints at constant speed: straight legs, and corners rounded so that an acceleration is kept."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.scene.findings import Fault
+
+SHARPEST = np.radians(170.0)
+"""Largest turn [rad] at a waypoint: an arc that turns back needs no end of room."""
+STRAIGHT = 1e-9
+"""[rad] A smaller turn is none."""
+
+
+class Way(NamedTuple):
+    """Legs and arcs in turn, P pieces; a leg is an arc of no curvature."""
+
+    start: Floats
+    """(P, 3) [m]."""
+    along: Floats
+    """(P, 3) unit vector at the start."""
+    inward: Floats
+    """(P, 3) unit vector at the start to the arc's centre; of a leg, zero."""
+    radius: Floats
+    """(P,) [m]; of a leg, one, which counts for nothing."""
+    length: Floats
+    """(P,) [m]."""
+
+    @property
+    def total(self) -> float:
+        """[m]."""
+        return float(np.sum(self.length))
+
+    def at(self, travelled: Floats) -> tuple[Floats, Floats]:
+        """Positions (K, 3) [m] and unit tangents (K, 3) at distances (K,) [m] from the start."""
+        begin = np.concatenate([[0.0], np.cumsum(self.length)[:-1]])
+        piece = np.clip(np.searchsorted(begin, travelled, side="right") - 1, 0, len(begin) - 1)
+        gone, radius = travelled - begin[piece], self.radius[piece]
+        bent = self.inward[piece].any(axis=1)
+        angle = np.where(bent, gone / radius, 0.0)[:, None]
+        along, inward = self.along[piece], self.inward[piece]
+        straight = np.where(bent, 0.0, gone)[:, None] * along
+        arc = radius[:, None] * (np.sin(angle) * along + (1.0 - np.cos(angle)) * inward)
+        return self.start[piece] + straight + arc, np.cos(angle) * along + np.sin(angle) * inward
+
+
+def round_corners(waypoints: Floats, radius: float) -> Way:
+    """The way along waypoints (W, 3) [m], each but the first and the last cut by an arc of that radius [m].
+
+    Raises
+    ------
+    Fault
+        Two waypoints are one, a turn is sharper than `SHARPEST`, or a leg is too short for the arcs at its ends.
+    """
+    legs = np.diff(waypoints, axis=0)
+    length = np.linalg.norm(legs, axis=1)
+    if (length < 1e-6).any():
+        pair = int(np.argmax(length < 1e-6))
+        raise Fault(f"waypoints {pair} and {pair + 1} are the same point", "leave one out")
+    along = legs / length[:, None]
+    turn = np.arctan2(
+        np.linalg.norm(np.cross(along[:-1], along[1:]), axis=1), np.einsum("ij,ij->i", along[:-1], along[1:])
+    )
+    if (turn > SHARPEST).any():
+        raise Fault(
+            f"the way turns back by {np.degrees(turn.max()):.0f} degrees at waypoint {int(np.argmax(turn)) + 1}",
+            f"give a way round: at most {np.degrees(SHARPEST):.0f} degrees at a waypoint",
+        )
+    cut = np.concatenate([[0.0], np.where(turn > STRAIGHT, radius * np.tan(turn / 2.0), 0.0), [0.0]])
+    left = length - cut[:-1] - cut[1:]
+    if (left < 0.0).any():
+        leg = int(np.argmin(left))
+        raise Fault(
+            f"{length[leg]:.3g} m from waypoint {leg} to {leg + 1}, of which the corners' arcs (radius {radius:.3g} m, "
+            f"speed squared over acceleration) take {cut[leg] + cut[leg + 1]:.3g} m",
+            "lower agent.speed_m_s, raise agent.acceleration_m_s2, or part the waypoints",
+        )
+    return _pieces(waypoints, along, turn, cut, left, radius)
+
+
+def _pieces(waypoints: Floats, along: Floats, turn: Floats, cut: Floats, left: Floats, radius: float) -> Way:
+    """Leg, arc, leg, ..., leg."""
+    count = 2 * len(along) - 1
+    start, way, inward = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
+    start[::2], way[::2] = waypoints[:-1] + cut[:-1, None] * along, along
+    start[1::2], way[1::2] = waypoints[1:-1] - cut[1:-1, None] * along[:-1], along[:-1]
+    across = along[1:] - np.cos(turn)[:, None] * along[:-1]
+    size = np.linalg.norm(across, axis=1, keepdims=True)
+    bent = turn > STRAIGHT
+    inward[1::2] = np.where(bent[:, None], across / np.where(size > 0.0, size, 1.0), 0.0)
+    length = np.zeros(count)
+    length[::2], length[1::2] = left, np.where(bent, radius * turn, 0.0)
+    return Way(start, way, inward, np.where(inward.any(axis=1), radius, 1.0), length)

@@ -1,0 +1,100 @@
+"""The radio materials of a Sionna scene file: read as ours, and ours written as them."""
+
+from typing import Any, NamedTuple
+from xml.etree.ElementTree import Element, SubElement
+
+from rislam_rt.errors import SceneError
+from rislam_rt.model import Material
+from rislam_rt.model.itu import ITU_MATERIALS
+from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.scene.xml.parse import children
+from rislam_rt.scene.xml.shapes import number
+
+DEFAULT_THICKNESS = 0.1
+"""[m] What Sionna takes where a scene gives none."""
+ABSORBER = "absorber-radio-material"
+LEFT_OUT = ("xpd_coefficient", "alpha_r", "alpha_i", "lambda_")
+"""Properties of a Sionna material that are not carried over: all of diffuse scattering alone."""
+
+
+class Coat(NamedTuple):
+    """A material as read."""
+
+    material: Material | None
+    """None where nothing is reflected: an absorber."""
+    notes: tuple[str, ...]
+    """What could not be carried over."""
+
+
+def read_material(bsdf: Element) -> Coat:
+    """The material of a `<bsdf>` element: Sionna's `itu-radio-material` and `radio-material`, or any whose name says
+    `itu_...`, as Sionna itself takes them.
+
+    Raises
+    ------
+    Fault
+        It has no radio properties, or they are out of range.
+    """
+    name = bsdf.get("id") or bsdf.get("name") or ""
+    plain, kind = name.removeprefix("mat-"), bsdf.get("type", "")
+    values = {e.get("name", ""): e for e in children(bsdf, "float", "integer", "string")}
+    notes = tuple(f"bsdf '{one_line(name)[:40]}': {key} is not carried over" for key in LEFT_OUT if key in values)
+    if kind == ABSORBER or (kind == "radio-material" and _is_air(values)):
+        return Coat(None, ())
+    rough = _number(values, "scattering_coefficient", 0.0)
+    thickness = _number(values, "thickness", DEFAULT_THICKNESS)
+    if kind == "itu-radio-material" or plain.startswith(("itu_", "itu-")):
+        given = values["type"].get("value", "") if "type" in values else plain[4:]
+        if given not in ITU_MATERIALS:
+            raise Fault(f"an ITU material '{one_line(given)[:40]}'", f"take one of {', '.join(ITU_MATERIALS)}")
+        return Coat(_made(itu=given, thickness=thickness, scattering=rough), notes)
+    if kind == "radio-material":
+        permittivity, conductivity = _number(values, "relative_permittivity", 1.0), _number(values, "conductivity", 0.0)
+        own = {"permittivity": permittivity, "conductivity": conductivity}
+        return Coat(_made(**own, thickness=thickness, scattering=rough), notes)
+    raise Fault(
+        f"a material of type '{one_line(kind)[:40]}' says nothing of radio",
+        "call it itu_concrete (or itu_ and another name of ITU-R P.2040), or make it an itu-radio-material",
+    )
+
+
+def material_element(material: Material | None, name: str) -> Element:
+    """A `<bsdf>` that Sionna reads: its own ITU slab, a slab of given permittivity, or air for None.
+
+    A constant R has no counterpart that Sionna's `load_scene` knows; what comes nearest is `Material.as_body`. What
+    only hides is a slab of air, which Sionna's rays do not pass unless refraction is on: in Sionna RT 2.2.0 no
+    frequency can be set where there is an `absorber-radio-material`.
+    """
+    if material is None:
+        return Element("bsdf", {"type": "radio-material", "id": name})
+    material = material.as_body()
+    bsdf = Element("bsdf", {"type": "itu-radio-material" if material.itu else "radio-material", "id": name})
+    if material.itu:
+        SubElement(bsdf, "string", {"name": "type", "value": material.itu})
+    else:
+        for key, value in (
+            ("relative_permittivity", material.permittivity or 1.0),
+            ("conductivity", material.conductivity),
+        ):
+            SubElement(bsdf, "float", {"name": key, "value": repr(float(value))})
+    SubElement(bsdf, "float", {"name": "thickness", "value": repr(float(material.thickness))})
+    if material.scattering > 0.0:
+        SubElement(bsdf, "float", {"name": "scattering_coefficient", "value": repr(float(material.scattering))})
+    return bsdf
+
+
+def _is_air(values: dict[str, Element]) -> bool:
+    return (_number(values, "relative_permittivity", 1.0), _number(values, "conductivity", 0.0)) == (1.0, 0.0)
+
+
+def _number(values: dict[str, Element], name: str, default: float) -> float:
+    return number(values[name], "value") if name in values else default
+
+
+def _made(**values: Any) -> Material:
+    """A material whose numbers are in range."""
+    try:
+        return Material(**values)
+    except SceneError as error:
+        what, _, mend = str(error).partition("; ")
+        raise Fault(what, mend) from None

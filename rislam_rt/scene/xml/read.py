@@ -1,0 +1,206 @@
+"""A Mitsuba or Sionna RT scene file as meshes with names and materials."""
+
+import importlib.util
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.errors import SceneError
+from rislam_rt.model import Material
+from rislam_rt.scene.check.soup import without_area
+from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.scene.meshes import MAX_FACES, Mesh
+from rislam_rt.scene.xml.clip import clip_mesh
+from rislam_rt.scene.xml.materials import Coat, read_material
+from rislam_rt.scene.xml.parse import MAX_XML_BYTES, children, parse_xml
+from rislam_rt.scene.xml.shapes import shape_mesh
+
+SIONNA = "sionna:"
+"""What a name begins with that is one of Sionna's own scenes."""
+PICTURE_ONLY = ("default", "integrator", "sensor", "emitter", "film", "texture", "medium", "path", "string", "float",
+                "integer", "boolean", "rgb", "spectrum", "sampler")  # fmt: skip
+"""Elements beside shapes and materials: what a camera would need."""
+MAX_NAME = 64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class XmlPart:
+    """One shape of the file."""
+
+    name: str
+    mesh: Mesh
+    """In the room's frame [m]."""
+    material: Material | None
+    """None where it only hides: an absorber, or a slab of air."""
+
+
+@dataclass(slots=True)
+class XmlScene:
+    """What a scene file holds that a radio sees."""
+
+    parts: list[XmlPart] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    """What was left out or changed, each in one line."""
+
+
+def find_xml(source: str) -> Path:
+    """The file that a source names: a path, or `sionna:NAME` for a scene that Sionna RT brings along.
+
+    Raises
+    ------
+    SceneError
+        No such scene or file; the line says which there are.
+    """
+    if not source.startswith(SIONNA):
+        path = Path(source)
+        if not path.is_file():
+            raise SceneError(f"{source[:120]}: no such file; give an XML scene, or {SIONNA}NAME for one of Sionna's")
+        return path
+    name, known = source.removeprefix(SIONNA), sionna_scenes()
+    if name not in known:
+        there = f"give one of {', '.join(known)}" if known else "install sionna-rt, which brings them"
+        raise SceneError(f"--from: Sionna has no scene '{one_line(name)[:40]}'; {there}")
+    return known[name]
+
+
+def sionna_scenes() -> dict[str, Path]:
+    """The scene files that the installed Sionna RT brings along, by name; it is not imported for that."""
+    found = importlib.util.find_spec("sionna")
+    folders = [Path(place) / "rt" / "scenes" for place in (found.submodule_search_locations or ())] if found else []
+    return {file.stem: file for folder in folders for file in sorted(folder.glob("*/*.xml"))}
+
+
+def read_xml(path: Path, max_faces: int = MAX_FACES, window: Floats | None = None) -> XmlScene:
+    """The shapes of a Mitsuba or Sionna scene file, with radio materials; where a window is given, what lies in it.
+
+    Parameters
+    ----------
+    max_faces
+        Of all shapes together, before the window.
+    window
+        (2, 2) lowest and highest x and y [m].
+
+    Raises
+    ------
+    SceneError
+        The file or something in it cannot be used; one line with file, element and how to mend it.
+    """
+    where = ""
+    try:
+        root = _root(path)
+        coats, found = _Coats(root), XmlScene()
+        count = 0
+        for number, shape in enumerate(_shapes(root)):
+            identity = one_line(shape.get("id") or shape.get("name") or f"shape_{number}")
+            where = f"shape '{identity[:60]}'"
+            mesh = shape_mesh(shape, path.parent, max_faces)
+            count += len(mesh.faces)
+            if count > max_faces:
+                raise _too_many(root, number, max_faces)
+            _take(found, identity, mesh if window is None else clip_mesh(mesh, window), coats.of(shape))
+        where = ""
+        if not found.parts:
+            where_not = "no shape in it" if window is None else "no shape within the window"
+            raise Fault(where_not, "give a scene with at least one mesh there")
+    except Fault as fault:
+        raise SceneError(fault.at(str(path), where).line) from None
+    found.notes[:0] = coats.notes
+    return found
+
+
+class _Coats:
+    """The materials of a file by their names, each read when a shape asks for it."""
+
+    def __init__(self, root: Element) -> None:
+        self._elements = {bsdf.get("id", ""): bsdf for bsdf in children(root, "bsdf")}
+        self._alias = {e.get("as", ""): e.get("id", "") for e in children(root, "alias")}
+        self._read: dict[str, Coat] = {}
+        self.notes: list[str] = []
+
+    def of(self, shape: Element) -> Material | None:
+        """The material of a shape: its own, or the one it refers to."""
+        for own in children(shape, "bsdf"):
+            return self._noted(read_material(own)).material
+        for reference in children(shape, "ref"):
+            name = reference.get("id", "")
+            name = self._alias.get(name, name)
+            if name in self._elements and name not in self._read:
+                self._read[name] = self._noted(read_material(self._elements[name]))
+            if name in self._read:
+                return self._read[name].material
+            raise Fault(f"it refers to '{one_line(name)[:40]}', which the file does not define", "add that <bsdf>")
+        raise Fault("it has no material", "add <ref id=...> to a <bsdf>, e.g. of type itu-radio-material")
+
+    def _noted(self, coat: Coat) -> Coat:
+        self.notes += coat.notes
+        return coat
+
+
+def _root(path: Path) -> Element:
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_XML_BYTES + 1)
+    except OSError as error:
+        raise Fault(f"cannot be read ({error.strerror})", "check the file and its permissions") from None
+    root = parse_xml(content)
+    if root.tag != "scene":
+        raise Fault(f"it begins with <{one_line(str(root.tag))[:40]}>", "give a scene file of Mitsuba 3 or Sionna RT")
+    return root
+
+
+def _shapes(parent: Element) -> Iterator[Element]:
+    """All shapes in order, those within a `merge` too.
+
+    Raises
+    ------
+    Fault
+        An element that is neither a shape, nor a material, nor for cameras alone.
+    """
+    for element in parent:
+        if element.tag == "shape" and element.get("type") == "merge":
+            yield from _shapes(element)
+        elif element.tag == "shape":
+            yield element
+        elif element.tag == "include":
+            name = one_line(element.get("filename", ""))[:60]
+            raise Fault(f"<include filename='{name}'>: other files are not followed", "put its content in its place")
+        elif element.tag not in (*PICTURE_ONLY, "bsdf", "alias"):
+            name = one_line(str(element.tag))[:40]
+            raise Fault(f"an element <{name}>, which means nothing here", "delete it, or make it shapes and bsdfs")
+
+
+def _too_many(root: Element, number: int, max_faces: int) -> Fault:
+    """Too large a scene: how far it was read, and what to do."""
+    return Fault(
+        f"more than {max_faces} faces in the first {number + 1} of {sum(1 for _ in _shapes(root))} shapes",
+        "take a part: --within x0,y0,x1,y1 keeps what lies in that window of the plan [m]",
+    )
+
+
+def _take(found: XmlScene, identity: str, mesh: Mesh, material: Material | None) -> None:
+    """Add a shape under a name of its own, without faces that are no more than a line."""
+    bad = without_area(mesh.vertices[mesh.faces])
+    if bad.any():
+        found.notes.append(f"{identity}: {int(bad.sum())} faces without area left out")
+    if not bad.all():
+        used, compact = np.unique(mesh.faces[~bad], return_inverse=True)
+        faces = compact.reshape(-1, 3).astype(np.int64)
+        name = _free_name(identity.removeprefix("mesh-"), {part.name for part in found.parts})
+        found.parts.append(XmlPart(name, Mesh(mesh.vertices[used], faces), material))
+
+
+def _free_name(wanted: str, taken: set[str]) -> str:
+    """What a reflector is called: letters, digits, `_`, `-` and `.`, and nobody else's name."""
+    plain = re.sub(r"[^\w.\-]", "_", wanted)[:MAX_NAME]
+    plain = plain if re.search(r"\w", plain) else "shape"
+    name, number = plain, 1
+    while name in taken:
+        number += 1
+        tail = f"_{number}"
+        name = plain[: MAX_NAME - len(tail)] + tail
+    return name

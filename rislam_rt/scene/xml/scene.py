@@ -1,0 +1,125 @@
+"""From a Mitsuba or Sionna scene file to a scene folder of ours."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.errors import ConfigError, SceneError
+from rislam_rt.model import Body, Material, Reflector, RisPanel, Scene, Shade, Trajectory
+from rislam_rt.scene.check import find_errors
+from rislam_rt.scene.findings import Fault, raise_errors
+from rislam_rt.scene.importing.draft import RoomDraft, propose_panel
+from rislam_rt.scene.importing.free_space import Free
+from rislam_rt.scene.load import SCENE_FILE, build_panel, load_scene
+from rislam_rt.scene.meshes import MAX_FACES, Mesh
+from rislam_rt.scene.motion import straight_motion
+from rislam_rt.scene.placing import suggest_agent
+from rislam_rt.scene.schema import RisSection
+from rislam_rt.scene.templates import room_name
+from rislam_rt.scene.write import write_scene
+from rislam_rt.scene.xml.materials import material_element, read_material
+from rislam_rt.scene.xml.read import find_xml, read_xml
+from rislam_rt.scene.xml.write import SHADE_OF
+
+CITY_FACES = 1_000_000
+"""Faces that are read at most where only those within a window are kept."""
+
+
+def new_from_xml(
+    source: str, folder: str | Path, *, within: Sequence[float] = (), overwrite: bool = False
+) -> list[str]:
+    """Make a scene folder from an XML file, or from `sionna:NAME`; remarks on what was left out or supplied.
+
+    Parameters
+    ----------
+    within
+        `x0, y0, x1, y1` [m]: only what lies in this window of the plan is taken, walls cut at its sides.
+
+    Raises
+    ------
+    SceneError
+        The file cannot be used, or the folder exists and `overwrite` is False.
+    """
+    path = find_xml(source)
+    scene, notes = scene_of_xml(path, room_name(Path(folder), path.stem), within)
+    raise_errors(list(find_errors(scene, str(path))))
+    write_scene(scene, folder, overwrite=overwrite)
+    return notes
+
+
+def scene_of_xml(path: Path, name: str, within: Sequence[float] = ()) -> tuple[Scene, list[str]]:
+    """The scene of an XML file, and remarks.
+
+    Where a `scene.toml` lies beside the file (as `rislam-rt export --xml` leaves it), agent, panel and scatterers are
+    its, and a material that the XML file still has as it was written there is the exact one. Without it the agent gets
+    a motion of its own.
+
+    Raises
+    ------
+    SceneError
+        The file, or the scene file beside it, cannot be used.
+    """
+    found = read_xml(path, CITY_FACES if within else MAX_FACES, _window(within))
+    notes = list(found.notes)
+    beside = path.with_name(SCENE_FILE)
+    whole = load_scene(beside) if beside.is_file() else None
+    exact = {r.name: r.material for r in whole.reflectors} if whole else {}
+    reflectors = tuple(
+        Reflector(p.name, p.mesh.vertices, p.mesh.faces, _exact(p.material, exact.get(p.name)))
+        for p in found.parts
+        if p.material is not None
+    )
+    if not reflectors:
+        raise SceneError(f"{path}: nothing in it reflects; give a scene with radio materials")
+    own = {SHADE_OF + s.name for s in whole.scatterers} if whole else set()
+    shades = tuple(
+        Shade(p.mesh.vertices, p.mesh.faces, p.name) for p in found.parts if p.material is None and p.name not in own
+    )
+    if whole is not None:
+        notes.append(f"agent, panel and {len(whole.scatterers)} scatterers are those of the {SCENE_FILE} beside it")
+        return replace(whole, name=name, reflectors=reflectors, shades=shades, digest=""), notes
+    agent = _motion(path, reflectors, shades)
+    panel, about = _panel(reflectors, shades, agent)
+    way = float(np.linalg.norm(agent.position[-1] - agent.position[0]))
+    notes.append(f"proposed way: {way:.2g} m in {agent.time[-1]:.0f} s, to be edited in [agent]; {about}")
+    return Scene(name, reflectors, (), panel, agent, "", shades), notes
+
+
+def _window(within: Sequence[float]) -> Floats | None:
+    """(2, 2) [m] lowest and highest x, y; None for everything."""
+    if not within:
+        return None
+    window = np.array(within, dtype=np.float64)
+    if window.shape != (4,) or not np.isfinite(window).all() or (window[2:] <= window[:2]).any():
+        raise ConfigError(f"--within: {list(within)} received; give x0,y0,x1,y1 in metres, x0 < x1 and y0 < y1")
+    return window.reshape(2, 2)
+
+
+def _exact(read: Material, exact: Material | None) -> Material:
+    """The material as the scene file beside has it, if the XML file has just what is written for that one."""
+    if exact is not None and read_material(material_element(exact, "written")).material == read:
+        return exact
+    return read
+
+
+def _panel(reflectors: Sequence[Reflector], shades: Sequence[Shade], agent: Trajectory) -> tuple[RisPanel | None, str]:
+    """A panel like the paper's above or beside the way, where there is a place for one, and words on it."""
+    draft = RoomDraft(
+        {r.name: (Mesh(r.vertices, r.faces), {}) for r in reflectors},
+        {s.name: Mesh(s.vertices, s.faces) for s in shades},
+    )
+    way = agent.position[[0, -1]]
+    table, about = propose_panel(draft, Free(way, way, 0.0, 0.0))
+    return (build_panel(RisSection(**table)) if table else None), about
+
+
+def _motion(path: Path, reflectors: Sequence[Reflector], shades: Sequence[Shade]) -> Trajectory:
+    try:
+        table = suggest_agent(np.concatenate([r.triangles for r in reflectors] + [s.triangles for s in shades]))
+    except Fault as fault:
+        raise SceneError(fault.at(str(path), "").line) from None
+    body = Body(np.array(table["tx_offset_m"]), np.array(table["rx_offset_m"]))
+    return straight_motion(table["start"], table["velocity"], table["cycles"], table["cycle_s"], body)

@@ -1,0 +1,89 @@
+"""A scene as a folder that Sionna RT opens: `scene.xml` beside the scene's own files."""
+
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from rislam_rt.model import Material, Scene
+from rislam_rt.scene.meshes import ply_bytes
+from rislam_rt.scene.write import mesh_file, scene_files, write_files
+from rislam_rt.scene.xml.materials import material_element
+
+XML_FILE = "scene.xml"
+SHADE_OF = "shade-of-"
+"""What the shape of a scatterer's shade is called, before the scatterer's name."""
+
+_README = """# {name} for Sionna RT
+
+```python
+import sionna.rt
+scene = sionna.rt.load_scene("scene.xml", merge_shapes=False)
+scene.frequency = 10e9
+```
+
+`merge_shapes=False` keeps each wall an object of its own. `scene.toml` beside it is the whole room for rislam_rt, which
+also holds what Sionna's file format has no place for:
+
+{notes}
+
+`rislam-rt new ROOM --from scene.xml` brings it back, with what was changed in the XML file.
+"""
+
+
+def write_xml(scene: Scene, folder: str | Path) -> list[str]:
+    """Write a scene into a new folder, as `scene.xml` with meshes for Sionna's `load_scene`; what it cannot carry.
+
+    Raises
+    ------
+    SceneError
+        The folder exists.
+    StoreError
+        The disk refused.
+    """
+    notes = left_behind(scene)
+    readme = _README.format(name=scene.name, notes="\n".join(f"- {note}" for note in notes) or "- nothing")
+    files = scene_files(scene)
+    for scatterer in scene.scatterers:
+        if scatterer.shade is not None:
+            shade = scatterer.shade
+            files[mesh_file(SHADE_OF + scatterer.name)] = ply_bytes(shade.vertices, shade.faces)
+    write_files(files | {XML_FILE: xml_bytes(scene), "README.md": readme.encode()}, folder)
+    return notes
+
+
+def xml_bytes(scene: Scene) -> bytes:
+    """The scene file: one `<shape>` a reflector or shade, one `<bsdf>` a material."""
+    root = Element("scene", {"version": "2.1.0"})
+    shapes: list[tuple[str, Material | None]] = [(r.name, r.material) for r in scene.reflectors]
+    shapes += [(shade.name, None) for shade in scene.shades]
+    shapes += [(SHADE_OF + s.name, None) for s in scene.scatterers if s.shade is not None]
+    names = {m: f"{_word(m)}-{number}" for number, m in enumerate(dict.fromkeys(material for _, material in shapes))}
+    root.extend(material_element(material, name) for material, name in names.items())
+    for name, material in shapes:
+        shape = SubElement(root, "shape", {"type": "ply", "id": f"mesh-{name}"})
+        SubElement(shape, "string", {"name": "filename", "value": mesh_file(name)})
+        SubElement(shape, "boolean", {"name": "face_normals", "value": "true"})
+        SubElement(shape, "ref", {"id": names[material], "name": "bsdf"})
+    indent(root, space="    ")
+    return tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+
+
+def left_behind(scene: Scene) -> list[str]:
+    """What of a scene a Sionna scene file has no place for, each in one line."""
+    constant = [r.name for r in scene.reflectors if r.material.level is not None]
+    notes = []
+    if constant:
+        few = ", ".join(constant[:6]) + (f" and {len(constant) - 6} more" if len(constant) > 6 else "")
+        notes.append(
+            f"the constant R of {few}: as a body with that |R| at normal incidence, and Fresnel's law elsewhere"
+        )
+    if scene.scatterers:
+        notes.append(f"{len(scene.scatterers)} scatterers (of shadows: a shape of air, which hides their centre too)")
+    notes += [f"the panel '{panel.name}'" for panel in scene.panels]
+    return [*notes, "the agent's motion, and Tx and Rx on it"]
+
+
+def _word(material: Material | None) -> str:
+    """What a material is called in the file. Sionna reads names that begin with `itu` in a way of its own."""
+    if material is None:
+        return "air"
+    return material.itu if material.itu else ("constant" if material.level is not None else "slab")

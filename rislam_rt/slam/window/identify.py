@@ -1,0 +1,92 @@
+"""Points that tracks may be: each as a scatterer and as the panel, by amplitudes and silence over the whole history."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.slam.moments import even_draws, poses_of
+from rislam_rt.slam.tracks import OTHER, UNTOLD
+from rislam_rt.slam.window.book import Book
+from rislam_rt.slam.window.context import Context
+from rislam_rt.slam.window.gauss import poses
+from rislam_rt.slam.window.guesses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
+from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.panel import CERTAIN, Identity, Sight, gains, spread_places, unknown, weigh
+from rislam_rt.slam.window.trial import Fits
+
+ASIDE = 12.0
+"""Log evidence behind a track's best point from which on another place is not asked whether it is the panel's."""
+
+
+class Identified(NamedTuple):
+    """H hypotheses for T tracks."""
+
+    gain: Floats
+    """(H,) in log evidence, of points that may be the panel instead of a scatterer."""
+    identity: Identity
+    """(H,) who each is then."""
+    elsewhere: Floats
+    """(T,) log odds that a track runs over the panel by a way that is none of these, against none over the panel."""
+
+
+def identify(context: Context, ats: list[Integers], table: Hypotheses, fits: Fits, evidence: Floats) -> Identified:
+    """The tracks whose components are the log's rows `ats`: what comes of its being the panel that throws them."""
+    found = Identified(np.zeros(len(evidence)), unknown(len(evidence)), np.full(len(ats), -CERTAIN))
+    scene, named = context.scene, float(context.book.ris_probability.max(initial=0.0))
+    if scene.ris is None:
+        found.identity.log_ris[:] = -np.inf
+        return found
+    point = np.isin(table.kind, (POINT, OVER_RX, OVER_TX, OVER_SAME))
+    taken = np.log1p(-min(named, 1.0 - 1e-6))  # there is but one panel
+    for track, at in enumerate(ats):
+        rows = (point & (table.trials.track == track)).nonzero()[0]
+        if (context.log.side[at] == OTHER).all():
+            found.identity.log_ris[rows] = -CERTAIN
+            continue
+        near = rows[evidence[rows] > evidence[rows].max() - ASIDE]
+        fresh = _history(context, at, table, fits, np.append(near, rows[0]))
+        fresh.log_ris[:-1] += taken
+        found.gain[near] = np.logaddexp(0.0, fresh.log_ris[:-1]) - np.log1p(LEVELS.panels)
+        found.elsewhere[track] = fresh.log_ris[-1]
+        found = found._replace(identity=found.identity.put(near, fresh.take(np.arange(len(near)))))
+    # what is heard over walls alone may well be hidden straight ahead: silence there tells nothing
+    found.identity.hidden[table.kind != POINT] = 1.0
+    return found._replace(identity=found.identity.settled())
+
+
+def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> Identity:
+    """Identities of the hypotheses `rows` (R,) of a track whose components are the log's rows `at`.
+
+    The last row stands for a panel anywhere else: amplitudes scatter as they do.
+    """
+    scene, window, log, count = context.scene, context.window, context.log, len(rows)
+    place = poses(window)
+    ends = poses_of(place[:, :3], context.heading + place[:, 3], scene.body)
+    turn, shift = np.swapaxes(table.trials.turn[rows], 2, 3), table.trials.shift[rows]
+    spots, ratio = spread_places(fits.place[rows], fits.held[rows]), _ratio(table, context.book, rows)
+    level = log.log_amplitude[at]
+    anywhere = np.exp(level.mean() + max(float(level.std()), LEVELS.fading) * even_draws(spots.shape[1], 1)[:, 0])
+    first = context.cycle - window.num_poses + 1
+    heard = {int(log.cycle[row] - first): row for row in at}
+    found = unknown(count)
+    for slot in range(min(heard), window.num_poses):
+        row = heard.get(slot, -1)
+        amplitude, side = (np.exp(log.log_amplitude[row]), log.side[row]) if row >= 0 else (1.0, UNTOLD)
+        tx, rx = (end[slot] @ turn[:, leg] + shift[:, leg] for leg, end in enumerate((ends.tx, ends.rx)))
+        sight = Sight(
+            spots, tx, rx, ratio, np.full(count, amplitude), np.full(count, side), np.full(count, row >= 0)
+        )  # fmt: skip
+        gain = gains(sight, scene.ris, context.codes[slot], scene.radio)
+        if gain is not None:
+            gain[-1] = anywhere
+        found = weigh(found, sight, gain, scene.sensor)
+    return found
+
+
+def _ratio(table: Hypotheses, book: Book, rows: Integers) -> Floats:
+    """(R,) amplitude that the known walls of hypotheses leave."""
+    if not len(book.ident):
+        return np.ones(len(rows))
+    known, bounces = table.known[rows], np.where(table.kind[rows] == OVER_SAME, 2.0, 1.0)
+    return np.asarray(np.exp(np.where(known >= 0, book.ratio[known] * bounces, 0.0)))

@@ -1,0 +1,147 @@
+"""Which point is the panel? Bayes from amplitudes under the codes applied, and from silence; for features and tracks.
+
+"Is the panel" predicts the amplitude with no free parameter; "is a scatterer" has one unknown cross-section for all
+cycles, integrated out. Silence under a code that would have made it loud speaks against the panel; what is blocked is
+silent whatever it is. A receiver that alternates codes tells more: what only the panel's paths can cause. The same
+update serves features and tracks from cycle to cycle, and births over a whole history.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.information import amplitude_std
+from rislam_rt.model import RadioConfig, RisCode, RisSpec, SensorModel
+from rislam_rt.slam.identity import (
+    DOUBT,
+    STRENGTHS,
+    add_evidence,
+    log_panel,
+    log_panel_missed,
+    log_scatterer,
+    log_scatterer_missed,
+    predicted_panel_gain,
+    weigh_silence,
+)
+from rislam_rt.slam.moments import even_draws, square_root
+from rislam_rt.slam.tracks import OTHER, PANEL
+from rislam_rt.slam.window.levels import LEVELS
+
+DRAWS = 12
+"""Places of the belief over which the panel's predicted gain is averaged."""
+CERTAIN = 30.0
+"""Log odds beyond which an identity is no longer in question."""
+
+
+class Identity(NamedTuple):
+    """What N points are held to be."""
+
+    log_grid: Floats
+    """(N, G) log posterior of their strength, were they scatterers (see `identity`)."""
+    log_ris: Floats
+    """(N,) log odds of panel against scatterer."""
+    hidden: Floats
+    """(N, 2) probability that something stands in the way, were it the panel, and a scatterer."""
+
+    def take(self, rows: Integers | Booleans) -> "Identity":
+        """Only some of the points."""
+        return Identity(*(field[rows] for field in self))
+
+    def put(self, rows: Integers, fresh: "Identity") -> "Identity":
+        """With some of the points replaced."""
+        fields = [field.copy() for field in self]
+        for field, value in zip(fields, fresh, strict=True):
+            field[rows] = value
+        return Identity(*fields)
+
+    def settled(self) -> "Identity":
+        """With odds that new evidence can still turn."""
+        return self._replace(log_ris=np.clip(self.log_ris, -CERTAIN, CERTAIN))
+
+    def join(self, other: "Identity") -> "Identity":
+        """Both, one after the other."""
+        return Identity(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+
+
+def _strength_prior() -> Floats:
+    log = -0.5 * ((STRENGTHS - np.log(LEVELS.strength)) / LEVELS.strength_std) ** 2
+    return np.asarray(log - np.logaddexp.reduce(log))
+
+
+STRENGTH_PRIOR = _strength_prior()
+"""(G,) log probability of a point's strength beforehand."""
+
+
+def unknown(count: int) -> Identity:
+    """Points of which nothing is known but that panels are fewer than scatterers."""
+    return Identity(
+        np.tile(STRENGTH_PRIOR, (count, 1)), np.full(count, np.log(LEVELS.panels)), np.zeros((count, 2)),
+    )  # fmt: skip
+
+
+class Sight(NamedTuple):
+    """One cycle's look at N points."""
+
+    place: Floats
+    """(N, S, 3) [m] equally likely places of each."""
+    tx: Floats
+    """(N, 3) [m] the Tx, or its image in the walls on the leg."""
+    rx: Floats
+    """(N, 3) likewise."""
+    ratio: Floats
+    """(N,) amplitude that the walls on both legs leave."""
+    amplitude: Floats
+    """(N,) measured; what it is without a measurement does not matter."""
+    side: Integers
+    """(N,) of the measurement (see `tracks.Glance`)."""
+    seen: Booleans
+    """(N,) whether there is a measurement."""
+
+
+def spread_places(mean: Floats, covariance: Floats) -> Floats:
+    """(N, S, 3) equally likely places of means (N, 3) and covariances (N, 3, 3)."""
+    draws = []
+    for middle, spread in zip(mean, covariance, strict=True):
+        root = square_root(spread)
+        draws.append(middle + even_draws(DRAWS, root.shape[1]) @ root.T)
+    return np.array(draws).reshape(len(mean), -1, 3)
+
+
+def gains(sight: Sight, spec: RisSpec | None, code: RisCode | None, radio: RadioConfig) -> Complexes | None:
+    """Gains (N, S) of the panel, were it at each of the places; None without a panel."""
+    if spec is None or code is None:
+        return None
+    ends = sight.tx[:, None], sight.rx[:, None]
+    return predicted_panel_gain(spec, code, sight.place, *ends, sight.ratio[:, None], radio)
+
+
+def weigh(before: Identity, sight: Sight, gain: Complexes | None, sensor: SensorModel) -> Identity:
+    """The identities (N,) after one more cycle, in which the panel has one of the gains (N, S)."""
+    radio, count = sensor.radio, len(sight.place)
+    if not count:
+        return before
+    noise = amplitude_std(radio)
+    threshold = float(np.sqrt(2.0 * sensor.threshold) * noise)
+    middle, std = sight.place.mean(axis=1), np.full(count, noise)
+    first, second = (np.maximum(np.linalg.norm(middle - end, axis=1), 0.05) for end in (sight.tx, sight.rx))
+    first = first / sight.ratio  # what walls take, a longer way takes as well
+    log_grid, log_ris, hidden = before.log_grid.copy(), before.log_ris.copy(), before.hidden.copy()
+    at, silent = sight.seen.nonzero()[0], (~sight.seen).nonzero()[0]
+    if len(at):
+        amplitude = sight.amplitude[at]
+        panel = np.full(len(at), -np.inf)
+        if gain is not None:
+            panel = np.where(sight.side[at] == OTHER, -np.inf, log_panel(amplitude, std[at], gain[at]))
+        scatterer = log_scatterer(amplitude, std[at], first[at], second[at], radio)
+        log_grid[at], log_ris[at] = add_evidence(log_grid[at], log_ris[at], scatterer, panel)
+        log_ris[at] += np.where(sight.side[at] == PANEL, DOUBT, 0.0)
+        hidden[at] = 0.0
+    if len(silent) and gain is not None:
+        each = log_scatterer_missed(std[silent], first[silent], second[silent], radio, threshold)
+        grid = log_grid[silent] - np.logaddexp.reduce(log_grid[silent], axis=1, keepdims=True)
+        scatterer = np.logaddexp.reduce(grid + each, axis=1)
+        missed = np.stack([log_panel_missed(std[silent], gain[silent], threshold), scatterer], axis=1)
+        hidden[silent], surplus = weigh_silence(hidden[silent], np.exp(missed))
+        log_ris[silent] += surplus
+    return Identity(log_grid, log_ris, hidden)

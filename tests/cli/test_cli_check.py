@@ -1,0 +1,62 @@
+"""`rislam-rt check` as an adviser: what it says, writes and refuses."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from rislam_rt.cli import main
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def check(capsys, monkeypatch, tmp_path):
+    """Run the command in an empty folder; returns exit code, output and error stream."""
+    monkeypatch.chdir(tmp_path)
+
+    def _check(*arguments):
+        monkeypatch.setattr(sys, "argv", ["rislam-rt", "check", *map(str, arguments)])
+        with pytest.raises(SystemExit) as left:
+            main()
+        captured = capsys.readouterr()
+        return left.value.code, captured.out, captured.err
+
+    return _check
+
+
+def test_a_panel_that_cannot_be_heard_is_said_so_with_the_mend(check, tmp_path):
+    arguments = ("paper_room", "--set", "radio.reference_snr_db=-12", "--json", "c.json", "--picture", "map.png")
+    code, out, _ = check(*arguments)
+    assert code == 0
+    line = next(line for line in out.splitlines() if line.startswith("ris: "))
+    assert "dB lack where it is too weak" in line
+    assert "or a panel of" in line
+    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
+    advice = json.loads((tmp_path / "c.json").read_text())["advice"]
+    assert {(link["landmark"], link["code"]) for link in advice["links"]} == {
+        ("sphere", ""), ("ris", "aimed"), ("ris", "swept"), ("ris", "random"),
+    }  # fmt: skip
+    assert advice["links"][1]["start"]["margin_db"] < 0.0
+    assert line in advice["remedies"]
+    assert [cost["depth"] for cost in advice["costs"]] == [1, 2, 3]
+
+
+def test_the_pipelines_radio_counts_and_a_wrong_setting_is_one_line(check):
+    assert "threshold of 10.0 dB" in check("empty_box", "--pipeline", "demo")[1] + check("paper_room")[1]
+    code, out, err = check("paper_room", "--set", "radio.reference_snr=3")
+    assert code == 2
+    assert not out
+    assert "reference_snr_db" in err
+    assert len(err.splitlines()) == 1
+    code, _, err = check("paper_room", "--picture", "map.doc")
+    assert code == 2
+    assert "map.doc" in err
+
+
+def test_a_scene_without_a_panel_has_no_map(check, tmp_path):
+    code, out, _ = check("empty_box", "--picture", "map.png")
+    assert code == 0
+    assert "picture: none: the scene has no panel" in out
+    assert not (tmp_path / "map.png").exists()

@@ -1,0 +1,107 @@
+"""Help, loudness, and several faults at once."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rislam_rt.cli import main
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def run(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+
+    def _run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["rislam-rt", *map(str, arguments)])
+        with pytest.raises(SystemExit) as left:
+            main()
+        captured = capsys.readouterr()
+        return left.value.code, captured.out, captured.err
+
+    return _run
+
+
+def commands():
+    from typer.main import get_command
+
+    from rislam_rt.cli.app import app
+
+    return get_command(app).commands
+
+
+@pytest.mark.parametrize("name", sorted(commands()))
+def test_every_help_has_examples_of_options_that_are_there(name):
+    command = commands()[name]
+    examples = re.findall(r"Example: (rislam-rt [^\n]+)", command.help)
+    assert examples, name
+    known = {option for one in command.params for option in (*one.opts, *one.secondary_opts)}
+    assert {"-q", "-v"} <= known
+    for example in examples:
+        words = shlex.split(example)
+        assert words[1] == name
+        assert {word for word in words if word.startswith("--")} <= known
+
+
+def test_several_faults_are_several_lines(run, tmp_path):
+    (tmp_path / "mine.toml").write_text(
+        'name = "a"\nscheems = ["random"]\n[radio]\ncarier_ghz = 10\nnum_particles = 9\n'
+    )
+    code, _, err = run("run", "mine.toml", "--scene", ROOT / "scenes" / "paper_room", "--set", "depth=-1")
+    lines = err.splitlines()
+    assert code == 2
+    assert len(lines) == 4
+    assert all(line.startswith("error: ") for line in lines)
+    told = " ".join(lines)
+    for place, meant in (
+        ("scheems", "schemes"),
+        ("radio.carier_ghz", "carrier_ghz"),
+        ("radio.num_particles", "slam."),
+    ):
+        assert f"mine.toml: {place}: unknown key; did you mean '{meant}" in told
+    assert "error: --set: depth: " in told
+
+
+def test_several_faults_of_a_scene_are_several_lines(run, tmp_path):
+    import shutil
+
+    shutil.copytree(ROOT / "scenes" / "paper_room", tmp_path / "room")
+    file = tmp_path / "room" / "scene.toml"
+    text = file.read_text()
+    file.write_text(text.replace("radius = 0.05", "radius = -0.05").replace("rows = 6", "rows = 0"))
+    code, _, err = run("trace", "room")
+    assert code == 2
+    assert len(err.splitlines()) == 2
+    assert "radius" in err
+    assert "rows" in err
+
+
+def test_quiet_and_verbose(run):
+    words = ("trace", ROOT / "scenes" / "paper_room", "--channel", "image_source", "--depth", 1, "--cycles", 2)
+    _, out, err = run(*words)
+    assert "warning: " in err
+    code, quiet, err = run(*words, "-q")
+    assert (code, err) == (0, "")
+    assert quiet.splitlines()[2:] == out.splitlines()[2:]
+    code, _, err = run(*words, "-v")
+    assert code == 0
+    assert "numpy " in err
+    assert "processor time" in err
+    code, _, err = run("trace", "nowhere", "-v")
+    assert code == 2
+    code, _, err = run("run", "--set", "depth=-1", "-v")
+    assert code == 2
+    assert "Traceback" in err
+    assert err.splitlines()[-1].startswith("error: ")
+
+
+def test_as_a_module(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "rislam_rt", "--version"], capture_output=True, text=True, cwd=tmp_path, check=True
+    )
+    assert re.fullmatch(r"\d+\.\d+\.\d+\n", done.stdout)

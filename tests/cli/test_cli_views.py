@@ -1,0 +1,64 @@
+"""`show --html` and `report --gif`: files that stand alone, and one line for what cannot be."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from rislam_rt.cli import main
+
+PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
+
+
+@pytest.fixture
+def run(capsys, monkeypatch, tmp_path):
+    """Run a command in an empty folder; returns exit code, output and error stream."""
+    monkeypatch.chdir(tmp_path)
+
+    def _run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["rislam-rt", *map(str, arguments)])
+        with pytest.raises(SystemExit) as left:
+            main()
+        captured = capsys.readouterr()
+        return left.value.code, captured.out, captured.err
+
+    return _run
+
+
+def test_show_writes_a_page_that_turns_and_a_picture_if_asked(run, tmp_path):
+    code, out, _ = run("show", "paper_room", "--html", "room.html", "--depth", 0)
+    assert code == 0
+    assert "view: room.html" in out
+    assert [path.name for path in tmp_path.iterdir()] == ["room.html"]
+    text = (tmp_path / "room.html").read_text()
+    assert text.startswith("<!doctype html>")
+    assert "6 x 6 x 3 m, 60 poses along the way" in text
+    code, out, _ = run("show", "empty_box", "--html", "box.html", "--out", "box.png", "--depth", 1)
+    assert code == 0
+    assert (tmp_path / "box.png").stat().st_size > 10_000
+    assert "box.png" in out
+
+
+def test_a_view_that_cannot_be_is_one_line(run, tmp_path):
+    code, out, err = run("show", "paper_room", "--html", "room.html", "--set", "radio.carrier=3")
+    assert code == 2
+    assert not out
+    assert "did you mean" in err
+    assert len(err.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+    code, _, err = run("show", "paper_room", "--html", "/proc/none/room.html", "--depth", 0)
+    assert code == 4
+    assert "/proc/none/room.html" in err
+
+
+def test_report_writes_a_moving_picture(run, tmp_path):
+    short = ("--set", "channel=image_source", "--set", "cycles=3", "--set", "depth=0", "--set", 'schemes=["random"]')
+    assert run("run", PIPELINE, *short, "--no-report", "--out", "r")[0] == 0
+    code, _, err = run("report", "r", "--gif", "run.mp4")
+    assert code == 2
+    assert "give a name that ends in .gif" in err
+    code, out, _ = run("report", "r", "--gif", "run.gif")
+    assert code == 0
+    assert "moving picture: run.gif" in out
+    assert (tmp_path / "run.gif").read_bytes().startswith(b"GIF89a")
+    assert (tmp_path / "r" / "report.html").exists()

@@ -1,0 +1,95 @@
+"""A run in a room of two panels: found and told apart, stored and read back, slices and faults alike."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rislam_rt
+from rislam_rt.errors import ConfigError
+from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline.dataset import dataset_to_paths, dataset_to_scheme, paths_to_dataset, scheme_to_dataset
+from rislam_rt.pipeline.inputs import dataset_to_inputs, inputs_to_dataset
+from rislam_rt.pipeline.join import join_schemes, thinned_scheme
+from rislam_rt.pipeline.summary import landmark_scores, landmark_track
+from rislam_rt.report.verdict import panel_found_at
+from rislam_rt.shipped import find_pipeline, find_room
+
+SET = ["channel=image_source", "depth=1", "design.method=coordinate", "receiver.alternation=true"]
+
+
+def run(cycles: int, *keys: str, **about):
+    scene = replace(rislam_rt.load_scene(find_room("two_panels")), **about)
+    spec = load_spec(find_pipeline("trace_then_slam"), [*SET, f"cycles={cycles}", *keys])
+    return rislam_rt.run_slam(scene, spec, rng=np.random.default_rng(7))
+
+
+@pytest.fixture(scope="module")
+def result():
+    """Long enough for both panels to be found, once."""
+    return run(30, 'schemes=["optimized"]')
+
+
+def test_both_panels_are_found_and_told_apart(result):
+    scheme = result.schemes["optimized"]
+    scores = landmark_scores(result.scene, scheme)
+    track = landmark_track(result.scene, scheme)
+    for panel, name in enumerate(("above", "beside")):
+        assert panel_found_at(result, scheme, panel) is not None
+        assert scores[name]["final_m"] < 0.1
+        assert scores[name]["cycles_identified"] > 5
+        named = np.argwhere(scheme.named(panel))
+        assert (track.column[named[:, 0], 1 + panel] == named[:, 1]).all()  # never another landmark
+    assert panel_found_at(result, scheme, 2) is None
+    assert scheme.map.panel_row(0) != scheme.map.panel_row(1) >= 0
+    assert "2 panels known" in repr(scheme.map)
+    assert "cycles_identified" not in scores["sphere"]
+    assert scheme.applied.shape == (30, 1, 100)
+
+
+def test_which_panel_is_kept_in_the_files(result):
+    scheme = result.schemes["optimized"]
+    data = scheme_to_dataset(scheme)
+    again = dataset_to_scheme(data)
+    np.testing.assert_array_equal(again.panel, scheme.panel)
+    np.testing.assert_array_equal(again.map.panel, scheme.map.panel)
+    paths = dataset_to_paths(paths_to_dataset(result.paths, result.scene.agent))
+    np.testing.assert_array_equal(paths.panel, result.paths.panel)
+    assert set(paths.panel.tolist()) == {-1, 0, 1}
+    given = dataset_to_inputs(inputs_to_dataset(scheme.given.inputs))
+    assert given.panel.num_elements == 100
+    for one, other in zip(given.measurements, scheme.given.inputs.measurements, strict=True):
+        np.testing.assert_array_equal(one.panel, other.panel)
+    few = thinned_scheme(scheme, np.array([3, 29]))
+    np.testing.assert_array_equal(few.panel, scheme.panel[[3, 29]])
+    twice = join_schemes([scheme, scheme], [result.paths, result.paths])
+    np.testing.assert_array_equal(twice.panel, np.concatenate([scheme.panel, scheme.panel]))
+
+
+def test_a_map_that_is_still_empty_has_no_panels(result):
+    begun = run(1, 'schemes=["optimized"]').schemes["optimized"]
+    assert begun.panel is None
+    mixed = join_schemes([begun, result.schemes["optimized"]], [result.paths, result.paths])
+    assert mixed.panel.shape == (31, len(mixed.ident))
+
+
+def test_faults_of_every_element_reach_the_air():
+    perfect, dead = (run(2, 'schemes=["random"]', *more) for more in ((), ("panel.dead=1.0",)))
+    over = perfect.paths.panel >= 0
+    assert np.abs(perfect.schemes["random"].gain[:, over]).max() > 0.0
+    assert not dead.schemes["random"].gain[:, over].any()
+
+
+def test_the_window_filter_says_that_it_knows_one_panel():
+    with pytest.raises(ConfigError, match=r"window.*knows one panel.*room of 2"):
+        run(2, 'schemes=["random"]', "slam.filter=window", "slam.use_vt=true")
+
+
+def test_pictures_of_both_codes_are_drawn(result, tmp_path: Path):
+    from rislam_rt.report.code import draw_run_codes
+
+    figure = draw_run_codes(result, 2)
+    image = figure.axes[0].images[0].get_array()
+    assert image.shape == (8, 15)  # 6 x 6 and 8 x 8 elements, a gap between them
+    assert np.isfinite(np.ma.filled(image, np.nan)).sum() == 100

@@ -1,0 +1,130 @@
+"""Rooms from one mesh: the same walls from every format, unit and axis, and what becomes of things and round ones."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.errors import RislamError, SceneError
+from rislam_rt.model import Scene
+from rislam_rt.scene import load_scene
+from rislam_rt.scene.check.probe import winding
+from rislam_rt.scene.importing import ImportOptions, import_room
+from rislam_rt.scene.importing.materials import THICKNESS, itu_by_word, parse_choices, parse_material
+from rislam_rt.scene.schema import ItuMaterial
+
+SHELL = {"floor", "ceiling", "wall_north", "wall_south", "wall_east", "wall_west"}
+
+
+def imported(file: Path, **options: object) -> tuple[Scene, list[str]]:
+    folder = file.parent / "room"
+    remarks = import_room(file, folder, ImportOptions(**options))  # type: ignore[arg-type]
+    return load_scene(folder), remarks
+
+
+@pytest.mark.parametrize(
+    ("suffix", "unit", "options"),
+    [
+        (".glb", 1e-3, {"units": "mm"}),
+        (".gltf", 1.0, {}),
+        (".obj", 1e-2, {"units": "cm", "up": "y"}),
+        (".ply", 1.0, {"up": "y"}),
+        (".stl", 0.0254, {"units": "in", "up": "y"}),
+    ],
+)
+def test_every_format_gives_the_same_room(
+    mesh_file: Callable[..., Path], suffix: str, unit: float, options: dict[str, object]
+) -> None:
+    scene, _ = imported(mesh_file(suffix, unit, "y"), **options)
+    by_name = {reflector.name: reflector for reflector in scene.reflectors}
+    assert set(by_name) == SHELL | {"table_top", "cabinet"}
+    assert np.allclose(scene.bounds, [[0, 0, 0], [5.0, 4.0, 2.6]], rtol=0, atol=1e-6)  # float32 in the file
+    assert np.allclose(by_name["wall_north"].vertices[:, 1], 4.0, rtol=0, atol=1e-6)
+    assert np.allclose(by_name["wall_east"].vertices[:, 0], 5.0, rtol=0, atol=1e-6)
+    assert len(by_name["floor"].faces) <= 3  # of 8; the cabinet touches its edge in a corner
+    # the cabinet stands on the floor and at the wall: four of its faces are left; the table has two that are wide
+    assert [len(build_walls(_only(scene, name))) for name in ("cabinet", "table_top")] == [4, 2]
+    assert "column_clutter" in [shade.name for shade in scene.shades]
+    assert scene.ris is not None
+    assert scene.ris.host == "ceiling"
+
+
+def _only(scene: Scene, name: str) -> Scene:
+    from dataclasses import replace
+
+    return replace(scene, reflectors=tuple(r for r in scene.reflectors if r.name == name), shades=(), ris=None)
+
+
+def test_a_cylinder_keeps_its_shadow_or_becomes_planes(mesh_file: Callable[..., Path]) -> None:
+    file = mesh_file(".glb", 1.0, "y")
+    shading, remarks = imported(file)
+    shade = next(s for s in shading.shades if s.name == "column_clutter")
+    girth = np.unique(np.round(shade.vertices[:, :2], 9), axis=0)
+    angle = np.argsort(np.arctan2(*(girth - girth.mean(axis=0)).T))
+    around = np.linalg.norm(np.diff(girth[np.append(angle, angle[0])], axis=0), axis=1).sum()
+    assert around == pytest.approx(2.0 * np.pi * 0.2, rel=0.01)  # the drawing has 40 sides, 0.1 % less
+    assert any("a cylinder of 0.2 m became" in line and "that shade" in line for line in remarks)
+    file.rename(file.parent / "again.glb")
+    (file.parent / "room").rename(file.parent / "first")
+    planes, remarks = imported(file.parent / "again.glb", curved="planes")
+    assert {"column"} | SHELL <= {r.name for r in planes.reflectors}
+    corners = _only(planes, "column").reflectors[0].vertices[:, :2] - [4.2, 3.1]
+    error = float(next(line for line in remarks if "a cylinder" in line).split("within ")[1].split()[0])
+    assert np.abs(np.linalg.norm(corners, axis=1) - 0.2).max() <= 1e-3 * error + 1e-4
+
+
+def test_nodes_and_materials_keep_their_names(node_file: Path) -> None:
+    scene, remarks = imported(node_file, materials=parse_choices(["wall_*=itu:brick:0.3", "floor=reflection:0.5"]))
+    material = {r.name: r.material for r in scene.reflectors}
+    assert {"meeting_table", "locker"} | SHELL == set(material)
+    assert material["meeting_table"].itu == "wood"
+    assert material["locker"].itu == "metal"
+    assert (material["wall_north"].itu, material["wall_north"].thickness) == ("brick", 0.3)
+    assert material["floor"].reflection == 0.5
+    assert material["ceiling"].itu == "plasterboard"
+    assert not any("unknown" in line for line in remarks)
+
+
+def test_the_proposal_is_inside_and_free(node_file: Path) -> None:
+    scene, _ = imported(node_file)
+    shell = np.concatenate([r.triangles for r in scene.reflectors if r.name in SHELL])
+    assert abs(winding(scene.agent.position[0], shell)) == pytest.approx(1.0)
+    assert abs(winding(scene.agent.position[-1], shell)) == pytest.approx(1.0)
+    assert np.linalg.norm(scene.agent.position[-1] - scene.agent.position[0]) > 2.0
+
+
+def test_origin_moves_the_room(mesh_file: Callable[..., Path]) -> None:
+    scene, _ = imported(mesh_file(".stl"), origin=(1.0, -2.0, 0.5))
+    assert np.allclose(scene.bounds[0], [-1.0, 2.0, -0.5], rtol=0, atol=1e-6)
+
+
+def test_more_walls_than_wanted_become_shades(mesh_file: Callable[..., Path]) -> None:
+    scene, remarks = imported(mesh_file(".stl"), max_walls=8)
+    assert len(build_walls(scene)) <= 8
+    assert {r.name for r in scene.reflectors} >= SHELL
+    assert any("--max-walls" in line for line in remarks)
+
+
+@pytest.mark.parametrize(("unit", "says"), [(1e-3, "give --units mm (6.9 m)"), (1e3, "give --units mm, cm, m or in")])
+def test_a_wrong_unit_is_named_and_nothing_is_written(mesh_file: Callable[..., Path], unit: float, says: str) -> None:
+    file = mesh_file(".stl", unit)
+    with pytest.raises(SceneError, match="would measure") as caught:
+        imported(file)
+    assert says in str(caught.value)
+    assert [path.name for path in file.parent.iterdir()] == [file.name]
+
+
+def test_names_speak_of_materials() -> None:
+    names = {"Oak.003": "wood", "itu_concrete": "concrete", "Window Glass": "glass", "Stahl-blank": "metal",
+             "M_Ceiling_Board": "ceiling_board", "Material.004": None, "": None}  # fmt: skip
+    assert {name: itu_by_word(name) for name in names} == names
+    assert set(THICKNESS) == set(get_args(ItuMaterial))
+    assert parse_material("itu:glass") == {"itu": "glass", "thickness_m": 0.006}
+    for wrong in ("itu:cheese", "reflection:1.5", "concrete", "itu:wood:-1", "reflection:nan"):
+        with pytest.raises(RislamError, match="--material"):
+            parse_material(wrong)
+    with pytest.raises(RislamError, match="NAME=itu:concrete"):
+        parse_choices(["itu:wood"])

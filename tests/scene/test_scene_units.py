@@ -1,0 +1,84 @@
+"""Unit mistakes are named, whatever else is wrong with a scene."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rislam_rt.scene import check_scene, load_scene, write_scene
+from rislam_rt.scene.check.units import unit_warnings
+
+ROOM = Path(__file__).parents[2] / "scenes" / "paper_room"
+BOX = np.array([[0.0, 0.0, 0.0], [6.0, 6.0, 3.0]])
+
+
+def said(table: dict[str, object], bounds: np.ndarray | None = BOX) -> list[str]:
+    return [finding.line for finding in unit_warnings("scene.toml", table, bounds)]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(ROOM, tmp_path / "room"))
+
+
+def change(folder: Path, old: str, new: str) -> None:
+    text = (folder / "scene.toml").read_text()
+    assert old in text
+    (folder / "scene.toml").write_text(text.replace(old, new, 1))
+
+
+def test_a_room_drawn_in_millimetres_is_named_beside_the_errors_that_it_causes(tmp_path: Path) -> None:
+    scene = load_scene(ROOM)
+    large = tuple(replace(wall, vertices=1000.0 * wall.vertices) for wall in scene.reflectors)
+    findings = check_scene(write_scene(replace(scene, reflectors=large), tmp_path / "large"))
+    assert any(finding.severity == "error" for finding in findings)
+    line = next(finding.line for finding in findings if finding.field == "meshes.units")
+    assert "6e+03 x 6e+03 x 3e+03 m; in millimetres it would be 6 x 6 x 3 m" in line
+    assert 'units = "mm"' in line
+
+
+def test_a_number_in_millimetres_is_named_though_a_key_is_missing(folder: Path) -> None:
+    change(folder, 'name = "paper_room"\n', "")
+    change(folder, "spacing_m = [0.015, 0.015]", "spacing_m = [15.0, 15.0]")
+    findings = check_scene(folder)
+    assert [finding.severity for finding in findings] == ["error", "warning"]
+    assert "name: missing" in findings[0].line
+    assert "ris.spacing_m: 15 m; in millimetres it would be 0.015 m" in findings[1].line
+
+
+def test_a_start_in_millimetres_is_named_beside_being_outside(folder: Path) -> None:
+    change(folder, "start = [0.5, 0.7, 0.5]", "start = [500.0, 700.0, 500.0]")
+    errors, units = check_scene(folder)
+    assert "lies outside" in errors.line
+    assert "agent.start: [500.0, 700.0, 500.0] is far outside the room; in millimetres" in units.line
+    assert "[0.5, 0.7, 0.5] m" in units.line
+
+
+def test_each_quantity_is_named_with_its_place() -> None:
+    wall = {"material": {"itu": "concrete", "thickness_m": 200.0}}
+    agent = {"cycle_s": 100, "velocity": [0, 70.7, 0]}
+    table = {"reflector": [{"material": {"reflection": 0.5}}, wall], "agent": agent}
+    lines = said(table)
+    assert any("reflector[1].material.thickness_m: 200 m; in millimetres it would be 0.2 m" in line for line in lines)
+    assert any("agent.cycle_s: 100 s; in milliseconds it would be 0.1 s" in line for line in lines)
+    assert any("agent.velocity: 70.7 m/s" in line for line in lines)
+    assert len(lines) == 3
+
+
+def test_usual_numbers_wrong_types_and_points_lost_for_other_reasons_are_left_alone() -> None:
+    assert not said({"agent": {"start": [7.0, 1.0, 1.0], "cycle_s": 0.1}, "ris": {"spacing_m": [0.015, 0.015]}})
+    assert not said({"agent": {"start": "500", "cycle_s": True, "velocity": [None]}, "ris": [3], "reflector": 7})
+    assert not said({"agent": {"start": [9e4, 9e4, 9e4]}})
+    assert not said({"agent": {"start": [500.0, 700.0, 500.0]}}, None)
+
+
+def test_a_toy_and_a_city_are_named() -> None:
+    assert "enlarged" in said({}, BOX / 1000.0)[0]
+    assert said({}, BOX * 1e5)[0].endswith("the room is 6e+05 x 6e+05 x 3e+05 m; give metres")
+
+
+def test_the_rooms_that_come_with_the_package_have_no_such_warning() -> None:
+    for file in sorted(ROOM.parent.glob("*/scene.toml")):
+        assert not [f for f in check_scene(file) if "would be" in f.message], file
