@@ -9,8 +9,7 @@ arrays have only a few beams across the sky, and half of the peaks lie on its ed
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ellipe
+import scipy
 
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.model import RadioConfig
@@ -49,7 +48,7 @@ def _intrinsic_volumes(radio: RadioConfig, window: float) -> tuple[float, float,
     positions = 2.0 * np.pi * radio.array.positions(1.0)[:, :2]
     minor, major = np.sort(np.sqrt(np.mean(positions**2, axis=0)))
     area = np.pi * minor * major
-    half_perimeter = 2.0 * major * float(ellipe(1.0 - (minor / major) ** 2)) if major > 0.0 else 0.0
+    half_perimeter = 2.0 * major * float(scipy.special.ellipe(1.0 - (minor / major) ** 2)) if major > 0.0 else 0.0
     return 1.0, half_perimeter + length, area + half_perimeter * length, area * length
 
 
@@ -59,4 +58,6 @@ def _threshold_of_rate(rate: float, radio: RadioConfig, window: float) -> float:
     lowest, highest = 4.0, 300.0
     if expected_false_alarms(lowest, radio, window) <= rate:
         return lowest
-    return float(brentq(lambda level: expected_false_alarms(level, radio, window) - rate, lowest, highest))
+    return float(
+        scipy.optimize.brentq(lambda level: expected_false_alarms(level, radio, window) - rate, lowest, highest)
+    )

@@ -1,7 +1,7 @@
 """Symmetric positive matrices that may be close to singular: solved and inverted at unit diagonal, with a ridge."""
 
 import numpy as np
-from scipy.linalg import lapack
+import scipy
 
 from rislam_rt.arrays import Floats
 
@@ -14,7 +14,7 @@ def inverse(matrix: Floats) -> Floats:
     if not len(matrix):
         return matrix
     scale, factor = _factor(matrix)
-    lower = lapack.dpotri(factor, lower=1)[0] * scale * scale[:, None]
+    lower = scipy.linalg.lapack.dpotri(factor, lower=1)[0] * scale * scale[:, None]
     full = lower + lower.T
     full.flat[:: len(scale) + 1] *= 0.5
     return np.asarray(full)
@@ -25,7 +25,7 @@ def solve(matrix: Floats, right: Floats) -> Floats:
     if not len(matrix):
         return right
     scale, factor = _factor(matrix)
-    return np.asarray(scale * lapack.dpotrs(factor, scale * right, lower=1)[0])
+    return np.asarray(scale * scipy.linalg.lapack.dpotrs(factor, scale * right, lower=1)[0])
 
 
 def _factor(matrix: Floats) -> tuple[Floats, Floats]:
@@ -34,7 +34,7 @@ def _factor(matrix: Floats) -> tuple[Floats, Floats]:
     scaled, ridge = matrix * scale * scale[:, None], RIDGE
     while True:
         scaled.flat[:: len(scale) + 1] += ridge
-        factor, failed = lapack.dpotrf(scaled, lower=1, clean=1)
+        factor, failed = scipy.linalg.lapack.dpotrf(scaled, lower=1, clean=1)
         if not failed:
             return scale, factor
         ridge *= 100.0

@@ -7,8 +7,8 @@ the one that they are told, which may be wrong.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import chndtr
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
@@ -94,7 +94,7 @@ def detection_probability(snr: ArrayLike, threshold: float) -> Floats:
     """
     level = np.sqrt(2.0 * threshold)
     mean = np.minimum(np.sqrt(2.0 * np.maximum(np.asarray(snr, dtype=np.float64), 0.0)), level + CERTAIN_SNR)
-    return np.asarray(1.0 - chndtr(level**2, 2.0, mean**2))
+    return np.asarray(1.0 - scipy.special.chndtr(level**2, 2.0, mean**2))
 
 
 def merged_pull(ratio: ArrayLike) -> tuple[Floats, Floats]:

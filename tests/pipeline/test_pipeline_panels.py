@@ -1,7 +1,6 @@
 """A run in a room of two panels: found and told apart, stored and read back, slices and faults alike."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +12,8 @@ from rislam_rt.pipeline.dataset import dataset_to_paths, dataset_to_scheme, path
 from rislam_rt.pipeline.inputs import dataset_to_inputs, inputs_to_dataset
 from rislam_rt.pipeline.join import join_schemes, thinned_scheme
 from rislam_rt.pipeline.summary import landmark_scores, landmark_track
+from rislam_rt.report.code import draw_run_codes
+from rislam_rt.report.room import draw_above
 from rislam_rt.report.verdict import panel_found_at
 from rislam_rt.shipped import find_pipeline, find_room
 
@@ -86,9 +87,12 @@ def test_the_window_filter_says_that_it_knows_one_panel():
         run(2, 'schemes=["random"]', "slam.filter=window", "slam.use_vt=true")
 
 
-def test_pictures_of_both_codes_are_drawn(result, tmp_path: Path):
-    from rislam_rt.report.code import draw_run_codes
+def test_the_picture_of_the_room_says_which_is_held_for_which(result):
+    texts = [text.get_text() for text in draw_above(result).axes[0].texts]
+    assert {"held for above", "held for beside"} <= set(texts)
 
+
+def test_pictures_of_both_codes_are_drawn(result):
     figure = draw_run_codes(result, 2)
     image = figure.axes[0].images[0].get_array()
     assert image.shape == (8, 15)  # 6 x 6 and 8 x 8 elements, a gap between them

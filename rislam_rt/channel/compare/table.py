@@ -61,7 +61,7 @@ def validation_table(rows: Sequence[Validation]) -> str:
 
 
 def validation_page(rows: Sequence[Validation], *, seed: int) -> str:
-    """The page `docs/channel_validation.md`: what was compared, and the table."""
+    """The page `docs/results/channel_validation.md`: what was compared, and the table."""
     return f"{_TEXT}Seed {seed}; poses at random, midpoint at least 0.1 m off every surface, baseline 0.1 m.\n\n" + (
         validation_table(rows)
     )

@@ -98,7 +98,7 @@ class ClaimsSpec(Section):
     """Of folders and pages."""
     description: str = ""
     """For readers alone."""
-    results: str = "../docs"
+    results: str = "../docs/results"
     """Folder of `fig4a.json`, `fig4b.json` and `fig4c.json`, relative to the pipeline file."""
 
 

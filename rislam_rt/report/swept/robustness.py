@@ -27,7 +27,7 @@ WORST = 3
 LEVELS = ("#9ecae1", "#4292c6", "#08519c", "#08306b")
 """Colours of the levels, the first one first."""
 REFERENCE = "#8c8c8c"
-LAW = """One quantity at a time is not as filter and design are told ([list](told.md)), all else right. The change is
+LAW = """One quantity at a time is not as filter and design are told ([list](../told.md)), all else right. The change is
 that of the agent's RMSE against the reference, from pairs of runs with the same motion and noise; a wrong height is
 part of the error. The bound is that of an agent that is told the truth."""
 

@@ -143,5 +143,5 @@ def weigh(before: Identity, sight: Sight, gain: Complexes | None, sensor: Sensor
         scatterer = np.logaddexp.reduce(grid + each, axis=1)
         missed = np.stack([log_panel_missed(std[silent], gain[silent], threshold), scatterer], axis=1)
         hidden[silent], surplus = weigh_silence(hidden[silent], np.exp(missed))
-        log_ris[silent] += surplus
+        log_ris[silent] += surplus[:, 0]
     return Identity(log_grid, log_ris, hidden)
