@@ -40,7 +40,8 @@ def read_blocks(page: Path) -> Iterator[Block]:
         if kind == "python":
             yield Block(text, text.partition("\n")[0].removeprefix("# "))
         else:
-            yield from (Block(line, None) for line in text.splitlines() if line)
+            lines = re.sub(r"\\\n\s*", "", text).splitlines()
+            yield from (Block(line, None) for line in lines if line)
 
 
 def build_wheel(folder: Path) -> Path:

@@ -168,6 +168,8 @@ def find_run(folder: Path, identity: Identity) -> dict[str, Any] | None:
     try:
         names = sorted(entry.name for entry in folder.iterdir())
     except FileNotFoundError:
+        if folder.is_symlink():
+            raise ConfigError(f"--out {folder}: a link to nothing; mend it, or give another folder") from None
         return None
     except OSError as error:
         raise ConfigError(f"--out {folder}: cannot be used ({error.strerror}); give another folder") from None
