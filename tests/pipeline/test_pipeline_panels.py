@@ -7,8 +7,10 @@ import pytest
 
 import rislam_rt
 from rislam_rt.errors import ConfigError
+from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.dataset import dataset_to_paths, dataset_to_scheme, paths_to_dataset, scheme_to_dataset
+from rislam_rt.pipeline.design_at import design_at, design_table
 from rislam_rt.pipeline.inputs import dataset_to_inputs, inputs_to_dataset
 from rislam_rt.pipeline.join import join_schemes, thinned_scheme
 from rislam_rt.pipeline.summary import landmark_scores, landmark_track
@@ -97,3 +99,23 @@ def test_pictures_of_both_codes_are_drawn(result):
     image = figure.axes[0].images[0].get_array()
     assert image.shape == (8, 15)  # 6 x 6 and 8 x 8 elements, a gap between them
     assert np.isfinite(np.ma.filled(image, np.nan)).sum() == 100
+
+
+def test_a_design_at_a_point_says_the_gain_of_each_panel():
+    room = rislam_rt.load_scene(find_room("two_panels"))
+    point = np.array([3.0, 2.0, 0.6])
+    found = design_at(
+        room, RadioConfig(), point, channel="image_source", depth=0, rng=np.random.default_rng(1)
+    )  # fmt: skip
+    assert set(found.panels["exact"]) == {"above", "beside"}
+    assert found.panels["exact"]["above"] == pytest.approx(found.designs["exact"].gain_db, abs=1e-9)
+    for panel in ("above", "beside"):
+        levels = [gains[panel] for name, gains in found.panels.items() if name != "continuous"]
+        assert found.panels["exact"][panel] == max(levels)
+    assert "panel_gain_db" in design_table(found)["methods"]["exact"]
+    alone = design_at(
+        replace(room, ris=room.panels[1]), RadioConfig(), point, channel="image_source", depth=0,
+        rng=np.random.default_rng(1),
+    )  # fmt: skip
+    assert alone.designs["exact"].gain_db == pytest.approx(found.panels["exact"]["beside"], abs=1e-9)
+    assert "panel_gain_db" not in design_table(alone)["methods"]["exact"]
