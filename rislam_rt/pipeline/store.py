@@ -9,6 +9,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -167,6 +168,8 @@ def find_run(folder: Path, identity: Identity) -> dict[str, Any] | None:
     try:
         names = sorted(entry.name for entry in folder.iterdir())
     except FileNotFoundError:
+        if folder.is_symlink():
+            raise ConfigError(f"--out {folder}: a link to nothing; mend it, or give another folder") from None
         return None
     except OSError as error:
         raise ConfigError(f"--out {folder}: cannot be used ({error.strerror}); give another folder") from None
@@ -332,7 +335,7 @@ def read_run(folder: Path) -> SlamResult:
         }
         return SlamResult(
             name=about["name"],
-            scene=Scene(scene.name, scene.reflectors, scene.scatterers, scene.ris, agent, about["scene"]["sha256"]),
+            scene=replace(scene, agent=agent, digest=about["scene"]["sha256"]),
             paths=paths,
             schemes=schemes,
             config=about["config"],

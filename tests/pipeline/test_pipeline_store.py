@@ -293,6 +293,12 @@ def test_the_lock_of_a_dead_process_is_taken_over(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_link_to_nothing_is_refused_before_the_work(identity, tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(ConfigError, match="a link to nothing"):
+        find_run(tmp_path / "link", identity)
+
+
 @pytest.mark.parametrize("change", [{"files": None}, {"files": {"a": 1}}, {"state": "over"}, {"identity": 3}, {}])
 def test_a_marker_of_another_form_is_refused_whatever_its_checksum_says(identity, tmp_path, change):
     """A forged marker has a checksum that fits; it is one line, not a traceback."""
