@@ -11,7 +11,6 @@ from functools import lru_cache
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Floats
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.model import RadioConfig
 
@@ -26,31 +25,13 @@ def detection_threshold(radio: RadioConfig, config: ReceiverConfig) -> float:
 def expected_false_alarms(threshold: float, radio: RadioConfig, window: float) -> float:
     """Mean number of peaks of noise alone above a linear SNR threshold, in delays over a window [s] and the whole sky.
 
-    Inside and on the rim of the sky together (`rim_share`).
     `sum_d mu_d rho_d(2 threshold)` over d = 0 .. 3: mu_d are the intrinsic volumes of (disc of cosines) x (window) in
     units in which the field's derivatives have unit variance, rho_d Worsley's densities for two degrees of freedom.
     """
-    return float(_peak_densities(threshold) @ np.array(_intrinsic_volumes(radio, window)))
-
-
-@lru_cache(maxsize=64)
-def rim_share(threshold: float, radio: RadioConfig, window: float) -> float:
-    """Share of those peaks that lies on the rim of the sky, where a cosine cannot grow any more.
-
-    The terms of the Euler characteristic that belong to the disc's edge; the window's ends, which are few, count as
-    inside.
-    """
-    _, edge, surface, bulk = _intrinsic_volumes(radio, window)
-    area = _sky_area(radio)
-    density = _peak_densities(threshold)
-    rim = density[1] * edge + density[2] * (surface - area)
-    return float(rim / (rim + density[2] * area + density[3] * bulk))
-
-
-def _peak_densities(threshold: float) -> Floats:
-    """Worsley's rho_0 .. rho_3 at a linear SNR."""
-    u, tail = 2.0 * threshold, np.exp(-threshold)
-    return np.array(
+    volume = _intrinsic_volumes(radio, window)
+    u = 2.0 * threshold
+    tail = np.exp(-threshold)
+    density = np.array(
         [
             tail,
             np.sqrt(u / (2.0 * np.pi)) * tail,
@@ -58,12 +39,7 @@ def _peak_densities(threshold: float) -> Floats:
             np.sqrt(u) * (u - 3.0) / (2.0 * np.pi) ** 1.5 * tail,
         ]
     )
-
-
-def _sky_area(radio: RadioConfig) -> float:
-    """Of the disc of cosines, in units in which the field's derivatives have unit variance."""
-    positions = 2.0 * np.pi * radio.array.positions(1.0)[:, :2]
-    return float(np.pi * np.prod(np.sqrt(np.mean(positions**2, axis=0))))
+    return float(density @ volume)
 
 
 def _intrinsic_volumes(radio: RadioConfig, window: float) -> tuple[float, float, float, float]:

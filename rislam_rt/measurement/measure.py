@@ -6,7 +6,6 @@ from rislam_rt.arrays import Floats
 from rislam_rt.measurement.bound import measure_bound
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.hardware import FrontEnd
-from rislam_rt.measurement.nearby import measure_local
 from rislam_rt.measurement.received import Clutter, direct_gain, receive
 from rislam_rt.measurement.waveform import measure_waveform
 from rislam_rt.model import Measurement, Paths, PathTruth, RadioConfig
@@ -55,8 +54,6 @@ def measure(
     if config.estimator == "waveform":
         leakage = direct_gain(paths, cycle) if front_end is not None else 0.0
         found, truth = measure_waveform(received, radio, config, previous, front_end, leakage, rng=rng)
-    elif config.estimator == "local":
-        found, truth = measure_local(received, radio, config, rng=rng)
     else:
         found, truth = measure_bound(received, radio, config, paths.num_paths, extra, rng=rng)
     return found, PathTruth(np.where(truth.path < paths.num_paths, truth.path, -1)) if extra else truth

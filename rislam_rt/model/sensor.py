@@ -24,7 +24,7 @@ CERTAIN_SNR = 30.0
 
 @dataclass(frozen=True, slots=True)
 class SensorModel:
-    """Detection, false alarms, resolution and error tails of a receiver. SI units; SNRs linear, over all antennas."""
+    """Detection, false alarms and resolution of a receiver. SI units; SNRs linear, over all antennas."""
 
     radio: RadioConfig
     """Noise, band, gains and array that the rest refers to."""
@@ -36,22 +36,16 @@ class SensorModel:
     """First and last delay [s] that are reported."""
     resolution: str = "cell"
     """What two paths must be to come out apart (`RESOLUTIONS`)."""
-    tail_share: float = 0.0
-    """Share of the components of true paths whose errors are larger than reported,"""
-    tail_scale: float = 1.0
-    """...and by how much their standard deviations are."""
     alternation: bool = False
     """Whether components come with the probability that they ran over the panel."""
 
     def __post_init__(self) -> None:
-        for name, least in (("threshold", 1e-300), ("false_alarms", 0.0), ("tail_scale", 1.0)):
+        for name, least in (("threshold", 1e-300), ("false_alarms", 0.0)):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= least):
                 raise ConfigError(f"sensor.{name}: {value} received; give a finite number of at least {least:g}")
         if not self.window[1] > self.window[0]:
             raise ConfigError(f"sensor.window: {self.window} received; give a last delay after the first")
-        if not 0.0 <= self.tail_share <= 1.0:
-            raise ConfigError(f"sensor.tail_share: {self.tail_share} received; give a share from 0 to 1")
         if self.resolution not in RESOLUTIONS:
             raise ConfigError(f"sensor.resolution: '{self.resolution}' received; give one of {', '.join(RESOLUTIONS)}")
 

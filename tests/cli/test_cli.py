@@ -51,6 +51,13 @@ def edited(tmp_path_factory):
     return _edited
 
 
+def test_new_room_from_corners(run):
+    code, out, _ = run("new", "mine", "--floorplan", "0,0 4,0 4,3 0,3", "--height", "2.5", "--rest", "itu:brick")
+    assert code == 0
+    assert "brick" in out
+    assert Path("mine/scene.toml").is_file()
+
+
 def test_help_and_version_import_nothing_heavy():
     code = (
         "import sys\n"
@@ -105,6 +112,14 @@ def test_settings_are_printed_without_what_only_a_run_needs():
         ["show", SCENE, "--out", "room.doc"],
         ["new", "room", "--template", "palace"],
         ["new", ROOT / "docs"],
+        ["new", "room", "--from", "missing.glb"],
+        ["new", "room", "--from", ROOT / "README.md"],
+        ["new", "room", "--from", "missing.glb", "--origin", "1,2"],
+        ["new", "room", "--from", "missing.glb", "--material", "floor=cheese"],
+        ["new", "room", "--from", "missing.glb", "--floorplan", "0,0 4,0 4,3"],
+        ["new", "room", "--floorplan", "0,0 4,0"],
+        ["new", "room", "--units", "mm"],
+        ["new", ROOT / "docs", "--floorplan", "0,0 4,0 4,3 0,3"],
         ["report", ROOT / "docs"],
     ],
     ids=lambda words: " ".join(str(word) for word in words).replace(str(ROOT), ""),

@@ -91,10 +91,10 @@ def gather_walk(
             features, age = np.zeros((len(length), len(FEATURES))), np.zeros(len(length), dtype=np.int64)
             if far.any():
                 features[far], age[far] = track_features(sightings, motion.body, radio), sightings.held.sum(axis=1)
-            free = radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * length)
+            spread = 4.0 * np.pi * length / (radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain))
             walk, policy = (np.full(len(length), number) for number in name)
             kind, legs = _classes(paths, truth.path)
-            ratio = measurement.amplitude / free
+            ratio = measurement.amplitude * spread  # a false component may have no length
             found.append(Examples(features, kind, legs, age, ratio, walk, policy, info.label, ~far))
     return join(found)
 
