@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from rislam_rt.cli.options import Depth, JsonFile, SceneFolder, Seed, write_json
+from rislam_rt.cli.options import Depth, JsonFile, RadioSettings, SceneFolder, Seed, write_json
 
 
 def command(
@@ -12,6 +12,7 @@ def command(
     poses: Annotated[int, typer.Option(min=1, max=100_000, help="Number of random poses.")] = 50,
     depth: Depth = 2,
     seed: Seed = 7,
+    set_: RadioSettings = None,
     json: JsonFile = None,
 ) -> None:
     """Compare traced and analytic paths one by one at random poses. Exit code 1 if a path that one side lacks is
@@ -20,22 +21,23 @@ def command(
     Twice: with the tracer's own float32 vertices, which are the independent evidence and the verdict; and refined in
     float64, as every run uses them. A refined number beyond its limits is exit code 1 too.
 
-    Example: rislam-rt compare paper_room --poses 20 --depth 1
+    Example: rislam-rt compare paper_room --poses 20 --depth 1 --set radio.tx_pattern=dipole
     """
     import numpy as np
 
     from rislam_rt.backend import prepare_backend
     from rislam_rt.channel.compare import compare_channels
     from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.model import RadioConfig
+    from rislam_rt.pipeline.read import load_radio
     from rislam_rt.report.tables import print_comparison
 
-    opened = open_scene(scene, RadioConfig())
+    radio = load_radio(set_ or ())
+    opened = open_scene(scene, radio)
     room = opened.scene
     prepare_backend()
     opened.warn()
     refined, raw = (
-        compare_channels(room, RadioConfig(), poses=poses, depth=depth, rng=np.random.default_rng(seed), refine=refine)
+        compare_channels(room, radio, poses=poses, depth=depth, rng=np.random.default_rng(seed), refine=refine)
         for refine in (True, False)
     )
     print_comparison(room.name, refined, raw)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rislam_rt.cli.options import ChannelName, Depth, JsonFile, SceneFolder, Seed, write_json
+from rislam_rt.cli.options import ChannelName, Depth, JsonFile, RadioSettings, SceneFolder, Seed, write_json
 
 
 def command(
@@ -14,6 +14,7 @@ def command(
     depth: Depth = 2,
     channel: ChannelName = "image_source",
     seed: Seed = 7,
+    set_: RadioSettings = None,
     figure: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the codes (PNG or SVG).")] = None,
     json: JsonFile = None,
 ) -> None:
@@ -24,17 +25,18 @@ def command(
     import numpy as np
 
     from rislam_rt.cli.scenes import open_scene, parse_point
-    from rislam_rt.model import RadioConfig
     from rislam_rt.pipeline.design_at import design_at, design_table
+    from rislam_rt.pipeline.read import load_radio
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.report.tables import print_designs
 
-    opened = open_scene(scene, RadioConfig())
+    radio = load_radio(set_ or ())
+    opened = open_scene(scene, radio)
     room = opened.scene
     point = parse_point(at, room)
     prepare_channel(channel)
     opened.warn()
-    found = design_at(room, RadioConfig(), point, channel=channel, depth=depth, rng=np.random.default_rng(seed))
+    found = design_at(room, radio, point, channel=channel, depth=depth, rng=np.random.default_rng(seed))
     table = design_table(found)
     print_designs(room.name, point, found.designs, found.target)
     if not found.is_direct:

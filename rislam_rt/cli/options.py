@@ -45,6 +45,10 @@ Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a setting, e.g. radio.bandwidth_ghz=0.5; repeatable."),
 ]
+RadioSettings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a setting radio.*, as in a pipeline; repeatable."),
+]
 JsonFile = Annotated[
     Path | None, typer.Option("--json", metavar="FILE", help="Write what is printed to FILE, machine-readable.")
 ]

@@ -77,8 +77,8 @@ def run_main_job(spec: "PipelineSpec", given: Given) -> None:
     """All schemes over all cycles of a room; a run that is there already is shown."""
     from rislam_rt.cli.scenes import open_scene, scene_of
     from rislam_rt.pipeline.identity import run_identity
+    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import check_run, prepare_channel
-    from rislam_rt.pipeline.spec import build_radio
     from rislam_rt.pipeline.store import DONE, find_run
 
     opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))

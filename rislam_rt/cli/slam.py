@@ -59,7 +59,7 @@ def command(
 
     from rislam_rt.pipeline import load_spec
     from rislam_rt.pipeline.own import localise, read_inputs, run_rng
-    from rislam_rt.pipeline.spec import build_radio
+    from rislam_rt.pipeline.radio import build_radio
 
     spec = load_spec(config, set_ or ())
     prior = None if start is None else _prior(start, velocity, spec.start.position_std_m, spec.start.velocity_std_m_s)

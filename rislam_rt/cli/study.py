@@ -31,8 +31,8 @@ def run_compare_channels(spec: "CompareSpec", given: Given) -> None:
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.errors import ConfigError
+    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.spec import build_radio
     from rislam_rt.pipeline.studies.compare import comparison_table, run_comparison
     from rislam_rt.pipeline.studies.spec import study_record
     from rislam_rt.report.study import write_comparison
@@ -65,8 +65,8 @@ def run_gain_curves(spec: "Fig4aSpec", given: Given) -> None:
 
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene, scene_of
+    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.spec import build_radio
     from rislam_rt.pipeline.studies.fig4a import check_fig4a, run_fig4a
     from rislam_rt.pipeline.studies.spec import study_record
     from rislam_rt.report.fig4a import fig4a_table, verdict

@@ -9,14 +9,14 @@ import typer
 from rislam_rt.cli.options import ChannelName, Depth, JsonFile, SceneFolder, write_json
 
 if TYPE_CHECKING:
-    from rislam_rt.model import Paths, Scene
+    from rislam_rt.model import Paths, RadioConfig, Scene
 
 SignalSettings = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="With --signals: seed, code (focused, random, zero), radio.* and receiver.* as in a pipeline; repeatable.",
+        help="radio.* as in a pipeline; with --signals seed, code (focused, random, zero), receiver.* too; repeatable.",
     ),
 ]
 
@@ -61,8 +61,7 @@ def command(
     Example: rislam-rt trace paper_room --stride 50 --deepmimo scenarios/paper_room
     """
     from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.errors import ConfigError
-    from rislam_rt.model import RadioConfig
+    from rislam_rt.pipeline.read import load_radio
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.signals import load_signals_spec, signal_settings
     from rislam_rt.report.deepmimo import deepmimo_files
@@ -70,9 +69,7 @@ def command(
     from rislam_rt.scene.names import safe_name
     from rislam_rt.scene.write import write_files
 
-    if set_ and not signals:
-        raise ConfigError(f"--set {set_[0][:60]}: settings are for --signals; add it, or leave them out")
-    radio = signal_settings(load_signals_spec(set_ or ()))[0] if signals else RadioConfig()
+    radio = signal_settings(load_signals_spec(set_ or ()))[0] if signals else load_radio(set_ or ())
     opened = open_scene(scene, radio)
     room = thinned(opened.scene, cycles, stride)
     if deepmimo is not None:
@@ -84,7 +81,7 @@ def command(
         )
     else:
         opened.warn()
-        traced = trace_paths(room, channel, depth, out)
+        traced = trace_paths(room, radio, channel, depth, out)
     if deepmimo is not None:
         traced.content.setdefault("files", {})["deepmimo"] = str(deepmimo)
         write_files(deepmimo_files(room, traced.paths, radio, depth), deepmimo)
@@ -132,16 +129,15 @@ def thinned(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
     return replace(scene, agent=agent)
 
 
-def trace_paths(scene: "Scene", channel: str, depth: int, file: Path | None) -> Traced:
+def trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, file: Path | None) -> Traced:
     """All paths with the panel at level 0, written to a file if one is given."""
     from time import perf_counter
 
-    from rislam_rt.model import RadioConfig
     from rislam_rt.pipeline.dataset import paths_to_dataset, write_dataset
     from rislam_rt.pipeline.run import build_channel
 
     begin = perf_counter()
-    paths = build_channel(channel, scene, RadioConfig(), depth).paths(scene.agent)
+    paths = build_channel(channel, scene, radio, depth).paths(scene.agent)
     seconds = perf_counter() - begin
     if file is None:
         return Traced(paths, seconds, AT_REST, {})

@@ -24,8 +24,8 @@ def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
     from rislam_rt.cli.study import output_folder
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.files import write_atomic
+    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.spec import build_radio
     from rislam_rt.pipeline.studies.classifier.run import ALL, run_training
     from rislam_rt.pipeline.studies.spec import study_record
     from rislam_rt.report.classifier import (

@@ -130,8 +130,9 @@ def _dataset(values: dict[str, Any], radio: RadioConfig, config: ReceiverConfig)
             parts = {"_real": value.real, "_imag": value.imag}
         for suffix, part in parts.items():
             content[name + suffix] = (dims, part, {"units": unit, "long_name": meaning})
-    attributes = {f"radio_{key}": value for key, value in asdict(radio).items() if key != "array"}
-    attributes |= {f"array_{key}": value for key, value in asdict(radio.array).items()}
+    attributes = {f"radio_{key}": value for key, value in asdict(radio).items() if key not in ("array", "antennas")}
+    for part in ("array", "antennas"):
+        attributes |= {f"{part}_{key}": value for key, value in asdict(getattr(radio, part)).items()}
     # NetCDF attributes know numbers and text, not truth values.
     settings = {key: int(value) if isinstance(value, bool) else value for key, value in asdict(config).items()}
     attributes |= {f"receiver_{key}": value for key, value in settings.items()}

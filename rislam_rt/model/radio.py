@@ -7,6 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
+from rislam_rt.model.antennas import Antennas
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,11 +55,14 @@ class RadioConfig:
     """Bandwidth of the flat band [Hz]."""
     tx_gain: float = 1.0
     rx_gain: float = 1.0
+    """Of either antenna, in all directions; times what `antennas` say of a direction."""
     energy: float = 1.0
     """E: energy of one sounding signal [J]."""
     noise_psd: float = 3.52e-11
     """N0: noise power spectral density [W/Hz]; by default the paper's sphere, 3 m away, has 13 dB over 16 antennas."""
     array: RxArray = field(default_factory=RxArray)
+    antennas: Antennas = field(default_factory=Antennas)
+    """Pattern and polarisation of either end; isotropic and vertical by default."""
 
     def __post_init__(self) -> None:
         for name in ("carrier", "bandwidth", "tx_gain", "rx_gain", "energy", "noise_psd"):

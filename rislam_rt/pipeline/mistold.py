@@ -44,6 +44,9 @@ class ToldSection(Section):
     """N0 as told less the true one."""
     gain_db: Decibel = 0.0
     """Transmit power and antenna gains as told less the true ones."""
+    antennas: Literal["", "iso"] = ""
+    """Antennas as told: `iso`, isotropic and vertical, whatever they are. Must be given where they are others, as no
+    estimator can be told of those."""
     std_scale: Positive = 1.0
     """Standard deviations of delays, cosines and amplitudes as reported over those that the receiver worked out."""
     threshold_db: Decibel = 0.0

@@ -9,6 +9,9 @@ from typing import Any, NamedTuple, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.model import RadioConfig
+from rislam_rt.pipeline.radio import RadioSection, build_radio
+from rislam_rt.pipeline.section import Section
 from rislam_rt.pipeline.spec import PipelineSpec, build_settings
 from rislam_rt.shipped import shipped_pipelines
 from rislam_rt.toml import MAX_LEVELS, parse_toml
@@ -42,6 +45,25 @@ def load_spec(path: str | Path, overrides: Sequence[str] = ()) -> PipelineSpec:
         The file cannot be read or is not TOML; a key is unknown, a value of the wrong type or out of range. One line.
     """
     return build_spec(read_table(path, overrides), PipelineSpec, build_settings)
+
+
+class RadioSpec(Section):
+    """What a command may set that knows no more of a pipeline than its radio."""
+
+    radio: RadioSection = RadioSection()
+
+
+def load_radio(overrides: Sequence[str]) -> RadioConfig:
+    """The usual radio, with `radio.key=value` settings put over it.
+
+    Raises
+    ------
+    ConfigError
+        A key is unknown, a value of the wrong type or out of range. One line.
+    """
+    if not overrides:
+        return RadioConfig()
+    return build_radio(build_spec(settings_table(overrides, {}), RadioSpec, lambda spec: build_radio(spec.radio)).radio)
 
 
 def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:

@@ -20,9 +20,10 @@ from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.extras import check_extras, trace_clutter
 from rislam_rt.pipeline.motion import draw_motion
 from rislam_rt.pipeline.own_methods import OwnChannel
+from rislam_rt.pipeline.radio import build_radio
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
-from rislam_rt.pipeline.spec import PipelineSpec, build_radio
+from rislam_rt.pipeline.spec import PipelineSpec
 from rislam_rt.pipeline.told import lean
 from rislam_rt.pipeline.walk import Walk
 from rislam_rt.pipeline.workers import run_side_by_side

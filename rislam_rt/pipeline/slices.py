@@ -27,10 +27,11 @@ from rislam_rt.pipeline.dataset import (
 )
 from rislam_rt.pipeline.extras import trace_clutter
 from rislam_rt.pipeline.join import join_paths, join_schemes, thinned_paths, thinned_scheme
+from rislam_rt.pipeline.radio import build_radio
 from rislam_rt.pipeline.record import given_to_dataset
 from rislam_rt.pipeline.run import Progress, build_channel
 from rislam_rt.pipeline.seeds import Seeds
-from rislam_rt.pipeline.spec import PipelineSpec, build_radio
+from rislam_rt.pipeline.spec import PipelineSpec
 from rislam_rt.pipeline.walk import Walk
 
 SLICE = 1000

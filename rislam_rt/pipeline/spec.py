@@ -8,14 +8,14 @@ from pydantic import AfterValidator, Field, create_model, model_validator
 
 from rislam_rt.design import DESIGNERS, DesignConfig
 from rislam_rt.errors import ConfigError
-from rislam_rt.measurement import HardwareConfig, ReceiverConfig, build_sensor, with_reference_snr
-from rislam_rt.model import RadioConfig, RxArray, SensorModel
+from rislam_rt.measurement import HardwareConfig, ReceiverConfig, build_sensor
+from rislam_rt.model import RadioConfig, SensorModel
 from rislam_rt.pipeline.extras import ExtrasSection
 from rislam_rt.pipeline.mistold import ToldSection
 from rislam_rt.pipeline.own_methods import is_own
+from rislam_rt.pipeline.radio import RadioSection, build_radio, linear
 from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
 from rislam_rt.pipeline.section import (
-    Carrier,
     Choices,
     Count,
     Decibel,
@@ -24,7 +24,6 @@ from rislam_rt.pipeline.section import (
     Positive,
     Probability,
     Section,
-    Side,
     Wide,
 )
 from rislam_rt.ris import PanelTolerance
@@ -85,45 +84,6 @@ SchemeName = Annotated[str, AfterValidator(check_scheme), Choices(SCHEMES)]
 ChannelName = Annotated[str, AfterValidator(_check_channel), Choices(CHANNELS)]
 
 
-class ArraySection(Section):
-    """The Rx array."""
-
-    rows: Side = 4
-    """Antennas along the body's x axis, forward."""
-    cols: Side = 4
-    """Antennas along the body's y axis."""
-    spacing_wavelengths: Positive = 0.5
-    """Between neighbours, in wavelengths of the carrier."""
-    pattern: Literal["upper", "isotropic"] = "upper"
-    """`upper` hears nothing from below the array's plane."""
-
-
-class RadioSection(Section):
-    """The radio. The noise is given by what it does to the paper's sphere at 3 m, or by its density."""
-
-    carrier_ghz: Carrier = 10.0
-    """Carrier frequency."""
-    bandwidth_ghz: Positive = 1.0
-    """Of a flat band; delays are resolved to its inverse."""
-    tx_gain_db: Decibel = 0.0
-    """Of the transmit antenna, the same in all directions."""
-    rx_gain_db: Decibel = 0.0
-    """Of each receive antenna, where its pattern hears."""
-    energy_j: Positive = 1.0
-    """Of one sounding; SNR follows from its ratio to the noise."""
-    reference_snr_db: Decibel | None = None
-    """SNR of the paper's sphere 3 m away, integrated over the signal and over all antennas; 13 if nothing is given."""
-    noise_psd: Positive | None = None
-    """N0 [W/Hz], instead."""
-    array: ArraySection = ArraySection()
-
-    @model_validator(mode="after")
-    def _one_noise(self) -> "RadioSection":
-        if self.reference_snr_db is not None and self.noise_psd is not None:
-            raise ValueError("give 'reference_snr_db' or 'noise_psd', not both")
-        return self
-
-
 class DesignerSection(_Designers):  # type: ignore[misc, valid-type]
     """A designer and its settings."""
 
@@ -147,7 +107,7 @@ class DesignSection(DesignerSection):
     @property
     def least_snr(self) -> float:
         """Linear; 0 if there is none."""
-        return 0.0 if self.least_snr_db is None else _linear(self.least_snr_db)
+        return 0.0 if self.least_snr_db is None else linear(self.least_snr_db)
 
 
 class BudgetSection(Section):
@@ -280,6 +240,17 @@ class PipelineSpec(Section):
             raise ValueError("schemes: each at most once")
         return self
 
+    @model_validator(mode="after")
+    def _antennas_told(self) -> "PipelineSpec":
+        if not self.radio.antennas.plain and not self.told.antennas:
+            raise ValueError(
+                "radio.tx_pattern, rx_pattern, *_polarization: others than isotropic and vertical ones received, which "
+                "no estimator can be told of; give told.antennas = 'iso' to have them reckon with isotropic ones"
+            )
+        if not self.radio.antennas.plain and self.extras.wanted:
+            raise ValueError("extras: traced between isotropic, vertical antennas alone; leave out [extras] or those")
+        return self
+
 
 ESTIMATOR_SECTIONS = ("bp_slam", "channel_slam")
 """Sections of the estimators that are not the project's own."""
@@ -350,29 +321,6 @@ def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> Hardw
     return hardware
 
 
-def build_radio(section: RadioSection) -> RadioConfig:
-    """The radio in SI units and linear ratios.
-
-    Raises
-    ------
-    ConfigError
-        A value is out of the range that the record itself checks.
-    """
-    array = RxArray(section.array.rows, section.array.cols, section.array.spacing_wavelengths, section.array.pattern)
-    radio = RadioConfig(
-        carrier=section.carrier_ghz * 1e9,
-        bandwidth=section.bandwidth_ghz * 1e9,
-        tx_gain=_linear(section.tx_gain_db),
-        rx_gain=_linear(section.rx_gain_db),
-        energy=section.energy_j,
-        array=array,
-        **({} if section.noise_psd is None else {"noise_psd": section.noise_psd}),
-    )
-    if section.noise_psd is None:
-        radio = with_reference_snr(radio, 13.0 if section.reference_snr_db is None else section.reference_snr_db)
-    return radio
-
-
 def build_design(section: DesignerSection) -> DesignConfig:
     """The designer's settings; no certificate, which takes longer than a cycle has.
 
@@ -382,7 +330,3 @@ def build_design(section: DesignerSection) -> DesignConfig:
         A value is out of the range that the record itself checks.
     """
     return DesignConfig(**{name: getattr(section, name) for name in _Designers.model_fields}, certify=False)
-
-
-def _linear(decibel: float) -> float:
-    return float(np.power(10.0, decibel / 10.0))

@@ -11,7 +11,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.model import Body, DataSheet, Measurement, Paths, RadioConfig, RisSpec, RisSpecs, Trajectory
+from rislam_rt.model import Antennas, Body, DataSheet, Measurement, Paths, RadioConfig, RisSpec, RisSpecs, Trajectory
 from rislam_rt.pipeline.mistold import ToldSection
 from rislam_rt.pipeline.spec import ESTIMATOR_SECTIONS, PipelineSpec, Settings, StartSection
 from rislam_rt.slam import StartPrior
@@ -120,11 +120,12 @@ def tell_settings(settings: Settings, told: ToldSection) -> Settings:
 
 
 def tell_radio(radio: RadioConfig, told: ToldSection) -> RadioConfig:
-    """Carrier, band and array as they are; noise and gains."""
+    """Carrier, band and array as they are; noise, gains and antennas."""
     return replace(
         radio,
         noise_psd=radio.noise_psd * _amplitude(told.noise_db) ** 2,
         tx_gain=radio.tx_gain * _amplitude(told.gain_db) ** 2,
+        antennas=Antennas() if told.antennas else radio.antennas,
     )
 
 

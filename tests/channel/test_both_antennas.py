@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from rislam_rt.channel.compare import compare_channels
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.image_source.antennas import amplitude
+from rislam_rt.channel.image_source.antennas import amplitude, peak_amplitude
 from rislam_rt.channel.traced import TracedChannel
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Antennas, Material, PathKind, RadioConfig
@@ -78,3 +79,21 @@ def test_a_sector_has_its_beam_ahead_and_half_its_power_at_the_edge():
     c, s = np.cos(2.0), np.sin(2.0)
     turned = ways @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
     np.testing.assert_allclose(20.0 * np.log10(amplitude("tr38901", turned, np.full(4, 2.0))), level, atol=1e-9)
+
+
+@pytest.mark.parametrize("antennas", [ENDS[0], ENDS[3]])
+@pytest.mark.parametrize("refine", [True, False])
+def test_the_comparison_takes_the_antennas_of_the_radio(rooms, antennas, refine):
+    """Errors are judged by what isotropic antennas of one polarisation would hear, times the peak gains."""
+    radio, rng = RadioConfig(antennas=antennas), np.random.default_rng(7)
+    report = compare_channels(rooms.paper(), radio, poses=3, depth=2, rng=rng, refine=refine)
+    assert report.passed
+    assert report.matched > 500
+
+
+def test_no_direction_is_stronger_than_the_peak():
+    rng = np.random.default_rng(1)
+    ways = unit(rng.standard_normal((2000, 3)))
+    for name in ("iso", "dipole", "hw_dipole", "tr38901"):
+        level = amplitude(name, ways, rng.uniform(0.0, 6.0, 2000)).max()
+        assert 0.9 < level / peak_amplitude(Antennas(name)) <= 1.0

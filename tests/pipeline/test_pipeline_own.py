@@ -12,7 +12,8 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.own import inputs_of, localise, read_inputs
-from rislam_rt.pipeline.spec import PipelineSpec, build_radio
+from rislam_rt.pipeline.radio import build_radio
+from rislam_rt.pipeline.spec import PipelineSpec
 from rislam_rt.pipeline.studies.unseen import Inputs, Recorder
 from rislam_rt.scene.write import tum_bytes
 from rislam_rt.shipped import find_pipeline

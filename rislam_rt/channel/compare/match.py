@@ -1,5 +1,6 @@
 """Matching by identity: kind, landmark and wall names on either leg; delays and columns' order play no part."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,10 +10,11 @@ from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, Certifier, I
 from rislam_rt.channel.compare.limits import Limits, Precision, coherent_scale, with_mirrors
 from rislam_rt.channel.compare.report import OneSided, PathReport
 from rislam_rt.channel.image_source import ImageSourceChannel
+from rislam_rt.channel.image_source.antennas import peak_amplitude
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import angle_between
-from rislam_rt.model import Paths, RadioConfig, Scene, Trajectory
+from rislam_rt.model import Antennas, Paths, RadioConfig, Scene, Trajectory
 
 
 class Columns(NamedTuple):
@@ -100,13 +102,14 @@ def _scale(
 ) -> Floats:
     """(M,) coherent scale of matched paths, given by cycle, analytic column and identity."""
     cycle, column, path = matched
-    mirrors = with_mirrors(precision.scene)
-    if mirrors is None or len(path) == 0:
+    mirrors, antennas = with_mirrors(precision.scene), precision.radio.antennas
+    if (mirrors is None and antennas.plain) or len(path) == 0:
         return coherent_scale(analytic, cycle, column, trajectory, precision)
-    unit = ImageSourceChannel(mirrors, precision.radio, analytic.tx_walls.shape[1]).paths(trajectory)
+    radio = replace(precision.radio, antennas=Antennas())
+    unit = ImageSourceChannel(mirrors or precision.scene, radio, analytic.tx_walls.shape[1]).paths(trajectory)
     place = {named_identity(unit, p): p for p in range(unit.num_paths)}
     columns = np.array([place.get(i, -1) for i in identity], dtype=np.int64)[path]
-    return coherent_scale(unit, cycle, columns, trajectory, precision)
+    return peak_amplitude(antennas) * coherent_scale(unit, cycle, columns, trajectory, precision)
 
 
 def _align(traced: Paths, analytic: Paths) -> Columns:

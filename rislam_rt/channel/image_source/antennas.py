@@ -6,6 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.channel.image_source.fresnel import Coatings, polarisation_basis
+from rislam_rt.model import Antennas
 
 SHORT, HALF_WAVE = 1.5, 1.643
 """Directivities of a short and of a half-wave dipole (Balanis, Antenna Theory, eq. 4-26a and 4-84)."""
@@ -43,6 +44,12 @@ def radiated(pattern: str, polarization: str, direction: Floats, heading: Floats
     level = amplitude(pattern, direction, heading)
     nothing = np.zeros_like(level)
     return np.stack([level, nothing] if polarization == "V" else [nothing, level], axis=-1)
+
+
+def peak_amplitude(antennas: Antennas) -> float:
+    """What either end's pattern makes of a path at most: all of them are strongest ahead."""
+    ahead, heading = np.array([[1.0, 0.0, 0.0]]), np.zeros(1)
+    return float(amplitude(antennas.tx, ahead, heading)[0] * amplitude(antennas.rx, ahead, heading)[0])
 
 
 def amplitude(pattern: str, direction: Floats, heading: Floats) -> Floats:

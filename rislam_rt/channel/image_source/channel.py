@@ -15,8 +15,6 @@ from rislam_rt.errors import ConfigError, expect
 from rislam_rt.model import Antennas, Paths, RadioConfig, RisCode, Scene, Trajectory
 from rislam_rt.ris import rephase
 
-_PLAIN = Antennas()
-
 
 @dataclass(frozen=True, eq=False)
 class ImageSourceChannel:
@@ -38,8 +36,8 @@ class ImageSourceChannel:
     radio: RadioConfig
     depth: int = 2
     search: str = "auto"
-    antennas: Antennas = _PLAIN
-    """Patterns and polarisation of the agent's antennas; by default both are isotropic and vertical."""
+    antennas: Antennas | None = None
+    """Patterns and polarisation of the agent's antennas, if they are others than the radio's."""
     walls: Walls = field(init=False)
     facets: Facets = field(init=False)
     coatings: Coatings = field(init=False)
@@ -62,7 +60,7 @@ class ImageSourceChannel:
         """Every path of every cycle, with the panel at level 0."""
         expect("trajectory", trajectory, Trajectory)
         tx, rx = trajectory.tx, trajectory.rx
-        ends = self.antennas
+        ends = self.antennas or self.radio.antennas
         at = {
             end: None if ends.plain else Terminals(*pair, trajectory.heading)
             for end, pair in (

@@ -22,8 +22,6 @@ from rislam_rt.ris import rephase
 BLOCK_ROWS = 200_000
 """Candidates traced at once: bounds the memory of a solve."""
 
-_ISOTROPIC = Antennas()
-
 
 class TracedChannel:
     """All paths of a room over a trajectory, traced with Sionna RT on the room's meshes.
@@ -41,13 +39,13 @@ class TracedChannel:
         computed on the refined points in either case).
 
     antennas
-        Patterns and polarisation of the agent's antennas; by default both are isotropic and vertical.
+        Patterns and polarisation of the agent's antennas, if they are others than the radio's.
 
     The channel holds the tracer's scene; `paths` may be called for any number of trajectories.
     """
 
     def __init__(
-        self, scene: Scene, radio: RadioConfig, depth: int = 2, *, refine: bool = True, antennas: Antennas = _ISOTROPIC
+        self, scene: Scene, radio: RadioConfig, depth: int = 2, *, refine: bool = True, antennas: Antennas | None = None
     ) -> None:
         expect("scene", scene, Scene)
         expect("radio", radio, RadioConfig)
@@ -61,7 +59,7 @@ class TracedChannel:
         self.radio = radio
         self.depth = depth
         self.refine = refine
-        self.antennas = antennas
+        self.antennas = antennas or radio.antennas
         self.walls = build_walls(scene)
         self._sides = wall_sides(self.walls)
         shades = {n: s.shade.triangles for n, s in enumerate(scene.scatterers) if s.shade is not None}

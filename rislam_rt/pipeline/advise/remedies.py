@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.channel.image_source.antennas import amplitude
 from rislam_rt.design import exact_code
+from rislam_rt.geometry.angles import unit
 from rislam_rt.model import RisPanel, RisSpec
 from rislam_rt.pipeline.advise.budget import Link, Survey
 from rislam_rt.pipeline.advise.reasons import WEAK
@@ -125,10 +127,14 @@ def _way_round(why: str) -> str:
 def _margins(looked: Survey, panel: RisPanel, spec: RisSpec) -> Floats:
     """(K,) SNR over the threshold [dB] of the direct path under the best code, as if nothing were in its way."""
     radio, agent = looked.settings.radio, looked.scene.agent
+    ends, patterns = ((agent.tx, radio.tx_gain), (agent.rx, radio.rx_gain)), (radio.antennas.tx, radio.antennas.rx)
     tx, rx = (
-        leg_response(spec, panel.center, end, np.sqrt(np.full(len(end), gain, dtype=np.complex128)), radio.wavelength)
-        for end, gain in ((agent.tx, radio.tx_gain), (agent.rx, radio.rx_gain))
-    )
+        leg_response(
+            spec, panel.center, end, np.sqrt(gain) * amplitude(pattern, unit(panel.center - end), agent.heading) + 0j,
+            radio.wavelength,
+        )
+        for (end, gain), pattern in zip(ends, patterns, strict=True)
+    )  # fmt: skip
     _, gain = exact_code((tx * rx).reshape(len(agent), -1), spec.levels)
     snr = radio.integrated_snr(gain) / looked.settings.sensor.threshold
     return np.asarray(10.0 * np.log10(np.maximum(snr, 1e-40)))

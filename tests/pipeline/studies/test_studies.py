@@ -13,7 +13,7 @@ from rislam_rt.cli import main
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.pipeline import PipelineSpec, load_spec
-from rislam_rt.pipeline.spec import build_radio
+from rislam_rt.pipeline.radio import build_radio
 from rislam_rt.pipeline.studies import CompareSpec, Fig4aSpec, load_any
 from rislam_rt.pipeline.studies.compare import run_comparison
 from rislam_rt.pipeline.studies.fig4a import longer_side, run_fig4a, sphere_gain, walk_to_panel

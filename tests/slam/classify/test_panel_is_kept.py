@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.model import PathKind
-from rislam_rt.pipeline.spec import build_radio
+from rislam_rt.pipeline.radio import build_radio
 from rislam_rt.pipeline.studies import load_any
 from rislam_rt.pipeline.studies.classifier.codes import AIMED
 from rislam_rt.pipeline.studies.classifier.score import panel_dropped, right_by_class, rules

@@ -5,8 +5,9 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rislam_rt.measurement import ReceiverConfig
+from rislam_rt.pipeline.radio import RadioSection
 from rislam_rt.pipeline.section import Count, Positive, Section
-from rislam_rt.pipeline.spec import RadioSection, ReceiverSection
+from rislam_rt.pipeline.spec import ReceiverSection
 from rislam_rt.pipeline.studies.spec import RoomSection, StudySpec
 from rislam_rt.scene.random_rooms import CYCLES
 
@@ -85,4 +86,6 @@ class ClassifierSpec(StudySpec):
             raise ValueError("rooms: each scene at most once")
         if self.snr_high_db < self.snr_low_db:
             raise ValueError("snr_high_db: below snr_low_db")
+        if not self.radio.antennas.plain:
+            raise ValueError("radio: the classifier reckons with isotropic, vertical antennas; leave out the others")
         return self
