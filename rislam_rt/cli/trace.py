@@ -61,6 +61,7 @@ def command(
     Example: rislam-rt trace paper_room --stride 50 --deepmimo scenarios/paper_room
     """
     from rislam_rt.cli.scenes import open_scene
+    from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.read import load_radio
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.signals import load_signals_spec, signal_settings
@@ -69,6 +70,9 @@ def command(
     from rislam_rt.scene.names import safe_name
     from rislam_rt.scene.write import write_files
 
+    beyond = [word for word in set_ or () if not signals and not word.startswith("radio.")]
+    if beyond:
+        raise ConfigError(f"--set {beyond[0][:60]}: without --signals radio.* alone; add it, or leave this out")
     radio = signal_settings(load_signals_spec(set_ or ()))[0] if signals else load_radio(set_ or ())
     opened = open_scene(scene, radio)
     room = thinned(opened.scene, cycles, stride)

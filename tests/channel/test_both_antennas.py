@@ -81,7 +81,7 @@ def test_a_sector_has_its_beam_ahead_and_half_its_power_at_the_edge():
     np.testing.assert_allclose(20.0 * np.log10(amplitude("tr38901", turned, np.full(4, 2.0))), level, atol=1e-9)
 
 
-@pytest.mark.parametrize("antennas", [ENDS[0], ENDS[3]])
+@pytest.mark.parametrize("antennas", [ENDS[0], ENDS[3], Antennas("hw_dipole")])
 @pytest.mark.parametrize("refine", [True, False])
 def test_the_comparison_takes_the_antennas_of_the_radio(rooms, antennas, refine):
     """Errors are judged by what isotropic antennas of one polarisation would hear, times the peak gains."""

@@ -114,7 +114,8 @@ def test_code_focuses_on_the_agent(run, tmp_path):
     ("options", "told"),
     [
         (("--signals", "--cycles", 601), "--cycles: 601"),
-        (("--set", "radio.bandwidth_ghz=2"), "--signals"),
+        (("--set", "receiver.alternation=true"), "--signals"),
+        (("--set", "radio.tx_pattern=yagi"), "radio.tx_pattern"),
         (("--signals", "--set", "receiver.estimator=bound"), "receiver.estimator"),
         (("--signals", "--set", "radio.bandwith_ghz=2"), "bandwidth_ghz"),
         (("--signals", "--set", "design.method=exact"), "design"),

@@ -120,7 +120,7 @@ class Precision:
         angle = np.minimum(_ratio(ends, shape.at_device) + 8.0 * self.roundoff, np.pi)
         turn = _ratio(beside, shape.at_landmark) + 8.0 * self.roundoff
         gain = self._field(shape) + _ratio(leg_length, shape.length).sum(axis=1)
-        gain += self._landmark(paths, cycle, path, trajectory, turn)
+        gain += self._landmark(paths, cycle, path, trajectory, turn) + self._patterns(paths, cycle, path)
         share = np.minimum(gain * scale / np.maximum(np.abs(paths.gain[cycle, path]), np.finfo(np.float64).tiny), 1.0)
         phase = 2.0 * np.pi / self.radio.wavelength * length + np.where(share < 1.0, np.arcsin(share), np.pi)
         return Limits(length, gain, np.minimum(phase, np.pi), angle[:, 0], angle[:, 1])
@@ -130,6 +130,15 @@ class Precision:
         error = np.full(len(shape.length), 4.0 * FIELD_STEPS * SINGLE)
         for walls in shape.walls:
             error += np.where(walls >= 0, self.field[walls], 0.0).sum(axis=1)
+        return error
+
+    def _patterns(self, paths: Paths, cycle: Integers, path: Integers) -> Floats:
+        """(M,) what the antennas' patterns may be off: a half-wave dipole's is a difference over the sine to its axis."""
+        error, antennas = np.zeros(len(path)), self.radio.antennas
+        for pattern, ray in ((antennas.tx, paths.departure), (antennas.rx, paths.arrival)):
+            if pattern == "hw_dipole":
+                sine = np.linalg.norm(ray[cycle, path, :2], axis=-1)
+                error += np.minimum(_ratio(np.full(len(path), 0.5 * np.pi * FIELD_STEPS * SINGLE), sine), 1.0)
         return error
 
     def _landmark(self, paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, turn: Floats) -> Floats:
