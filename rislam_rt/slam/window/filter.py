@@ -8,6 +8,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los, stranger_density
+from rislam_rt.slam.returns import TX
 from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window import gauss, motion, tracks
 from rislam_rt.slam.window.births import births
@@ -105,13 +106,13 @@ def step(
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(LEVELS.stay))))
 
     log = append(state.log, glance, state.cycle, state.cycle - state.window.num_poses + 1)
-    log = _explain(log, expected, groups, book, scatter, row, pick, len(glance.seen))
+    # wall returns that are thrown away are known for what they are, and move nothing
+    used = np.ones(len(row), dtype=np.bool_) if config.use_vt else expected.forms[groups.leader[row], 0] != TX
+    log = _explain(log, expected, groups, book, scatter, row[used], pick[used], len(glance.seen))
     state = state._replace(log=log)
     state, left, nis = _solve(state)
-    raw = np.zeros(len(row))
-    if len(row):
-        at = np.searchsorted(left.row, len(log.cycle) - len(glance.seen) + pick)
-        raw = np.mean(left.left[at] ** 2 * (1.0 + log.extra[left.row[at]] / log.std[left.row[at]] ** 2), axis=1)
+    raw = scatter[groups.leader[row]]
+    raw[used] = _squares(left, log, len(log.cycle) - len(glance.seen) + pick[used])
 
     taken = np.zeros(len(glance.seen), dtype=np.bool_)
     taken[pick] = True
@@ -124,7 +125,7 @@ def step(
         state.sights, book, state.window, expected, groups, shows, row, pick, raw, glance, poses, scene, code
     )
     state = state._replace(sights=sights, book=book)
-    landmark[free[pick]] = _names(state.book, expected, groups, row)
+    landmark[free[pick]] = np.where(used, _names(state.book, expected, groups, row), REMOVED)
 
     context = Context(
         state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle, state.sights, state.codes
@@ -244,6 +245,14 @@ def _explain(
     shares[at], extra[at] = np.where(both, share, 0.0), groups.disturbance[row] + variance[:, None] * gap**2
     extra[at] += LEVELS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
     return log._replace(form=form, share=shares, extra=extra)
+
+
+def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:
+    """Mean squares (A,) of the residuals of some explained rows of the log, in reported deviations."""
+    if not len(rows):
+        return np.zeros(0)
+    at = np.searchsorted(left.row, rows)
+    return np.asarray(np.mean(left.left[at] ** 2 * (1.0 + log.extra[rows] / log.std[rows] ** 2), axis=1))
 
 
 def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
