@@ -6,6 +6,9 @@ their prior singular):
 
     p_k = p_0 + t_k v_0 + sum_{i < k} (T_i^2 / 2 + T_i (t_k - t_{i+1})) a_i .
 
+Where the heading is not known either, each step has a rate of turn, likewise constant over it; and an agent that looks
+where it goes does not slip sideways, but for a little (`course`).
+
 Unknowns: the head (first position, its velocity, offset of the compass; then the features, three numbers each) and
 the accelerations. All of them live in vector spaces, so that no manifold is needed. What left the window stands as a
 quadratic on the head (`prior`); each cycle inside it as a quadratic on its own pose and the features (`slots`), which
@@ -22,6 +25,10 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 
 HEAD = 7
 """Numbers of the head before the features: position, velocity, offset of the compass."""
+TURN = 3
+"""Axis of the rate of turn, after those of the room."""
+SLIP = 0.01
+"""Standard deviation [m/s] of the velocity sideways, of an agent that looks where it goes."""
 POSE = 4
 """Numbers of a pose that measurements depend on: position, offset of the compass."""
 
@@ -70,13 +77,13 @@ class Window(NamedTuple):
     head: Floats
     """(7 + 3F,)."""
     accel: Floats
-    """(K - 1, A) [m/s^2] over the steps between the poses, along the axes that move freely."""
+    """(K - 1, A) [m/s^2] over the steps between the poses, along the axes that move freely; of `TURN`, rates [rad/s]."""
     precision: Floats
     """(K - 1, A) [s^4/m^2] of each acceleration's prior (see `motion`)."""
     step: Floats
     """(K - 1,) [s]."""
     axes: Integers
-    """(A,) axes that move freely."""
+    """(A,) axes that move freely; `TURN` where the heading does."""
     prior: Quadratic
     """On the head."""
     slots: Quadratic
@@ -84,6 +91,8 @@ class Window(NamedTuple):
     covariance: Floats
     """(D, D) of head and accelerations, at the last solution."""
     holds: Holds
+    course: float = np.nan
+    """[rad] heading that offsets are against, of an agent that looks where it goes."""
 
     @property
     def num_poses(self) -> int:
@@ -96,7 +105,7 @@ class Window(NamedTuple):
         return self.head[HEAD:].reshape(-1, 3)
 
 
-def begin(position: Floats, velocity: Floats, axes: Integers, std: Floats) -> Window:
+def begin(position: Floats, velocity: Floats, axes: Integers, std: Floats, course: float = np.nan) -> Window:
     """One pose, no features; `std` (7,) of the head's numbers, 0 for what is held."""
     head = np.concatenate([position, velocity, [0.0]])
     information = np.diag(np.maximum(std, 1e-6) ** -2.0)
@@ -113,6 +122,7 @@ def begin(position: Floats, velocity: Floats, axes: Integers, std: Floats) -> Wi
         slots,
         np.diag(np.maximum(std, 1e-6) ** 2),
         no_holds(),
+        course,
     )
 
 
@@ -125,9 +135,10 @@ def pose_design(step: Floats, axes: Integers) -> Floats:
         design[:, axis, axis], design[:, axis, 3 + axis] = 1.0, time
     design[:, 3, 6] = 1.0
     lag = time[:, None] - time[1:]
-    reach = np.where(np.arange(count)[:, None] > np.arange(len(step)), 0.5 * step**2 + step * lag, 0.0)
+    after = np.arange(count)[:, None] > np.arange(len(step))
+    reach = np.where(after, 0.5 * step**2 + step * lag, 0.0)
     for place, axis in enumerate(axes):
-        design[:, axis, HEAD + place :: free] = reach
+        design[:, axis, HEAD + place :: free] = np.where(after, step, 0.0) if axis == TURN else reach
     return design
 
 
@@ -138,11 +149,14 @@ def poses(window: Window) -> Floats:
 
 
 def velocity_design(window: Window) -> Floats:
-    """(3, 7 + (K - 1) A): the last velocity as a linear function of the motion's numbers."""
-    design = np.zeros((3, HEAD + window.accel.size))
-    design[:, 3:6] = np.eye(3)
+    """(K, 3, 7 + (K - 1) A): velocities as a linear function of the motion's numbers."""
+    count = window.num_poses
+    design = np.zeros((count, 3, HEAD + window.accel.size))
+    design[:, :, 3:6] = np.eye(3)
+    after = np.where(np.arange(count)[:, None] > np.arange(count - 1), window.step, 0.0)
     for place, axis in enumerate(window.axes):
-        design[axis, HEAD + place :: len(window.axes)] = window.step
+        if axis != TURN:
+            design[:, axis, HEAD + place :: len(window.axes)] = after
     return design
 
 
@@ -153,8 +167,7 @@ def now(window: Window) -> tuple[Floats, Floats]:
     design = np.zeros((size, total))
     motion = np.concatenate([np.arange(count), np.arange(size, total)])
     last = pose_design(window.step, window.axes)[-1]
-    design[:3, motion], design[3:6, motion] = last[:3], velocity_design(window)
-    design[6, 6] = 1.0
+    design[:3, motion], design[3:6, motion], design[6, motion] = last[:3], velocity_design(window)[-1], last[3]
     design[HEAD:size, HEAD:size] = np.eye(size - HEAD)
     mean = design @ np.concatenate([window.head, window.accel.ravel()])
     return mean, design @ window.covariance @ design.T
@@ -188,26 +201,38 @@ def slide(window: Window) -> Window:
     oldest = Quadratic(*(field[0] for field in window.slots))
     hessian[np.ix_(first, first)] += oldest.hessian
     gradient[first] += oldest.slope(window.head[first])
+    if np.isfinite(window.course):
+        slip, by_head = _slip(window, window.head[None, 3:6], window.head[6:7], np.eye(HEAD)[None, 3:7])
+        hessian[:HEAD, :HEAD] += by_head.T @ by_head
+        gradient[:HEAD] += by_head.T @ slip
     # the next pose and the acceleration in between, instead of the oldest pose
     dt, accel = window.step[0], window.accel[0]
     change = np.eye(size, size + free)
     change[:3, 3:6] = -dt * np.eye(3)
     for place, axis in enumerate(window.axes):
-        change[axis, size + place], change[3 + axis, size + place] = 0.5 * dt**2, -dt
+        if axis == TURN:
+            change[6, size + place] = -dt
+        else:
+            change[axis, size + place], change[3 + axis, size + place] = 0.5 * dt**2, -dt
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
     steep[size:] += window.precision[0] * accel
     gain = np.linalg.solve(wide[size:, size:], wide[size:, :size]).T
     head = window.head.copy()
     head[:3] += dt * head[3:6]
-    head[window.axes] += 0.5 * dt**2 * accel
-    head[3 + window.axes] += dt * accel
+    moves = window.axes != TURN
+    head[window.axes[moves]] += 0.5 * dt**2 * accel[moves]
+    head[3 + window.axes[moves]] += dt * accel[moves]
+    head[6] += dt * accel[~moves].sum()
     left = wide[:size, :size] - gain @ wide[size:, :size]
     prior = Quadratic(0.5 * (left + left.T), steep[:size] - gain @ steep[size:], head)
     back = np.eye(size + window.accel.size)
     back[:3, 3:6] = dt * np.eye(3)
     for place, axis in enumerate(window.axes):
-        back[axis, size + place], back[3 + axis, size + place] = 0.5 * dt**2, dt
+        if axis == TURN:
+            back[6, size + place] = dt
+        else:
+            back[axis, size + place], back[3 + axis, size + place] = 0.5 * dt**2, dt
     covariance = back @ window.covariance @ back.T
     kept = np.concatenate([np.arange(size), np.arange(size + free, len(covariance))])
     return window._replace(
@@ -241,6 +266,12 @@ def solve(window: Window) -> Window:
     gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
     hessian[:size, :size] += window.prior.hessian
     gradient[:size] += window.prior.slope(window.head)
+    if np.isfinite(window.course):
+        speed = velocity_design(window)
+        state = np.concatenate([window.head[:HEAD], window.accel.ravel()])
+        slip, by_motion = _slip(window, speed @ state, place[:, 3], np.concatenate([speed, design[:, 3:]], axis=1))
+        hessian[np.ix_(motion, motion)] += by_motion.T @ by_motion
+        gradient[motion] += by_motion.T @ slip
     for feature, pull, information in zip(*_pulls(window), strict=True):
         own = slice(HEAD + 3 * feature, HEAD + 3 * feature + 3)
         hessian[own, own] += information
@@ -256,6 +287,15 @@ def solve(window: Window) -> Window:
         accel=window.accel + change[size:].reshape(window.accel.shape),
         covariance=covariance,
     )
+
+
+def _slip(window: Window, velocity: Floats, offset: Floats, design: Floats) -> tuple[Floats, Floats]:
+    """Velocity (K, 3) sideways of heading, in its deviations (K,), and its derivatives (K, D); the velocity and the
+    offset (K,) of the heading are `design` (K, 4, D) times the unknowns."""
+    cos, sin = np.cos(window.course + offset), np.sin(window.course + offset)
+    sideways, ahead = np.stack([-sin, cos], axis=1), np.vecdot(velocity[:, :2], np.stack([cos, sin], axis=1))
+    slope = np.vecdot(design[:, :2], sideways[..., None], axis=1) - ahead[:, None] * design[:, 3]
+    return np.vecdot(velocity[:, :2], sideways) / SLIP, slope / SLIP
 
 
 def _pulls(window: Window) -> tuple[Integers, Floats, Floats]:

@@ -2,6 +2,7 @@
 
 Known walls are affine maps here. What is sought is a wall `w` (as image of the agent's place), with the Tx's image
 `m = S_out R_w(S_in x + t_in) + t_out`, or a point `p`, seen by the Rx at `S_r p + t_r` and by the Tx at `S_t p + t_t`.
+With `S_in = 0` the wall mirrors a known point `t_in`, which the Tx sees as it is.
 What two unknown walls throw together is `m = S_in x + d`, the shift `d` being sought: opposite walls turn nothing, at
 right angles they turn by half a turn about their edge.
 """
@@ -44,6 +45,8 @@ class Trials(NamedTuple):
     """(H,) whether it comes out as one with what a known wall makes of it (`beyond`), at an unknown share between."""
     beyond: Floats
     """(H, 3, 4) turn and shift of that wall."""
+    fixed: Booleans
+    """(H,) whether the wall mirrors a known point, which is `shift[:, 0]`, and not the Tx; on the leg to the Rx."""
 
 
 class Fits(NamedTuple):
@@ -144,7 +147,7 @@ def _equations(
     by_image = _by_image(arrival, reach)
     # the point's leg to the Tx
     far = place[:, None, :] @ np.swapaxes(first, 1, 2) + shift[:, None, 0]
-    to_tx = np.where(moving[:, None, None], 0.0, far - tx)
+    to_tx = np.where((moving & ~trials.fixed[rows])[:, None, None], 0.0, far - tx)
     leg = np.sqrt(np.vecdot(to_tx, to_tx))
     toward = to_tx / np.maximum(leg, 1e-6)[..., None]
     seen = np.concatenate([(reach + leg)[..., None], cosines], axis=-1)
