@@ -62,22 +62,17 @@ def init(
 ) -> WindowState:  # fmt: skip
     """The start prior, and an empty map."""
     free = np.array([1.0, 1.0, float(config.height == "estimated")])
-    heading, doubt, course = start.heading, 0.0, np.nan
-    if config.heading == "estimated":
-        doubt = start.heading_std
-    elif config.heading == "velocity":
-        heading = course = float(np.arctan2(start.velocity[1], start.velocity[0]))
-        doubt = np.pi
+    doubt = start.heading_std if config.heading == "estimated" else 0.0
     axes = np.arange(3) if config.heading == "known" else np.append(np.arange(3), gauss.TURN)
     std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [doubt]])
-    window = gauss.begin(start.position, start.velocity, axes, std, course)
+    window = gauss.begin(start.position, start.velocity, axes, std)
     scene = Scene(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
     lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if gauss.TURN in axes else ()))
     gait = np.stack([motion.first_gait(level) for level in lively])
     return WindowState(
         0, config, window, empty_book(), empty_log(), tracks.no_tracks(), no_sights(), gait, gait,
-        np.array([heading]), start.position_std * free, scene, 0.0, (None,), np.zeros((0, 3)),
+        np.array([start.heading]), start.position_std * free, scene, 0.0, (None,), np.zeros((0, 3)),
     )  # fmt: skip
 
 
@@ -155,7 +150,8 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = gauss.slide(window), headings[1:]
     level = state.level @ motion.transition(LEVELS.stay)
-    window = gauss.extend(window, dt, motion.expected_precision(level)[COLUMNS[: len(window.axes)]])
+    columns = COLUMNS[: len(window.axes)]
+    window = gauss.extend(window, dt, np.array([motion.prior_precision(level[group], group == 2) for group in columns]))
     return state._replace(window=window, gait=gait, heading=np.append(headings, heading), passed=passed)
 
 
@@ -274,7 +270,8 @@ def liven(state: WindowState) -> WindowState:
     if not len(window.accel):
         return state
     found = _liveliness(window, state.gait)
-    fresh = np.stack([motion.expected_precision(found[group][0]) for group in COLUMNS[: len(window.axes)]], axis=1)
+    columns = COLUMNS[: len(window.axes)]
+    fresh = np.stack([motion.prior_precision(found[group][0], group == 2) for group in columns], axis=1)
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
     level = np.stack([filtered[-1] for _, filtered in found])
@@ -303,6 +300,8 @@ def _follow(
     spare = np.setdiff1d(free, picks)
     reach = np.maximum(glance.seen[spare, 0], 0.5)
     rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * (speed + 0.05)
+    if len(state.level) > 2:  # what turns without a compass turns all that it sees
+        rate[:, 1:] += np.sqrt(motion.expected_variance(state.level[2]))
     found, fresh = tracks.start(found, glance, spare, rate, state.cycle)
     base = len(state.log.cycle) - len(glance.seen)
     track = state.log.track.copy()

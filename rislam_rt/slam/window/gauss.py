@@ -6,8 +6,7 @@ their prior singular):
 
     p_k = p_0 + t_k v_0 + sum_{i < k} (T_i^2 / 2 + T_i (t_k - t_{i+1})) a_i .
 
-Where the heading is not known either, each step has a rate of turn, likewise constant over it; and an agent that looks
-where it goes does not slip sideways, but for a little (`course`).
+Where the heading is not known either, each step has a rate of turn, likewise constant over it.
 
 Unknowns: the head (first position, its velocity, offset of the compass; then the features, three numbers each) and
 the accelerations. All of them live in vector spaces, so that no manifold is needed. What left the window stands as a
@@ -27,8 +26,6 @@ HEAD = 7
 """Numbers of the head before the features: position, velocity, offset of the compass."""
 TURN = 3
 """Axis of the rate of turn, after those of the room."""
-SLIP = 0.01
-"""Standard deviation [m/s] of the velocity sideways, of an agent that looks where it goes."""
 POSE = 4
 """Numbers of a pose that measurements depend on: position, offset of the compass."""
 
@@ -77,7 +74,7 @@ class Window(NamedTuple):
     head: Floats
     """(7 + 3F,)."""
     accel: Floats
-    """(K - 1, A) [m/s^2] over the steps between the poses, along the axes that move freely; of `TURN`, rates [rad/s]."""
+    """(K - 1, A) [m/s^2] over the steps between the poses, along the free axes; of `TURN`, rates [rad/s]."""
     precision: Floats
     """(K - 1, A) [s^4/m^2] of each acceleration's prior (see `motion`)."""
     step: Floats
@@ -91,8 +88,6 @@ class Window(NamedTuple):
     covariance: Floats
     """(D, D) of head and accelerations, at the last solution."""
     holds: Holds
-    course: float = np.nan
-    """[rad] heading that offsets are against, of an agent that looks where it goes."""
 
     @property
     def num_poses(self) -> int:
@@ -105,7 +100,7 @@ class Window(NamedTuple):
         return self.head[HEAD:].reshape(-1, 3)
 
 
-def begin(position: Floats, velocity: Floats, axes: Integers, std: Floats, course: float = np.nan) -> Window:
+def begin(position: Floats, velocity: Floats, axes: Integers, std: Floats) -> Window:
     """One pose, no features; `std` (7,) of the head's numbers, 0 for what is held."""
     head = np.concatenate([position, velocity, [0.0]])
     information = np.diag(np.maximum(std, 1e-6) ** -2.0)
@@ -122,7 +117,6 @@ def begin(position: Floats, velocity: Floats, axes: Integers, std: Floats, cours
         slots,
         np.diag(np.maximum(std, 1e-6) ** 2),
         no_holds(),
-        course,
     )
 
 
@@ -149,14 +143,12 @@ def poses(window: Window) -> Floats:
 
 
 def velocity_design(window: Window) -> Floats:
-    """(K, 3, 7 + (K - 1) A): velocities as a linear function of the motion's numbers."""
-    count = window.num_poses
-    design = np.zeros((count, 3, HEAD + window.accel.size))
-    design[:, :, 3:6] = np.eye(3)
-    after = np.where(np.arange(count)[:, None] > np.arange(count - 1), window.step, 0.0)
+    """(3, 7 + (K - 1) A): the last velocity as a linear function of the motion's numbers."""
+    design = np.zeros((3, HEAD + window.accel.size))
+    design[:, 3:6] = np.eye(3)
     for place, axis in enumerate(window.axes):
         if axis != TURN:
-            design[:, axis, HEAD + place :: len(window.axes)] = after
+            design[axis, HEAD + place :: len(window.axes)] = window.step
     return design
 
 
@@ -167,7 +159,7 @@ def now(window: Window) -> tuple[Floats, Floats]:
     design = np.zeros((size, total))
     motion = np.concatenate([np.arange(count), np.arange(size, total)])
     last = pose_design(window.step, window.axes)[-1]
-    design[:3, motion], design[3:6, motion], design[6, motion] = last[:3], velocity_design(window)[-1], last[3]
+    design[:3, motion], design[3:6, motion], design[6, motion] = last[:3], velocity_design(window), last[3]
     design[HEAD:size, HEAD:size] = np.eye(size - HEAD)
     mean = design @ np.concatenate([window.head, window.accel.ravel()])
     return mean, design @ window.covariance @ design.T
@@ -201,10 +193,6 @@ def slide(window: Window) -> Window:
     oldest = Quadratic(*(field[0] for field in window.slots))
     hessian[np.ix_(first, first)] += oldest.hessian
     gradient[first] += oldest.slope(window.head[first])
-    if np.isfinite(window.course):
-        slip, by_head = _slip(window, window.head[None, 3:6], window.head[6:7], np.eye(HEAD)[None, 3:7])
-        hessian[:HEAD, :HEAD] += by_head.T @ by_head
-        gradient[:HEAD] += by_head.T @ slip
     # the next pose and the acceleration in between, instead of the oldest pose
     dt, accel = window.step[0], window.accel[0]
     change = np.eye(size, size + free)
@@ -266,12 +254,6 @@ def solve(window: Window) -> Window:
     gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
     hessian[:size, :size] += window.prior.hessian
     gradient[:size] += window.prior.slope(window.head)
-    if np.isfinite(window.course):
-        speed = velocity_design(window)
-        state = np.concatenate([window.head[:HEAD], window.accel.ravel()])
-        slip, by_motion = _slip(window, speed @ state, place[:, 3], np.concatenate([speed, design[:, 3:]], axis=1))
-        hessian[np.ix_(motion, motion)] += by_motion.T @ by_motion
-        gradient[motion] += by_motion.T @ slip
     for feature, pull, information in zip(*_pulls(window), strict=True):
         own = slice(HEAD + 3 * feature, HEAD + 3 * feature + 3)
         hessian[own, own] += information
@@ -287,15 +269,6 @@ def solve(window: Window) -> Window:
         accel=window.accel + change[size:].reshape(window.accel.shape),
         covariance=covariance,
     )
-
-
-def _slip(window: Window, velocity: Floats, offset: Floats, design: Floats) -> tuple[Floats, Floats]:
-    """Velocity (K, 3) sideways of heading, in its deviations (K,), and its derivatives (K, D); the velocity and the
-    offset (K,) of the heading are `design` (K, 4, D) times the unknowns."""
-    cos, sin = np.cos(window.course + offset), np.sin(window.course + offset)
-    sideways, ahead = np.stack([-sin, cos], axis=1), np.vecdot(velocity[:, :2], np.stack([cos, sin], axis=1))
-    slope = np.vecdot(design[:, :2], sideways[..., None], axis=1) - ahead[:, None] * design[:, 3]
-    return np.vecdot(velocity[:, :2], sideways) / SLIP, slope / SLIP
 
 
 def _pulls(window: Window) -> tuple[Integers, Floats, Floats]:

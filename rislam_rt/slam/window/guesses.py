@@ -18,6 +18,9 @@ KINDS = (
 """Names of the kinds, by their number."""
 WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS, BESIDE, IMAGE = range(len(KINDS))
 
+WALLS = (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE, IMAGE)
+"""Kinds whose new feature is a wall."""
+
 
 class Known(NamedTuple):
     """Features of the map as affine maps and places; walls as images of the agent's present place."""
@@ -124,19 +127,27 @@ def hypotheses(digest: Digest, known: Known, book: Book, use_vt: bool) -> Hypoth
         add(TWO_WALLS, NONE, image - turned, NONE, NONE, (tx, tx))
         turns[-1] = np.stack([pair, np.broadcast_to(AXES, (count, 3, 3))], axis=1)
     for point in book.points.tolist() if not use_vt else []:
-        spot = known.place[point]
-        reach = np.maximum(length - np.linalg.norm(spot - tx, axis=1), 0.1)
-        add(IMAGE, point, reflect(anchor, rx + reach[:, None] * ray, spot), NONE, NONE, (tx, tx))
-        turns[-1] = np.stack([np.zeros((count, 3, 3)), np.broadcast_to(AXES, (count, 3, 3))], axis=1)
-        shifts[-1] = np.stack([np.broadcast_to(spot, (count, 3)), np.zeros((count, 3))], axis=1)
-        doubts[-1] = np.stack([np.broadcast_to(known.root[point], (count, 3, 3)), np.zeros((count, 3, 3))], axis=1)
+        start, *parts = _image(digest, known.place[point], known.root[point])
+        add(IMAGE, point, start, NONE, NONE, (tx, tx))
+        turns[-1], shifts[-1], doubts[-1] = parts
     kind, walled = np.concatenate(kinds), np.concatenate(knowns)
     trials = Trials(
-        np.concatenate(tracks), (kind <= WALL_KNOWN) | (kind == BESIDE) | (kind == IMAGE), kind == TWO_WALLS, np.concatenate(starts),
+        np.concatenate(tracks), np.isin(kind, WALLS), kind == TWO_WALLS, np.concatenate(starts),
         np.concatenate(turns), np.concatenate(shifts), np.concatenate(doubts), kind == BESIDE,
         _beyond(kind, walled, known), kind == IMAGE,
     )  # fmt: skip
     return Hypotheses(kind, walled, trials)
+
+
+def _image(digest: Digest, spot: Floats, root: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """First guess of the wall (T, 3) that mirrors a point (3,), known to `root` (3, 3), and the `Trials` of that."""
+    (seen, tx, rx), count = digest.mean, len(digest.seen)
+    reach = np.maximum(seen[:, 0] - np.linalg.norm(spot - tx, axis=1), 0.1)
+    anchor = np.broadcast_to(digest.middle, rx.shape)
+    start = reflect(anchor, rx + reach[:, None] * digest.direction, np.broadcast_to(spot, rx.shape))
+    parts = ((np.zeros((3, 3)), AXES), (spot, np.zeros(3)), (root, np.zeros((3, 3))))
+    turn, shift, doubt = (np.tile(np.stack(pair), (count, *(1,) * (pair[1].ndim + 1))) for pair in parts)
+    return start, turn, shift, doubt
 
 
 def _beyond(kind: Integers, walled: Integers, known: Known) -> Floats:

@@ -15,14 +15,13 @@ from rislam_rt.slam.window.gauss import Holds, no_holds
 from rislam_rt.slam.window.guesses import (
     BESIDE,
     IMAGE,
-    KNOWN_WALL,
     LEVEL_TURN,
     OVER_SAME,
     OVER_TX,
     POINT,
     TWO_WALLS,
     WALL,
-    WALL_KNOWN,
+    WALLS,
     Hypotheses,
     Known,
     hypotheses,
@@ -76,7 +75,7 @@ class Verdict(NamedTuple):
     @property
     def is_wall(self) -> bool:
         """Whether the new feature is one."""
-        return self.kind in (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE, IMAGE)
+        return self.kind in WALLS
 
     @property
     def is_return(self) -> bool:
