@@ -10,6 +10,7 @@ fetched. The package itself comes of the wheel alone: that is checked. `PYTHONPA
 import argparse
 import os
 import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -39,7 +40,8 @@ def read_blocks(page: Path) -> Iterator[Block]:
         if kind == "python":
             yield Block(text, text.partition("\n")[0].removeprefix("# "))
         else:
-            yield from (Block(line, None) for line in text.splitlines() if line)
+            lines = re.sub(r"\\\n\s*", "", text).splitlines()
+            yield from (Block(line, None) for line in lines if line)
 
 
 def build_wheel(folder: Path) -> Path:
@@ -59,14 +61,32 @@ def install(wheel: Path, folder: Path) -> Path:
     return folder / "bin"
 
 
-def run(command: str, folder: Path, environment: dict[str, str]) -> tuple[int, float, str]:
-    """Exit code, seconds, and what was said: the result, and behind it, where it failed, the errors."""
-    begin = time.perf_counter()
+class Outcome(NamedTuple):
+    """Of a command."""
+
+    code: int
+    wall: float
+    """[s]."""
+    processor: float
+    """[s] of all its processes."""
+    said: str
+    """The result, and behind it, where it failed, the errors."""
+
+
+def run(command: str, folder: Path, environment: dict[str, str]) -> Outcome:
+    """A command in a shell."""
+    begin, used = time.perf_counter(), processor_time()
     done = subprocess.run(
         ["bash", "-c", command], cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
     said = done.stdout + (done.stderr if done.returncode else "")
-    return done.returncode, time.perf_counter() - begin, said
+    return Outcome(done.returncode, time.perf_counter() - begin, processor_time() - used, said)
+
+
+def processor_time() -> float:
+    """[s] of all processes that were waited for."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def log_lines(bin_folder: Path, folder: Path) -> Iterator[str]:
@@ -80,20 +100,21 @@ def log_lines(bin_folder: Path, folder: Path) -> Iterator[str]:
     environment = {
         "PATH": f"{bin_folder}:{os.environ['PATH']}", "HOME": str(folder.parent), "COLUMNS": "100", "LANG": "C.UTF-8",
     }  # fmt: skip
-    where = run("python -c 'import rislam_rt; print(rislam_rt.__file__)'", folder, environment)[2].strip()
+    where = run("python -c 'import rislam_rt; print(rislam_rt.__file__)'", folder, environment).said.strip()
     if not where.startswith(str(bin_folder.parent)):
         raise SystemExit(f"the package is {where}, not that of the wheel")
-    begin = time.perf_counter()
+    begin, used = time.perf_counter(), processor_time()
     for block in read_blocks(TUTORIAL):
         if block.file is not None:
             (folder / block.file).write_text(block.text)
             continue
-        code, seconds, said = run(block.text, folder, environment)
-        yield f"{seconds:6.1f} s  $ {block.text}"
-        yield from (f"          {line}" for line in [line for line in said.splitlines() if re.search(r"\w", line)][-2:])
-        if code:
-            raise SystemExit(f"{block.text}: exit code {code}\n{said}")
-    yield f"{time.perf_counter() - begin:6.1f} s  in all"
+        done = run(block.text, folder, environment)
+        yield f"{done.wall:6.1f} {done.processor:6.1f}  $ {block.text}"
+        told = [line for line in done.said.splitlines() if re.search(r"\w", line)]
+        yield from (f"{'':14} {line}" for line in told[-2:])
+        if done.code:
+            raise SystemExit(f"{block.text}: exit code {done.code}\n{done.said}")
+    yield f"{time.perf_counter() - begin:6.1f} {processor_time() - used:6.1f}  in all"
 
 
 def main() -> None:
@@ -106,9 +127,11 @@ def main() -> None:
         empty = place / "empty"
         empty.mkdir()
         begin = time.perf_counter()
+        print("  wall    cpu  [s]")
         wheel = build_wheel(place)
         bin_folder = install(wheel, place / "environment")
-        lines = [f"{time.perf_counter() - begin:6.1f} s  wheel {wheel.name} built and installed"]
+        took = f"{time.perf_counter() - begin:6.1f} {processor_time():6.1f}"
+        lines = [f"{took}  wheel {wheel.name} built and installed"]
         print(lines[0], flush=True)
         for line in log_lines(bin_folder, empty):
             lines.append(line.replace(str(place), "..."))
@@ -116,7 +139,10 @@ def main() -> None:
     finally:
         shutil.rmtree(place)
     if write:
-        about = "`python benchmarks/installed.py --write`, on two cores that other work shared:\n"
+        about = (
+            "`python benchmarks/installed.py --write`, on two cores that other work shared; seconds on the clock, and\n"
+        )
+        about += "of the processor:\n"
         text = TUTORIAL.read_text(encoding="utf-8").partition(HEADING)[0]
         TUTORIAL.write_text(f"{text}{HEADING}\n{about}\n```\n" + "\n".join(lines) + "\n```\n", encoding="utf-8")
 

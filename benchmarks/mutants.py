@@ -145,7 +145,8 @@ class Enough:
             self.failed.add(report.nodeid)
             print(f"\nBROKEN {report.nodeid}", flush=True)
         if len(self.failed) >= self.least and len({name.split("::")[0] for name in self.failed}) >= self.files:
-            self.session.shouldstop = "enough"
+            spread = self.session.config.pluginmanager.getplugin("dsession")  # who stops when several processes test
+            (spread or self.session).shouldstop = "enough"
 
 
 def run_tests(arguments: argparse.Namespace) -> int:

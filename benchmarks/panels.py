@@ -33,6 +33,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--cycles", type=int, default=240)
+    parser.add_argument("--snr", type=float, default=13.0, help="radio.reference_snr_db")
     parser.add_argument("--figure", type=Path)
     parser.add_argument("--double", action="store_true", help="the strength of paths from panel to panel, alone")
     options = parser.parse_args()
@@ -43,6 +44,7 @@ def main() -> None:
     for name, scene, alternation in variants():
         schemes = ["optimized", "random"] + ["no_ris"] * (name == "both")
         keys = [f"schemes={schemes}".replace("'", '"'), "channel=image_source", f"cycles={options.cycles}"]
+        keys += [f"radio.reference_snr_db={options.snr}"]
         spec = load_spec(find_pipeline("two_panels"), [*keys, f"receiver.alternation={str(alternation).lower()}"])
         runs = [rislam_rt.run_slam(scene, spec, rng=np.random.default_rng(seed)) for seed in range(options.seeds)]
         if options.figure is not None and name == "both" and alternation:

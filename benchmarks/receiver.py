@@ -59,14 +59,8 @@ def main() -> None:
     for name, config in (
         ("bound, cell", ReceiverConfig(estimator="bound")),
         ("bound, joint", ReceiverConfig(estimator="bound", resolution="joint")),
-        ("local", ReceiverConfig(estimator="local")),
-        ("local, alternation", ReceiverConfig(estimator="local", alternation=True)),
     ):
         print_times(name, times(lambda k, c=config: draw(paths, motion, k, base, c), arguments.places))
-    for snr in (0.0, 30.0):
-        config, radio = ReceiverConfig(estimator="local"), with_reference_snr(base, snr)
-        name = f"local, sphere at {snr:.0f} dB"
-        print_times(name, times(lambda k, r=radio, c=config: draw(paths, motion, k, r, c), arguments.places))
     if arguments.quick:
         return
     print_times("synthesis", times(lambda k: sound(paths, motion, k, base, WAVEFORM), arguments.places))

@@ -1,12 +1,14 @@
-"""Does a cheap receiver agree with the waveform receiver, class by class, in rooms that neither was made for?
+"""Does a receiver agree with another one, class by class, in rooms that neither was made for?
 
 Random rooms with a panel, and walks (those of the classifier's study; each seed is one room). In each, every receiver
 hears the same paths under the same codes, exact for the true place in even seeds, random in odd ones, the reference
 sphere at 0 or 13 dB, codes held or alternated. With `--walk` the filter is led along on what it hears. Per class: share
-of paths found, errors over reported deviations and deviations, shares beyond five of them; false components, error of
-the agent, and whether the panel was named. Run: `python benchmarks/receiver_agreement.py --first 1000 --rooms 50
-[--cycles 60] [--receivers waveform,local,cell] [--walk] [--keep FOLDER] [--figure FILE]`. What was run is kept in
-FOLDER by receiver and seed; a file that is taken away is run again.
+of paths found, errors over reported deviations and deviations, shares beyond five of them; false components, how many
+of them come again, level returns on the wrong side, error of the agent, and whether the panel was named. The first
+receiver is the one that the others are compared with. Run: `python benchmarks/receiver_agreement.py --first 2000
+--rooms 50 [--cycles 60] [--receivers waveform,cell] [--before FOLDER] [--walk] [--keep FOLDER] [--figure FILE]`. What
+was run is kept in FOLDER by receiver and seed; a file that is taken away is run again. `--before` takes, as first
+receiver, what the waveform receiver of another version of the code left in its folder, where this file was run.
 """
 
 import argparse
@@ -31,13 +33,16 @@ from rislam_rt.slam import SlamConfig, StartPrior, estimate, init, step
 
 RECEIVERS: dict[str, dict[str, Any]] = {
     "waveform": {"estimator": "waveform"},
-    "local": {"estimator": "local"},
     "cell": {"estimator": "bound", "resolution": "cell"},
     "joint": {"estimator": "bound", "resolution": "joint"},
 }
 SNR_DB = (0.0, 13.0)
 """Of the paper's sphere at 3 m; every other pair of seeds has the second."""
 CLASSES = [kind for kind in PathKind if kind is not PathKind.LOS]
+LEVEL = 0.98
+"""Length of the two cosines from which on a return counts as level: within 11 degrees of the horizon."""
+SURE = 0.5
+"""Deviation of a cosine [cells] below which a component claims to know its side, four cells from the other."""
 FAR = 5.0
 """Reported deviations beyond which an error counts as a tail."""
 
@@ -47,16 +52,19 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--rooms", type=int, default=10)
     parser.add_argument("--cycles", type=int, default=60)
-    parser.add_argument("--receivers", default="waveform,local,cell")
+    parser.add_argument("--receivers", default="waveform,cell")
     parser.add_argument("--keep", default="/tmp/receiver_agreement")
+    parser.add_argument("--before", default=None, help="folder of another version's waveform receiver")
     parser.add_argument("--walk", action="store_true", help="lead the filter along")
     parser.add_argument("--figure", default=None)
     arguments = parser.parse_args()
     names, found = arguments.receivers.split(","), {}
+    names = names if arguments.before is None else ["before", *names]
     seeds = range(arguments.first, arguments.first + arguments.rooms)
     for name in names:
         found[name] = [kept("heard", hear, name, seed, arguments) for seed in seeds]
     report(names, found)
+    report_ghosts(names, found)
     if arguments.walk:
         walks = {name: [kept("walked", walk, name, seed, arguments) for seed in seeds] for name in names}
         report_walks(names, walks)
@@ -66,7 +74,8 @@ def main() -> None:
 
 def kept(kind: str, work: Any, name: str, seed: int, arguments: argparse.Namespace) -> dict[str, Any]:
     """One room with one receiver, from the folder if it is there."""
-    file = Path(arguments.keep) / f"{kind}-{name}-{seed}-{arguments.cycles}.npz"
+    folder, label = (arguments.before, "waveform") if name == "before" else (arguments.keep, name)
+    file = Path(folder) / f"{kind}-{label}-{seed}-{arguments.cycles}.npz"
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
         result = work(name, seed, arguments)
@@ -104,7 +113,7 @@ def room_of(seed: int, cycles: int) -> tuple[Scene, Trajectory, Paths, RadioConf
 
 def settings_of(name: str, seed: int) -> ReceiverConfig:
     """Four seeds with the codes held, four with code and twin."""
-    return ReceiverConfig(**RECEIVERS[name], alternation=bool((seed // 4) % 2))
+    return ReceiverConfig(**RECEIVERS["waveform" if name == "before" else name], alternation=bool((seed // 4) % 2))
 
 
 def hear(name: str, seed: int, arguments: argparse.Namespace) -> dict[str, Any]:
@@ -186,7 +195,10 @@ def report_walks(names: list[str], walks: dict[str, list[dict[str, Any]]]) -> No
 def score(
     paths: Paths, motion: Trajectory, cycle: int, radio: RadioConfig, found: Measurement, truth: PathTruth
 ) -> Floats:
-    """(M, 11) cycle, what each component is, path, errors and deviations in cells, SNR, distance to any path."""
+    """(M, 13) cycle, what each component is, path, errors and deviations in cells, SNR, distance to any path.
+
+    Then the length of the path's cosines, 1 for a level one, and its distance [cells] to the nearest other one.
+    """
     cells = np.array([radio.bandwidth, radio.array.rows * radio.array.spacing, radio.array.cols * radio.array.spacing])
     place = np.column_stack([found.tau, found.cosines]) * cells
     deviation = np.column_stack([found.tau_std, found.cosines_std]) * cells
@@ -199,7 +211,10 @@ def score(
     gap = (place[:, None] - true[there]) / deviation[:, None]
     nearest = np.sqrt(np.min(np.max(gap**2, axis=-1), axis=1, initial=np.inf))
     kind = np.where(known, paths.kind[truth.path], -1)
-    return np.column_stack([np.full(len(snr), cycle), kind, truth.path, error, deviation, snr, nearest])
+    apart = np.linalg.norm(true[truth.path][:, None] - true[there], axis=-1)
+    apart[truth.path[:, None] == there] = np.inf
+    lone, level = np.min(apart, axis=1, initial=np.inf), np.linalg.norm(arrival[truth.path], axis=1)
+    return np.column_stack([np.full(len(snr), cycle), kind, truth.path, error, deviation, snr, nearest, level, lone])
 
 
 class Row(NamedTuple):
@@ -258,6 +273,37 @@ def report(names: list[str], found: dict[str, list[dict[str, Any]]]) -> None:
             f"{np.sum(far) / cycles:.3f} farther than five deviations from every path, of those above 16 dB "
             f"{np.sum(far & (table[:, 9] > 16.0)) / cycles:.3f}; of all of a path {tail:.4f} "
             f"beyond five; {1e3 * np.mean([float(one['seconds']) for one in found[name]]):.2f} ms a cycle"
+        )
+
+
+def again(found: dict[str, Any]) -> tuple[int, int]:
+    """Of the components farther than five deviations from every path: how many come again in the next cycle, and all.
+
+    Again is within half a cell in delay and both cosines; the last cycle has no next one.
+    """
+    table, raw = found["table"], found["raw"]
+    place = raw[:, 1:4] / np.array([1e-9, 0.5, 0.5])  # cells of 1 GHz and four elements half a wavelength apart
+    far, last = table[:, 10] > FAR, int(found["cycles"]) - 1
+    count = total = 0
+    for cycle in range(last):
+        now, after = (place[far & (table[:, 0] == number)] for number in (cycle, cycle + 1))
+        gap = np.abs(now[:, None] - after).max(axis=-1)
+        count, total = count + int(np.sum(np.min(gap, axis=1, initial=np.inf) < 0.5)), total + len(now)
+    return count, total
+
+
+def report_ghosts(names: list[str], found: dict[str, list[dict[str, Any]]]) -> None:
+    """How false components hang together in time, and what becomes of level returns."""
+    for name in names:
+        count, total = np.sum([again(one) for one in found[name]], axis=0)
+        table = np.vstack([one["table"] for one in found[name]])
+        lone = table[(table[:, 1] == PathKind.VT) & (table[:, 11] > LEVEL) & (table[:, 12] > 1.0)]
+        wrong = (np.abs(lone[:, 4:6]) > 2.0).any(axis=1)  # a period of the array is four cells
+        sure = wrong & (lone[:, 7:9].max(axis=1) < SURE)
+        print(
+            f"{name}: of {total} components far from every path {count / max(total, 1):.3f} come again in the next "
+            f"cycle; of {len(lone)} lone level wall returns {np.mean(wrong):.4f} on the wrong side, "
+            f"{np.mean(sure):.4f} with deviations below {SURE} cells"
         )
 
 

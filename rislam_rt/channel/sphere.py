@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import spherical_jn, spherical_yn
+import scipy
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.errors import SceneError
@@ -73,8 +73,8 @@ def mie_coefficients(size: float) -> tuple[Complexes, Complexes]:
     terms.
     """
     n = np.arange(1, int(size + 4.05 * size ** (1.0 / 3.0) + 2.0) + 1)
-    j, y = spherical_jn(n, size), spherical_yn(n, size)
+    j, y = scipy.special.spherical_jn(n, size), scipy.special.spherical_yn(n, size)
     psi, chi = size * j, size * y
-    d_psi = j + size * spherical_jn(n, size, derivative=True)
-    d_chi = y + size * spherical_yn(n, size, derivative=True)
+    d_psi = j + size * scipy.special.spherical_jn(n, size, derivative=True)
+    d_chi = y + size * scipy.special.spherical_yn(n, size, derivative=True)
     return d_psi / (d_psi + 1j * d_chi), psi / (psi + 1j * chi)

@@ -39,6 +39,10 @@ def command(
     print_designs(room.name, point, found.designs, found.target)
     if not found.is_direct:
         typer.echo(f"the direct path to the panel is hidden; gains and gaps are those of {found.target}")
+    for name, gains in found.panels.items():
+        if gains:
+            each = ", ".join(f"{panel} {gain:.2f} dB" for panel, gain in gains.items())
+            typer.echo(f"{name}: {each}")
     if figure is not None:
         from rislam_rt.report.code import draw_codes
 

@@ -146,6 +146,7 @@ def _summary(inputs: "Inputs", answers: "Answers", true: "Floats | None") -> dic
 
     last = answers.estimates[-1]
     outcomes = [str(info.outcome) for info in answers.infos]
+    panels = 1 if inputs.panel is None else len(inputs.panel.panels)
     found: dict[str, Any] = {
         "cycles": len(inputs.time),
         "components": sum(len(m) for m in inputs.measurements),
@@ -154,7 +155,7 @@ def _summary(inputs: "Inputs", answers: "Answers", true: "Floats | None") -> dic
         "deviation_m": float(np.sqrt(np.trace(last.covariance[:2, :2]))),
         "landmarks": int(np.sum(last.map.parent < 0)),
         "walls": len(last.map.wall_offset),
-        "panel_found": last.map.ris >= 0,
+        "panel_found": all(last.map.panel_row(panel) >= 0 for panel in range(panels)),
         "ms_a_cycle": 1000.0 * answers.seconds,
     }
     if true is not None:
@@ -183,5 +184,6 @@ def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
     write_atomic(folder / "estimate.csv", ("\n".join(lines) + "\n").encode())
     last = answers.estimates[-1].map
     fields = ("ident", "position", "covariance", "parent", "ris_probability", "strength", "wall_normal", "wall_offset")
-    content = {name: getattr(last, name).tolist() for name in (*fields, "wall_std")}
+    names = (*fields, "wall_std", *(["panel"] if last.panel is not None else []))
+    content = {name: getattr(last, name).tolist() for name in names}
     write_atomic(folder / "map.json", (json.dumps(content, indent=1) + "\n").encode())

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rislam_rt.pipeline.studies.classifier.spec import ClassifierSpec
 
 PAGE, SCORES, IMPORTANCE = "classifier", "figures/classifier_scores.png", "figures/classifier_features.png"
+PANEL = "figures/classifier_panel.png"
 
 
 def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
@@ -31,6 +32,7 @@ def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
         classifier_page,
         classifier_table,
         draw_importance,
+        draw_panel,
         draw_scores,
         weights_file,
     )
@@ -47,12 +49,13 @@ def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
         found = run_training(scenes, spec, progress=progress)
     content = {**record, **classifier_table(found)}
     files = {
-        f"{PAGE}.md": classifier_page(found, spec, (SCORES, IMPORTANCE) if given.page else None).encode(),
+        f"{PAGE}.md": classifier_page(found, spec, (SCORES, IMPORTANCE, PANEL) if given.page else None).encode(),
         f"{PAGE}.json": (json.dumps(content, indent=1, allow_nan=False) + "\n").encode(),
         "weights.npz": weights_file(found),
     }
     if given.page:
         files |= {SCORES: to_png(draw_scores(found)), IMPORTANCE: to_png(draw_importance(found))}
+        files |= {PANEL: to_png(draw_panel(found))}
     for name, data in files.items():
         write_atomic(folder / name, data)
     typer.echo(f"F1 on all test rooms: {found.scores[ALL]['network'].f1:.4f}")

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from rislam_rt.arrays import Integers
 
@@ -42,7 +42,7 @@ def association_score(label: Integers, truth: Integers) -> AssociationScore:
 def association_fractions(labels: Integers, identities: Integers, counts: Integers) -> tuple[float, float, float]:
     """Accuracy, precision and recall from how often (L, I) each label (L,) met each identity (I,); -1 for none."""
     own = counts[np.ix_(labels != NONE, identities != NONE)]
-    right = int(own[linear_sum_assignment(own, maximize=True)].sum()) if own.size else 0
+    right = int(own[scipy.optimize.linear_sum_assignment(own, maximize=True)].sum()) if own.size else 0
     left_alone = int(counts[np.ix_(labels == NONE, identities == NONE)].sum())
     total, answered, known = (
         int(counts.sum()),

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaincinv
+import scipy
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
@@ -53,5 +53,5 @@ def chi_square_bounds(dof: int, runs: int = 1, *, level: float = 0.95) -> tuple[
             f"dof, runs, level: {dof}, {runs}, {level} received; give 1 or more, 1 or more, within (0, 1)"
         )
     tail = (1.0 - level) / 2.0
-    lower, upper = 2.0 * gammaincinv(0.5 * dof * runs, np.array([tail, 1.0 - tail])) / (dof * runs)
+    lower, upper = 2.0 * scipy.special.gammaincinv(0.5 * dof * runs, np.array([tail, 1.0 - tail])) / (dof * runs)
     return float(lower), float(upper)

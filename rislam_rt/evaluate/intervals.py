@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+import scipy
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
@@ -39,7 +39,7 @@ def share_interval(count: int, runs: int, *, level: float = 0.95) -> Interval:
     """A share `count / runs` with Wilson's interval (Wilson 1927), which holds at shares of 0 and 1 too."""
     if not 0 <= count <= runs or runs < 1:
         raise ConfigError(f"count, runs: {count} of {runs} received; give a part of at least one run")
-    z, share = float(ndtri(0.5 + 0.5 * level)), count / runs
+    z, share = float(scipy.special.ndtri(0.5 + 0.5 * level)), count / runs
     middle = (share + z**2 / (2 * runs)) / (1.0 + z**2 / runs)
     half = z / (1.0 + z**2 / runs) * float(np.sqrt(share * (1.0 - share) / runs + z**2 / (4.0 * runs**2)))
     return Interval(share, min(share, max(0.0, middle - half)), max(share, min(1.0, middle + half)))
@@ -69,10 +69,10 @@ def bootstrap(
     if np.ptp(replicates) == 0.0:
         return Interval(value, value, value)
     below = np.mean(replicates < value) + 0.5 * np.mean(replicates == value)
-    bias = ndtri(np.clip(below, 0.5 / resamples, 1.0 - 0.5 / resamples))
-    quantile = ndtri(np.array([(1.0 - level) / 2.0, (1.0 + level) / 2.0]))
+    bias = scipy.special.ndtri(np.clip(below, 0.5 / resamples, 1.0 - 0.5 / resamples))
+    quantile = scipy.special.ndtri(np.array([(1.0 - level) / 2.0, (1.0 + level) / 2.0]))
     shifted = bias + (bias + quantile) / (1.0 - _acceleration(samples, statistic) * (bias + quantile))
-    lower, upper = np.quantile(replicates, ndtr(shifted))
+    lower, upper = np.quantile(replicates, scipy.special.ndtr(shifted))
     return Interval(value, float(lower), float(upper))
 
 

@@ -3,8 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
-from scipy.spatial.distance import cdist
+import scipy
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.errors import ConfigError
@@ -37,7 +36,7 @@ def ospa(estimate: Floats, truth: Floats, *, cutoff: float = 1.0, order: float =
     larger = max(distance.shape)
     if larger == 0:
         return Ospa(0.0, 0.0, 0.0)
-    rows, cols = linear_sum_assignment(distance**order)
+    rows, cols = scipy.optimize.linear_sum_assignment(distance**order)
     local = float(np.sum(distance[rows, cols] ** order)) / larger
     count = cutoff**order * abs(distance.shape[0] - distance.shape[1]) / larger
     return Ospa((local + count) ** (1.0 / order), local ** (1.0 / order), count ** (1.0 / order))
@@ -50,7 +49,7 @@ def gospa(estimate: Floats, truth: Floats, *, cutoff: float = 1.0, order: float 
     false one costs `c^p / 2`, so that a pair further apart than c counts as one of each.
     """
     distance = _distances(estimate, truth, cutoff, order)
-    rows, cols = linear_sum_assignment(distance**order)
+    rows, cols = scipy.optimize.linear_sum_assignment(distance**order)
     close = distance[rows, cols] < cutoff
     local = float(np.sum(distance[rows[close], cols[close]] ** order))
     missed, false = distance.shape[1] - int(close.sum()), distance.shape[0] - int(close.sum())
@@ -70,7 +69,7 @@ def match_points(estimate: Floats, truth: Floats, *, cutoff: float = np.inf) -> 
     # A pair beyond the cut-off costs more than all good pairs together, but its finite cost keeps the problem feasible.
     bound = min(cutoff, float(distance.max()))
     cost = np.where(distance <= cutoff, distance**2, (bound**2 + 1.0) * (min(distance.shape) + 1))
-    rows, cols = linear_sum_assignment(cost)
+    rows, cols = scipy.optimize.linear_sum_assignment(cost)
     close = distance[rows, cols] <= cutoff
     index[cols[close]] = rows[close]
     return index
@@ -89,4 +88,4 @@ def _pairwise(estimate: Floats, truth: Floats) -> Floats:
     first, second = (np.asarray(points, dtype=np.float64) for points in (estimate, truth))
     if not first.size or not second.size:
         return np.zeros((len(first), len(second)))
-    return np.asarray(cdist(np.atleast_2d(first), np.atleast_2d(second)))
+    return np.asarray(scipy.spatial.distance.cdist(np.atleast_2d(first), np.atleast_2d(second)))

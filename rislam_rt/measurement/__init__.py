@@ -4,7 +4,7 @@ from rislam_rt.measurement.calibrate import calibrate
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.dataset import NO_COMPONENT, load_signals, signals_dataset
 from rislam_rt.measurement.false_alarms import detection_threshold, expected_false_alarms
-from rislam_rt.measurement.hardware import Correction, FrontEnd, HardwareConfig, build_front_end
+from rislam_rt.measurement.hardware import Correction, FrontEnd, HardwareConfig, build_front_end, expected_distortion
 from rislam_rt.measurement.measure import measure
 from rislam_rt.measurement.noise import (
     paper_snr_db,
@@ -14,7 +14,7 @@ from rislam_rt.measurement.noise import (
     with_reference_snr,
 )
 from rislam_rt.measurement.parts import path_std
-from rislam_rt.measurement.received import Received, receive, twin
+from rislam_rt.measurement.received import Clutter, Received, receive, twin
 from rislam_rt.measurement.sensor import build_sensor
 from rislam_rt.measurement.signal import num_tones, pulse_samples, to_samples, to_tones, tones
 from rislam_rt.measurement.tracking import TrackInfo, TrackingConfig, TrackState, init_tracks, step_tracks
@@ -24,6 +24,7 @@ from rislam_rt.model import detection_probability
 __all__ = [
     "NO_COMPONENT",
     "Capture",
+    "Clutter",
     "Components",
     "Correction",
     "FrontEnd",
@@ -39,6 +40,7 @@ __all__ = [
     "capture",
     "detection_probability",
     "detection_threshold",
+    "expected_distortion",
     "expected_false_alarms",
     "find_components",
     "init_tracks",

@@ -50,16 +50,26 @@ class Components(NamedTuple):
 
 
 def measure_bound(
-    received: Received, radio: RadioConfig, config: ReceiverConfig, num_paths: int, *, rng: np.random.Generator
+    received: Received,
+    radio: RadioConfig,
+    config: ReceiverConfig,
+    num_paths: int,
+    num_extra: int = 0,
+    *,
+    rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
     """Components with bound-driven errors, missed detections, merging and clutter, in the order of their delays.
 
     The errors have the variance that belongs to the true SNR; the standard deviations reported are those that the
     measured one suggests, all that a receiver knows. Each of the `num_paths` columns has its own draws in every capture
-    whether heard or not, so that two codes see the same noise.
+    whether heard or not, so that two codes see the same noise; the `num_extra` columns beyond have theirs from a
+    generator of their own, so that they change nobody else's.
     """
     sensor, captures = build_sensor(radio, config), split(received, config)
     draws = rng.standard_normal((len(captures), num_paths, 5))
+    if num_extra:
+        more = rng.spawn(1)[0].standard_normal((len(captures), num_extra, 5))
+        draws = np.concatenate([draws, more], axis=1)
     # false components are as many in all, whichever capture they are in
     rate = replace(sensor, false_alarms=sensor.false_alarms / len(captures))
     parts = [_capture(*one, rate, config, rng=rng) for one in zip(captures, draws, strict=True)]

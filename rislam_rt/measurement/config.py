@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.errors import ConfigError
 
-ESTIMATORS = ("bound", "waveform", "local")
+ESTIMATORS = ("bound", "waveform")
 """Ways from the channel to multipath components: errors drawn from the Cramér-Rao bound, or a real estimator."""
 
 RESOLUTIONS = ("cell", "joint")

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
-from rislam_rt.measurement.atoms import Sounding, factors
+from rislam_rt.measurement.atoms import Sounding
 
 OVERSAMPLING = 2
 """Grid points per resolution cell of the delay."""
@@ -30,6 +30,10 @@ class Grid(NamedTuple):
     delays: Integers
     """(T,) indices of delays within the window, in steps of 1 / `OVERSAMPLING` cells."""
     tones: int
+    places: tuple[Floats, Floats, Floats]
+    """Tones, rows and columns times 2 pi; the tones' sign is turned."""
+    powers: tuple[Complexes, Complexes, Complexes]
+    """(3, n) of each: what `a^H y` is weighed with for its value and its first two derivatives."""
 
 
 def build_grid(sounding: Sounding, window: tuple[float, float]) -> Grid:
@@ -44,12 +48,14 @@ def build_grid(sounding: Sounding, window: tuple[float, float]) -> Grid:
     first, last = np.floor(window[0] * OVERSAMPLING), np.ceil(window[1] * OVERSAMPLING)
     count = OVERSAMPLING * len(sounding.frequency)
     delays = np.unique(np.arange(first, last + 1, dtype=np.int64) % count)
-    return Grid(cosines, antennas, delays, count)
+    places = (-2.0 * np.pi * sounding.frequency, 2.0 * np.pi * sounding.row, 2.0 * np.pi * sounding.col)
+    tones, row, col = (np.stack([np.ones(len(x)), -1j * x, -(x**2)]) for x in places)
+    return Grid(cosines, antennas, delays, count, places, (tones, row, col))
 
 
 def spectrum(grid: Grid, residual: Complexes) -> Complexes:
     """Matched filter's output (G, T), up to a phase, for samples (L, M)."""
-    return _delay_spectrum(grid, grid.antennas @ residual.astype(np.complex64))
+    return np.asarray(grid.antennas @ _delay_spectrum(grid, residual.astype(np.complex64)))
 
 
 def _delay_spectrum(grid: Grid, beams: Complexes) -> Complexes:
@@ -72,48 +78,57 @@ def pick_peaks(
         if power[best] < lowest:
             break
         start = np.array([grid.delays[best[1]] / OVERSAMPLING, *grid.cosines[best[0]]])
-        parameters = _climb(sounding, start, residual, window)
-        parts = factors(sounding, parameters[None])
-        antennas = (parts.row[0][:, None] * parts.col[0][None]).reshape(-1, 1)
-        amplitude = (antennas[:, 0].conj() @ residual @ parts.delay[0, :, 0].conj()) / sounding.num_samples
-        snr = sounding.num_samples * abs(amplitude) ** 2
+        parameters, matched, antennas, tones = _climb(grid, start, residual, window)
+        snr = abs(matched) ** 2 / sounding.num_samples
         if snr < threshold:
             break
         picked.append(parameters)
         lowest = max(lowest, BATCH_RANGE * snr * sounding.num_samples)
-        signal = amplitude * parts.delay[0].T
-        residual = residual - antennas * signal
-        output -= (grid.antennas @ antennas.astype(np.complex64)) * _delay_spectrum(grid, signal.astype(np.complex64))
+        signal = matched / sounding.num_samples * tones
+        residual = residual - np.multiply.outer(antennas, signal)
+        beams = grid.antennas @ antennas.astype(np.complex64)
+        single: Complexes = signal[None].astype(np.complex64)
+        output -= np.multiply.outer(beams, _delay_spectrum(grid, single)[0])
     return np.array(picked).reshape(-1, 3)
 
 
-def _climb(sounding: Sounding, start: Floats, residual: Complexes, window: tuple[float, float]) -> Floats:
-    """The peak of the matched filter next to a grid point, by Newton steps along each parameter."""
+def _climb(
+    grid: Grid, start: Floats, residual: Complexes, window: tuple[float, float]
+) -> tuple[Floats, complex, Complexes, Complexes]:
+    """The peak of the matched filter next to a grid point, by Newton steps along each parameter.
+
+    Also returns `a^H y` there, and the signal's factors over antennas (L,) and tones (M,).
+    """
     point = start
     for _ in range(CLIMB_STEPS):
-        moves = _newton_moves(sounding, point, residual)
-        point = into_range(point + np.clip(moves, -CLIMB_LIMIT, CLIMB_LIMIT), window)
-    return point
+        moves = _newton_moves(_moments(grid, _signals(grid, point), residual), grid)
+        point = into_range(point + np.minimum(np.maximum(moves, -CLIMB_LIMIT), CLIMB_LIMIT), window)
+    tones, row, col = _signals(grid, point)
+    antennas = np.multiply.outer(row, col).ravel()
+    return point, complex(antennas.conj() @ (residual @ tones.conj())), antennas, tones
 
 
-def _newton_moves(sounding: Sounding, point: Floats, residual: Complexes) -> Floats:
+def _signals(grid: Grid, point: Floats) -> list[Complexes]:
+    """A signal's factors over tones, rows and columns."""
+    return [np.exp(1j * value * place) for place, value in zip(grid.places, point, strict=True)]
+
+
+def _moments(grid: Grid, signal: list[Complexes], residual: Complexes) -> Complexes:
+    """(3, 3) `a^H y` and its first two derivatives by each of (B tau, u, v)."""
+    tones, row, col = (weight * factor.conj() for weight, factor in zip(grid.powers, signal, strict=True))
+    field = residual @ tones.T
+    beam = field[:, 0].reshape(row.shape[1], col.shape[1])
+    return np.array([np.multiply.outer(row[0], col[0]).ravel() @ field, row @ (beam @ col[0]), col @ (row[0] @ beam)])
+
+
+def _newton_moves(moments: Complexes, grid: Grid) -> Floats:
     """Newton steps (3,) of |a^H y|^2, each parameter on its own; uphill where the curvature has the wrong sign."""
-    slopes = (-2j * np.pi * sounding.frequency, 2j * np.pi * sounding.row, 2j * np.pi * sounding.col)
-    delay, row, col = (np.exp(-slope * value) for slope, value in zip(slopes, point, strict=True))
-    beam = (row[:, None] * col).ravel() @ residual
-    field = (residual @ delay).reshape(len(row), len(col))
-    moves = np.zeros(3)
-    for axis, (line, slope) in enumerate(
-        zip((beam * delay, field @ col * row, row @ field * col), slopes, strict=True)
-    ):
-        if len(line) < 2:
-            continue
-        value, first, second = line.sum(), -(slope @ line), slope**2 @ line
-        gradient = np.real(np.conj(value) * first)
-        curvature = np.abs(first) ** 2 + np.real(np.conj(value) * second)
-        least = 0.2 * np.mean(np.abs(slope) ** 2) * np.abs(value) ** 2
-        moves[axis] = gradient / max(-curvature, least)
-    return moves
+    value, first, second = moments.T
+    power = value.real**2 + value.imag**2
+    gradient = value.real * first.real + value.imag * first.imag
+    curvature = first.real**2 + first.imag**2 + value.real * second.real + value.imag * second.imag
+    least = 0.2 * np.array([x @ x / len(x) for x in grid.places]) * power
+    return np.where(least > 0.0, gradient / np.maximum(np.maximum(-curvature, least), 1e-300), 0.0)
 
 
 def into_range(parameters: Floats, window: tuple[float, float]) -> Floats:

@@ -5,7 +5,7 @@ believes the bound alone is sure of what is wrong.
 """
 
 import numpy as np
-from scipy.special import ndtr
+import scipy
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import RadioConfig
@@ -62,7 +62,7 @@ def mirror_variance(cosines: Floats, deviation: Floats, radio: RadioConfig) -> F
     image = cosines - period * np.where(cosines < 0.0, -1.0, 1.0)
     other = cosines[:, ::-1]
     sure, doubt = (
-        ndtr((np.sqrt(np.maximum(1.0 - other**2, 0.0)) - np.abs(x)) / np.maximum(deviation, 1e-12))
+        scipy.special.ndtr((np.sqrt(np.maximum(1.0 - other**2, 0.0)) - np.abs(x)) / np.maximum(deviation, 1e-12))
         for x in (cosines, image)
     )
     aperture = np.array([radio.array.rows, radio.array.cols]) > 1

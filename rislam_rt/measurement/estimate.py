@@ -13,19 +13,30 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Complexes, Floats
 from rislam_rt.measurement.atoms import Sounding
 from rislam_rt.measurement.detect import Grid, into_range, pick_peaks
-from rislam_rt.measurement.refine import Accuracy, Fit, accuracy, contribution, fit_amplitudes, refine, without_idle
+from rislam_rt.measurement.refine import (
+    Accuracy,
+    Fit,
+    accuracy,
+    fit_amplitudes,
+    part,
+    pick,
+    refine,
+    refine_some,
+    residual,
+    without_idle,
+)
 
 BATCH = 16
 """Most paths that are added between two refinements."""
 ROUNDS = 40
 """Most rounds of search; each but the last adds a path."""
 SEARCH_STEPS = 2
-"""Refinements a round: enough for the residual of the next one, since every round refines all paths again."""
-KNOWN_STEPS = 6
+"""Refinements a round: enough for the residual of the next one."""
+KNOWN_STEPS = 3
 """Most refinements of paths that were known beforehand: a cycle moves them by less than a tenth of a cell."""
 FINAL_STEPS = 12
-FINAL_TOLERANCE = 0.01
-"""Noise energy that the last step may leave: a tenth of a standard deviation."""
+FINAL_TOLERANCE = 0.03
+"""Noise energy that the last step may leave in each path: a quarter of a standard deviation of one parameter."""
 TRIAL_STEPS = 6
 """Most refinements of the other paths after one was taken out, before the costs are compared."""
 TOUCHED = 1.0
@@ -73,26 +84,33 @@ def estimate_paths(
         fit = drop(sounding, fit, samples, threshold, window)
     for _ in range(ROUNDS):
         room = min(BATCH, most - len(fit.parameters))
-        fresh = pick_peaks(sounding, grid, fit.residual, threshold, window, room)
+        fresh = pick_peaks(sounding, grid, residual(fit, samples), threshold, window, room)
         if not len(fresh):
             break
         grown = fit_amplitudes(sounding, np.concatenate([fit.parameters, fresh]), samples)
         # From nothing, every round moves all paths; where most were known, only those that a new one touches.
-        local = _touched(grown, len(fresh)) if len(known) else np.ones(len(grown.parameters), dtype=bool)
+        local = _touched(grown, len(fresh), samples.size) if len(known) else np.ones(len(grown.parameters), dtype=bool)
         grown = _refine_some(sounding, grown, samples, local)
         grown = drop(sounding, grown, samples, threshold, window)
         if grown.cost >= fit.cost - threshold:
             break
         fit = grown
-    fit = refine(sounding, fit, samples, steps=FINAL_STEPS)
-    fit = prune(sounding, drop(sounding, fit, samples, threshold, window), samples, threshold)
+    return _finish(sounding, fit, samples, threshold, window)
+
+
+def _finish(
+    sounding: Sounding, fit: Fit, samples: Complexes, threshold: float, window: tuple[float, float]
+) -> Estimate:
+    """All paths refined to the end, those taken out that the others can stand in for."""
     fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
-    return Estimate(fit, accuracy(fit))
+    fit, bound = prune(sounding, drop(sounding, fit, samples, threshold, window), samples, threshold)
+    final = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
+    return Estimate(final, bound if final is fit else accuracy(final))
 
 
-def _touched(fit: Fit, fresh: int) -> Booleans:
+def _touched(fit: Fit, fresh: int, num_samples: int) -> Booleans:
     """(P,) the last so many paths, and those which would lose more than noise if they did not give way to them."""
-    energy = np.abs(fit.amplitude[-fresh:]) ** 2 / fit.residual.size
+    energy = np.abs(fit.amplitude[-fresh:]) ** 2 / num_samples
     touched = np.any(np.abs(fit.inner.signal[:, -fresh:]) ** 2 * energy > TOUCHED, axis=1)
     touched[-fresh:] = True
     return touched
@@ -102,54 +120,50 @@ def _refine_some(sounding: Sounding, fit: Fit, samples: Complexes, chosen: Boole
     """Refine the chosen paths (P,) for the next search, the others held."""
     if chosen.all():
         return refine(sounding, fit, samples, steps=SEARCH_STEPS)
-    rows = np.flatnonzero(chosen)
-    local = fit.residual + contribution(fit, rows)
-    part = refine(sounding, fit_amplitudes(sounding, fit.parameters[rows], local), local, steps=SEARCH_STEPS)
-    parameters = fit.parameters.copy()
-    parameters[rows] = part.parameters
-    return fit_amplitudes(sounding, parameters, samples)
+    return refine_some(sounding, fit, samples, np.flatnonzero(chosen), steps=SEARCH_STEPS)
 
 
 def drop(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float, window: tuple[float, float]) -> Fit:
     """Without the paths that left the window or the sky, and those whose loss alone costs less than the threshold."""
     keep = _inside(fit.parameters, window)
     if not keep.all():
-        fit = fit_amplitudes(sounding, fit.parameters[keep], samples)
+        fit = pick(sounding, fit, keep, samples)
     keep = without_idle(fit, threshold)
-    return fit if keep.all() else fit_amplitudes(sounding, fit.parameters[keep], samples)
+    return fit if keep.all() else pick(sounding, fit, keep, samples)
 
 
-def prune(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float) -> Fit:
-    """Without the paths that their neighbours, refined, can stand in for.
+def prune(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float) -> tuple[Fit, Accuracy]:
+    """Without the paths that their neighbours, refined, can stand in for; and the bound of what is left.
 
     Noise alone lowers the cost by its highest peak when a path is added, so the threshold is the one of the search.
     Only paths whose amplitude is uncertain by more than that are tried, the most uncertain first.
     """
     tried = np.zeros((0, 3))
     while True:
-        certainty = np.abs(fit.amplitude) ** 2 / accuracy(fit).amplitude ** 2
+        bound = accuracy(fit)
+        certainty = np.abs(fit.amplitude) ** 2 / bound.amplitude**2
         doubtful = np.flatnonzero((certainty < threshold) & ~_among(fit.parameters, tried))
         for row in doubtful[np.argsort(certainty[doubtful])]:
-            rest = _neighbours_instead(sounding, fit, int(row), fit.cost + threshold)
+            rest = _neighbours_instead(sounding, fit, samples, int(row), fit.cost + threshold)
             if rest is not None:
                 fit = fit_amplitudes(sounding, rest, samples)
                 break
             tried = np.concatenate([tried, fit.parameters[row : row + 1]])
         else:
-            return fit
+            return fit, bound
 
 
-def _neighbours_instead(sounding: Sounding, fit: Fit, row: int, enough: float) -> Floats | None:
+def _neighbours_instead(sounding: Sounding, fit: Fit, samples: Complexes, row: int, enough: float) -> Floats | None:
     """Parameters (P - 1, 3) without a path, its neighbours refined, if the cost stays below `enough`."""
     near = np.flatnonzero(np.abs(fit.inner.signal[row]) > COUPLED * sounding.num_samples)
-    local = near[near != row]
-    samples = fit.residual + contribution(fit, near)
-    trial = fit_amplitudes(sounding, fit.parameters[local], samples)
-    trial = refine(sounding, trial, samples, steps=TRIAL_STEPS, enough=enough)
+    whole, local = part(sounding, fit, near, samples)
+    others = near != row
+    trial = pick(sounding, whole, others, local)
+    trial = refine(sounding, trial, local, steps=TRIAL_STEPS, enough=enough)
     if trial.cost >= enough:
         return None
     rest = fit.parameters.copy()
-    rest[local] = trial.parameters
+    rest[near[others]] = trial.parameters
     return np.delete(rest, row, axis=0)
 
 

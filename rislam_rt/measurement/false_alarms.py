@@ -9,10 +9,8 @@ arrays have only a few beams across the sky, and half of the peaks lie on its ed
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ellipe
+import scipy
 
-from rislam_rt.arrays import Floats
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.model import RadioConfig
 
@@ -27,31 +25,13 @@ def detection_threshold(radio: RadioConfig, config: ReceiverConfig) -> float:
 def expected_false_alarms(threshold: float, radio: RadioConfig, window: float) -> float:
     """Mean number of peaks of noise alone above a linear SNR threshold, in delays over a window [s] and the whole sky.
 
-    Inside and on the rim of the sky together (`rim_share`).
     `sum_d mu_d rho_d(2 threshold)` over d = 0 .. 3: mu_d are the intrinsic volumes of (disc of cosines) x (window) in
     units in which the field's derivatives have unit variance, rho_d Worsley's densities for two degrees of freedom.
     """
-    return float(_peak_densities(threshold) @ np.array(_intrinsic_volumes(radio, window)))
-
-
-@lru_cache(maxsize=64)
-def rim_share(threshold: float, radio: RadioConfig, window: float) -> float:
-    """Share of those peaks that lies on the rim of the sky, where a cosine cannot grow any more.
-
-    The terms of the Euler characteristic that belong to the disc's edge; the window's ends, which are few, count as
-    inside.
-    """
-    _, edge, surface, bulk = _intrinsic_volumes(radio, window)
-    area = _sky_area(radio)
-    density = _peak_densities(threshold)
-    rim = density[1] * edge + density[2] * (surface - area)
-    return float(rim / (rim + density[2] * area + density[3] * bulk))
-
-
-def _peak_densities(threshold: float) -> Floats:
-    """Worsley's rho_0 .. rho_3 at a linear SNR."""
-    u, tail = 2.0 * threshold, np.exp(-threshold)
-    return np.array(
+    volume = _intrinsic_volumes(radio, window)
+    u = 2.0 * threshold
+    tail = np.exp(-threshold)
+    density = np.array(
         [
             tail,
             np.sqrt(u / (2.0 * np.pi)) * tail,
@@ -59,12 +39,7 @@ def _peak_densities(threshold: float) -> Floats:
             np.sqrt(u) * (u - 3.0) / (2.0 * np.pi) ** 1.5 * tail,
         ]
     )
-
-
-def _sky_area(radio: RadioConfig) -> float:
-    """Of the disc of cosines, in units in which the field's derivatives have unit variance."""
-    positions = 2.0 * np.pi * radio.array.positions(1.0)[:, :2]
-    return float(np.pi * np.prod(np.sqrt(np.mean(positions**2, axis=0))))
+    return float(density @ volume)
 
 
 def _intrinsic_volumes(radio: RadioConfig, window: float) -> tuple[float, float, float, float]:
@@ -73,7 +48,7 @@ def _intrinsic_volumes(radio: RadioConfig, window: float) -> tuple[float, float,
     positions = 2.0 * np.pi * radio.array.positions(1.0)[:, :2]
     minor, major = np.sort(np.sqrt(np.mean(positions**2, axis=0)))
     area = np.pi * minor * major
-    half_perimeter = 2.0 * major * float(ellipe(1.0 - (minor / major) ** 2)) if major > 0.0 else 0.0
+    half_perimeter = 2.0 * major * float(scipy.special.ellipe(1.0 - (minor / major) ** 2)) if major > 0.0 else 0.0
     return 1.0, half_perimeter + length, area + half_perimeter * length, area * length
 
 
@@ -83,4 +58,6 @@ def _threshold_of_rate(rate: float, radio: RadioConfig, window: float) -> float:
     lowest, highest = 4.0, 300.0
     if expected_false_alarms(lowest, radio, window) <= rate:
         return lowest
-    return float(brentq(lambda level: expected_false_alarms(level, radio, window) - rate, lowest, highest))
+    return float(
+        scipy.optimize.brentq(lambda level: expected_false_alarms(level, radio, window) - rate, lowest, highest)
+    )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import erfc
+import scipy
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.errors import ConfigError
@@ -141,7 +141,9 @@ def digitise(
     level = radio.noise_psd + extra
     if config.told:
         power = max(float(np.mean(np.abs(samples) ** 2)) - level, 0.0)
-        level += power * _distortion(front_end, radio) + _residue_power(front_end, leakage)
+        left = None if front_end.correction is None else front_end.correction.left
+        level += power * _distortion(config, radio, left)
+        level += 0.0 if front_end.correction is not None else abs(leakage) ** 2 * config.leakage_residue**2
     if front_end.correction is not None:
         samples = correct(samples, sent.unit, front_end.correction)
     return samples, level
@@ -190,29 +192,42 @@ def _neighbours(positions: Floats, spacing: float) -> Complexes:
     return np.asarray(spacing / apart * phase)
 
 
-def _distortion(front_end: FrontEnd, radio: RadioConfig) -> float:
-    """Power of multiplicative faults over that of the signal, as their own tolerances say, or the calibration."""
-    config = front_end.config
+def expected_distortion(
+    config: HardwareConfig, radio: RadioConfig, receiver: ReceiverConfig, power: Floats, direct: Floats
+) -> Floats:
+    """Power a tone [J] (K,) that an estimator told of the faults counts as noise, by the tolerances alone.
+
+    Of a calibrated front end what no calibration takes out, phase noise and clipping: at least that is left.
+
+    Parameters
+    ----------
+    power
+        (K,) of all paths that the array hears, the sum of their squared gains.
+    direct
+        (K,) squared gain of the direct path before its cancellation.
+    """
+    share = _distortion(config, radio, 0.0 if config.calibration_cycles else None) * power
+    residue = 0.0 if config.calibration_cycles else config.leakage_residue**2 * direct
+    halves = 0.5 if receiver.alternation else 1.0  # each code has half of the energy
+    return np.asarray(halves * radio.energy / num_tones(radio, receiver) * (share + residue))
+
+
+def _distortion(config: HardwareConfig, radio: RadioConfig, left: float | None) -> float:
+    """Power of multiplicative faults over that of the signal: as their tolerances say, or what calibration `left`."""
     trembling = np.radians(config.phase_noise_deg) ** 2 + _clipped(config.clip_rms)
-    if front_end.correction is not None:
-        return float(trembling + front_end.correction.left)
+    if left is not None:
+        return float(trembling + left)
     gain = (np.log(10.0) / 20.0 * config.gain_std_db) ** 2 + np.radians(config.phase_std_deg) ** 2
     place = (2.0 * np.pi * config.position_std_m / radio.wavelength) ** 2
     neighbours = np.abs(_neighbours(radio.array.positions(1.0), radio.array.spacing)) ** 2
     return float(gain + place + config.coupling**2 * neighbours.sum(axis=1).mean() + config.iq_image**2 + trembling)
 
 
-def _residue_power(front_end: FrontEnd, leakage: complex) -> float:
-    if front_end.correction is not None:
-        return 0.0
-    return float(abs(leakage) ** 2 * front_end.config.leakage_residue**2)
-
-
 def _clipped(level: float) -> float:
     """Share of the power of a normal signal that lies above `level` deviations, what is cut off squared; 0 for none."""
     if not level:
         return 0.0
-    tail = 0.5 * erfc(level / np.sqrt(2.0))
+    tail = 0.5 * scipy.special.erfc(level / np.sqrt(2.0))
     return float(2.0 * ((1.0 + level**2) * tail - level * np.exp(-0.5 * level**2) / np.sqrt(2.0 * np.pi)))
 
 

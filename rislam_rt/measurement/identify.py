@@ -1,7 +1,7 @@
 """Which path a component was: for scoring only, never shown to the agent."""
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.measurement.received import Received
@@ -35,7 +35,7 @@ def identify(tau: Floats, cosines: Floats, gain: Complexes, received: Received, 
     misfit = delay**2 + np.sum(angle**2, axis=-1) + loudness**2
     # A stand-in column for each component, at the gate, makes "none of them" the answer where nothing fits.
     cost = np.concatenate([np.minimum(misfit, 10.0 * GATE), np.full((len(tau), len(tau)), GATE)], axis=1)
-    rows, cols = linear_sum_assignment(cost)
+    rows, cols = scipy.optimize.linear_sum_assignment(cost)
     path = np.full(len(tau), -1)
     taken = cols < len(heard)
     path[rows[taken]] = received.path[heard[cols[taken]]]

@@ -1,7 +1,8 @@
-"""Signals of many paths in one or several captures, and their inner products, which are all real.
+"""Signals of many paths, products over tones, rows and columns, and their inner products, which are all real.
 
-The signals are those of `atoms`. Tones and elements lie evenly about their middles, so that an inner product over one
-axis is a sum of cosines: half the axis says all, and real matrices do. Paths of different captures have none.
+Every inner product of signals or of their derivatives is a product of three small ones, so that the P x P matrices of P
+paths cost little. Tones and elements lie evenly about their middles: an inner product over one axis is a sum of
+cosines, half the axis says all, and real matrices do.
 """
 
 from typing import NamedTuple
@@ -17,8 +18,6 @@ class Waves(NamedTuple):
 
     parameters: Floats
     """(P, 3) of (B tau, u, v)."""
-    capture: Integers
-    """(P,)."""
     delay: Complexes
     """(M, P)."""
     row: Complexes
@@ -28,51 +27,28 @@ class Waves(NamedTuple):
 
     def take(self, rows: Booleans | Integers) -> "Waves":
         """Some of the paths."""
-        return Waves(
-            self.parameters[rows], self.capture[rows], self.delay[:, rows], self.row[:, rows], self.col[:, rows]
-        )
-
-    def join(self, other: "Waves") -> "Waves":
-        """These and more."""
-        return Waves(
-            np.concatenate([self.parameters, other.parameters]),
-            np.concatenate([self.capture, other.capture]),
-            np.concatenate([self.delay, other.delay], axis=1),
-            np.concatenate([self.row, other.row], axis=1),
-            np.concatenate([self.col, other.col], axis=1),
-        )
+        return Waves(self.parameters[rows], self.delay[:, rows], self.row[:, rows], self.col[:, rows])
 
     @property
     def antennas(self) -> Complexes:
         """(L, P)."""
         return (self.row[:, None] * self.col).reshape(len(self.row) * len(self.col), -1)
 
-    def matched(self, samples: Complexes) -> Complexes:
-        """`a^H y` (P,) of the capture of each in samples (C, L, M)."""
-        return np.asarray(np.sum(self.antennas.conj() * self._beams(samples, self.delay), axis=0))
-
-    def slopes(self, sounding: Sounding, samples: Complexes) -> Complexes:
-        """`d^H y` (3, P) of the derivatives by the parameters, likewise."""
+    def correlate(self, sounding: Sounding, samples: Complexes) -> Complexes:
+        """(4, P) `a^H y` and `d^H y`, d the derivatives by the three parameters, of samples (L, M)."""
+        count = len(samples)
+        beams = np.concatenate([samples, samples * sounding.frequency]) @ self.delay.conj()
         antennas = self.antennas.conj()
-        field = (antennas * self._beams(samples, self.delay)).reshape(len(self.row), len(self.col), -1)
-        steep = self._beams(samples, sounding.frequency[:, None] * self.delay)
-        by_row, by_col = sounding.row @ field.sum(axis=1), sounding.col @ field.sum(axis=0)
-        return 2j * np.pi * np.stack([np.sum(antennas * steep, axis=0), -by_row, -by_col])
+        fields = (antennas * beams.reshape(2, count, -1)).reshape(2, len(self.row), len(self.col), -1)
+        by_row = fields.sum(axis=2)
+        matched, steep = by_row.sum(axis=1)
+        seen = np.stack([matched, steep, -(sounding.row @ by_row[0]), -(sounding.col @ fields[0].sum(axis=0))])
+        seen[1:] *= 2j * np.pi
+        return seen
 
-    def sum(self, amplitude: Complexes, captures: int) -> Complexes:
-        """Samples (C, L, M) of all paths with amplitudes (P,)."""
-        antennas = self.antennas * amplitude
-        if captures == 1:
-            return np.asarray(antennas @ self.delay.T)[None]
-        mine = self.capture == np.arange(captures)[:, None]
-        return np.asarray((antennas * mine[:, None]) @ self.delay.T)
-
-    def _beams(self, samples: Complexes, delay: Complexes) -> Complexes:
-        """(L, P) antennas' outputs matched to the delays, of the capture of each."""
-        beams = samples @ delay.conj()
-        if len(samples) == 1:
-            return np.asarray(beams[0])
-        return np.asarray(np.take_along_axis(beams, self.capture[None, None], axis=0)[0])
+    def sum(self, amplitude: Complexes) -> Complexes:
+        """Samples (L, M) of all paths with amplitudes (P,)."""
+        return np.asarray((self.antennas * amplitude) @ self.delay.T)
 
 
 class Inner(NamedTuple):
@@ -85,31 +61,16 @@ class Inner(NamedTuple):
     slope: Floats
     """(3, P, 3, P) `d_i^H d_j`."""
 
-    def take(self, keep: Booleans) -> "Inner":
+    def take(self, keep: Booleans | Integers) -> "Inner":
         """Some of the paths."""
-        rows = np.flatnonzero(keep)
-        return Inner(
-            self.signal[np.ix_(rows, rows)],
-            self.mixed[rows][..., rows],
-            self.slope[:, rows][..., rows],
-        )
+        return Inner(self.signal[keep][:, keep], self.mixed[keep][..., keep], self.slope[:, keep][..., keep])
 
 
-def waves_at(sounding: Sounding, parameters: Floats, capture: Integers) -> Waves:
+def waves_at(sounding: Sounding, parameters: Floats) -> Waves:
     """Signals of paths at parameters (P, 3)."""
-    return Waves(
-        parameters,
-        capture,
-        tone_response(sounding.frequency, parameters[:, 0]),
-        np.exp(2j * np.pi * np.multiply.outer(sounding.row, parameters[:, 1])),
-        np.exp(2j * np.pi * np.multiply.outer(sounding.col, parameters[:, 2])),
-    )
-
-
-def signal_products(waves: Waves) -> Floats:
-    """(P, P) inner products of the signals alone."""
-    value = _real_gram(waves.delay) * _real_gram(waves.row) * _real_gram(waves.col)
-    return _apart(value, waves.capture)
+    delay, u, v = parameters.T
+    row, col = (np.exp(2j * np.pi * np.multiply.outer(x, c)) for x, c in ((sounding.row, u), (sounding.col, v)))
+    return Waves(parameters, tone_response(sounding.frequency, delay), row, col)
 
 
 def inner_of(sounding: Sounding, waves: Waves) -> Inner:
@@ -123,7 +84,6 @@ def inner_of(sounding: Sounding, waves: Waves) -> Inner:
         )
     )
     count = len(f0)
-    f0, f1, f2 = (_apart(value, waves.capture) for value in (f0, f1, f2))
     fx, fy, xy = f0 * x0, f0 * y0, x0 * y0
     mixed, slope = np.empty((count, 3, count)), np.empty((3, count, 3, count))
     mixed[:, 0], mixed[:, 1], mixed[:, 2] = f1 * xy, x1 * fy, y1 * fx
@@ -133,23 +93,11 @@ def inner_of(sounding: Sounding, waves: Waves) -> Inner:
     return Inner(fx * y0, mixed, slope)
 
 
-def _apart(value: Floats, capture: Integers) -> Floats:
-    """Inner products (P, P), zero between captures."""
-    if not len(capture) or (capture == capture[0]).all():
-        return value
-    return np.asarray(value * (capture[:, None] == capture))
-
-
 def _axis_products(wave: Complexes, place: Floats) -> tuple[Floats, Floats, Floats]:
     """(P, P) along one axis of the signals (n, P), of signals and derivatives, and of derivatives."""
     count, size = wave.shape
     half = wave[: count // 2] if count % 2 == 0 else wave
     flat = np.concatenate([half, (2j * np.pi * place[: len(half)])[:, None] * half], axis=1)
-    product = _real_gram(flat) * (1.0 if len(half) == count else 2.0)
+    stacked = np.concatenate([flat.real, flat.imag])
+    product = stacked.T @ stacked * (1.0 if len(half) == count else 2.0)
     return product[:size, :size], product[:size, size:], product[size:, size:]
-
-
-def _real_gram(wave: Complexes) -> Floats:
-    """Real part (P, P) of the inner products of columns (n, P)."""
-    stacked = np.concatenate([wave.real, wave.imag])
-    return np.asarray(stacked.T @ stacked)

@@ -3,8 +3,9 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.measurement.atoms import Sounding, build_sounding, factors, inner_products
+from rislam_rt.measurement.atoms import Sounding, build_sounding
 from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.inner import inner_of, waves_at
 from rislam_rt.measurement.parts import Errors, Parts, in_cells, join
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.refine import joint_bound
@@ -50,7 +51,7 @@ def joint_errors(received: Received, radio: RadioConfig, config: ReceiverConfig,
 
 def _bound(parts: Parts, sounding: Sounding, radio: RadioConfig, unit: float) -> tuple[Floats, Floats]:
     parameters = np.column_stack([parts.tau * radio.bandwidth, parts.cosines])
-    return joint_bound(inner_products(factors(sounding, parameters)), parts.gain * unit)
+    return joint_bound(inner_of(sounding, waves_at(sounding, parameters)), parts.gain * unit)
 
 
 def _absorbed(faint: Booleans, near: Floats) -> Integers:

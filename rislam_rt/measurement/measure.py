@@ -6,8 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.measurement.bound import measure_bound
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.hardware import FrontEnd
-from rislam_rt.measurement.nearby import measure_local
-from rislam_rt.measurement.received import direct_gain, receive
+from rislam_rt.measurement.received import Clutter, direct_gain, receive
 from rislam_rt.measurement.waveform import measure_waveform
 from rislam_rt.model import Measurement, Paths, PathTruth, RadioConfig
 
@@ -21,6 +20,7 @@ def measure(
     previous: Measurement | None = None,
     doppler: Floats | None = None,
     front_end: FrontEnd | None = None,
+    clutter: Clutter | None = None,
     *,
     rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
@@ -42,13 +42,18 @@ def measure(
         (P,) Doppler shifts [Hz] of the paths, which turn within the slot; None if nothing moves.
     front_end
         A receiver as it was built (`waveform`); None for an ideal one.
+    clutter
+        What is heard besides and has no identity (row `cycle` too): a component that it made is -1 in the truth.
     """
     if front_end is not None and front_end.config.carrier_offset_hz:
         doppler = (np.zeros(paths.num_paths) if doppler is None else doppler) + front_end.config.carrier_offset_hz
-    received = receive(paths, cycle, heading, radio, config, doppler)
+    received, extra = receive(paths, cycle, heading, radio, config, doppler), 0
+    if clutter is not None:
+        received = clutter.beside(received, paths.num_paths, cycle, heading, radio, config)
+        extra = clutter.paths.num_paths
     if config.estimator == "waveform":
         leakage = direct_gain(paths, cycle) if front_end is not None else 0.0
-        return measure_waveform(received, radio, config, previous, front_end, leakage, rng=rng)
-    if config.estimator == "local":
-        return measure_local(received, radio, config, rng=rng)
-    return measure_bound(received, radio, config, paths.num_paths, rng=rng)
+        found, truth = measure_waveform(received, radio, config, previous, front_end, leakage, rng=rng)
+    else:
+        found, truth = measure_bound(received, radio, config, paths.num_paths, extra, rng=rng)
+    return found, PathTruth(np.where(truth.path < paths.num_paths, truth.path, -1)) if extra else truth

@@ -66,6 +66,26 @@ def receive(
     return Received(path, paths.tau[cycle, path], arrival[path], gain, paths.panel[path], radius, shift)
 
 
+class Clutter(NamedTuple):
+    """Paths without an identity, heard like any other: their columns mean nothing from one cycle to the next."""
+
+    paths: Paths
+    doppler: Floats
+    """(K, P) [Hz]."""
+
+    def of_cycle(self, cycle: int) -> "Clutter":
+        """That of one cycle alone."""
+        return Clutter(self.paths.of_cycle(cycle), self.doppler[[cycle]])
+
+    def beside(
+        self, received: Received, num_paths: int, cycle: int, heading: float, radio: RadioConfig, config: ReceiverConfig
+    ) -> Received:
+        """All that reaches the receiver in a cycle; the clutter's columns count on from `num_paths`."""
+        more = receive(self.paths, cycle, heading, radio, config, self.doppler[cycle])
+        more = more._replace(path=more.path + num_paths)
+        return Received._make(np.concatenate(pair) for pair in zip(received, more, strict=True))
+
+
 def direct_gain(paths: Paths, cycle: int) -> complex:
     """Gain of the direct path from Tx to Rx, nothing cancelled; 0 where it is hidden."""
     return complex(np.sum(paths.gain[cycle, paths.kind == PathKind.LOS]))

@@ -19,7 +19,7 @@ def build_sensor(radio: RadioConfig, config: ReceiverConfig) -> SensorModel:
     """
     threshold = detection_threshold(radio, config)
     rate = config.clutter_rate
-    if config.estimator != "bound":
+    if config.estimator == "waveform":
         expected = expected_false_alarms(threshold, radio, config.max_delay - config.min_delay)
         rate = config.num_captures * GRID_SHARE * expected
     resolution = "cell" if config.estimator == "bound" and config.resolution == "cell" else "joint"

@@ -8,6 +8,7 @@ of M samples at rate B, scaled by 1 / sqrt(B), whose noise has the variance N0 B
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.measurement.atoms import tone_response
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.received import Received
 from rislam_rt.model import RadioConfig
@@ -33,7 +34,7 @@ def tones(received: Received, radio: RadioConfig, config: ReceiverConfig, elemen
     if config.element_exact:
         return scale * _element_exact(received, radio, frequencies, elements)
     antennas = np.exp(2j * np.pi * elements @ received.direction.T)
-    return scale * (antennas * received.gain) @ delay_response(received.tau, frequencies)
+    return scale * (antennas * received.gain) @ tone_response(frequencies, received.tau).T
 
 
 def pulse_samples(received: Received, radio: RadioConfig, config: ReceiverConfig) -> Complexes:

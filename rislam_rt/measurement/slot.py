@@ -8,7 +8,7 @@ into all of them. The order A-B-B-A cancels the first order of it.
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import hadamard
+import scipy
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.measurement.config import ReceiverConfig
@@ -31,7 +31,7 @@ def look_signs(order: str, panels: int) -> Floats:
 
 def codes_in_turn(panels: int) -> Floats:
     """(C, C) Hadamard matrix of the C codes that so many panels need: code and twin for one, four codes for two."""
-    return hadamard(2 ** int(np.ceil(np.log2(1 + panels)))).astype(np.float64)
+    return scipy.linalg.hadamard(2 ** int(np.ceil(np.log2(1 + panels)))).astype(np.float64)
 
 
 def slot_mean(doppler: Floats, signs: Floats, config: ReceiverConfig) -> Complexes:

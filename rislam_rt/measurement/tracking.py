@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
@@ -146,7 +146,7 @@ def _assign(
     cost = distance + np.sum(np.log(spread), axis=-1)
     barred = distance > config.gate
     ceiling = np.abs(np.where(barred, 0.0, cost)).max(initial=0.0) * 2.0 * (min(cost.shape) + 1) + 1.0
-    rows, cols = linear_sum_assignment(np.where(barred, ceiling, cost))
+    rows, cols = scipy.optimize.linear_sum_assignment(np.where(barred, ceiling, cost))
     good = ~barred[rows, cols]
     return rows[good], cols[good]
 

@@ -1,23 +1,23 @@
 """The waveform-driven receiver: makes the signal of a cycle, and finds the paths in it again."""
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import measurement_std
-from rislam_rt.measurement.atoms import build_sounding
+from rislam_rt.measurement.atoms import Sounding, build_sounding
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.detect import build_grid
+from rislam_rt.measurement.detect import Grid, build_grid
 from rislam_rt.measurement.doubt import crowding, luck, mirror_variance, unmirrored
-from rislam_rt.measurement.estimate import NOTHING, estimate_paths
+from rislam_rt.measurement.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_swing, in_step
 from rislam_rt.measurement.identify import identify
 from rislam_rt.measurement.joint import LEAST_CERTAINTY
 from rislam_rt.measurement.parts import capped, into_disc
 from rislam_rt.measurement.received import Received
-from rislam_rt.measurement.refine import amplitude_covariance
 from rislam_rt.measurement.sides import Found, panel_probability
 from rislam_rt.measurement.signal import num_tones, tones
 from rislam_rt.measurement.slot import codes_in_turn, split
@@ -53,20 +53,6 @@ class Components(NamedTuple):
     """(N,)."""
     capture: Integers
     """(N,) number of the capture that it was found in."""
-
-
-class Bounded(NamedTuple):
-    """P paths fitted to samples of unit noise, with their joint bound."""
-
-    parameters: Floats
-    """(P, 3) of (B tau, u, v)."""
-    amplitude: Complexes
-    deviation: Floats
-    """(P, 3)."""
-    amplitude_std: Floats
-    """(P,) of the complex amplitude, all else unknown."""
-    covariance: Any
-    """(P, P) of the complex amplitudes at known parameters."""
 
 
 def capture(
@@ -190,27 +176,12 @@ def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Fl
 
 
 def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Floats) -> Components:
-    """Components of one capture."""
-    sounding = build_sounding(one.samples.shape[1], radio, element_exact=config.element_exact)
+    """Components of one capture: what is told apart, with deviations that count what cannot be seen."""
     window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
+    sounding, grid = _searched(one.samples.shape[1], window, radio, config)
     threshold = detection_threshold(radio, config)
     samples = one.samples / np.sqrt(one.noise_psd)
-    grid = build_grid(sounding, window)
     found = estimate_paths(sounding, grid, samples, threshold, window, config.max_components, known)
-    bounded = Bounded(
-        found.fit.parameters,
-        found.fit.amplitude,
-        found.accuracy.parameters,
-        found.accuracy.amplitude,
-        amplitude_covariance(found.fit),
-    )
-    return reported(bounded, one, radio, config)
-
-
-def reported(found: Bounded, one: Capture, radio: RadioConfig, config: ReceiverConfig) -> Components:
-    """What is told apart of an estimate, with deviations that count what cannot be seen."""
-    window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
-    threshold = detection_threshold(radio, config)
     parameters, gain, deviation, amplitude_std = _resolved(found, one.samples.size, radio)
     cosines = into_disc(unmirrored(parameters[:, 1:], radio))
     variance = deviation**2 * luck(np.abs(gain) ** 2 * one.samples.size)[:, None]
@@ -228,17 +199,26 @@ def reported(found: Bounded, one: Capture, radio: RadioConfig, config: ReceiverC
     )
 
 
-def _resolved(found: Bounded, samples: int, radio: RadioConfig) -> tuple[Floats, Complexes, Floats, Floats]:
+@lru_cache(maxsize=16)
+def _searched(
+    count: int, window: tuple[float, float], radio: RadioConfig, config: ReceiverConfig
+) -> tuple[Sounding, Grid]:
+    """Sounding of so many tones, and the grid that is searched in a window of delays, in cells."""
+    sounding = build_sounding(count, radio, element_exact=config.element_exact)
+    return sounding, build_grid(sounding, window)
+
+
+def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats, Complexes, Floats, Floats]:
     """Parameters (N, 3), gains (N,), deviations (N, 3) and amplitude deviations (N,) of what can be told apart.
 
     Where the data ask for several paths but cannot share the amplitude out between them, they are reported as one, as
     wide as they lie apart.
     """
-    parameters, amplitude = found.parameters, found.amplitude
-    label = _groups(parameters, np.abs(amplitude) < LEAST_CERTAINTY * found.amplitude_std, radio)
+    parameters, amplitude, bound = found.fit.parameters, found.fit.amplitude, found.accuracy
+    label = _groups(parameters, np.abs(amplitude) < LEAST_CERTAINTY * bound.amplitude, radio)
     member = (label == np.unique(label)[:, None]).astype(np.float64)
     gain = member @ amplitude
-    spread = np.real(np.sum((member @ found.covariance) * member, axis=1))
+    spread = np.real(np.sum((member @ found.fit.covariance) * member, axis=1))
     single = member.sum(axis=1) == 1
     share = member * np.abs(amplitude)
     share /= share.sum(axis=1, keepdims=True)
@@ -246,8 +226,8 @@ def _resolved(found: Bounded, samples: int, radio: RadioConfig) -> tuple[Floats,
     lone = measurement_std(np.abs(gain) ** 2 * samples, radio)
     lone_std = np.column_stack([lone.tau * radio.bandwidth, lone.cosines])
     offset = np.where(member[..., None] > 0.0, np.abs(parameters - centre[:, None]), 0.0).max(axis=1, initial=0.0)
-    deviation = np.where(single[:, None], member @ found.deviation, np.hypot(lone_std, offset))
-    variance = np.where(single, member @ found.amplitude_std**2, spread)
+    deviation = np.where(single[:, None], member @ bound.parameters, np.hypot(lone_std, offset))
+    variance = np.where(single, member @ bound.amplitude**2, spread)
     sure = np.abs(gain) ** 2 > LEAST_CERTAINTY**2 * variance
     return centre[sure], gain[sure], deviation[sure], np.sqrt(variance[sure] / 2.0)
 

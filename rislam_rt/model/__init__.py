@@ -1,5 +1,6 @@
 """Floor 2: frozen data, checked once on construction. No behaviour beyond what a field's name promises."""
 
+from rislam_rt.model.antennas import Antennas
 from rislam_rt.model.estimate import MapEstimate, SlamEstimate, Suspect, empty_map, pose_estimate
 from rislam_rt.model.measurement import Measurement, PathTruth
 from rislam_rt.model.paths import PathKind, Paths, RisLegs
@@ -23,6 +24,7 @@ from rislam_rt.model.trajectory import Body, Trajectory
 __all__ = [
     "NOTHING",
     "STEPS",
+    "Antennas",
     "Body",
     "DataSheet",
     "MapEstimate",

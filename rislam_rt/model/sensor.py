@@ -7,8 +7,8 @@ the one that they are told, which may be wrong.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import chndtr
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
@@ -24,7 +24,7 @@ CERTAIN_SNR = 30.0
 
 @dataclass(frozen=True, slots=True)
 class SensorModel:
-    """Detection, false alarms, resolution and error tails of a receiver. SI units; SNRs linear, over all antennas."""
+    """Detection, false alarms and resolution of a receiver. SI units; SNRs linear, over all antennas."""
 
     radio: RadioConfig
     """Noise, band, gains and array that the rest refers to."""
@@ -36,22 +36,16 @@ class SensorModel:
     """First and last delay [s] that are reported."""
     resolution: str = "cell"
     """What two paths must be to come out apart (`RESOLUTIONS`)."""
-    tail_share: float = 0.0
-    """Share of the components of true paths whose errors are larger than reported,"""
-    tail_scale: float = 1.0
-    """...and by how much their standard deviations are."""
     alternation: bool = False
     """Whether components come with the probability that they ran over the panel."""
 
     def __post_init__(self) -> None:
-        for name, least in (("threshold", 1e-300), ("false_alarms", 0.0), ("tail_scale", 1.0)):
+        for name, least in (("threshold", 1e-300), ("false_alarms", 0.0)):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= least):
                 raise ConfigError(f"sensor.{name}: {value} received; give a finite number of at least {least:g}")
         if not self.window[1] > self.window[0]:
             raise ConfigError(f"sensor.window: {self.window} received; give a last delay after the first")
-        if not 0.0 <= self.tail_share <= 1.0:
-            raise ConfigError(f"sensor.tail_share: {self.tail_share} received; give a share from 0 to 1")
         if self.resolution not in RESOLUTIONS:
             raise ConfigError(f"sensor.resolution: '{self.resolution}' received; give one of {', '.join(RESOLUTIONS)}")
 
@@ -100,7 +94,7 @@ def detection_probability(snr: ArrayLike, threshold: float) -> Floats:
     """
     level = np.sqrt(2.0 * threshold)
     mean = np.minimum(np.sqrt(2.0 * np.maximum(np.asarray(snr, dtype=np.float64), 0.0)), level + CERTAIN_SNR)
-    return np.asarray(1.0 - chndtr(level**2, 2.0, mean**2))
+    return np.asarray(1.0 - scipy.special.chndtr(level**2, 2.0, mean**2))
 
 
 def merged_pull(ratio: ArrayLike) -> tuple[Floats, Floats]:

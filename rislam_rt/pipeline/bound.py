@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.information import (
     LandmarkModel,
@@ -17,11 +17,12 @@ from rislam_rt.information import (
     plane_tangents,
     posterior_bound,
 )
-from rislam_rt.measurement import build_sensor
+from rislam_rt.measurement import build_sensor, expected_distortion
+from rislam_rt.measurement.received import HORIZON_MARGIN
 from rislam_rt.model import PathKind, Paths, Scene, SensorModel, detection_probability
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.spec import PipelineSpec, Settings, build_settings
 
 SILENT = 1e-4
 """Information over that at the detection threshold below which a path counts as not heard."""
@@ -68,7 +69,8 @@ def bound_problem(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Ma
     sensor = build_sensor(settings.radio, settings.receiver)
     axes = 3 if settings.slam.height == "estimated" else 2
     use_vt = settings.slam.use_vt and estimator.walls == "planes"
-    audible = heard_paths(paths.with_gain(gain), sensor, use_vt=use_vt)
+    lit = paths.with_gain(gain)
+    audible = heard_paths(lit.with_gain(over_distortion(lit, settings)), sensor, use_vt=use_vt)
     motion = MotionPrior(settings.slam.sigma_a, spec.start.position_std_m, spec.start.velocity_std_m_s, axes)
     if not audible.num_paths:
         return BoundProblem(len(scene.agent) * [NO_ROWS], None, np.zeros(0), motion, frozenset())
@@ -110,6 +112,21 @@ def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Map
     walls = build_walls(scene)
     middle = np.array([wall_surface(walls, number)[0] for number in range(len(walls))]).reshape(-1, 3)
     return SchemeBound(agent, landmarks, model.wall_error(bound.last, middle))
+
+
+def over_distortion(paths: Paths, settings: Settings) -> Complexes:
+    """Gains (K, P), smaller by as much as the distortion that the estimator is told of exceeds the noise."""
+    hardware, receiver, radio = settings.hardware, settings.receiver, settings.radio
+    if not hardware.told:
+        return paths.gain
+    leakage = 10.0 ** (-receiver.leakage_cancellation_db / 20.0)
+    direct = paths.kind == PathKind.LOS
+    heard = np.where(direct, leakage, 1.0) * np.abs(paths.gain) * paths.valid
+    if radio.array.pattern == "upper":
+        heard = heard * (paths.arrival[..., 2] >= -HORIZON_MARGIN)
+    power = np.sum(heard**2, axis=1)
+    extra = expected_distortion(hardware, radio, receiver, power, np.sum(np.abs(paths.gain[:, direct]) ** 2, axis=1))
+    return np.asarray(paths.gain * np.sqrt(radio.noise_psd / (radio.noise_psd + extra))[:, None])
 
 
 def prior_std(model: LandmarkModel, scene: Scene, *, upright: bool) -> Floats:

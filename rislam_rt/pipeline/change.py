@@ -37,7 +37,11 @@ def change_room(scene: Scene, room: RoomSection, *, rng: np.random.Generator) ->
     if room.scatterers is not None:
         scatterers = _scatterers(scene, room.scatterers, rng=rng)
     ris = scene.ris if panels is scene.panels else join_panels(panels)
-    return replace(scene, ris=ris, scatterers=scatterers)
+    reflectors = scene.reflectors
+    if room.scattering is not None:
+        rough = [replace(r.material, scattering=room.scattering) for r in reflectors]
+        reflectors = tuple(replace(r, material=m) for r, m in zip(reflectors, rough, strict=True))
+    return replace(scene, ris=ris, scatterers=scatterers, reflectors=reflectors)
 
 
 def _changed(panel: RisPanel, room: RoomSection) -> RisPanel:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.measurement import FrontEnd, measure
+from rislam_rt.measurement import Clutter, FrontEnd, measure
 from rislam_rt.model import DataSheet, Measurement, Paths, PathTruth, RisCode, SlamEstimate, Trajectory
 from rislam_rt.pipeline.control import Link, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
@@ -44,10 +44,17 @@ class Room(NamedTuple):
     """The cycle that the paths begin at; the trajectory is the whole one."""
     front_end: FrontEnd | None = None
     """What the receiver does wrong; None for an ideal one."""
+    clutter: Clutter | None = None
+    """What is heard besides, and has no identity."""
 
     def at(self, cycle: int) -> Paths:
         """The paths of one cycle alone."""
         return self.paths.of_cycle(cycle - self.first)
+
+    def clutter_at(self, cycle: int) -> Clutter | None:
+        """What is heard besides in one cycle."""
+        row = cycle - self.first
+        return None if self.clutter is None else self.clutter.of_cycle(row)
 
 
 class Agent(NamedTuple):
@@ -124,7 +131,7 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
         paths = rephase(paths, applied, 1.0 if room.faults is None else room.faults.weight)
     measurement, truth = measure(
         paths, 0, float(room.trajectory.heading[cycle]), means.settings.radio, means.settings.receiver, agent.heard,
-        room.doppler[cycle - room.first], room.front_end, rng=rng.noise,
+        room.doppler[cycle - room.first], room.front_end, room.clutter_at(cycle), rng=rng.noise,
     )  # fmt: skip
     clock.append(perf_counter())
 

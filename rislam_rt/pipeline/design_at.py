@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.design import DESIGNERS, Design, panel_columns, problem_from_paths
+from rislam_rt.design import DESIGNERS, Design, DesignProblem, panel_columns, problem_from_paths
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind, RadioConfig, Scene, Trajectory
 from rislam_rt.pipeline.run import build_channel
@@ -19,6 +19,8 @@ class DesignsAt(NamedTuple):
     target: str
     """The panel path that single-path methods aim at: the direct one, or where it is hidden the first walled one."""
     is_direct: bool
+    panels: dict[str, dict[str, float]]
+    """By method, of each of several panels the gain [dB] of its first path, the direct one where it is seen."""
 
 
 def design_at(
@@ -42,7 +44,16 @@ def design_at(
     designs = {
         name: design(problem, rng=child) for (name, design), child in zip(DESIGNERS.items(), children, strict=True)
     }
-    return DesignsAt(designs, paths.label(int(target)), bool(paths.kind[target] == PathKind.RIS))
+    gains = {name: _panel_gains(scene, problem, design) for name, design in designs.items()}
+    return DesignsAt(designs, paths.label(int(target)), bool(paths.kind[target] == PathKind.RIS), gains)
+
+
+def _panel_gains(scene: Scene, problem: DesignProblem, design: Design) -> dict[str, float]:
+    """Of each of several panels; nothing of one, whose gain stands with the design."""
+    weight, found = np.exp(-1j * design.xi.ravel()), {}
+    for panel, target, (_, span) in zip(scene.panels, problem.targets, problem.panels, strict=True):
+        found[panel.name] = float(20.0 * np.log10(max(abs(target @ weight[span]), 1e-20)))
+    return found if len(found) > 1 else {}
 
 
 def design_table(found: DesignsAt) -> dict[str, Any]:
@@ -62,6 +73,7 @@ def design_table(found: DesignsAt) -> dict[str, Any]:
             "seconds": design.seconds,
             "outcome": design.outcome.name,
             "code": design.code.index.tolist(),
+            **({"panel_gain_db": found.panels[name]} if found.panels[name] else {}),
         }
         for name, design in designs.items()
     }

@@ -15,6 +15,8 @@ from rislam_rt.pipeline.spec import Settings
 from rislam_rt.slam import StartPrior
 from rislam_rt.slam.schemes import bp_slam, channel_slam
 
+ROUNDING = 1e-6
+"""Negative eigenvalues of a covariance over its largest one, that rounding in single precision may leave."""
 FARTHEST = 1e12
 """[m] Largest coordinate that a filter of one's own may give: as the largest number of a pipeline file; scores, which
 square it, stay finite."""
@@ -54,6 +56,11 @@ def own_estimator(name: str) -> Estimator:
         far = float(np.abs(found.position).max())
         if far > FARTHEST:
             raise ConfigError(f"'{name}': {what}: a position of {far:g} m returned; give one up to {FARTHEST:g} m")
+        least, *_, most = np.linalg.eigvalsh(0.5 * (found.covariance + found.covariance.T))
+        if least < -ROUNDING * max(most, 0.0):
+            raise ConfigError(
+                f"'{name}': {what}: a covariance with an eigenvalue of {least:g} returned; give none below 0"
+            )
         return found
 
     def init(start: StartPrior, body: Body, panel: DataSheet | None, sensor: SensorModel, config: Any,

@@ -22,16 +22,27 @@ def write_atomic(path: Path, content: bytes) -> None:
     StoreError
         The disk refused.
     """
+    write_pieces(path, [content])
+
+
+def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
+    """As `write_atomic`, of content that comes in pieces and never is all in memory.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
     try:
         if _is_device(path):
             with os.fdopen(os.open(path, os.O_WRONLY | os.O_APPEND), "wb") as device:
-                device.write(content)
+                device.writelines(pieces)
             return
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=path.parent)
         try:
             with os.fdopen(handle, "wb") as file:
-                file.write(content)
+                file.writelines(pieces)
                 file.flush()
                 os.fsync(file.fileno())
             os.chmod(name, 0o644)

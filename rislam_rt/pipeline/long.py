@@ -11,9 +11,8 @@ import numpy as np
 from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.model import Scene, SlamResult
 from rislam_rt.pipeline import slices
-from rislam_rt.pipeline.pieces import write_pieces
+from rislam_rt.pipeline.files import write_pieces
 from rislam_rt.pipeline.run import Progress, library_versions, panel_warnings, set_scene
-from rislam_rt.pipeline.seal import read_sealed
 from rislam_rt.pipeline.slices import (
     FOLDER,
     SHOWN,
@@ -24,7 +23,7 @@ from rislam_rt.pipeline.slices import (
     thin_scheme,
 )
 from rislam_rt.pipeline.spec import PipelineSpec
-from rislam_rt.pipeline.store import DONE, RUN_FILE, RunFolder, check_files, read_run, record_files
+from rislam_rt.pipeline.store import DONE, RUN_FILE, RunFolder, check_files, read_marker, read_run, record_files
 from rislam_rt.pipeline.summary import summarise
 from rislam_rt.pipeline.tally import Tally
 from rislam_rt.pipeline.workers import run_side_by_side
@@ -137,7 +136,7 @@ def read_any(folder: Path) -> LongRun:
     ConfigError
         The folder is not a completed run.
     """
-    about = read_sealed(folder / RUN_FILE) if (folder / RUN_FILE).is_file() else {}
+    about = read_marker(folder) if (folder / RUN_FILE).is_file() else {}
     if "slices" not in about:
         result = read_run(folder)
         return LongRun(summarise(result), result)

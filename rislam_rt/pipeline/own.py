@@ -40,6 +40,8 @@ COLUMNS: dict[str, tuple[str, str]] = {
 """Columns of a table: unit and meaning."""
 LONGEST_DELAY = 1e-5
 """[s] 3 km: no room; a number above is of another unit."""
+ROUNDING = 1e-6
+"""By how much the squares of two cosines may sum to more than 1: what tables of six digits leave."""
 FINEST_STD = 1e-15
 """[s] a standard deviation below a third of a micrometre is of another unit, too."""
 
@@ -159,6 +161,12 @@ def checked(inputs: Inputs, place: str) -> Inputs:
         reach = np.abs(one.cosines).max(initial=0.0)
         if reach > 1.0:
             raise ConfigError(f"{where}: cosine of {reach:g} received; give direction cosines from -1 to 1, not angles")
+        squares = np.sum(one.cosines**2, axis=-1).max(initial=0.0)
+        if squares > 1.0 + ROUNDING:
+            raise ConfigError(
+                f"{where}: cosines whose squares sum to {squares:g} received, which no direction has; give at most 1 "
+                "(bring estimates beyond the horizon back to it)"
+            )
         for name in ("tau_std", "cosines_std", "amplitude", "amplitude_std"):
             value = getattr(one, name)
             if not (np.isfinite(value) & (value > 0.0)).all():

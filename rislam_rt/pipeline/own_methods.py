@@ -4,7 +4,6 @@ A name is `module:attribute`, as `mine:my_designer` for a function in `mine.py`,
 `GROUPS`. The command line looks for modules beside the pipeline file and in the working folder too.
 """
 
-import hashlib
 import inspect
 import re
 import traceback
@@ -32,6 +31,7 @@ from rislam_rt.model import (
     SlamEstimate,
     Trajectory,
 )
+from rislam_rt.pipeline.own_files import own_digest
 from rislam_rt.slam import StartPrior
 
 GROUPS = ("rislam_rt.schemes", "rislam_rt.designers", "rislam_rt.estimators", "rislam_rt.channels")
@@ -124,12 +124,13 @@ def is_own(name: str) -> bool:
 
 
 def own_digests(names: Iterable[str]) -> dict[str, str]:
-    """SHA-256 of the files behind the names that are methods of one's own: numbers depend on them."""
+    """SHA-256 of the files behind the names that are methods of one's own, with what they import from beside them:
+    numbers depend on them."""
     found = {}
     for name in sorted(set(names)):
         if is_own(name):
             file = _file(load_own(name))
-            found[name] = hashlib.sha256(Path(file).read_bytes()).hexdigest() if file else ""
+            found[name] = own_digest(Path(file)) if file else ""
     return found
 
 

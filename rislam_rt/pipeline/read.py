@@ -59,6 +59,16 @@ def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
     return Table(path, content, changed, content.pop("sweep", None))
 
 
+def make_way(table: Table, keys: Sequence[str]) -> None:
+    """Take out of a table what excludes one of some keys (dotted) that are to be set later, unless the command line set
+    it: then it is a contradiction, and stays one."""
+    for section, *names in EITHER:
+        if any(f"{section}.{name}" in keys for name in names):
+            for name in names:
+                if f"{section}.{name}" not in (*keys, *table.changed) and section in table.content:
+                    table.content[section].pop(name, None)
+
+
 def settings_table(overrides: Sequence[str], defaults: dict[str, Any]) -> Table:
     """A table of `key=value` settings (dotted keys) alone, put over defaults.
 

@@ -17,6 +17,7 @@ from rislam_rt.pipeline.change import change_room
 from rislam_rt.pipeline.control import check_control
 from rislam_rt.pipeline.cycle import usual_step
 from rislam_rt.pipeline.estimators import Estimator
+from rislam_rt.pipeline.extras import check_extras, trace_clutter
 from rislam_rt.pipeline.motion import draw_motion
 from rislam_rt.pipeline.own_methods import OwnChannel
 from rislam_rt.pipeline.schemes import SCHEMES
@@ -57,6 +58,8 @@ class Stage(NamedTuple):
     seeds: Seeds
     seconds: float
     """Time [s] that the channel took."""
+    extras: Paths | None = None
+    """What is heard besides, without identities."""
 
 
 def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> tuple[Scene, Body, Seeds]:
@@ -87,8 +90,10 @@ def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
     check_one_piece(spec.cycles or len(scene.agent), "'rislam-rt run' goes in slices")
     scene, body, seeds = set_scene(scene, spec, rng=rng)
     begin = perf_counter()
-    paths = build_channel(spec.channel, scene, build_radio(spec.radio), spec.depth).paths(scene.agent)
-    return Stage(scene, paths, body, seeds, perf_counter() - begin)
+    radio = build_radio(spec.radio)
+    paths = build_channel(spec.channel, scene, radio, spec.depth).paths(scene.agent)
+    extras = trace_clutter(scene, radio, scene.agent, spec.extras)
+    return Stage(scene, paths, body, seeds, perf_counter() - begin, extras)
 
 
 def check_one_piece(cycles: int, way_out: str) -> None:
@@ -171,7 +176,7 @@ def run_scheme(
 ) -> SchemeResult:
     """One scheme over all cycles, with its own estimator unless another is given."""
     walk = Walk(name, stage.scene, stage.body, spec, stage.seeds, estimator)
-    return walk.lead(stage.paths, 0, len(stage.scene.agent), tell)
+    return walk.lead(stage.paths, 0, len(stage.scene.agent), tell, stage.extras)
 
 
 def check_run(scene: Scene, spec: PipelineSpec) -> None:
@@ -181,12 +186,13 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     ------
     ConfigError
         The budget is not the cycle, there are fewer cycles than asked for, a scheme needs a panel that is not there, or
-        the room cannot be changed as asked.
+        the room cannot be changed as asked, or extra paths are wanted that nobody could trace.
     SceneError
         A wall's material is not specified at the radio's carrier.
     """
     raise_errors(list(material_errors(scene, f"scene '{scene.name}'", build_radio(spec.radio))))
     scene = change_room(scene, spec.room, rng=np.random.default_rng(0))
+    check_extras(scene, spec.extras, spec.channel)
     motion, budget = scene.agent, spec.budget
     if spec.cycles is not None and spec.cycles > len(motion):
         raise ConfigError(f"cycles: {spec.cycles} received; the scene has {len(motion)}, give no more")

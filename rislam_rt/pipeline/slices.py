@@ -25,6 +25,7 @@ from rislam_rt.pipeline.dataset import (
     seal_dataset,
     write_dataset,
 )
+from rislam_rt.pipeline.extras import trace_clutter
 from rislam_rt.pipeline.join import join_paths, join_schemes, thinned_paths, thinned_scheme
 from rislam_rt.pipeline.record import given_to_dataset
 from rislam_rt.pipeline.run import Progress, build_channel
@@ -78,13 +79,15 @@ def run_slices(
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
-    channel = build_channel(spec.channel, scene, build_radio(spec.radio), spec.depth)
+    radio = build_radio(spec.radio)
+    channel = build_channel(spec.channel, scene, radio, spec.depth)
     walk, seconds, cycles = Walk(name, scene, body, spec, seeds), 0.0, len(scene.agent)
     for number, (first, last) in enumerate(slice_bounds(cycles)):
         begin = perf_counter()
         paths = channel.paths(scene.agent[first : min(last + walk.foresight, cycles)])
+        extras = trace_clutter(scene, radio, scene.agent[first : min(last + walk.foresight, cycles)], spec.extras)
         seconds += perf_counter() - begin
-        part = walk.lead(paths, first, last, tell)
+        part = walk.lead(paths, first, last, tell, extras)
         own = paths if walk.foresight == 0 else thinned_paths(paths, np.arange(last - first))
         for file, data in (
             (slice_file(folder, number, PATHS_FILE), paths_to_dataset(own, scene.agent[first:last])),

@@ -10,6 +10,7 @@ from rislam_rt.design import DESIGNERS, DesignConfig
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement import HardwareConfig, ReceiverConfig, build_sensor, with_reference_snr
 from rislam_rt.model import RadioConfig, RxArray, SensorModel
+from rislam_rt.pipeline.extras import ExtrasSection
 from rislam_rt.pipeline.mistold import ToldSection
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
@@ -225,6 +226,8 @@ class RoomSection(Section):
     """Phase levels of an element."""
     scatterers: Annotated[int, Field(ge=0, le=100)] | None = None
     """Their number: the scene's first ones, and then spheres at places drawn for every seed (see `pipeline.change`)."""
+    scattering: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
+    """Share of the reflected field that every wall scatters: what it reflects like a mirror is weaker for it."""
 
 
 class PipelineSpec(Section):
@@ -256,6 +259,7 @@ class PipelineSpec(Section):
     budget: BudgetSection = BudgetSection()
     control: ControlSection = ControlSection()
     room: RoomSection = RoomSection()
+    extras: ExtrasSection = ExtrasSection()
     panel: PanelSection = PanelSection()
     motion: MotionSection = MotionSection()
     start: StartSection = StartSection()

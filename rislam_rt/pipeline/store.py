@@ -9,6 +9,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -167,6 +168,8 @@ def find_run(folder: Path, identity: Identity) -> dict[str, Any] | None:
     try:
         names = sorted(entry.name for entry in folder.iterdir())
     except FileNotFoundError:
+        if folder.is_symlink():
+            raise ConfigError(f"--out {folder}: a link to nothing; mend it, or give another folder") from None
         return None
     except OSError as error:
         raise ConfigError(f"--out {folder}: cannot be used ({error.strerror}); give another folder") from None
@@ -174,10 +177,26 @@ def find_run(folder: Path, identity: Identity) -> dict[str, Any] | None:
         if all(name == LOCK_FILE or TEMPORARY.fullmatch(name) for name in names):
             return None
         raise ConfigError(f"--out {folder}: exists and is not a run; give a folder that does not exist yet")
-    about = read_sealed(folder / RUN_FILE)
+    about = read_marker(folder)
     if about.get("identity") != identity.digest:
         differ = identity.difference({key: about.get(key, {}) for key in identity.content})
         raise ConfigError(f"--out {folder}: holds another run ({differ}); give another folder")
+    return about
+
+
+def read_marker(folder: Path) -> dict[str, Any]:
+    """The marker of a run, with its state, identity and the digests of its files.
+
+    Raises
+    ------
+    ResultError
+        It is not as it was written, or holds none of these.
+    """
+    about = read_sealed(folder / RUN_FILE)
+    files = about.get("files")
+    named = isinstance(files, dict) and all(isinstance(digest, str) for digest in files.values())
+    if not named or about.get("state") not in (RUNNING, DONE) or not isinstance(about.get("identity"), str):
+        raise ResultError(f"{folder / RUN_FILE}: no state, identity or files as a run writes them; give another folder")
     return about
 
 
@@ -295,7 +314,7 @@ def read_run(folder: Path) -> SlamResult:
     """
     if not (folder / RUN_FILE).is_file():
         raise ConfigError(f"{folder}: not a completed run (no {RUN_FILE}); give a folder that `run` wrote")
-    about = read_sealed(folder / RUN_FILE)
+    about = read_marker(folder)
     try:
         if about["state"] != DONE:
             raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
@@ -316,7 +335,7 @@ def read_run(folder: Path) -> SlamResult:
         }
         return SlamResult(
             name=about["name"],
-            scene=Scene(scene.name, scene.reflectors, scene.scatterers, scene.ris, agent, about["scene"]["sha256"]),
+            scene=replace(scene, agent=agent, digest=about["scene"]["sha256"]),
             paths=paths,
             schemes=schemes,
             config=about["config"],

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.walls import Walls, build_walls
@@ -212,7 +212,7 @@ def match_walls(walls: Walls, estimate: MapEstimate, heard: Booleans | None = No
     if not planes or not len(asked):
         return match
     cost = np.array([[surface_rms(walls, int(w), n, float(d)) for n, d in planes] for w in asked])
-    rows, columns = linear_sum_assignment(np.minimum(cost, 10.0 * NEAR_WALL))
+    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(cost, 10.0 * NEAR_WALL))
     good = cost[rows, columns] <= NEAR_WALL
     match[asked[rows[good]]] = columns[good]
     return match

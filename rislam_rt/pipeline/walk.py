@@ -1,6 +1,7 @@
 """One scheme on its way through the cycles of a run, led through all of them at once or slice by slice."""
 
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from rislam_rt.pipeline.choose import build_designer
 from rislam_rt.pipeline.control import open_link
 from rislam_rt.pipeline.cycle import Agent, Cycle, Means, Rng, Room, run_cycle
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
+from rislam_rt.pipeline.extras import heard_clutter
 from rislam_rt.pipeline.front_end import prepare_front_end
 from rislam_rt.pipeline.record import gather, given_of
 from rislam_rt.pipeline.schemes import SCHEMES
@@ -58,17 +60,23 @@ class Walk:
         """Cycles beyond the last one whose paths a slice needs: a design on the truth looks as far as the delay."""
         return self.means.spec.control.delay_cycles if self.scheme.on_truth else 0
 
-    def lead(self, paths: Paths, first: int, last: int, tell: Tell) -> SchemeResult:
-        """Cycles `first` to `last` (not included); `paths` begin at `first` and may go on beyond `last`."""
+    def lead(self, paths: Paths, first: int, last: int, tell: Tell, extras: Paths | None = None) -> SchemeResult:
+        """Cycles `first` to `last` (not included); `paths` begin at `first` and may go on beyond `last`, and so do the
+        `extras` that are heard with them.
+        """
         if self.means.panel is None:
             paths = without_panel(paths)
         spec, motion = self.means.spec, self.motion[first : first + paths.num_cycles]
         shift = doppler_shift(paths, motion, self.means.settings.radio.wavelength)
+        clutter, twin = None, deepcopy(self.sway)  # one array hears both
+        if extras is not None:
+            extras = deceive(extras, motion, spec.told, rng=twin, since=float(self.motion.time[0]))
+            clutter = heard_clutter(extras, motion, self.means.settings.radio)
         heard = deceive(paths, motion, spec.told, rng=self.sway, since=float(self.motion.time[0]))
         if first == 0:
             build = np.random.default_rng(self.seeds.hardware)
             self.front_end = prepare_front_end(heard, motion, self.body, self.means.settings, rng=build)
-        room = Room(heard, self.motion, shift, self.faults, first, self.front_end)
+        room = Room(heard, self.motion, shift, self.faults, first, self.front_end, clutter)
         cycles: list[Cycle] = []
         tell(self.name, first, len(self.motion))
         for cycle in range(first, last):

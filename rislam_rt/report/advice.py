@@ -60,8 +60,8 @@ def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> N
         norm=BoundaryNorm(STEPS_DB, colours.N, extend="both"),
     )  # fmt: skip
     axis.set_facecolor(UNSEEN)
-    level = np.where(np.isfinite(coverage.margin_db), coverage.margin_db, -60.0)
-    if level.min() < 0.0 < level.max():
+    level = np.ma.masked_invalid(coverage.margin_db)
+    if level.count() and level.min() < 0.0 < level.max():
         axis.contour(coverage.x, coverage.y, level, levels=[0.0], colors="#d55e00", linewidths=2.0, zorder=1)
     draw_plan(axis, scene)
     axis.set_xlabel("x [m]")

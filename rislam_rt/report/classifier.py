@@ -6,10 +6,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from rislam_rt.pipeline.studies.classifier.codes import POLICIES
+from rislam_rt.pipeline.studies.classifier.gather import Examples
 from rislam_rt.pipeline.studies.classifier.run import Training
-from rislam_rt.pipeline.studies.classifier.score import Score, by_value, mistakes, rules
+from rislam_rt.pipeline.studies.classifier.score import Score, by_value, mistakes, panel_dropped, rules
 from rislam_rt.pipeline.studies.classifier.spec import ClassifierSpec
 from rislam_rt.report.style import styled
+from rislam_rt.report.swept.entries import paragraph
 from rislam_rt.slam.classify import FEATURES, network_arrays
 
 COLOUR = {"network": "#0072B2", "single": "#56B4E9", "geometric": "#D55E00", "amplitude": "#009E73"}
@@ -20,6 +23,10 @@ NAME = {
 }  # fmt: skip
 AGES = (1, 2, 3, 5, 10, 20, 40, 41)
 SNRS = (5, 10, 13, 16, 20, 25, 30, 40, 60)
+CODES = """`random` a new one each cycle; `held` one random one; `aimed` the best for the direct path from the middle of
+the walk, held; `exact` the best for the direct path in each cycle."""
+FEWEST = 5
+"""Looks at the panel's direct path in a room under one policy, from which on its share of them says something."""
 
 
 def weights_file(found: Training) -> bytes:
@@ -79,9 +86,28 @@ def draw_importance(found: Training) -> Figure:
     return figure
 
 
+def draw_panel(found: Training) -> Figure:
+    """Share of the looks at the panel's direct path in which it is removed: a dot a room, by policy and rule."""
+    judges = rules(found.network)
+    with styled():
+        figure = Figure(figsize=(9.0, 4.0))
+        axis = figure.subplots()
+        for shift, rule in zip((-0.27, -0.09, 0.09, 0.27), NAME, strict=True):
+            for number, policy in enumerate(POLICIES):
+                looks = [panel_dropped(examples, judges[rule])[policy] for examples in _rooms(found).values()]
+                share = np.array(sorted(dropped / total for dropped, total in looks if total >= FEWEST))
+                place = number + shift + np.linspace(-0.06, 0.06, len(share))
+                label = NAME[rule] if number == 0 else None
+                axis.plot(place, share, MARK[rule], ms=4, color=COLOUR[rule], alpha=0.7, label=label)
+        axis.set(xticks=range(len(POLICIES)), xticklabels=POLICIES, xlabel="codes", title="A dot for each room")
+        axis.set(ylim=(-0.04, 1.04), ylabel="share of looks in which\nthe direct panel path is dropped")
+        figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    return figure
+
+
 def classifier_table(found: Training) -> dict[str, Any]:
     """All scores as plain data."""
-    tested = found.sets.tested
+    tested, drawn, judges = found.sets.tested, found.sets.all_drawn, rules(found.network)
     return {
         "scores": {
             room: {rule: one._asdict() for rule, one in scores.items()} for room, scores in found.scores.items()
@@ -92,28 +118,44 @@ def classifier_table(found: Training) -> dict[str, Any]:
         "importance": {name: lost.tolist() for name, lost in found.importance.items()},
         "by_age": {rule: _by_age(found, rule) for rule in NAME},
         "by_snr": {rule: _by_snr(found, rule) for rule in NAME},
-        "mistakes": {rule: mistakes(tested, judge) for rule, judge in rules(found.network).items()},
+        "mistakes": {rule: mistakes(tested, judge) for rule, judge in judges.items()},
+        "mistakes_in_drawn_rooms": {rule: mistakes(drawn, judge) for rule, judge in judges.items()},
+        "panel_dropped": {
+            name: {rule: panel_dropped(examples, judge) for rule, judge in judges.items()}
+            for name, examples in _rooms(found).items()
+        },
     }
 
 
-def classifier_page(found: Training, spec: ClassifierSpec, figures: tuple[str, str] | None) -> str:
-    """Markdown: what was done, scores, features."""
+def classifier_page(found: Training, spec: ClassifierSpec, figures: tuple[str, str, str] | None) -> str:
+    """Markdown: what was done, scores by room, by class and of the panel by code, features."""
+    about = f"""Written by `rislam-rt run` from one pipeline, do not edit. Seed {spec.seed}, paths by
+    {"ray tracing" if spec.channel == "traced" else "image sources"}, receiver `{spec.receiver.estimator}`. Trained on
+    {spec.train} random rooms, one walk of {spec.cycles} cycles each, reference SNR {spec.snr_low_db:g} to
+    {spec.snr_high_db:g} dB; the random start chosen on {spec.validation} further ones. Tested on {spec.walks} random
+    walks through each named room, and on the drawn rooms {spec.drawn_first} to {spec.drawn_first + spec.drawn - 1}
+    along their own motion; none of them was trained on, and each walk is gone under all codes: {CODES} Intervals:
+    {spec.coverage:.0%}, whole walks resampled. Clutter is neither kept nor removed in F1; its share that is kept stands
+    apart."""
     lines = [
         "# Classifier of multipath components: scores", "",
-        f"Written by `rislam-rt run` from one pipeline, do not edit. Seed {spec.seed}, paths by "
-        f"{'ray tracing' if spec.channel == 'traced' else 'image sources'}. Trained on {spec.train} random rooms, one",
-        f"walk of {spec.cycles} cycles each, reference SNR {spec.snr_low_db:g} to {spec.snr_high_db:g} dB; the random "
-        f"start chosen on {spec.validation} further random rooms;",
-        f"tested on {spec.walks} random walks through each named room, none of which was trained on. Intervals: "
-        f"{spec.coverage:.0%}, whole walks",
-        "resampled. Clutter is neither kept nor removed in F1; its share that is kept stands apart.", "",
+        *paragraph(about), "",
     ]  # fmt: skip
     if figures is not None:
         lines += [f"![F1 in each room]({figures[0]})", ""]
     lines += ["## Scores", "", *_score_table(found), ""]
-    lines += ["F1 of each random start, on the random rooms for validation and on all test rooms: "]
-    lines += [", ".join(f"{chosen:.4f} and {tested:.4f}" for chosen, tested in found.restarts) + ".", ""]
-    lines += ["## Mistakes on the test rooms", "", *_mistake_table(found), ""]
+    lines += [
+        "Of each random start, the mean over classes of the share told rightly in the random rooms for validation,"
+    ]
+    lines += ["and F1 on all test rooms: "]
+    lines[-1] += ", ".join(f"{chosen:.4f} and {tested:.4f}" for chosen, tested in found.restarts) + "."
+    lines += ["", "## The panel's direct path", "", *_panel_summary(found), ""]
+    if figures is not None:
+        lines += [f"![Share of looks at the panel that are dropped, room by room]({figures[2]})", ""]
+    lines += ["### Room by room", "", *_panel_rooms(found), ""]
+    lines += ["## By class", "", "Share told wrongly: of LOS and VT kept, of the others removed.", ""]
+    for title, examples in (("Named rooms", found.sets.tested), ("Drawn rooms", found.sets.all_drawn)):
+        lines += [f"### {title}", "", *_class_table(found, examples), ""]
     lines += ["### By room, of the network", "", *_room_mistakes(found), ""]
     lines += ["### By age and by SNR", "", *_bin_table(found), "", "## Features", ""]
     if figures is not None:
@@ -152,11 +194,46 @@ def _score_table(found: Training) -> list[str]:
     return [*lines, _row(["mean over test rooms", "", "", *mean, "", "", "", ""])]
 
 
-def _mistake_table(found: Training) -> list[str]:
-    tables = {rule: mistakes(found.sets.tested, judge) for rule, judge in rules(found.network).items()}
+def _rooms(found: Training) -> dict[str, Examples]:
+    """All rooms of the test, named and drawn."""
+    return {**found.sets.test, **found.sets.drawn}
+
+
+def _panel_summary(found: Training) -> list[str]:
+    """Dropped looks by code and rule: share of all, and of the room where it is largest."""
+    judges = rules(found.network)
+    titles = ["codes", "looks", "rooms", *(f"{name}: dropped, worst room" for name in NAME.values())]
+    lines = [_row(titles), _row(["---"] * len(titles))]
+    for policy in POLICIES:
+        cells = []
+        for rule in NAME:
+            looks = [panel_dropped(examples, judges[rule])[policy] for examples in _rooms(found).values()]
+            dropped, total = np.sum(looks, axis=0)
+            shares = [part / whole for part, whole in looks if whole >= FEWEST]
+            cells.append(f"{dropped / max(total, 1):.3f}, {max(shares, default=0.0):.2f}")
+        heard = sum(whole >= FEWEST for _, whole in looks)
+        lines.append(_row([f"`{policy}`", str(total), str(heard), *cells]))
+    return [*lines, "", f"Rooms: those with {FEWEST} looks or more, of which the worst one is."]
+
+
+def _panel_rooms(found: Training) -> list[str]:
+    """Dropped of all looks of the network by code, and of the baselines under the best code."""
+    judges = rules(found.network)
+    titles = ["room", *(f"`{policy}`" for policy in POLICIES), "geometric, `exact`", "amplitude, `exact`"]
+    lines = [_row(titles), _row(["---"] * len(titles))]
+    for name, examples in _rooms(found).items():
+        own = {rule: panel_dropped(examples, judges[rule]) for rule in NAME}
+        if any(total for _, total in own["network"].values()):
+            looks = [*own["network"].values(), own["geometric"]["exact"], own["amplitude"]["exact"]]
+            lines.append(_row([name, *("{} of {}".format(*pair) if pair[1] else "" for pair in looks)]))
+    return lines
+
+
+def _class_table(found: Training, examples: Examples) -> list[str]:
+    tables = {rule: mistakes(examples, judge) for rule, judge in rules(found.network).items()}
     lines = [_row(["path class", "examples", *NAME.values()]), _row(["---"] * (2 + len(NAME)))]
     for kind, (_, total) in tables["network"].items():
-        lines.append(_row([kind, str(total), *(str(tables[rule][kind][0]) for rule in NAME)]))
+        lines.append(_row([kind, str(total), *(f"{tables[rule][kind][0] / total:.3f}" for rule in NAME)]))
     return lines
 
 

@@ -1,7 +1,5 @@
 """Lines and polygons of rooms and estimated planes, for drawing."""
 
-from itertools import pairwise
-
 import numpy as np
 
 from rislam_rt.arrays import Floats
@@ -10,16 +8,12 @@ from rislam_rt.channel.walls import Walls
 
 def outline_edges(walls: Walls) -> Floats:
     """(E, 2, 3) [m] edges of all walls, without the lines between triangles of the same wall."""
-    edges = []
-    for wall in range(len(walls)):
-        count: dict[tuple[tuple[float, ...], ...], int] = {}
-        for triangle in np.round(walls.triangles[walls.wall_of_triangle == wall], 9).tolist():
-            corners = [tuple(corner) for corner in triangle]
-            for a, b in pairwise([*corners, corners[0]]):
-                key = tuple(sorted((a, b)))
-                count[key] = count.get(key, 0) + 1
-        edges += [key for key, times in count.items() if times == 1]
-    return np.array(edges, dtype=np.float64).reshape(-1, 2, 3)
+    corners = np.round(walls.triangles, 9)
+    edges = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 3)
+    _, point = np.unique(edges.reshape(-1, 3), axis=0, return_inverse=True)
+    key = np.column_stack([np.repeat(walls.wall_of_triangle, 3), np.sort(point.reshape(-1, 2), axis=1)])
+    _, index, count = np.unique(key, axis=0, return_index=True, return_counts=True)
+    return edges[index[count == 1]]
 
 
 def section(triangles: Floats, height: float) -> Floats:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -92,11 +92,10 @@ def draw_scene(scene: Scene, path: Path) -> Path:
 def draw_plan(axis: Axes, scene: Scene) -> None:
     """Walls (thick where they stand at the agent's height), shades, path and landmarks as they are."""
     walls, path = build_walls(scene), scene.agent.position
+    cuts = section(walls.triangles, float(path[-1, 2]))
     axis.add_collection(PolyCollection(list(walls.shades.triangles[..., :2]), color=SHADE, lw=0.5, zorder=0))
-    for edge in outline_edges(walls):
-        axis.plot(edge[:, 0], edge[:, 1], color="#dddddd", lw=0.8, zorder=0)
-    for cut in section(walls.triangles, float(path[-1, 2])):
-        axis.plot(cut[:, 0], cut[:, 1], color=WALL, lw=3.0, solid_capstyle="round", zorder=1)
+    axis.add_collection(LineCollection(list(outline_edges(walls)[..., :2]), colors="#dddddd", lw=0.8, zorder=0))
+    axis.add_collection(LineCollection(list(cuts), colors=WALL, lw=3.0, capstyle="round", zorder=1))
     axis.plot(path[:, 0], path[:, 1], color=TRUTH, lw=4.0, alpha=0.25, zorder=2)
     axis.plot(path[0, 0], path[0, 1], "o", color=TRUTH, ms=5, zorder=3)
     axis.annotate("start", (path[0, 0], path[0, 1]), (6, -10), textcoords="offset points", fontsize=9)
@@ -167,6 +166,14 @@ def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
         axis.plot(point[0], point[1], "x", color=colour, ms=9, mew=2.2, zorder=6)
         ring = ellipse(point[:2], scheme.map.covariance[row, :2, :2])
         axis.plot(ring[:, 0], ring[:, 1], color=colour, lw=1.0, zorder=6)
+    for number, panel in enumerate(
+        scene.panels if len(scene.panels) > 1 else ()
+    ):  # of several: which is held for which
+        row = scheme.map.panel_row(number)
+        if row >= 0:
+            point = scheme.map.position[row]
+            axis.annotate(f"held for {panel.name}", (point[0], point[1]), (-8, -14), textcoords="offset points",
+                          ha="right", fontsize=8, color=colour, zorder=7)  # fmt: skip
 
 
 def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) -> None:
@@ -214,15 +221,14 @@ def _legend() -> list[Line2D]:
 
 
 def _draw_room_3d(axis: Any, scene: Scene) -> None:
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
     walls = build_walls(scene)
     low, high = scene.bounds
     floor = walls.triangles[np.abs(walls.triangles[:, :, 2] - low[2]).max(axis=1) < 1e-6]
     if len(floor):
         axis.add_collection3d(Poly3DCollection(list(floor), facecolor="#f1f1f1", edgecolor="none", zorder=0))
-    for edge in outline_edges(walls):
-        axis.plot(*edge.T, color=WALL, lw=1.0, zorder=1)
+    axis.add_collection3d(Line3DCollection(list(outline_edges(walls)), colors=WALL, lw=1.0, zorder=1))
     axis.add_collection3d(Poly3DCollection(list(walls.shades.triangles), facecolor=SHADE, alpha=0.3, zorder=1))
     axis.set_xlim(low[0], high[0])
     axis.set_ylim(low[1], high[1])

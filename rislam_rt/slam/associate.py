@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.tracks import Glance, same_side
@@ -39,7 +39,7 @@ def associate(candidates: Candidates, glance: Glance, gate: float, strangers: Fl
     if not len(candidates.seen) or not len(glance.seen):
         return chosen
     cost = pair_costs(candidates, glance, gate, strangers)
-    rows, columns = linear_sum_assignment(cost)
+    rows, columns = scipy.optimize.linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     chosen[rows[good]] = columns[good]
     return chosen

@@ -6,7 +6,7 @@ in which a landmark does not show count too: of a path near the threshold only t
 """
 
 import numpy as np
-from scipy.special import chndtr, i0e
+import scipy
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.model import RadioConfig, RisCode, RisSpec
@@ -34,7 +34,7 @@ def log_rice(amplitude: Floats, mean: Floats, std: Floats) -> Floats:
     """Log density of the amplitude of a constant `mean` in complex noise of `std` a real dimension."""
     variance = std**2
     product = amplitude * mean / variance
-    bessel = np.log(i0e(product))
+    bessel = np.log(scipy.special.i0e(product))
     return np.log(amplitude / variance) - 0.5 * (amplitude - mean) ** 2 / variance + bessel
 
 
@@ -44,7 +44,7 @@ def log_missed(mean: Floats, std: Floats, threshold: float) -> Floats:
     Below it is one minus Marcum's Q, a noncentral chi-square of two degrees of freedom.
     """
     level = threshold / std
-    below = chndtr(level**2, 2.0, np.minimum(mean / std, level + BEYOND) ** 2)
+    below = scipy.special.chndtr(level**2, 2.0, np.minimum(mean / std, level + BEYOND) ** 2)
     return np.asarray(np.log(1.0 - SHOWN * (1.0 - below)))
 
 

@@ -4,7 +4,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
+import scipy
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
@@ -97,7 +97,7 @@ def even_draws(count: int, dims: int) -> Floats:
         return np.zeros((count, 0))
     from scipy.stats.qmc import Halton  # half a second of import: only once there is something to sample
 
-    draws = ndtri(Halton(dims, scramble=False).random(count + 1)[1:])
+    draws = scipy.special.ndtri(Halton(dims, scramble=False).random(count + 1)[1:])
     if count <= dims + 1:
         return np.zeros((count, dims)) if count == 1 else np.asarray(draws - draws.mean(axis=0))
     draws -= draws.mean(axis=0)

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaln, ndtri
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.identity import STRENGTHS
@@ -100,8 +100,10 @@ class Tracks(NamedTuple):
 
     @property
     def specular(self) -> Booleans:
-        """(T,) whether it is taken for a wall return."""
-        return self.moving | np.where(self.looks > 0, self.odds < 0.0, self.shine > 0.3)
+        """(T,) whether it is taken for a wall return. What the receiver says ran over the panel is none, however it
+        looks to a classifier."""
+        told = (self.looks > 0) & (self.side != PANEL)
+        return self.moving | np.where(told, self.odds < 0.0, self.shine > 0.3)
 
     @property
     def length(self) -> Integers:
@@ -135,7 +137,12 @@ def log_silence(tracks: Tracks, cycle: int) -> Floats:
     """
     missed, gap = tracks.earlier_misses(cycle), tracks.misses
     total = tracks.length + missed
-    return np.asarray(gammaln(missed + gap + 1) - gammaln(missed + 1) - gammaln(total + gap + 2) + gammaln(total + 2))
+    return np.asarray(
+        scipy.special.gammaln(missed + gap + 1)
+        - scipy.special.gammaln(missed + 1)
+        - scipy.special.gammaln(total + gap + 2)
+        + scipy.special.gammaln(total + 2)
+    )
 
 
 def has_ended(tracks: Tracks, cycle: int, max_misses: int) -> Booleans:
@@ -153,7 +160,7 @@ def overstatement(tracks: Tracks, cycle: int, threshold: float) -> Floats:
     """
     seen, missed = tracks.length, tracks.earlier_misses(cycle)
     share = np.clip((seen + 1.0) / (seen + missed + 2.0), FAINTEST, 1.0 - 1e-9)
-    quantile = ndtri(share)
+    quantile = scipy.special.ndtri(share)
     mean = np.sqrt(2.0 * threshold) + quantile
     return np.asarray(1.0 + np.exp(-0.5 * quantile**2) / np.sqrt(2.0 * np.pi) / share / mean)
 

@@ -51,6 +51,13 @@ def edited(tmp_path_factory):
     return _edited
 
 
+def test_new_room_from_corners(run):
+    code, out, _ = run("new", "mine", "--floorplan", "0,0 4,0 4,3 0,3", "--height", "2.5", "--rest", "itu:brick")
+    assert code == 0
+    assert "brick" in out
+    assert Path("mine/scene.toml").is_file()
+
+
 def test_help_and_version_import_nothing_heavy():
     code = (
         "import sys\n"
@@ -60,6 +67,30 @@ def test_help_and_version_import_nothing_heavy():
         "    try:\n        main()\n"
         "    except SystemExit as left:\n        assert left.code == 0, left.code\n"
         f"print([name for name in {HEAVY} if name in sys.modules])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_settings_are_printed_without_what_only_a_run_needs():
+    """Half a second of scipy, trimesh and plots for a list of settings; on modules, as clocks lie."""
+    heavy = [
+        "scipy.linalg",
+        "scipy.special",
+        "scipy.optimize",
+        "scipy.spatial",
+        "scipy.stats",
+        "trimesh",
+        "xarray",
+        "matplotlib",
+    ]
+    code = (
+        "import sys\n"
+        "from rislam_rt.cli import main\n"
+        "sys.argv = ['rislam-rt', 'config']\n"
+        "try:\n    main()\n"
+        "except SystemExit as left:\n    assert left.code in (0, None), left.code\n"
+        f"print([name for name in {heavy} if name in sys.modules])\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
@@ -90,6 +121,14 @@ def test_help_and_version_import_nothing_heavy():
         ["show", SCENE, "--out", "room.doc"],
         ["new", "room", "--template", "palace"],
         ["new", ROOT / "docs"],
+        ["new", "room", "--from", "missing.glb"],
+        ["new", "room", "--from", ROOT / "README.md"],
+        ["new", "room", "--from", "missing.glb", "--origin", "1,2"],
+        ["new", "room", "--from", "missing.glb", "--material", "floor=cheese"],
+        ["new", "room", "--from", "missing.glb", "--floorplan", "0,0 4,0 4,3"],
+        ["new", "room", "--floorplan", "0,0 4,0"],
+        ["new", "room", "--units", "mm"],
+        ["new", ROOT / "docs", "--floorplan", "0,0 4,0 4,3 0,3"],
         ["report", ROOT / "docs"],
     ],
     ids=lambda words: " ".join(str(word) for word in words).replace(str(ROOT), ""),
@@ -168,6 +207,10 @@ def test_run_report_and_json(run, tmp_path, monkeypatch):
     page = tmp_path / "mine" / "report.html"
     first = page.read_bytes()
     assert len(list((tmp_path / "mine" / "figures").glob("*.png"))) == 7
+    words = ("--config", "mine/config.toml", "--truth", "mine/truth.tum", "--json", "slam.json", "--out", "again")
+    assert run("slam", "mine/measurements_random.nc", *words)[0] == 0
+    found = json.loads((tmp_path / "slam.json").read_text())
+    assert found["rmse_m"] == pytest.approx(content["schemes"]["random"]["rmse_m"], abs=1e-8)  # poses of nine digits
     monkeypatch.setitem(sys.modules, "rerun", None)  # as where the extra is not installed
     code, _, err = run("report", "mine", "--rerun", "mine.rrd")
     assert code == 3
@@ -325,9 +368,10 @@ def test_a_material_not_specified_at_the_carrier_names_the_file(run, tmp_path):
     for command in (["run", PIPELINE, "--scene", room, *SHORT], ["trace", room, "--signals"]):
         code, _, err = run(*command, "--set", "radio.carrier_ghz=0.6")
         assert code == 2
-        assert err.count("\n") == 1
-        assert "itu_room/scene.toml: reflector[" in err
-        assert "not specified at the carrier of 0.6 GHz" in err
+        for line in err.splitlines():  # one for each of four reflectors
+            assert "itu_room/scene.toml: reflector[" in line
+            assert "not specified at the carrier of 0.6 GHz" in line
+        assert len(err.splitlines()) == 4
     assert list(tmp_path.iterdir()) == []
 
 

@@ -5,7 +5,8 @@ import pytest
 
 from rislam_rt.information import certainty_share, resolved_probability
 from rislam_rt.information.resolution import PHASES
-from rislam_rt.measurement.atoms import build_sounding, factors, inner_products
+from rislam_rt.measurement.atoms import build_sounding
+from rislam_rt.measurement.inner import inner_of, waves_at
 from rislam_rt.measurement.refine import joint_bound
 from rislam_rt.model import RadioConfig, RxArray, SensorModel
 
@@ -23,7 +24,7 @@ def test_share_is_that_of_the_joint_bound(array: RxArray) -> None:
             turn = np.exp(1j * np.pi * (number + 0.5) / PHASES)
             # the second is strong, so that the prior on its cosines tells nothing; the first stands at the origin
             amplitude = np.array([1e3 * turn, 1e3])
-            inner = inner_products(factors(sounding, np.stack([np.zeros(3), gap])))
+            inner = inner_of(sounding, waves_at(sounding, np.stack([np.zeros(3), gap])))
             _, variance = joint_bound(inner, amplitude)
             assert 1.0 / (variance[0] * sounding.num_samples) == pytest.approx(share[number], rel=1e-3)
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from rislam_rt.measurement import ReceiverConfig, measure
-from rislam_rt.measurement.atoms import build_sounding, factors, synthesise
+from rislam_rt.measurement.atoms import build_sounding
 from rislam_rt.measurement.doubt import UNSEEN, crowding, luck, mirror_variance, unmirrored
+from rislam_rt.measurement.inner import waves_at
 from rislam_rt.measurement.refine import accuracy, fit_amplitudes, refine
 from rislam_rt.measurement.signal import add_noise
 from rislam_rt.model import PathKind, RadioConfig, RxArray
@@ -49,7 +50,7 @@ def test_unseen_neighbours_act_like_noise_of_their_power():
         parameters = np.column_stack([delay, np.tile([0.2, -0.1], (count + 1, 1))])
         phase = np.exp(2j * np.pi * rng.uniform(size=count))
         amplitude = np.append(100.0, np.sqrt(power) * phase) / np.sqrt(sounding.num_samples)
-        samples = add_noise(synthesise(factors(sounding, parameters), amplitude), 1.0, rng=rng)
+        samples = add_noise(waves_at(sounding, parameters).sum(amplitude), 1.0, rng=rng)
         fit = refine(sounding, fit_amplitudes(sounding, parameters[:1], samples), samples, steps=5, tolerance=1e-4)
         errors.append((fit.parameters[0, 0] - 40.0) / accuracy(fit).parameters[0, 0])
     # a variance from 300 draws has a standard error of 8 %, three of them

@@ -12,6 +12,7 @@ from rislam_rt.measurement import (
     build_front_end,
     calibrate,
     capture,
+    expected_distortion,
     measure,
     receive,
     to_samples,
@@ -87,6 +88,26 @@ def test_told_of_its_faults_the_estimator_reckons_with_their_power():
         levels.append(level)
         powers.append(np.mean(np.abs(heard - clean) ** 2))
     assert np.mean(levels) == pytest.approx(np.mean(powers), rel=5.0 * np.sqrt(2.0 / (60 * 16)))
+
+
+@pytest.mark.parametrize("alternation", [False, True])
+def test_the_distortion_to_expect_is_what_the_estimator_is_told_on_average(stage, alternation):
+    """From the paths' gains, against the levels that come with the samples; the power of a sum of paths over antennas
+    and tones is the sum of their powers but for cross terms, which 30 cycles leave at a few percent."""
+    config = HardwareConfig(phase_std_deg=3.0, coupling=0.02, leakage_residue=0.01, told=True)
+    receiver = ReceiverConfig(estimator="waveform", alternation=alternation, leakage_cancellation_db=10.0)
+    front, paths = build_front_end(config, RADIO, receiver, rng=rng(4)), stage.paths
+    direct = np.array([direct_gain(paths, cycle) for cycle in range(30)])
+    heard = [receive(paths, cycle, float(stage.scene.agent.heading[cycle]), RADIO, receiver) for cycle in range(30)]
+    levels = [
+        capture(one, RADIO, receiver, front, leakage, rng=rng(5))[0].noise_psd
+        for one, leakage in zip(heard, direct, strict=True)
+    ]
+    power = np.array([np.sum(np.abs(one.gain) ** 2) for one in heard])
+    expected = expected_distortion(config, RADIO, receiver, power, np.abs(direct) ** 2)
+    assert np.mean(levels) - RADIO.noise_psd == pytest.approx(expected.mean(), rel=0.05)
+    tuned = HardwareConfig(phase_std_deg=3.0, coupling=0.02, leakage_residue=0.01, told=True, calibration_cycles=5)
+    assert (expected_distortion(tuned, RADIO, receiver, power, np.abs(direct) ** 2) == 0.0).all()
 
 
 def test_an_image_lies_mirrored_in_frequency_and_beside_in_time():

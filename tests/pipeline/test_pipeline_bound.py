@@ -11,7 +11,15 @@ from rislam_rt.information import MotionPrior, build_landmark_model, plane_tange
 from rislam_rt.information.landmarks import Rows
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.bound import FLOOR_TILT, UPRIGHT_TILT, fewer_rows, heard_paths, prior_std, scheme_bound
+from rislam_rt.pipeline.bound import (
+    FLOOR_TILT,
+    UPRIGHT_TILT,
+    fewer_rows,
+    heard_paths,
+    over_distortion,
+    prior_std,
+    scheme_bound,
+)
 from rislam_rt.pipeline.run import set_stage
 from rislam_rt.pipeline.spec import build_settings
 from rislam_rt.pipeline.summary import map_score, summarise
@@ -69,6 +77,21 @@ def test_less_noise_and_more_signals_lower_it(stage):
     assert loud < quiet
     plain = without_panel(stage.paths).gain
     assert bound(stage, "random", SEEN)[-1] < bound(stage, "no_ris", SEEN, gain=plain)[-1]
+
+
+def test_told_of_the_front_ends_faults_it_is_that_of_the_noise_they_make(stage):
+    """Between the bounds at the least and at the largest distortion of any cycle; untold, as with an ideal one."""
+    fault = ('receiver.estimator="waveform"', "hardware.phase_std_deg=1.0")
+    ideal, untold = bound(stage, "random"), bound(stage, "random", *fault)
+    told = bound(stage, "random", *fault, "hardware.told=true")
+    assert (untold == ideal).all()
+    assert (bound(stage, "random", *fault, "hardware.told=true", "hardware.calibration_cycles=5") == ideal).all()
+    noise = build_settings(load_spec(PIPELINE, SHORT)).radio.noise_psd
+    lit = over_distortion(stage.paths, build_settings(load_spec(PIPELINE, [*SHORT, *fault, "hardware.told=true"])))
+    here = stage.paths.gain[:, 0] != 0.0
+    rise = np.abs(stage.paths.gain[here, 0] / lit[here, 0]) ** 2
+    low, high = (bound(stage, "random", f"radio.noise_psd={float(noise * r)!r}")[-1] for r in (rise.min(), rise.max()))
+    assert ideal[-1] < low * (1.0 - 1e-9) < told[-1] < high * (1.0 + 1e-9)
 
 
 def test_delays_alone_and_images_apart_know_less(stage):

@@ -120,6 +120,15 @@ def test_a_cycle_in_which_nothing_is_heard_counts(table: Table, spec: PipelineSp
     assert len(localise(inputs, spec, rng=np.random.default_rng(0)).estimates) == CYCLES + 1
 
 
+def test_two_cosines_of_no_direction_are_refused(table: Table, spec: PipelineSpec) -> None:
+    """0.8 and 0.7: the squares sum to 1.13. Six digits of a ray on the horizon pass."""
+    start, rows = StartPrior(np.zeros(3), np.zeros(3), 0.0), len(table["time_s"])
+    level = {"cos_x": rows * [round(np.cos(0.7), 6) + 1e-7], "cos_y": rows * [round(np.sin(0.7), 6) + 1e-7]}
+    inputs_of({**table, **level}, start, build_radio(spec.radio))
+    with pytest.raises(ConfigError, match=r"squares sum to 1\.13 received"):
+        inputs_of({**table, "cos_x": rows * [0.8], "cos_y": rows * [0.7]}, start, build_radio(spec.radio))
+
+
 @pytest.mark.parametrize(
     ("name", "values", "said"),
     [

@@ -53,6 +53,10 @@ class Away(Nothing):
     def estimate(self, state):
         return pose_estimate(np.full(3, 1e200), np.zeros(3), 0.0, np.eye(6), state)
 
+class Negative(Away):
+    def estimate(self, state):
+        return pose_estimate(np.zeros(3), np.zeros(3), 0.0, np.diag([1.0, 1.0, -1e-3, 1.0, 1.0, 1.0]), state)
+
 class NoPaths:
     def __init__(self, scene, radio, depth): ...
     def paths(self, trajectory): ...
@@ -158,6 +162,7 @@ def test_the_file_is_part_of_the_identity(mine: Path) -> None:
         ('["mine:StepAlone"]', "has 'step' and no 'init'"),
         ('["mine:Nothing"]', "estimate: NoneType received; give a SlamEstimate"),
         ('["mine:Away"]', "estimate: a position of 1e[+]200 m"),
+        ('["mine:Negative"]', "estimate: a covariance with an eigenvalue of -0.001"),
     ],
 )
 def test_what_is_wrong_is_one_line(schemes: str, said: str) -> None:

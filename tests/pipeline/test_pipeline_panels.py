@@ -1,18 +1,21 @@
 """A run in a room of two panels: found and told apart, stored and read back, slices and faults alike."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rislam_rt
 from rislam_rt.errors import ConfigError
+from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.dataset import dataset_to_paths, dataset_to_scheme, paths_to_dataset, scheme_to_dataset
+from rislam_rt.pipeline.design_at import design_at, design_table
 from rislam_rt.pipeline.inputs import dataset_to_inputs, inputs_to_dataset
 from rislam_rt.pipeline.join import join_schemes, thinned_scheme
 from rislam_rt.pipeline.summary import landmark_scores, landmark_track
+from rislam_rt.report.code import draw_run_codes
+from rislam_rt.report.room import draw_above
 from rislam_rt.report.verdict import panel_found_at
 from rislam_rt.shipped import find_pipeline, find_room
 
@@ -86,10 +89,33 @@ def test_the_window_filter_says_that_it_knows_one_panel():
         run(2, 'schemes=["random"]', "slam.filter=window", "slam.use_vt=true")
 
 
-def test_pictures_of_both_codes_are_drawn(result, tmp_path: Path):
-    from rislam_rt.report.code import draw_run_codes
+def test_the_picture_of_the_room_says_which_is_held_for_which(result):
+    texts = [text.get_text() for text in draw_above(result).axes[0].texts]
+    assert {"held for above", "held for beside"} <= set(texts)
 
+
+def test_pictures_of_both_codes_are_drawn(result):
     figure = draw_run_codes(result, 2)
     image = figure.axes[0].images[0].get_array()
     assert image.shape == (8, 15)  # 6 x 6 and 8 x 8 elements, a gap between them
     assert np.isfinite(np.ma.filled(image, np.nan)).sum() == 100
+
+
+def test_a_design_at_a_point_says_the_gain_of_each_panel():
+    room = rislam_rt.load_scene(find_room("two_panels"))
+    point = np.array([3.0, 2.0, 0.6])
+    found = design_at(
+        room, RadioConfig(), point, channel="image_source", depth=0, rng=np.random.default_rng(1)
+    )  # fmt: skip
+    assert set(found.panels["exact"]) == {"above", "beside"}
+    assert found.panels["exact"]["above"] == pytest.approx(found.designs["exact"].gain_db, abs=1e-9)
+    for panel in ("above", "beside"):
+        levels = [gains[panel] for name, gains in found.panels.items() if name != "continuous"]
+        assert found.panels["exact"][panel] == max(levels)
+    assert "panel_gain_db" in design_table(found)["methods"]["exact"]
+    alone = design_at(
+        replace(room, ris=room.panels[1]), RadioConfig(), point, channel="image_source", depth=0,
+        rng=np.random.default_rng(1),
+    )  # fmt: skip
+    assert alone.designs["exact"].gain_db == pytest.approx(found.panels["exact"]["beside"], abs=1e-9)
+    assert "panel_gain_db" not in design_table(alone)["methods"]["exact"]

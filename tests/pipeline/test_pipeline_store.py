@@ -25,7 +25,7 @@ from rislam_rt.pipeline.dataset import (
     seal_dataset,
     write_dataset,
 )
-from rislam_rt.pipeline.files import write_atomic
+from rislam_rt.pipeline.files import write_atomic, write_pieces
 from rislam_rt.pipeline.identity import code_digest, run_identity
 from rislam_rt.pipeline.lock import hold
 from rislam_rt.pipeline.seal import file_digest, seal
@@ -293,6 +293,22 @@ def test_the_lock_of_a_dead_process_is_taken_over(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_link_to_nothing_is_refused_before_the_work(identity, tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(ConfigError, match="a link to nothing"):
+        find_run(tmp_path / "link", identity)
+
+
+@pytest.mark.parametrize("change", [{"files": None}, {"files": {"a": 1}}, {"state": "over"}, {"identity": 3}, {}])
+def test_a_marker_of_another_form_is_refused_whatever_its_checksum_says(identity, tmp_path, change):
+    """A forged marker has a checksum that fits; it is one line, not a traceback."""
+    about = {"state": "done", "identity": identity.digest, **identity.content, "files": {}} if change else {}
+    (tmp_path / "run.json").write_text(json.dumps(seal({**about, **change})))
+    for reader in (lambda: find_run(tmp_path, identity), lambda: read_run(tmp_path)):
+        with pytest.raises(ResultError, match=r"run\.json: no state, identity or files"):
+            reader()
+
+
 def test_unwritable_place_is_a_store_error(identity):
     with pytest.raises(StoreError, match="cannot be written"), open_run(Path("/proc/nowhere/run"), identity):
         pass
@@ -304,7 +320,8 @@ def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
     try:
         write_atomic(pipe, b"content")
-        assert os.read(reader, 100) == b"content"
+        write_pieces(pipe, (part for part in (b" in", b" pieces")))
+        assert os.read(reader, 100) == b"content in pieces"
     finally:
         os.close(reader)
     assert pipe.is_fifo()

@@ -27,6 +27,16 @@ def swept(tmp_path_factory):
     return folder, run_sweep(sweep, folder).rows
 
 
+def test_an_axis_takes_the_place_of_what_the_file_says_instead():
+    """The file gives the reference SNR; noise as an axis excludes it. From the command line it is a contradiction."""
+    axis = ["radio.noise_psd=1e-20,1e-19"]
+    sweep = slam_sweep(PIPELINE, TINY, axis)
+    assert {cell.settings["radio"]["noise_psd"] for cell in build_cells(sweep)} == {1e-20, 1e-19}
+    assert sweep.base["radio"]["reference_snr_db"] is None
+    with pytest.raises(ConfigError, match="noise_psd"):
+        build_cells(slam_sweep(PIPELINE, [*TINY, "radio.reference_snr_db=10"], axis))
+
+
 def test_axes_become_what_the_setting_is():
     sweep = slam_sweep(PIPELINE, TINY, ["radio.reference_snr_db=0,10", "schemes=random,no_ris", "cycles=3,4"])
     assert [axis.values for axis in sweep.axes] == [(0.0, 10.0), (["random"], ["no_ris"]), (3, 4)]

@@ -54,25 +54,20 @@ def test_a_fault_may_go_as_far_as_the_panel_still_matters(tmp_path):
     }
     run = {"receiver": {"estimator": "waveform"}}
     spec = HardwareSpec(kind="hardware", name="hardware", repetitions=2, faults=[fault], run=run)
-    ghosts = {"1.0": (1.0, 1.0), "3.0": (14.0, 2.0), "9.0": (40.0, 9.0)}
-    false = {"reference": 1.0}
-    for level, (built, tuned) in ghosts.items():
-        false |= {f"array_{level}": built, f"array_{level}_calibrated": tuned}
+    ghosts = {"1.0": (1.0, 0.5, 1.0, 0.5), "3.0": (14.0, 0.6, 2.0, 0.5), "9.0": (40.0, 8.0, 9.0, 2.9)}
+    false = {"reference": (1.0, 1.0)}
+    for level, counts in ghosts.items():
+        false |= {f"array_{level}": counts[:2], f"array_{level}_calibrated": counts[2:]}
     assert [variant.name for variant in spec.all_variants] == list(false)
-    cells = []
-    for name, ghosts in false.items():
-        scores = {
-            "false": ghosts,
-            "panel": 1.0,
-            "landmarks": 9.0,
-            "components": 20.0,
-            "error_over_std": 1.0,
-            "left": None,
-        }
+    cells, same = [], {"panel": 1.0, "landmarks": 9.0, "components": 20.0, "error_over_std": 1.0, "left": None}
+    for name, (untold, told) in false.items():
+        result = {"schemes": {}, "receiver": {"false": untold, **same}, "told": {"false": told, **same}}
         for number in range(2):
             cell = Cell(f"{len(cells):032d}", {"variant": name}, number, {}, number, {})
-            cells.append(Row(cell, "done", "", {"schemes": {}, "receiver": scores}))
+            cells.append(Row(cell, "done", "", result))
     page = write_swept(cells, spec, RECORD, tmp_path).read_text()
     content = json.loads((tmp_path / "hardware.json").read_text())
-    assert content["limits"] == {"array": {"built": "1.0", "calibrated": "3.0"}}
-    assert "| 1.0 deg | 3.0 deg |" in page
+    assert content["limits"] == {
+        "array": {"built": "1.0", "told": "3.0", "calibrated": "3.0", "calibrated_told": "9.0"}
+    }
+    assert "| 1.0 deg | 3.0 deg | 3.0 deg | 9.0 deg |" in page

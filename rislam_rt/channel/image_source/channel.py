@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.compose import compose_paths
+from rislam_rt.channel.image_source.antennas import Terminals
 from rislam_rt.channel.image_source.candidates import SEARCHES, Search, build_search
 from rislam_rt.channel.image_source.facets import Facets, build_facets
 from rislam_rt.channel.image_source.fresnel import Coatings, build_coatings
@@ -11,8 +12,10 @@ from rislam_rt.channel.image_source.images import find_legs
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.errors import ConfigError, expect
-from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
+from rislam_rt.model import Antennas, Paths, RadioConfig, RisCode, Scene, Trajectory
 from rislam_rt.ris import rephase
+
+_PLAIN = Antennas()
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +38,8 @@ class ImageSourceChannel:
     radio: RadioConfig
     depth: int = 2
     search: str = "auto"
+    antennas: Antennas = _PLAIN
+    """Patterns and polarisation of the agent's antennas; by default both are isotropic and vertical."""
     walls: Walls = field(init=False)
     facets: Facets = field(init=False)
     coatings: Coatings = field(init=False)
@@ -57,7 +62,16 @@ class ImageSourceChannel:
         """Every path of every cycle, with the panel at level 0."""
         expect("trajectory", trajectory, Trajectory)
         tx, rx = trajectory.tx, trajectory.rx
-        direct = find_legs(self.looked, self.coatings, tx, rx, self.depth)
+        ends = self.antennas
+        at = {
+            end: None if ends.plain else Terminals(*pair, trajectory.heading)
+            for end, pair in (
+                ("direct", (ends.of_tx, ends.of_rx)),
+                ("tx", (ends.of_tx, ends.of_landmark)),
+                ("rx", (ends.of_rx, ends.of_landmark)),
+            )
+        }
+        direct = find_legs(self.looked, self.coatings, tx, rx, self.depth, terminals=at["direct"])
         landmarks = range(len(self.scene.landmarks))
         return compose_paths(
             self.scene,
@@ -65,8 +79,8 @@ class ImageSourceChannel:
             self.walls,
             self.depth,
             direct,
-            [self._landmark_legs(tx, number) for number in landmarks],
-            [self._landmark_legs(rx, number) for number in landmarks],
+            [self._landmark_legs(tx, number, at["tx"]) for number in landmarks],
+            [self._landmark_legs(rx, number, at["rx"]) for number in landmarks],
             f"image source, {self.looked.words}",
         )
 
@@ -74,13 +88,15 @@ class ImageSourceChannel:
         """The same paths under another code."""
         return rephase(paths, code)
 
-    def _landmark_legs(self, device: Floats, number: int) -> Legs:
+    def _landmark_legs(self, device: Floats, number: int, terminals: Terminals | None) -> Legs:
         """Legs from device positions (K, 3) to a landmark; those to a panel arrive at its front."""
         panel = self.scene.panel_number(number)
         point = self.scene.landmark_positions[number : number + 1]
         if panel < 0:
-            return find_legs(self.looked, self.coatings, device, point, self.depth, landmark=number)
-        front = self.scene.panels[panel].spec.normal
+            return find_legs(
+                self.looked, self.coatings, device, point, self.depth, landmark=number, terminals=terminals
+            )
+        front, host = self.scene.panels[panel].spec.normal, self.walls.hosts[panel]
         return find_legs(
-            self.looked, self.coatings, device, point, self.depth, host=self.walls.hosts[panel], front=front
+            self.looked, self.coatings, device, point, self.depth, host=host, front=front, terminals=terminals
         )

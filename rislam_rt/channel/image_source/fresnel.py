@@ -102,14 +102,18 @@ class Coatings:
         """
         constant: Complexes = np.prod(self.reflection[walls], axis=1).astype(np.complex128)
         rows = np.flatnonzero((self.reflection[walls] == 0.0).any(axis=1))
-        incident = direction[rows]
-        field = polarisation_basis(incident)[0].astype(np.complex128)
-        for wall, normal in zip(walls[rows].T, normals[rows].swapaxes(0, 1), strict=True):
+        field = polarisation_basis(direction[rows])[0].astype(np.complex128)
+        field, incident = self.carried(field, walls[rows], normals[rows], direction[rows])
+        constant[rows] = np.sum(field * polarisation_basis(incident)[0], axis=-1)
+        return np.asarray(constant * np.prod(self.specular[walls], axis=1))
+
+    def carried(self, field: Complexes, walls: Integers, normals: Floats, incident: Floats) -> tuple[Complexes, Floats]:
+        """Field vectors (N, 3) after the bounces on `walls` (N, d), nothing scattered, and where the rays go then."""
+        for wall, normal in zip(walls.T, normals.swapaxes(0, 1), strict=True):
             reflected = mirror_direction(incident, normal)
             field = self._reflect(field, incident, reflected, normal, wall)
             incident = reflected
-        constant[rows] = np.sum(field * polarisation_basis(incident)[0], axis=-1)
-        return np.asarray(constant * np.prod(self.specular[walls], axis=1))
+        return field, incident
 
     def _reflect(
         self, field: Complexes, incident: Floats, reflected: Floats, normal: Floats, wall: Integers

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.image_source.antennas import Terminals
 from rislam_rt.channel.image_source.candidates import Search, candidate_rows
 from rislam_rt.channel.image_source.facets import SEAM, Facets
 from rislam_rt.channel.image_source.fresnel import Coatings
@@ -37,6 +38,7 @@ def find_legs(
     host: int = -1,
     front: Floats | None = None,
     landmark: int = -1,
+    terminals: Terminals | None = None,
 ) -> Legs:
     """Every specular leg of up to `depth` bounces from device positions (K, 3) to far ends (K, 3) or (1, 3) [m].
 
@@ -48,6 +50,8 @@ def find_legs(
         (3,) normal of the panel at the far end, which only sees what lies before it.
     landmark
         Number of the landmark at the far end, which its own shade does not hide; -1 for none.
+    terminals
+        Antennas at both ends; None for isotropic and vertical ones.
     """
     facets = search.facets
     found = {0: [_direct_rays(device, far)]}
@@ -56,7 +60,7 @@ def find_legs(
         found.setdefault(walls.shape[1], []).append(rays)
     blockers = facets.possible_blockers(np.concatenate([device, far]))
     visible = [_visible(facets, _joined(p), device, far, blockers, host, front, landmark) for p in found.values()]
-    return _legs(facets, coatings, [rays for rays in visible if len(rays.cycle)], device, far, depth)
+    return _legs(facets, coatings, [rays for rays in visible if len(rays.cycle)], device, far, depth, terminals)
 
 
 def _joined(parts: list[Rays]) -> Rays:
@@ -128,7 +132,15 @@ def _visible(
     return rays.only(keep)
 
 
-def _legs(facets: Facets, coatings: Coatings, found: list[Rays], device: Floats, far: Floats, depth: int) -> Legs:
+def _legs(
+    facets: Facets,
+    coatings: Coatings,
+    found: list[Rays],
+    device: Floats,
+    far: Floats,
+    depth: int,
+    terminals: Terminals | None,
+) -> Legs:
     """Rays scattered into dense arrays, one column a sequence that some cycle has."""
     cycles = len(device)
     columns: list[Integers] = []
@@ -152,7 +164,10 @@ def _legs(facets: Facets, coatings: Coatings, found: list[Rays], device: Floats,
         length[place] = np.linalg.norm(ray, axis=-1)
         at_device[place] = unit(ray)
         at_far_end[place] = -_followed(unit(ray), normals)
-        coefficient[place] = coatings.coefficient(rays.walls, normals, unit(ray))
+        if terminals is None:
+            coefficient[place] = coatings.coefficient(rays.walls, normals, unit(ray))
+        else:
+            coefficient[place] = terminals.coefficient(coatings, rays.walls, normals, unit(ray), cycle)
         vertices[cycle, column, : rays.walls.shape[1]] = rays.bounces
     return Legs(walls, valid, length, at_device, at_far_end, coefficient, vertices)
 

@@ -13,11 +13,11 @@ How a trajectory of K cycles becomes few solves:
 - *refinement* (`course.py`) recomputes in float64, on the walls' planes, where the legs found run.
 """
 
-from rislam_rt.channel.traced.antennas import Antennas
 from rislam_rt.channel.traced.channel import TracedChannel
 from rislam_rt.channel.traced.extras import ExtraConfig, ExtraKind, ExtraPaths
 from rislam_rt.channel.traced.limits import shortest_segment
 from rislam_rt.channel.traced.proof import BoxProof, trace_small_box
+from rislam_rt.model import Antennas
 
 __all__ = [
     "Antennas",

@@ -7,7 +7,6 @@ import numpy as np
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.shades import ALONE
-from rislam_rt.channel.traced.antennas import Antennas
 from rislam_rt.channel.traced.course import refined_course, traced_course
 from rislam_rt.channel.traced.extras import ExtraConfig, ExtraPaths, trace_extras
 from rislam_rt.channel.traced.limits import room_center
@@ -17,7 +16,7 @@ from rislam_rt.channel.traced.sequences import wall_sides
 from rislam_rt.channel.traced.start import start_tracer
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError, expect
-from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
+from rislam_rt.model import Antennas, Paths, RadioConfig, RisCode, Scene, Trajectory
 from rislam_rt.ris import rephase
 
 BLOCK_ROWS = 200_000

@@ -31,8 +31,9 @@ class ExtraConfig:
     """Switches of the tracer, all off at first."""
 
     scattering: float = 0.0
-    """S in [0, 1]: share of the reflected field that walls scatter (Lambertian); 0 is off. Where it is on, what is
-    reflected specularly loses `sqrt(1 - S^2)` at every bounce, which `Paths` of the same walls do not know."""
+    """S in [0, 1]: share of the reflected field that walls scatter (Lambertian) whose material says nothing of it; 0 is
+    off. What they reflect specularly would lose `sqrt(1 - S^2)` at every bounce, which `Paths` of the same walls do not
+    know; of a material's own `scattering` they do."""
     diffraction: bool = False
     """Edges between walls, and free ones, diffract (uniform theory of diffraction, first order)."""
     depth: int = 1
@@ -107,12 +108,13 @@ def trace_extras(scene: Scene, radio: RadioConfig, trajectory: Trajectory, confi
     """
     solved = [_nothing(config.depth)]
     cycles = [np.zeros(0, dtype=np.int64)]
-    if config.scattering > 0.0 or config.diffraction:
+    own = any(reflector.material.scattering > 0.0 for reflector in scene.reflectors)
+    if config.scattering > 0.0 or config.diffraction or own:
         start_tracer()
         origin = room_center(scene)
         stage = _rough_stage(scene, radio.carrier, origin, config.scattering)
         for cycle, (tx, rx) in enumerate(zip(trajectory.tx - origin, trajectory.rx - origin, strict=True)):
-            solved.append(_solve(stage, tx, rx, origin, config))
+            solved.append(_solve(stage, tx, rx, origin, config, config.scattering > 0.0 or own))
             cycles.append(np.full(len(solved[-1].kind), cycle))
     columns = Solved(*(np.concatenate(column) for column in zip(*solved, strict=True)))
     antennas = np.sqrt(radio.tx_gain * radio.rx_gain) * np.exp(-2j * np.pi * radio.carrier * columns.tau)
@@ -147,7 +149,7 @@ def _rough_stage(scene: Scene, carrier: float, origin: Floats, scattering: float
     return stage
 
 
-def _solve(stage: Any, tx: Floats, rx: Floats, origin: Floats, config: ExtraConfig) -> Solved:
+def _solve(stage: Any, tx: Floats, rx: Floats, origin: Floats, config: ExtraConfig, diffuse: bool) -> Solved:
     """Sionna's paths between positions about the origin, the purely specular ones left out."""
     import sionna.rt as rt
 
@@ -159,7 +161,7 @@ def _solve(stage: Any, tx: Floats, rx: Floats, origin: Floats, config: ExtraConf
         samples_per_src=config.samples,
         los=False,
         specular_reflection=True,
-        diffuse_reflection=config.scattering > 0.0,
+        diffuse_reflection=diffuse,
         refraction=False,
         diffraction=config.diffraction,
         edge_diffraction=config.diffraction,

@@ -16,13 +16,13 @@ from sionna.rt import antenna_pattern
 from sionna.rt.utils import spectrum_to_matrix_4f
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
-from rislam_rt.channel.traced.antennas import Antennas
 from rislam_rt.channel.traced.course import Course, segment_directions
 from rislam_rt.channel.traced.material import ConstantReflection
 from rislam_rt.channel.traced.problem import Ends
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.traced.stage import Stage
 from rislam_rt.channel.walls import Walls
+from rislam_rt.model import Antennas
 
 POLE = 1e-12
 """Sine of the zenith angle below which a direction is vertical: rounding of float64 a thousand times over. Its azimuth
@@ -34,14 +34,14 @@ def leg_coefficients(
 ) -> Complexes:
     """Field (N,) of legs over `sequences` (N, D), without spreading loss and carrier phase.
 
-    Both ends have the same linear polarisation. Between isotropic antennas what is left is the reflection: exactly the
+    Between isotropic antennas of one polarisation what is left is the reflection: exactly the
     product of R for walls of constant R, and the part of the Fresnel-reflected field in that polarisation for slabs.
     The field is a Jones vector (N, 2) along theta_hat and phi_hat of each segment's direction of travel.
     """
     if len(sequences) == 0:
         return np.zeros(0, dtype=np.complex128)
     travel = segment_directions(walls, sequences, course.at_device)
-    field = _radiated(antennas, travel[:, 0], ends.heading, ends.from_rx, antennas.tx)
+    field = _radiated(antennas, travel[:, 0], ends.heading, ends.from_rx, antennas.of_tx)
     for bounce, wall in enumerate(sequences.T):
         for number, material in enumerate(stage.materials):
             rows = np.flatnonzero((wall != NO_WALL) & (stage.material_of_wall[wall] == number))
@@ -49,7 +49,7 @@ def leg_coefficients(
                 normal = walls.normal[wall[rows]]
                 jones = _jones(material, travel[rows, bounce], travel[rows, bounce + 1], normal)
                 field[rows] = (jones @ field[rows][..., None])[..., 0]
-    received = _radiated(antennas, -travel[:, -1], ends.heading, ends.to_rx, "iso")
+    received = _radiated(antennas, -travel[:, -1], ends.heading, ends.to_rx, antennas.of_landmark)
     received[:, 1] *= -1.0  # theta_hat is the same seen from either end, phi_hat the opposite
     return np.vecdot(received, field)
 
@@ -113,13 +113,17 @@ def _turn(basis: tuple[Floats, Floats], across: Floats) -> Floats:
     return np.stack([np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)], axis=1)
 
 
-def _radiated(antennas: Antennas, direction: Floats, heading: Floats, is_rx: Booleans, otherwise: str) -> Complexes:
+def _radiated(
+    antennas: Antennas, direction: Floats, heading: Floats, is_rx: Booleans, otherwise: tuple[str, str]
+) -> Complexes:
     """Field (N, 2) along theta_hat and phi_hat that antennas radiate in `direction` (N, 3): the Rx's or another."""
     field = np.empty((len(direction), 2), dtype=np.complex128)
-    for name in {antennas.rx, otherwise}:
-        rows = np.flatnonzero(np.where(is_rx, antennas.rx, otherwise) == name)
+    for mine, (name, polarization) in ((is_rx, antennas.of_rx), (~is_rx, otherwise)):
+        rows = np.flatnonzero(mine)
+        if not len(rows):
+            continue
         shape = getattr(antenna_pattern, f"v_{name}_pattern")
-        kind = antenna_pattern.PolarizedAntennaPattern(v_pattern=shape, polarization=antennas.polarization)
+        kind = antenna_pattern.PolarizedAntennaPattern(v_pattern=shape, polarization=polarization)
         theta = np.arctan2(np.hypot(direction[rows, 0], direction[rows, 1]), direction[rows, 2])
         angles = theta, _azimuth(direction[rows]) - heading[rows]
         gains = kind.patterns[0](*(mi.Float(angle.astype(np.float32)) for angle in angles))

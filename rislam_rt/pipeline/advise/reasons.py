@@ -62,6 +62,7 @@ class Reasons(NamedTuple):
 def build_reasons(scene: Scene, paths: Paths, settings: Settings) -> Reasons:
     """All that hides, walls and shades."""
     meshes = [(r.name, r.triangles) for r in scene.reflectors]
+    meshes += [(shade.name, shade.triangles) for shade in scene.shades]
     meshes += [(s.name, s.shade.triangles) for s in scene.scatterers if s.shade is not None]
     triangles = np.concatenate([triangles for _, triangles in meshes])
     owner = tuple(name for name, triangles in meshes for _ in range(len(triangles)))

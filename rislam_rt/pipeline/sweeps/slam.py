@@ -14,7 +14,7 @@ from rislam_rt.evaluate import bootstrap, rms_over_runs
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.files import write_atomic
 from rislam_rt.pipeline.own_methods import own_digests
-from rislam_rt.pipeline.read import Table, build_spec, read_table
+from rislam_rt.pipeline.read import Table, build_spec, make_way, read_table
 from rislam_rt.pipeline.run import check_run, library_versions, prepare_channel, run_slam
 from rislam_rt.pipeline.section import Positive, Section
 from rislam_rt.pipeline.spec import PipelineSpec, build_settings
@@ -115,6 +115,7 @@ def slam_sweep(
         if key in found:
             raise ConfigError(f"axis '{key}': no setting to go through; use --repeat for seeds")
     table = read_table(path, overrides)
+    make_way(table, tuple(found))
     if scene is not None:
         table.content["scene"] = os.path.relpath(scene, path.parent)
     elif "scene" in found:

@@ -15,33 +15,40 @@ SCORES = ("false", "panel", "landmarks", "components", "error_over_std", "left")
 HEARD, MORE_FALSE = 0.9, 2.0
 """The panel still matters while it is heard in this share of the looks in which an ideal front end hears it, with at
 most so many more false components a cycle."""
-BUILT, TUNED = "#D55E00", "#0072B2"
-LAW = """Of each run the receiver alone is looked at, at some places of its second half, with the panel focused on the
-agent. One front end a seed is built with each fault; then the same one is calibrated on the first cycles
-(`hardware.calibration_cycles`), panel at rest. False: components a cycle that are no path. Panel: share of looks in
-which its direct path is reported. Errors: half width of 68 % of the cosine errors over the reported deviations, 1 if
+WAYS = {
+    "built": ("", "receiver"), "told": ("", "told"), "calibrated": (CALIBRATED, "receiver"),
+    "calibrated_told": (CALIBRATED, "told"),
+}  # fmt: skip
+"""How a fault is met: end of the variant's name, and which of its scores."""
+NAMES = dict(zip(WAYS, ("as built", "told", "calibrated", "calibrated, told"), strict=True))
+MARKS = dict(zip(WAYS, (("#D55E00", "o"), ("#E69F00", "^"), ("#0072B2", "s"), ("#009E73", "D")), strict=True))
+LAW = """Of each run the receiver alone is looked at, at some places of its second half, with the panel focused on
+the agent. One front end a seed is built with each fault; then the same one is calibrated on the first cycles
+(`hardware.calibration_cycles`), panel at rest. Told: the estimator counts the power of the distortion as noise
+(`hardware.told`), as the tolerances say or as the calibration left it; of its converters' steps it always is told.
+False: components a cycle that are no path. Panel: share of looks in which its direct path is reported. Landmarks:
+components that came over one. Errors: half width of 68 % of the cosine errors over the reported deviations, 1 if
 they are as reported. What false components do to the agent: [receiver](../receiver.md#real-hardware)."""
 
 
 def hardware_content(groups: Sequence[Group], spec: HardwareSpec) -> dict[str, Any]:
-    """Plain data: one entry a level with its scores, as built and calibrated, and how far each fault may go."""
-    found = {str(group.point["variant"]): _means(group) for group in groups}
-    ideal = found.get("reference", dict.fromkeys(SCORES))
-    entries = [{"fault": "none", "level": "", "note": "ideal", "calibrated": False, **ideal}]
+    """Plain data: one entry a level and way of meeting it with its scores, and how far each fault may go."""
+    found = {str(group.point["variant"]): group for group in groups}
+    ideal = _means(found.get("reference"), "receiver")
+    entries = [{"fault": "none", "level": "", "note": "ideal", "way": "built", **ideal}]
     for fault in spec.faults:
         for level in fault.levels:
-            for end in ("", CALIBRATED):
-                scores = found.get(fault.variant(level).name + end)
-                if scores is not None:
-                    head = {"fault": fault.name, "level": str(level), "note": fault.note, "calibrated": bool(end)}
-                    entries.append({**head, **scores})
+            for way, (end, key) in WAYS.items():
+                group = found.get(fault.variant(level).name + end)
+                head = {"fault": fault.name, "level": str(level), "note": fault.note, "way": way}
+                entries += [{**head, **_means(group, key)}] if group is not None else []
     about = {fault.name: fault.model_dump(exclude={"set"}) for fault in spec.faults}
-    limits = {fault.name: _limits(fault, found, ideal) for fault in spec.faults}
+    limits = {fault.name: {way: _limit(fault, entries, way, ideal) for way in WAYS} for fault in spec.faults}
     return {"entries": entries, "about": about, "limits": limits}
 
 
 def draw_hardware(content: Mapping[str, Any]) -> Figure:
-    """False components, and the panel's share, of every level: as built and calibrated."""
+    """False components, and the panel's share, of every level, however the fault is met."""
     entries = content["entries"]
     rows = list(dict.fromkeys((entry["fault"], entry["level"]) for entry in entries))
     with styled():
@@ -50,18 +57,17 @@ def draw_hardware(content: Mapping[str, Any]) -> Figure:
             figure.subplots(1, 2, sharey=True), ("false", "panel"),
             ("false components a cycle", "share of looks in which the panel's direct path is heard"), strict=True,
         ):  # fmt: skip
-            for calibrated, colour, mark in ((False, BUILT, "o"), (True, TUNED, "s")):
-                own = [e for e in entries if e["calibrated"] == calibrated and e[score] is not None]
+            for way, (colour, mark) in MARKS.items():
+                own = [e for e in entries if e["way"] == way and e[score] is not None]
                 place = [rows.index((e["fault"], e["level"])) for e in own]
-                name = "calibrated" if calibrated else "as built"
-                axis.plot([e[score] for e in own], place, mark, color=colour, ms=5, label=name, alpha=0.85)
+                axis.plot([e[score] for e in own], place, mark, color=colour, ms=5, label=NAMES[way], alpha=0.8)
             axis.set_xlabel(label, fontsize=9)
         figure.axes[0].set_yticks(range(len(rows)), [" ".join(row).strip() for row in rows], fontsize=8)
         figure.axes[0].invert_yaxis()
         figure.axes[0].set_xscale("symlog", linthresh=1.0)
         figure.axes[0].set_xticks([0, 1, 2, 5, 10, 20, 50], ["0", "1", "2", "5", "10", "20", "50"])
         figure.axes[1].set_xlim(-0.05, 1.05)
-        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(NAMES))
     return figure
 
 
@@ -71,40 +77,43 @@ def hardware_page(content: Mapping[str, Any], groups: Sequence[Group], about: Se
     ideal = content["entries"][0]
     text = f"""Largest level at which the panel is heard in {100 * HEARD:.0f} % of the looks in which an ideal front end
     hears it ({_share(ideal["panel"])}), with at most {MORE_FALSE:g} more false components a cycle than there
-    ({ratio(ideal["false"])}):"""
+    ({ratio(ideal["false"])}); {NOTHING} where it is so at none of the levels tried:"""
     lines += [*paragraph(text), ""]
-    head = ["fault", "as built", "calibrated", "levels tried"]
+    head = ["fault", *NAMES.values(), "levels tried"]
     rows = [_limit_row(content, name) for name in content["about"]]
     lines += [*table_lines(head, rows), ""]
     if figure is not None:
         lines += [f"![False components and the panel's share at every level]({figure})", ""]
-    lines += ["## All levels", "", *table_lines(_HEAD, _rows(content)), "", "## Failures", ""]
+    lines += ["## All levels", ""]
+    for scores in (("false", "panel"), ("landmarks", "error_over_std")):
+        head = ["fault", "level", *(f"{TITLES[score]}: {name}" for score in scores for name in NAMES.values())]
+        lines += [*table_lines(head, _rows(content, scores)), ""]
+    lines += ["## Failures", ""]
     failed = sum(result is None for group in groups for result in group.results) - sum(g.missing for g in groups)
     return "\n".join([*lines, f"Of {sum(len(group.results) for group in groups)} cells {failed} failed."]) + "\n"
 
 
-_HEAD = ["fault", "level", "false: built", "calibrated", "panel: built", "calibrated", "landmark components: built",
-         "calibrated", "errors: built", "calibrated"]  # fmt: skip
+TITLES = {"false": "false", "panel": "panel", "landmarks": "landmarks", "error_over_std": "errors"}
 
 
-def _means(group: Group) -> dict[str, Any]:
+def _means(group: Group | None, key: str) -> dict[str, Any]:
     """Mean of every score over the receivers that were built."""
-    rows = [result["receiver"] for result in group.results if result]
+    rows = [result.get(key, result["receiver"]) for result in group.results if result] if group is not None else []
     known = {name: [row[name] for row in rows if row.get(name) is not None] for name in SCORES}
     return {"runs": len(rows), **{name: float(np.mean(values)) if values else None for name, values in known.items()}}
 
 
-def _limits(fault: MismatchSection, found: Mapping[str, Any], ideal: Mapping[str, Any]) -> dict[str, str | None]:
-    """Largest level at which the panel still matters, as built and calibrated; None if it does at none."""
-    limits: dict[str, str | None] = {}
-    for end, name in (("", "built"), (CALIBRATED, "calibrated")):
-        limits[name] = None
-        for level in fault.levels:
-            scores = found.get(fault.variant(level).name + end)
-            if scores is None or not _matters(scores, ideal):
+def _limit(
+    fault: MismatchSection, entries: Sequence[Mapping[str, Any]], way: str, ideal: Mapping[str, Any]
+) -> str | None:
+    """Largest level, as they stand in the file, up to which the panel still matters; None if it does at none."""
+    limit = None
+    for entry in entries:
+        if entry["fault"] == fault.name and entry["way"] == way:
+            if not _matters(entry, ideal):
                 break
-            limits[name] = str(level)
-    return limits
+            limit = str(entry["level"])
+    return limit
 
 
 def _matters(scores: Mapping[str, Any], ideal: Mapping[str, Any]) -> bool:
@@ -115,23 +124,22 @@ def _matters(scores: Mapping[str, Any], ideal: Mapping[str, Any]) -> bool:
 
 def _limit_row(content: Mapping[str, Any], name: str) -> list[str]:
     fault, limits = content["about"][name], content["limits"][name]
-    built, tuned = (
-        f"{limits[end]} {fault['unit']}".strip() if limits[end] is not None else "none of those tried"
-        for end in ("built", "calibrated")
-    )
-    return [f"`{name}`: {fault['note']}", built, tuned, ", ".join(map(str, fault["levels"])) + f" {fault['unit']}"]
+    found = [limits[way] for way in WAYS]
+    cells = [NOTHING if one is None else f"{one} {fault['unit']}".strip() for one in found]
+    return [f"`{name}`: {fault['note']}", *cells, ", ".join(map(str, fault["levels"])) + f" {fault['unit']}"]
 
 
-def _rows(content: Mapping[str, Any]) -> list[list[str]]:
-    table: dict[tuple[str, str], dict[bool, Mapping[str, Any]]] = {}
+def _rows(content: Mapping[str, Any], scores: Sequence[str]) -> list[list[str]]:
+    table: dict[tuple[str, str], dict[str, Mapping[str, Any]]] = {}
     for entry in content["entries"]:
-        table.setdefault((entry["fault"], entry["level"]), {})[entry["calibrated"]] = entry
+        table.setdefault((entry["fault"], entry["level"]), {})[entry["way"]] = entry
     rows = []
-    for (name, level), both in table.items():
+    for (name, level), ways in table.items():
         unit = content["about"].get(name, {}).get("unit", "")
         cells = [f"`{name}`", f"{level} {unit}".strip()]
-        for score, show in (("false", ratio), ("panel", _share), ("landmarks", ratio), ("error_over_std", ratio)):
-            cells += [show(both[tuned][score]) if tuned in both else NOTHING for tuned in (False, True)]
+        for score in scores:
+            show = _share if score == "panel" else ratio
+            cells += [show(ways[way][score]) if way in ways else NOTHING for way in WAYS]
         rows.append(cells)
     return rows
 

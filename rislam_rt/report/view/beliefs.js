@@ -41,7 +41,7 @@ class Beliefs {
       }
       const [error, sigma] = scheme.error[at];
       lines.push(`${scheme.name}: ${size(error)} off (2σ ${size(2 * sigma)}), ${points} landmark${points === 1 ? "" : "s"}` +
-        (scheme.codes ? (panels.length ? ", panel known" : ", panel not known") : ""));
+        (scheme.codes ? knownPanels(panels.length, data.panels.length) : ""));
     }
     view.said.textContent = lines.join(" · ");
     this.closeUp(at);
@@ -103,6 +103,8 @@ class Beliefs {
   }
   pick() {}
 }
+const knownPanels = (known, all) =>
+  all > 1 ? `, ${known} of ${all} panels known` : known ? ", panel known" : ", panel not known";
 const size = (metres) => (metres < 1 ? `${Number((100 * metres).toPrecision(2))} cm` : `${Number(metres.toPrecision(2))} m`);
 
 // The 2σ ellipse (axis a, axis b, angle) about a point.

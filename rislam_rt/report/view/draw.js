@@ -66,6 +66,17 @@ class Painter {
     this.context.lineWidth = 1.2;
     this.context.stroke();
   }
+  // What hides and reflects nothing. Triangle by triangle: in one path the front and the back of a body cancel.
+  shade(triangles) {
+    this.context.globalAlpha = 0.2;
+    this.context.fillStyle = "#666";
+    for (const corners of triangles) {
+      this.context.beginPath();
+      this.trace(corners, true);
+      this.context.fill();
+    }
+    this.context.globalAlpha = 1;
+  }
   point(point, shape, size, colour, filled = true) {
     const [x, y] = this.camera.place(point), c = this.context;
     c.strokeStyle = colour;

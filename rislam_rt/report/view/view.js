@@ -88,6 +88,7 @@ class View {
     const { data, painter, camera, state } = this;
     painter.clear(camera.width, camera.height);
     painter.walls(data.walls, state.walls, camera.target);
+    painter.shade(data.shades);
     painter.line(data.track, "#000", 4, 0.22);
     for (const panel of data.panels) {
       painter.face(panel.corners, "#d55e00", "#000");

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.scene.importing.facets import Facets, bounds_of, connected
+from rislam_rt.constants import COPLANAR_OFFSET
+from rislam_rt.scene.importing.facets import FLAT_ANGLE, Facets, bounds_of, connected
 
 SPAN = 0.6
 """A piece that spans this share of the room along two axes is its shell."""
@@ -59,9 +60,30 @@ def find_pieces(facets: Facets, nodes: list[str]) -> list[Piece]:
             shell += regions.tolist()
         else:
             things.append(regions)
+    inset = [_continues(facets, regions, np.array(shell, dtype=np.int64)) for regions in things]
+    shell += [int(r) for regions, flush in zip(things, inset, strict=True) if flush for r in regions]
+    things = [regions for regions, flush in zip(things, inset, strict=True) if not flush]
     for regions in _touching(facets, things):
-        others.append(Piece(guess_kind(bounds_of(facets, regions), box), "", regions, False))
+        bounds = bounds_of(facets, regions)
+        if _is_shell(bounds, box):  # walls that were drawn apart
+            shell += regions.tolist()
+        else:
+            others.append(Piece(guess_kind(bounds, box), "", regions, False))
     return [Piece("", "", np.array(sorted(shell), dtype=np.int64), True), *others]
+
+
+def _continues(facets: Facets, regions: Integers, shell: Integers) -> bool:
+    """Whether a thing is one flat region in the plane of a wall that it touches: the piece above a door."""
+    if len(regions) != 1:
+        return False
+    normal, offset = facets.normal[regions[0]], facets.offset[regions[0]]
+    along = facets.normal[shell] @ normal
+    near = shell[
+        (np.abs(along) > np.cos(FLAT_ANGLE)) & (np.abs(along * facets.offset[shell] - offset) < COPLANAR_OFFSET)
+    ]
+    low, high = bounds_of(facets, regions)
+    boxes = (bounds_of(facets, near[k : k + 1]) for k in range(len(near)))
+    return any(bool(((box[0] <= high + TOUCH) & (box[1] >= low - TOUCH)).all()) for box in boxes)
 
 
 def _touching(facets: Facets, things: list[Integers]) -> list[Integers]:

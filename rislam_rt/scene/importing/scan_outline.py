@@ -79,6 +79,7 @@ def _ridges(
     """
     plane, found = planes[number], np.zeros(shape, dtype=np.bool_)
     reach = float(np.hypot(shape[0], shape[1])) * CELL
+    ends: list[tuple[Floats, Booleans]] = []
     for other, tree in enumerate(trees):
         line = frame.T @ planes[other].normal
         slope = float(np.linalg.norm(line))
@@ -94,10 +95,29 @@ def _ridges(
         if not near.any():
             continue
         near = binary_closing(np.pad(near, 20), np.ones(2 * int(BREAK / CELL) + 1))[20:-20]
+        ends.append((flat, near))
+    for flat, near in ends:
+        for other_flat, other_near in ends:
+            near |= _to_corner(flat, near, other_flat, other_near)
         cells = np.floor((flat[near] - low) / CELL).astype(int)
         cells = cells[((cells >= 0) & (cells < np.array(shape))).all(axis=1)]
         found[tuple(cells.T)] = True
     return found
+
+
+def _to_corner(flat: Floats, near: Booleans, other_flat: Floats, other_near: Booleans) -> Booleans:
+    """Which places (S, 2) of a line lie between its end and where it meets another line, if both end near there."""
+    distance, at = cKDTree(other_flat).query(flat)
+    meet = int(np.argmin(distance))
+    steps = int(BREAK / (0.5 * CELL))
+    mine, theirs = np.flatnonzero(near), np.flatnonzero(other_near)
+    added = np.zeros(len(near), dtype=np.bool_)
+    if distance[meet] > CELL or abs(flat[1] - flat[0]) @ abs(other_flat[1] - other_flat[0]) > 0.9 * (0.5 * CELL) ** 2:
+        return added
+    last = int(mine[np.argmin(np.abs(mine - meet))])
+    if abs(last - meet) <= steps and np.abs(theirs - at[meet]).min() <= steps:
+        added[min(last, meet) : max(last, meet) + 1] = True
+    return added
 
 
 def _closed(there: Booleans, ridges: Booleans, fill: float) -> tuple[Booleans, float]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
+from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene.importing.facets import FLAT_ANGLE, Facets
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.pieces import Piece
@@ -74,7 +75,7 @@ def sort_regions(facets: Facets, pieces: list[Piece], rounds: list[Round], optio
     part = np.zeros(len(owner), dtype=np.int64)
     part[facets.region] = facets.mesh.part
     mirror, narrow = _mirrors(facets, rounded, options)
-    resting = _resting(facets, pieces, mirror, options)
+    resting = _resting(facets, pieces, mirror)
     mirror &= ~resting
     group = _coplanar(facets, pieces[0].regions, mirror, part)
     label = group.copy()
@@ -103,7 +104,7 @@ def _mirrors(facets: Facets, rounded: Booleans, options: ImportOptions) -> tuple
     return flat & (width >= narrow), narrow
 
 
-def _resting(facets: Facets, pieces: list[Piece], mirror: Booleans, options: ImportOptions) -> Booleans:
+def _resting(facets: Facets, pieces: list[Piece], mirror: Booleans) -> Booleans:
     """Regions of things that lie on walls of the shell, their thing rising from there."""
     resting = np.zeros(len(mirror), dtype=np.bool_)
     walls = pieces[0].regions[mirror[pieces[0].regions]]
@@ -114,9 +115,13 @@ def _resting(facets: Facets, pieces: list[Piece], mirror: Booleans, options: Imp
         height = np.einsum("fci,wi->fcw", points, facets.normal[walls]) - facets.offset[walls]
         rises = np.abs(height).max(axis=(0, 1)) > 2.0 * RESTING
         one_side = (height.min(axis=(0, 1)) > -RESTING) | (height.max(axis=(0, 1)) < RESTING)
-        near = (np.abs(height).max(axis=1) < RESTING)[:, rises & one_side].any(axis=1)
-        far = np.unique(region[~near])
-        resting[np.setdiff1d(np.unique(region), far)] = True
+        near = np.abs(height).max(axis=1) < RESTING
+        on = np.zeros(len(points), dtype=np.bool_)
+        for wall in np.flatnonzero(rises & one_side & near.any(axis=0)):
+            rows = np.flatnonzero(near[:, wall])
+            solid = facets.mesh.vertices[facets.faces_of(walls[wall : wall + 1])]
+            on[rows] |= distance_to_triangles(points[rows].mean(axis=1), solid) < RESTING
+        resting[np.setdiff1d(np.unique(region), np.unique(region[~on]))] = True
     return resting
 
 

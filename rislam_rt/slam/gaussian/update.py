@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_triangular
+import scipy
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
@@ -107,7 +107,7 @@ def correct(particles: Particles, cross: Floats, spread: Floats, innovation: Flo
     for n in range(len(mean)):
         factor = np.linalg.cholesky(spread[n])
         both = np.concatenate([cross[n].T, innovation[n][:, None]], axis=1)
-        solved = solve_triangular(factor, both, lower=True, check_finite=False)
+        solved = scipy.linalg.solve_triangular(factor, both, lower=True, check_finite=False)
         root, scaled = solved[:, :-1], solved[:, -1]
         mean[n] += root.T @ scaled
         covariance[n] -= root.T @ root

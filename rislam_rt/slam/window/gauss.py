@@ -18,7 +18,7 @@ tells where the start was, whose error stands beside the Gaussian.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import lapack
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 
@@ -305,10 +305,10 @@ def inverse(matrix: Floats) -> Floats:
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-30))
     scaled = matrix * scale * scale[:, None]
     for damping in (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3):
-        factor, bad = lapack.dpotrf(scaled + damping * np.eye(len(scaled)), lower=1)
+        factor, bad = scipy.linalg.lapack.dpotrf(scaled + damping * np.eye(len(scaled)), lower=1)
         if not bad:
             break
-    inside, _ = lapack.dpotri(factor, lower=1)
+    inside, _ = scipy.linalg.lapack.dpotri(factor, lower=1)
     full = np.tril(inside) + np.tril(inside, -1).T
     return np.asarray(full * scale * scale[:, None])
 

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
@@ -110,7 +110,7 @@ def _associate(
     side = np.full(len(lead), UNTOLD) if sides is None else sides[lead]
     candidates = Candidates(seen, spread, groups.log_amplitude, np.hypot(groups.log_amplitude_std, 0.15), odds, side)
     cost = pair_costs(candidates, glance, LEVELS.gate, strangers)
-    rows, columns = linear_sum_assignment(cost)
+    rows, columns = scipy.optimize.linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     # the cost counts what is missed: seen against missed, both against strangers
     gain = -0.5 * float(cost[rows[good], columns[good]].sum()) + float(np.log1p(-shows[rows[good]]).sum())

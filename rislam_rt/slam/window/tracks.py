@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.associate import Candidates, pair_costs
@@ -85,7 +85,7 @@ def match(tracks: Tracks, glance: Glance, free: Integers, cycle: int) -> tuple[I
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
     )
     cost = pair_costs(candidates, glance.take(free), LEVELS.gate, LEVELS.clutter)
-    rows, columns = linear_sum_assignment(cost)
+    rows, columns = scipy.optimize.linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     return rows[good], free[columns[good]]
 

@@ -1,8 +1,9 @@
-"""Write the golden files: `python tests/channel/golden/build.py` after a change that is meant to change paths.
+"""Write the golden files: `python tests/channel/golden/build.py [ROOM ...]`, after a change meant to change paths.
 
 One NetCDF file a room: two poses and every path of theirs from the image-source channel, panel at level 0.
 """
 
+import sys
 from pathlib import Path
 
 import h5netcdf
@@ -77,6 +78,8 @@ def read(file):
 
 def main():
     for folder in sorted(path.parent for path in SCENES.glob("*/scene.toml")):
+        if sys.argv[1:] and folder.name not in sys.argv[1:]:
+            continue
         scene = load_scene(folder)
         depth = DEPTH.get(folder.name, 2)
         trajectory = random_poses(scene, 2, rng=np.random.default_rng(11))

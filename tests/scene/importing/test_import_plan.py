@@ -124,3 +124,19 @@ def test_corners_that_enclose_nothing(tmp_path: Path, corners: str, says: str) -
         import_corners(corners, tmp_path / "room", ImportOptions())
     assert str(caught.value).isprintable()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_plan_comes_back_from_its_own_triangles(two_rooms: Path, tmp_path: Path) -> None:
+    """As a soup of quads whose corners meet edges: every wall is found again, in full, and so is the doorway."""
+    import trimesh
+
+    import_room(two_rooms, tmp_path / "plan", ImportOptions(), height=2.5)
+    soup = surface(load_scene(tmp_path / "plan"))
+    trimesh.Trimesh(soup.reshape(-1, 3), np.arange(3 * len(soup)).reshape(-1, 3), process=False).export(
+        tmp_path / "soup.stl"
+    )
+    import_room(tmp_path / "soup.stl", tmp_path / "again", ImportOptions())
+    again = load_scene(tmp_path / "again")
+    assert area(surface(again)) == pytest.approx(area(soup), rel=1e-6)  # float32 in the file
+    assert {r.name for r in again.reflectors} >= {"floor", "ceiling", "wall_north", "wall_south"}
+    assert len(again.reflectors) == 7  # the wall between the rooms is a wall of its own

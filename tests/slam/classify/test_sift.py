@@ -7,7 +7,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import Body, RadioConfig
 from rislam_rt.slam import SlamConfig
 from rislam_rt.slam.sift import LOOK_EVERY, sift
-from rislam_rt.slam.tracks import Glance, Tracks, advance, begin, extend, no_tracks
+from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance, Tracks, advance, begin, extend, no_tracks
 
 RADIO, BODY, WINDOW = RadioConfig(), Body(), 40
 POINT, WALL = np.array([3.1, 2.6, 1.9]), 5.0
@@ -48,6 +48,13 @@ def test_a_wall_is_told_from_a_sphere(classifier: str) -> None:
     assert tracks.specular.tolist() == [False, False]  # by amplitude, which here was said to be dark
     again = sift(found, position, np.zeros(WINDOW), now + LOOK_EVERY, BODY, RADIO, classifier)
     assert again.looks.tolist() == [2, 2]
+
+
+def test_what_ran_over_the_panel_is_no_wall_whatever_the_odds() -> None:
+    tracks, _ = _walked()
+    tracks = tracks._replace(looks=np.array([1, 1]), odds=np.array([-8.0, -8.0]))
+    assert tracks._replace(side=np.array([PANEL, OTHER])).specular.tolist() == [False, True]
+    assert tracks._replace(side=np.array([UNTOLD, PANEL])).specular.tolist() == [True, False]
 
 
 def test_between_its_turns_and_by_amplitude_nothing_changes() -> None:

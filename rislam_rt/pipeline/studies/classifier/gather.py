@@ -7,11 +7,9 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.design import focus_codes
 from rislam_rt.measurement import ReceiverConfig, TrackingConfig, init_tracks, measure, step_tracks
-from rislam_rt.model import DataSheet, PathKind, Paths, RadioConfig, RisCode, Trajectory
-from rislam_rt.ris import rephase
-from rislam_rt.slam.classify import Sightings, track_features
+from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
+from rislam_rt.slam.classify import FEATURES, Sightings, track_features
 
 WINDOW = 40
 """Cycles that a track is judged by, as many as the filter keeps."""
@@ -21,25 +19,31 @@ VELOCITY_STD = 0.01
 """Error [m/s] of the agent's own velocity in each axis, constant over a walk."""
 CLUTTER = -1
 """In `Examples.kind`."""
-POLICIES = ("random", "held", "exact")
-"""How a walk sets the panel: a random code each cycle, one random code, or the best for its direct path."""
+OVER_RX, OVER_TX = 1, 2
+"""In `Examples.legs`, added up: walls between landmark and Rx, walls between Tx and landmark."""
 
 
 class Examples(NamedTuple):
-    """N components of tracks, one row a component and cycle; LOS by length left out, as it never becomes a track."""
+    """N components of tracks, one row a component and cycle."""
 
     features: Floats
-    """(N, F)."""
+    """(N, F), 0 where `near`."""
     kind: Integers
     """(N,) `PathKind`, or `CLUTTER`."""
+    legs: Integers
+    """(N,) over walls on which legs a landmark's path ran: 0, `OVER_RX`, `OVER_TX`, or both together."""
     age: Integers
     """(N,) measurements of its track within the window."""
     ratio: Floats
     """(N,) amplitude over that of free space of the same length."""
     walk: Integers
     """(N,) number of the walk."""
+    policy: Integers
+    """(N,) index into `POLICIES`, -1 without a panel: the same walk under other codes is another one to a track."""
     track: Integers
-    """(N,) label of its track within the walk; a walk's examples are in the order of time."""
+    """(N,) label of its track within walk and policy, whose examples are in the order of time."""
+    near: Booleans
+    """(N,) as short as the direct path is: removed by its length, before any rule looks."""
 
     @property
     def keep(self) -> Booleans:
@@ -61,30 +65,18 @@ def join(parts: list[Examples]) -> Examples:
     return Examples._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
 
 
-def set_codes(paths: Paths, panel: DataSheet | None, policy: str, *, rng: np.random.Generator) -> Paths:
-    """The paths of a walk under the codes of a policy."""
-    if panel is None or paths.ris is None:
-        return paths
-    shape = (paths.num_cycles, panel.rows, panel.cols)
-    if policy == "exact" and np.any(paths.kind == PathKind.RIS):
-        return rephase(paths, focus_codes(paths, panel.levels))
-    index = rng.integers(panel.levels, size=shape if policy == "random" else shape[1:])
-    return rephase(paths, RisCode(index, panel.levels))
-
-
 def gather_walk(
-    paths: Paths, motion: Trajectory, radio: RadioConfig, receiver: ReceiverConfig, walk: int, stride: int,
+    paths: Paths, motion: Trajectory, radio: RadioConfig, receiver: ReceiverConfig, name: tuple[int, int], stride: int,
     *, rng: np.random.Generator
 ) -> Examples:  # fmt: skip
-    """Examples of one walk, every `stride`-th cycle of it."""
+    """Examples of one walk, every `stride`-th cycle of it; `name` is its number and that of its policy."""
     believed = motion.position + np.outer(motion.time, rng.standard_normal(3) * [VELOCITY_STD, VELOCITY_STD, 0.0])
     baseline = float(np.linalg.norm(motion.body.tx_offset - motion.body.rx_offset))
     state, config, memory = init_tracks(), TrackingConfig(), _Memory()
     shift, found = doppler_shift(paths, motion, radio.wavelength), []
     for cycle in range(len(motion)):
-        measurement, truth = measure(
-            paths, cycle, float(motion.heading[cycle]), radio, receiver, None, shift[cycle], rng=rng
-        )
+        heard = measure(paths, cycle, float(motion.heading[cycle]), radio, receiver, None, shift[cycle], rng=rng)
+        measurement, truth = heard
         dt = float(motion.time[cycle] - motion.time[cycle - 1]) if cycle else 0.0
         state, info = step_tracks(state, measurement, dt, config)
         length = SPEED_OF_LIGHT * measurement.tau
@@ -93,18 +85,26 @@ def gather_walk(
         memory.add(info.label, rows, cycle)
         far = length > baseline + LOS_MARGIN + 3.0 * np.minimum(std[:, 0], LOS_MARGIN)
         memory.forget(state.label)
-        if cycle % stride == stride - 1 and far.any():
+        if cycle % stride == stride - 1 and len(length):
             # a cycle's walk through the window starts at a random phase, so that every age occurs
             sightings = memory.sightings(info.label[far], cycle, believed, motion.heading)
-            kind = np.where(truth.path >= 0, paths.kind[truth.path], CLUTTER)[far]
-            free = radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * length[far])
-            found.append(
-                Examples(
-                    track_features(sightings, motion.body, radio), kind, sightings.held.sum(axis=1),
-                    measurement.amplitude[far] / free, np.full(int(far.sum()), walk), info.label[far],
-                )
-            )  # fmt: skip
+            features, age = np.zeros((len(length), len(FEATURES))), np.zeros(len(length), dtype=np.int64)
+            if far.any():
+                features[far], age[far] = track_features(sightings, motion.body, radio), sightings.held.sum(axis=1)
+            spread = 4.0 * np.pi * length / (radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain))
+            walk, policy = (np.full(len(length), number) for number in name)
+            kind, legs = _classes(paths, truth.path)
+            ratio = measurement.amplitude * spread  # a false component may have no length
+            found.append(Examples(features, kind, legs, age, ratio, walk, policy, info.label, ~far))
     return join(found)
+
+
+def _classes(paths: Paths, column: Integers) -> tuple[Integers, Integers]:
+    """`Examples.kind` and `.legs` of components that are these columns of the paths, -1 for clutter."""
+    over = OVER_RX * np.any(paths.rx_walls >= 0, axis=1) + OVER_TX * np.any(paths.tx_walls >= 0, axis=1)
+    over = np.where(paths.kind >= PathKind.PS, over, 0)
+    true = column >= 0
+    return np.where(true, paths.kind[column], CLUTTER), np.where(true, over[column], 0)
 
 
 class _Memory:

@@ -24,8 +24,9 @@ THICKNESS = {"concrete": 0.2, "brick": 0.12, "plasterboard": 0.025, "chipboard":
 """ITU materials and thicknesses [m], which vary by a factor of 0.6 to 1.6."""
 SHADING = 0.5
 """Share of scatterers above 0.1 m of radius that hide what lies behind them."""
-PANEL, MAX_SCATTERERS = 0.75, 4
-"""Share of rooms with a panel in the ceiling; most scatterers."""
+PANEL, CEILING_PANEL, ELEMENTS = 0.8, 0.5, (4, 16)
+"""Share of rooms with a panel, of panels in the ceiling (the others are on a wall); range of elements along a side."""
+MAX_SCATTERERS = 4
 MARGIN = 0.5
 """Least distance [m] of a scatterer's or the panel's centre from the walls of an upright room."""
 
@@ -85,11 +86,16 @@ def _sphere(name: str, size: Floats, rng: np.random.Generator) -> Scatterer:
 
 
 def _panel(corners: Floats, size: Floats, rng: np.random.Generator) -> RisPanel:
-    """In the ceiling, its front downwards."""
-    a, b, c = corners[0, 0, 1], corners[1, 0, 1], corners[0, 1, 1]
-    normal = unit(np.cross(c - a, b - a))
+    """In the ceiling or in the upper half of a wall, its front into the room."""
+    host, (a, b, c) = "ceiling", (corners[0, 0, 1], corners[1, 0, 1], corners[0, 1, 1])
     share = rng.uniform(0.25, 0.75, size=2)
+    if rng.uniform() >= CEILING_PANEL:
+        axis, side = rng.integers(2, size=2)
+        wall, share[1] = np.moveaxis(corners, axis, 0)[side], rng.uniform(0.5, 0.85)
+        host, (a, b, c) = f"wall_{'xy'[axis]}{side}", (wall[0, 0], wall[1, 0], wall[0, 1])
+    normal = unit(np.cross(c - a, b - a))
     center = a + share[0] * (b - a) + share[1] * (c - a)
-    elements = int(rng.integers(4, 11))
+    normal = normal if (0.5 * size - center) @ normal > 0.0 else -normal
+    elements = int(rng.integers(ELEMENTS[0], ELEMENTS[1] + 1))
     spec = RisSpec(elements, elements, np.array([0.015, 0.015]), normal, unit(c - a - ((c - a) @ normal) * normal))
-    return RisPanel(spec, center, "ceiling")
+    return RisPanel(spec, center, host)

@@ -8,11 +8,14 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import PathKind
+from rislam_rt.pipeline.studies.classifier.codes import POLICIES
 from rislam_rt.pipeline.studies.classifier.gather import Examples
 from rislam_rt.slam.classify import FEATURES, Network, blend, classify_geometric, log_odds
 
 AMPLITUDE_RULE = 0.35
 """Amplitude over that of free space above which the plain rule removes (`SlamConfig.specular_ratio`)."""
+LEGS = ("", "", " reciprocal", " both legs")
+"""What a path class over walls is called by the legs they are on: none, Rx, Tx, both."""
 NUM_RESAMPLES = 1000
 NUM_SHUFFLES = 5
 
@@ -36,20 +39,21 @@ class Score(NamedTuple):
 
 
 def rules(network: Network) -> dict[str, Rule]:
-    """The network and what it is compared with."""
+    """The network and what it is compared with; what is near is removed by all of them."""
     return {
-        "network": lambda e: odds_over_life(e, network) > 0.0,
-        "single": lambda e: log_odds(e.features, network) > 0.0,
-        "geometric": lambda e: classify_geometric(e.features) > 0.5,
-        "amplitude": lambda e: e.ratio < AMPLITUDE_RULE,
+        "network": lambda e: ~e.near & (odds_over_life(e, network) > 0.0),
+        "single": lambda e: ~e.near & (log_odds(e.features, network) > 0.0),
+        "geometric": lambda e: ~e.near & (classify_geometric(e.features) > 0.5),
+        "amplitude": lambda e: ~e.near & (e.ratio < AMPLITUDE_RULE),
     }
 
 
 def odds_over_life(examples: Examples, network: Network) -> Floats:
     """Log odds (N,) of keep, blended over the looks that each track has had so far."""
     fresh = log_odds(examples.features, network)
-    found, held = np.empty(len(fresh)), dict[tuple[int, int], tuple[float, int]]()
-    for row, name in enumerate(zip(examples.walk.tolist(), examples.track.tolist(), strict=True)):
+    found, held = np.empty(len(fresh)), dict[tuple[int, int, int], tuple[float, int]]()
+    names = zip(examples.walk.tolist(), examples.policy.tolist(), examples.track.tolist(), strict=True)
+    for row, name in enumerate(names):
         odds, looks = held.get(name, (0.0, 0))
         found[row] = blend(np.array(odds), np.array(looks), fresh[row])
         held[name] = (float(found[row]), looks + 1)
@@ -90,7 +94,7 @@ def mean_over_rooms(rooms: list[Examples], rule: Rule, coverage: float, *, rng: 
 
 def importance(examples: Examples, network: Network, *, rng: np.random.Generator) -> dict[str, Floats]:
     """Loss of F1 (S,) when one feature is shuffled among the examples, S times."""
-    known = examples.pick(examples.labelled)
+    known = examples.pick(examples.labelled & ~examples.near)
     full = f1(known.keep, odds_over_life(known, network) > 0.0)
     lost: dict[str, Floats] = {}
     for column, name in enumerate(FEATURES):
@@ -105,7 +109,7 @@ def importance(examples: Examples, network: Network, *, rng: np.random.Generator
 
 def by_value(examples: Examples, rule: Rule, value: Floats, edges: tuple[int, ...]) -> dict[str, tuple[float, int]]:
     """F1, and how many examples, in bins `edges[i] <= value < edges[i + 1]` of age or SNR."""
-    kept, known = rule(examples), examples.labelled
+    kept, known = rule(examples), examples.labelled & ~examples.near
     bins = {}
     for low, high in pairwise(edges):
         rows = known & (value >= low) & (value < high)
@@ -115,14 +119,36 @@ def by_value(examples: Examples, rule: Rule, value: Floats, edges: tuple[int, ..
     return bins
 
 
-def mistakes(examples: Examples, rule: Rule) -> dict[str, Any]:
+def path_classes(examples: Examples) -> dict[str, Booleans]:
+    """Which examples (N,) are of each path class, those over walls apart by the legs that the walls are on."""
+    found = {}
+    for kind in PathKind:
+        over_walls = kind in (PathKind.VS, PathKind.VRIS)
+        for legs, words in enumerate(LEGS) if over_walls else ((0, ""),):
+            rows = (examples.kind == kind) & (examples.legs == legs)
+            if rows.any():
+                found[kind.name + words] = rows
+    return found
+
+
+def mistakes(examples: Examples, rule: Rule) -> dict[str, tuple[int, int]]:
     """Wrong examples by path class: wrong, and how many there are."""
+    wrong = rule(examples) != examples.keep
+    return {name: (int(np.sum(wrong & rows)), int(np.sum(rows))) for name, rows in path_classes(examples).items()}
+
+
+def right_by_class(examples: Examples, rule: Rule) -> float:
+    """Mean over the path classes of the share that is told rightly: a rare class counts as a common one does."""
     kept = rule(examples)
-    return {
-        kind.name: (int(np.sum((examples.kind == kind) & (kept != examples.keep))), int(np.sum(examples.kind == kind)))
-        for kind in PathKind
-        if np.any(examples.kind == kind)
-    }
+    shares = [np.mean((kept == examples.keep)[examples.kind == kind]) for kind in PathKind if kind in examples.kind]
+    return float(np.mean(shares)) if shares else 1.0
+
+
+def panel_dropped(examples: Examples, rule: Rule) -> dict[str, tuple[int, int]]:
+    """Looks at the panel's direct path in which it is removed, and all of them, by the policy of the codes."""
+    dropped, panel = ~rule(examples), examples.kind == PathKind.RIS
+    rows = {name: panel & (examples.policy == number) for number, name in enumerate(POLICIES)}
+    return {name: (int(np.sum(dropped & own)), int(np.sum(own))) for name, own in rows.items()}
 
 
 def f1(keep: Booleans, kept: Booleans) -> float:

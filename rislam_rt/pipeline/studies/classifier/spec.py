@@ -8,6 +8,10 @@ from rislam_rt.measurement import ReceiverConfig
 from rislam_rt.pipeline.section import Count, Positive, Section
 from rislam_rt.pipeline.spec import RadioSection, ReceiverSection
 from rislam_rt.pipeline.studies.spec import RoomSection, StudySpec
+from rislam_rt.scene.random_rooms import CYCLES
+
+LEARNT_FIRST = 1_000_000
+"""Drawn rooms from this number on are learnt from; those below it never are."""
 
 Share = Annotated[float, Field(ge=0.0, le=100.0)]
 
@@ -50,15 +54,19 @@ class ClassifierSpec(StudySpec):
     channel: Literal["traced", "image_source"] = "image_source"
     """Ray tracer, or exact image sources."""
     train: Annotated[int, Field(ge=2, le=10_000)] = 160
-    """Random rooms to learn from, one random walk through each."""
+    """Random rooms to learn from, one walk through each."""
     validation: Annotated[int, Field(ge=2, le=10_000)] = 40
     """More random rooms, by which the best of the random starts is chosen."""
     rooms: Annotated[list[TestedRoom], Field(min_length=1)]
     """Rooms to test on, once everything is chosen."""
     walks: Annotated[int, Field(ge=2, le=1000)] = 8
     """Random walks through each of them."""
-    cycles: Annotated[int, Field(ge=20, le=10_000)] = 120
-    """Length of a walk."""
+    cycles: Annotated[int, Field(ge=20, le=CYCLES)] = 120
+    """Length of a walk; a drawn room's own motion has no more."""
+    drawn_first: Annotated[int, Field(ge=0, lt=LEARNT_FIRST // 2)] = 200
+    """First of the drawn rooms (`scene.random_rooms`) to test on, as in the study of unseen rooms."""
+    drawn: Annotated[int, Field(ge=2, le=LEARNT_FIRST // 2)] = 40
+    """How many of them."""
     stride: Annotated[int, Field(ge=1, le=100)] = 4
     """Every so many cycles the tracks are examples."""
     snr_low_db: Share = 0.0

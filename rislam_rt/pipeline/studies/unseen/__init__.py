@@ -5,7 +5,7 @@ from rislam_rt.pipeline.studies.unseen.file import Recording, read_recording, wr
 from rislam_rt.pipeline.studies.unseen.recording import Answers, Recorder, answers_from_arrays, replay
 from rislam_rt.pipeline.studies.unseen.score import score_run
 from rislam_rt.pipeline.studies.unseen.spec import TEST, UnseenSpec
-from rislam_rt.pipeline.studies.unseen.sweep import build_unseen, code_digest, count_tests
+from rislam_rt.pipeline.studies.unseen.sweep import build_unseen, count_tests
 from rislam_rt.pipeline.studies.unseen.truth import Truth, build_truth
 
 __all__ = [
@@ -19,7 +19,6 @@ __all__ = [
     "answers_from_arrays",
     "build_truth",
     "build_unseen",
-    "code_digest",
     "count_tests",
     "read_recording",
     "replay",

@@ -2,10 +2,10 @@
 
 from typing import Any
 
+from rislam_rt.pipeline.identity import code_digest
 from rislam_rt.pipeline.run import library_versions
 from rislam_rt.pipeline.studies.swept.cell import cell_spec
 from rislam_rt.pipeline.studies.unseen.spec import UnseenSpec
-from rislam_rt.pipeline.studies.unseen.sweep import code_digest
 
 
 def unseen_record(spec: UnseenSpec) -> dict[str, Any]:

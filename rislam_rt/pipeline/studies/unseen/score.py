@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.evaluate import gospa, match_points, normalised_squares, root_mean_square
@@ -183,7 +183,7 @@ def match_planes(truth: Truth, found: MapEstimate, heard: Booleans, told: Floats
     if not len(asked) or not len(found.wall_offset):
         return match
     cost = plane_distance(truth, found, told)[asked]
-    rows, columns = linear_sum_assignment(np.minimum(cost, 10.0 * NEAR_WALL))
+    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(cost, 10.0 * NEAR_WALL))
     good = cost[rows, columns] <= NEAR_WALL
     match[asked[rows[good]]] = columns[good]
     return match

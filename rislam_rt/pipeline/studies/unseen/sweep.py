@@ -11,6 +11,7 @@ from typing import Any
 
 from rislam_rt.errors import RislamError, StoreError
 from rislam_rt.pipeline.files import write_atomic
+from rislam_rt.pipeline.identity import code_digest
 from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions
 from rislam_rt.pipeline.studies.swept.cell import cell_spec
@@ -22,8 +23,9 @@ from rislam_rt.scene.random_rooms import draw_room
 SNR = "run.radio.reference_snr_db"
 LEDGER = ("date", "first", "rooms", "snr_db", "variants", "code", "settings")
 """Columns of the ledger of test runs."""
-NOT_NUMBERS = ("report", "cli")
-"""Folders of the package whose code decides no result."""
+CODE_DIGITS = 16
+"""Of the code's hash in the ledger. Rows written before it was `identity.code_digest` have another hash of their code:
+they stay as what was run then."""
 
 
 def build_unseen(spec: UnseenSpec, pipeline: Path, data: Path) -> Sweep:
@@ -69,17 +71,6 @@ class _Depends:
         return told | ({"own": own} if own else {})
 
 
-@cache
-def code_digest() -> str:
-    """Hash of the package's code, without what only shows results: a filter that was changed is run anew."""
-    digest, root = hashlib.sha256(), Path(__file__).parents[3]
-    for file in sorted(root.rglob("*.py")):
-        name = file.relative_to(root).as_posix()
-        if not name.startswith(tuple(f"{folder}/" for folder in NOT_NUMBERS)):
-            digest.update(f"{name}\0".encode() + file.read_bytes())
-    return digest.hexdigest()[:16]
-
-
 def count_tests(spec: UnseenSpec, pipeline: Path) -> int:
     """How often test rooms were run, this time included if they are to be; the same run that goes on counts once.
 
@@ -97,7 +88,7 @@ def count_tests(spec: UnseenSpec, pipeline: Path) -> int:
         return len(rows)
     config = spec.model_dump_json(exclude={"name", "description", "time_limit_s", "save", "ledger"})
     settings = hashlib.sha256(config.encode()).hexdigest()[:16]
-    if any((row["code"], row["settings"]) == (code_digest(), settings) for row in rows):
+    if any((row["code"], row["settings"]) == (code_digest()[:CODE_DIGITS], settings) for row in rows):
         return len(rows)
     names = " ".join(variant.name for variant in spec.variants)
     entry = (datetime.now(UTC).date(), spec.first, spec.rooms, " ".join(f"{snr:g}" for snr in spec.snr_db), names)
@@ -105,6 +96,6 @@ def count_tests(spec: UnseenSpec, pipeline: Path) -> int:
     table = csv.writer(text, lineterminator="\n")
     table.writerow(LEDGER)
     table.writerows([[row[name] for name in LEDGER] for row in rows])
-    table.writerow([*entry, code_digest(), settings])
+    table.writerow([*entry, code_digest()[:CODE_DIGITS], settings])
     write_atomic(file, text.getvalue().encode())
     return len(rows) + 1

@@ -7,7 +7,7 @@ receiver's ranges are given, and a Kalman filter of range and rate a path, with 
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 
@@ -53,7 +53,7 @@ def assign(tracks: Tracks, length: Floats, std: Floats, gate: float) -> Integers
     variance = tracks.covariance[:, 0, 0][:, None] + std**2
     square = (length - tracks.mean[:, :1]) ** 2 / variance
     gain = np.where(square < gate, gate - square, 0.0)
-    row, column = linear_sum_assignment(-gain)
+    row, column = scipy.optimize.linear_sum_assignment(-gain)
     taken = gain[row, column] > 0.0
     found = np.full(len(length), UNLABELLED)
     found[column[taken]] = row[taken]

@@ -1,0 +1,40 @@
+"""Symmetric positive matrices that may be close to singular: solved and inverted at unit diagonal, with a ridge."""
+
+import numpy as np
+import scipy
+
+from rislam_rt.arrays import Floats
+
+RIDGE = 1e-9
+"""Added to the unit diagonal, so that coinciding paths do not stop the solver."""
+
+
+def inverse(matrix: Floats) -> Floats:
+    """Inverse (n, n)."""
+    if not len(matrix):
+        return matrix
+    scale, factor = _factor(matrix)
+    lower = scipy.linalg.lapack.dpotri(factor, lower=1)[0] * scale * scale[:, None]
+    full = lower + lower.T
+    full.flat[:: len(scale) + 1] *= 0.5
+    return np.asarray(full)
+
+
+def solve(matrix: Floats, right: Floats) -> Floats:
+    """Solution (n,) for one right-hand side."""
+    if not len(matrix):
+        return right
+    scale, factor = _factor(matrix)
+    return np.asarray(scale * scipy.linalg.lapack.dpotrs(factor, scale * right, lower=1)[0])
+
+
+def _factor(matrix: Floats) -> tuple[Floats, Floats]:
+    """Scale (n,) and Cholesky factor, zero above, of the scaled matrix; the ridge grows until it is positive."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(matrix), np.finfo(np.float64).tiny))
+    scaled, ridge = matrix * scale * scale[:, None], RIDGE
+    while True:
+        scaled.flat[:: len(scale) + 1] += ridge
+        factor, failed = scipy.linalg.lapack.dpotrf(scaled, lower=1, clean=1)
+        if not failed:
+            return scale, factor
+        ridge *= 100.0

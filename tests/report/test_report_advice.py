@@ -1,0 +1,47 @@
+"""The adviser's word as people read it, and the map of a panel."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rislam_rt.pipeline.advise.advice import Advice
+from rislam_rt.pipeline.advise.budget import NOTHING_DB, Link
+from rislam_rt.pipeline.advise.cost import Cost
+from rislam_rt.pipeline.advise.coverage import Coverage
+from rislam_rt.report.advice import draw_coverage, print_advice
+from rislam_rt.scene import load_scene
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_a_margin_in_brackets_is_not_heard_and_the_commonest_reason_is_given(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    margins, chances = np.array([3.2, -4.0, NOTHING_DB]), np.array([0.9, 0.0, 0.0])
+    reasons = ("", "too weak", "shaded by 'crate'")
+    links = [Link("lamp", "", margins, chances, reasons), Link("ris", "aimed", margins + 9, np.ones(3), ("", "", ""))]
+    costs = [Cost(1, 6, 33, 31, 0.2), Cost(2, 6, 10**9, None, None)]
+    print_advice(Advice(links, ["lamp: heard at times: [too] weak"], costs, 10.0))
+    text = capsys.readouterr().out
+    lamp = next(line for line in text.splitlines() if "lamp" in line and "any" in line)
+    assert "+3.2" in lamp
+    assert "(-4.0)" in lamp
+    assert "none" in lamp
+    assert "30%" in lamp
+    assert "too weak" in lamp
+    assert "lamp: heard at times: [too] weak" in text
+    assert "to trace 6 walls: 1 bounce: 33 wall sequences" in text
+    assert "up to 10^9 wall sequences" in text
+
+
+def test_a_map_without_any_direct_path_is_drawn_all_the_same(tmp_path: Path) -> None:
+    scene = load_scene(ROOT / "scenes" / "paper_room")
+    axis = np.linspace(0.0, 6.0, 5)
+    nothing = Coverage("ris", axis, axis, 0.5, np.full((5, 5), np.nan))
+    assert nothing.heard == 0.0
+    half = Coverage("second", axis, axis, 0.5, np.tile([-3.0, -1.0, np.nan, 2.0, 4.0], (5, 1)))
+    assert half.heard == 0.5
+    file = draw_coverage(scene, [nothing, half], tmp_path / "map.svg")
+    text = file.read_text()
+    assert "<svg" in text
