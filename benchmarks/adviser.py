@@ -74,7 +74,13 @@ def compare_hearing() -> None:
         scene = draw_room(int(name)).scene if name.isdigit() else rislam_rt.load_scene(name)
         scene = replace(scene, agent=scene.agent[:CYCLES])
         schemes = '["genie", "random", "optimized"]' if scene.ris else '["no_ris"]'
-        changed = [f"radio.reference_snr_db={snr}", "channel=image_source", f"schemes={schemes}", "design.method=exact"]
+        changed = [
+            "receiver.estimator=bound",
+            f"radio.reference_snr_db={snr}",
+            "channel=image_source",
+            f"schemes={schemes}",
+            "design.method=exact",
+        ]
         spec = load_spec(PIPELINE, changed)
         advice = advise(scene, build_settings(spec), rng=np.random.default_rng(SEED))
         result = rislam_rt.run_slam(scene, spec, rng=np.random.default_rng(SEED))

@@ -143,7 +143,9 @@ def print_moving(seeds: Sequence[int], scheme: str, settings: Sequence[str]) -> 
 
 def run_moving(seed: int, scheme: str, settings: Sequence[str]) -> tuple[float, ...]:
     """RMSE, that of dead reckoning, the bound's, largest error [m], mean NEES / 2, processor time with the room [s]."""
-    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", (*settings, f'schemes=["{scheme}"]'))
+    spec = load_spec(
+        ROOT / "pipelines" / "trace_then_slam.toml", ("receiver.estimator=bound", *settings, f'schemes=["{scheme}"]')
+    )
     began = time.process_time()
     result = run_slam(load_scene(ROOT / "scenes" / "paper_room"), spec, rng=np.random.default_rng([20, seed]))
     seconds = time.process_time() - began

@@ -107,7 +107,12 @@ def main() -> None:
     arguments = parser.parse_args()
     print("| SNR [dB] | along, across [m] | the same, 3 mm at least [m] | reckoned across [m] |\n" + "| --- " * 4 + "|")
     for snr in arguments.snr:
-        told = ("channel=image_source", "motion.sigma_a_m_s2=0.01", f"cycles={arguments.cycles}")
+        told = (
+            "receiver.estimator=bound",
+            "channel=image_source",
+            "motion.sigma_a_m_s2=0.01",
+            f"cycles={arguments.cycles}",
+        )
         spec = load_spec(
             ROOT / "pipelines" / "trace_then_slam.toml", (*told, f"radio.reference_snr_db={snr}", 'schemes=["bp_slam"]')
         )

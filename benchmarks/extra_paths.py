@@ -32,7 +32,10 @@ def nothing(stage: str, at: int, total: int) -> None:
 
 def lead(room: str, settings: list[str], seeds: int, cycles: int) -> tuple[np.ndarray, float]:
     """RMSE (seeds,) [m] of runs on one stage, and false components a cycle in the mean."""
-    spec = load_spec("pipelines/trace_then_slam.toml", [f"cycles={cycles}", "schemes=['optimized']", *settings])
+    spec = load_spec(
+        "pipelines/trace_then_slam.toml",
+        ["receiver.estimator=bound", f"cycles={cycles}", "schemes=['optimized']", *settings],
+    )
     stage = set_stage(load_scene(room), spec, rng=np.random.default_rng(7))
     errors, false = [], []
     for seed in range(seeds):

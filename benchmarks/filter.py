@@ -68,7 +68,12 @@ def copy_seconds(size: int) -> float:
 
 def default_run(seeds: int) -> None:
     """Time of the default filter, step and estimate, in the main job: random codes, sphere at 13 dB, image sources."""
-    settings = ["channel=image_source", "motion.sigma_a_m_s2=0.01", "radio.reference_snr_db=13.0"]
+    settings = [
+        "receiver.estimator=bound",
+        "channel=image_source",
+        "motion.sigma_a_m_s2=0.01",
+        "radio.reference_snr_db=13.0",
+    ]
     spec, room = (
         load_spec(HOME / "pipelines" / "trace_then_slam.toml", settings),
         load_scene(HOME / "scenes" / "paper_room"),

@@ -326,7 +326,7 @@ def draw_case(kind: str, seed: int, engine: str, most: int = 40) -> Case:
     code = RisCode(index, panel.levels)
     paths = rephase(_stretch(_paths(kind, depth), stretch), code)
     # merged components are one more thing that may go wrong, and not always wanted
-    receiver = ReceiverConfig(merge=bool(rng.integers(2)))
+    receiver = ReceiverConfig(estimator="bound", merge=bool(rng.integers(2)))
     cycles = []
     for row in range(count):
         heading = float(motion.heading[row])

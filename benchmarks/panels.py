@@ -44,7 +44,7 @@ def main() -> None:
     for name, scene, alternation in variants():
         schemes = ["optimized", "random"] + ["no_ris"] * (name == "both")
         keys = [f"schemes={schemes}".replace("'", '"'), "channel=image_source", f"cycles={options.cycles}"]
-        keys += [f"radio.reference_snr_db={options.snr}"]
+        keys += [f"radio.reference_snr_db={options.snr}", "receiver.estimator=bound"]
         spec = load_spec(find_pipeline("two_panels"), [*keys, f"receiver.alternation={str(alternation).lower()}"])
         runs = [rislam_rt.run_slam(scene, spec, rng=np.random.default_rng(seed)) for seed in range(options.seeds)]
         if options.figure is not None and name == "both" and alternation:

@@ -29,8 +29,8 @@ RATES = (0.01, 0.1, 0.5, 1.47)
 BINS_DB = np.arange(0.0, 41.0, 2.5)
 RECEIVERS = {
     "waveform": ReceiverConfig(estimator="waveform", clutter_rate=0.0),
-    "bound, joint": ReceiverConfig(resolution="joint", clutter_rate=0.0),
-    "bound, cell": ReceiverConfig(resolution="cell", clutter_rate=0.0),
+    "bound, joint": ReceiverConfig(estimator="bound", resolution="joint", clutter_rate=0.0),
+    "bound, cell": ReceiverConfig(estimator="bound", resolution="cell", clutter_rate=0.0),
 }
 
 

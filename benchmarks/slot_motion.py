@@ -22,10 +22,12 @@ from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene, Trajec
 from rislam_rt.scene import load_scene
 
 SLOTS = {
-    "A-B, 5 ms each": ReceiverConfig(alternation=True, order="AB"),
-    "A-B-B-A, 2.5 ms each": ReceiverConfig(alternation=True, order="ABBA"),
-    "A-B, 10 us each, repeated": ReceiverConfig(alternation=True, order="AB", code_dwell=10e-6),
-    "A-B-B-A, 10 us each, repeated": ReceiverConfig(alternation=True, order="ABBA", code_dwell=10e-6),
+    "A-B, 5 ms each": ReceiverConfig(estimator="bound", alternation=True, order="AB"),
+    "A-B-B-A, 2.5 ms each": ReceiverConfig(estimator="bound", alternation=True, order="ABBA"),
+    "A-B, 10 us each, repeated": ReceiverConfig(estimator="bound", alternation=True, order="AB", code_dwell=10e-6),
+    "A-B-B-A, 10 us each, repeated": ReceiverConfig(
+        estimator="bound", alternation=True, order="ABBA", code_dwell=10e-6
+    ),
 }
 
 

@@ -34,7 +34,8 @@ def main() -> None:
     arguments = parser.parse_args()
     scene = load_scene("scenes/paper_room")
     base = [
-        'schemes=["optimized"]', 'channel="image_source"', "receiver.alternation=true", f"cycles={arguments.cycles}",
+        'schemes=["optimized"]', "receiver.estimator=bound", 'channel="image_source"', "receiver.alternation=true",
+        f"cycles={arguments.cycles}",
         f"radio.reference_snr_db={arguments.snr}", "motion.sigma_a_m_s2=0.01", *arguments.settings,
     ]  # fmt: skip
     table = []

@@ -17,7 +17,7 @@ ORDERS = ("ABBA", "AB")
 class ReceiverConfig:
     """Everything that the receiver is free to choose. SI units; thresholds in dB refer to the SNR over all antennas."""
 
-    estimator: str = "bound"
+    estimator: str = "waveform"
     """`bound` draws errors from the Cramér-Rao bound; `waveform` makes the samples and estimates from them."""
     detection_threshold_db: float = 10.0
     """A component is reported when its measured SNR exceeds this; noise alone does so with probability exp(-SNR)."""

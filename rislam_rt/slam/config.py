@@ -111,10 +111,8 @@ class SlamConfig:
             value = getattr(self, name)
             if not (np.isfinite(value) and 0.0 <= value < (1.0 if name == "particle_share" else np.inf)):
                 raise ConfigError(f"slam.{name}: {value} received; give a share below 1, a spread of at least 0")
-        if self.filter == "window" and not self.use_vt:
-            raise ConfigError("slam.use_vt: false received; the filter 'window' lives on wall returns, give true")
-        if self.filter == "window" and self.heading != "known":
-            raise ConfigError(f"slam.heading: '{self.heading}' received; the filter 'window' takes 'known' alone")
+        if self.filter == "window" and self.heading == "velocity":
+            raise ConfigError("slam.heading: 'velocity' received; the filter 'window' takes 'known' or 'estimated'")
         if not 0.0 < self.resample_below <= 1.0:
             raise ConfigError(f"slam.resample_below: {self.resample_below} received; give a number in (0, 1]")
         if not 0 <= self.max_bounces <= 2:

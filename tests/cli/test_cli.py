@@ -74,7 +74,16 @@ def test_help_and_version_import_nothing_heavy():
 
 def test_settings_are_printed_without_what_only_a_run_needs():
     """Half a second of scipy, trimesh and plots for a list of settings; on modules, as clocks lie."""
-    heavy = ["scipy.special", "scipy.optimize", "scipy.spatial", "scipy.stats", "trimesh", "xarray", "matplotlib"]
+    heavy = [
+        "scipy.linalg",
+        "scipy.special",
+        "scipy.optimize",
+        "scipy.spatial",
+        "scipy.stats",
+        "trimesh",
+        "xarray",
+        "matplotlib",
+    ]
     code = (
         "import sys\n"
         "from rislam_rt.cli import main\n"

@@ -11,7 +11,7 @@ from rislam_rt.measurement import ReceiverConfig, detection_probability, measure
 from rislam_rt.model import PathKind, RadioConfig, RisCode, RxArray
 
 RADIO = RadioConfig()
-QUIET = ReceiverConfig(clutter_rate=0.0)
+QUIET = ReceiverConfig(estimator="bound", clutter_rate=0.0)
 UP = (0.3, -0.2, 0.9)
 
 
@@ -125,7 +125,7 @@ class TestMerging:
         measurement, truth = repeat(paths, QUIET, 1)[0]
         assert len(measurement) == count
         assert truth.path[0] == 0
-        assert len(repeat(paths, ReceiverConfig(clutter_rate=0.0, merge=False), 1)[0][0]) == 2
+        assert len(repeat(paths, ReceiverConfig(estimator="bound", clutter_rate=0.0, merge=False), 1)[0][0]) == 2
 
     @pytest.mark.parametrize("phase", [0.0, np.pi])
     def test_merged_component_is_where_one_path_fits_the_sum_best(self, make_paths, make_gain, phase):
@@ -148,14 +148,14 @@ class TestMerging:
 
     def test_alternation_keeps_the_panel_apart(self, make_paths, make_gain):
         paths = self.pair(make_paths, make_gain, 0.1, self.strong_direction)
-        measurement, truth = repeat(paths, ReceiverConfig(clutter_rate=0.0, alternation=True), 1)[0]
+        measurement, truth = repeat(paths, ReceiverConfig(estimator="bound", clutter_rate=0.0, alternation=True), 1)[0]
         assert truth.path.tolist() == [0, 1]
         np.testing.assert_allclose(measurement.from_panel, [0.0, 1.0], atol=0.01)
         assert repeat(paths, QUIET, 1)[0][0].from_panel is None
 
 
 def test_clutter_is_poisson_even_and_just_above_the_threshold(make_paths):
-    config = ReceiverConfig(clutter_rate=2.0)
+    config = ReceiverConfig(estimator="bound", clutter_rate=2.0)
     runs = repeat(make_paths([]), config, 1000)
     counts = np.array([len(m) for m, _ in runs])
     assert counts.mean() == pytest.approx(2.0, abs=5.0 * np.sqrt(2.0 / 1000))
@@ -172,7 +172,7 @@ def test_clutter_is_poisson_even_and_just_above_the_threshold(make_paths):
 
 def test_leakage_is_cancelled_by_what_is_set(make_paths, make_gain):
     paths = make_paths([(PathKind.LOS, 0.1, (1.0, 0.0, 0.0), make_gain(84.0, RADIO))])
-    config = ReceiverConfig(clutter_rate=0.0, leakage_cancellation_db=60.0)
+    config = ReceiverConfig(estimator="bound", clutter_rate=0.0, leakage_cancellation_db=60.0)
     measurement, _ = repeat(paths, config, 1)[0]
     # 24 dB are left; one draw of noise moves them by less than 3 dB
     assert 10.0 * np.log10(RADIO.integrated_snr(measurement.amplitude[0])) == pytest.approx(24.0, abs=3.0)
@@ -182,7 +182,7 @@ def test_components_come_by_delay_and_same_seed_same_result(make_paths, make_gai
     gain = make_gain(30.0, RADIO)
     rows = [(PathKind.PS, 9.0, UP, gain), (PathKind.PS, 3.0, UP, gain), (PathKind.PS, 6.0, UP, gain)]
     paths = make_paths(rows)
-    first, second = (repeat(paths, ReceiverConfig(), 1, seed=5)[0] for _ in range(2))
+    first, second = (repeat(paths, ReceiverConfig(estimator="bound"), 1, seed=5)[0] for _ in range(2))
     assert np.all(np.diff(first[0].tau) > 0.0)
     np.testing.assert_array_equal(first[0].tau, second[0].tau)
     np.testing.assert_array_equal(first[1].path, second[1].path)
@@ -207,7 +207,7 @@ def test_unusable_settings_are_refused_in_one_line(wrong):
 class TestJointResolution:
     """Errors from the joint bound: wider where signals overlap, and one component where they cannot be shared out."""
 
-    config = ReceiverConfig(clutter_rate=0.0, resolution="joint")
+    config = ReceiverConfig(estimator="bound", clutter_rate=0.0, resolution="joint")
 
     def pair(self, make_paths, make_gain, gap, snr_db):
         gains = make_gain(snr_db, RADIO), make_gain(snr_db, RADIO, 1.0)
@@ -242,7 +242,7 @@ class TestJointResolution:
 
     def test_alternation_keeps_the_panel_apart(self, make_paths, make_gain):
         rows = [(PathKind.VT, 5.0, UP, make_gain(30.0, RADIO)), (PathKind.RIS, 5.01, UP, make_gain(20.0, RADIO))]
-        config = ReceiverConfig(clutter_rate=0.0, resolution="joint", alternation=True)
+        config = ReceiverConfig(estimator="bound", clutter_rate=0.0, resolution="joint", alternation=True)
         measurement, truth = repeat(make_paths(rows), config, 1)[0]
         assert sorted(truth.path.tolist()) == [0, 1]
         assert (measurement.from_panel[truth.path == 1] > 0.99).all()

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+import scipy
 
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.information import delay_gain_information, measurement_std, steering
 from rislam_rt.measurement import ReceiverConfig, measure
 from rislam_rt.measurement.atoms import Sounding, build_sounding
-from rislam_rt.measurement.false_alarms import detection_threshold, expected_false_alarms
+from rislam_rt.measurement.false_alarms import _half_perimeter, detection_threshold, expected_false_alarms
 from rislam_rt.measurement.identify import identify
 from rislam_rt.measurement.inner import inner_of, waves_at
 from rislam_rt.measurement.received import receive
@@ -245,3 +246,9 @@ def test_elements_of_their_own_cost_nothing_when_the_model_knows(make_paths, mak
     for measurement, truth in repeat(make_paths(rows), config, 3):
         assert truth.path.tolist() == [0, 1]
         assert abs(measurement.tau[1] * SPEED_OF_LIGHT - 4.0) < 5.0 * SPEED_OF_LIGHT * measurement.tau_std[1]
+
+
+@pytest.mark.parametrize(("major", "minor"), [(1.0, 1.0), (3.0, 1.0), (5.0, 1e-3), (1.0, 1e-9), (2.0, 0.0), (0.0, 0.0)])
+def test_half_perimeter_is_the_elliptic_integral(major, minor):
+    wanted = 2.0 * major * scipy.special.ellipe(1.0 - (minor / major) ** 2) if major else 0.0
+    assert _half_perimeter(major, minor) == pytest.approx(wanted, rel=1e-13)

@@ -167,6 +167,6 @@ def test_calibration_finds_the_chains_and_what_the_leakage_left(stage):
 
 def test_a_bound_driven_receiver_has_no_hardware():
     with pytest.raises(ConfigError, match=r"hardware: set.*waveform"):
-        load_spec(ROOT / "pipelines" / "trace_then_slam.toml", ["hardware.clip_rms=3.0"])
+        load_spec(ROOT / "pipelines" / "trace_then_slam.toml", ["receiver.estimator=bound", "hardware.clip_rms=3.0"])
     with pytest.raises(ConfigError, match=r"hardware.coupling"):
         HardwareConfig(coupling=0.5)

@@ -60,7 +60,7 @@ def test_wrong_memories_are_no_detections(make_paths):
 
 
 def test_the_bound_needs_no_memory(make_paths, make_gain):
-    config, paths = ReceiverConfig(), room(make_paths, make_gain, 0.0)
+    config, paths = ReceiverConfig(estimator="bound"), room(make_paths, make_gain, 0.0)
     last, _ = measure(paths, 0, 0.0, RADIO, config, rng=np.random.default_rng(1))
     results = [measure(paths, 0, 0.0, RADIO, config, p, rng=np.random.default_rng(2))[0].tau for p in (None, last)]
     np.testing.assert_array_equal(*results)

@@ -62,7 +62,7 @@ def test_slices_hear_it_too(stage, tmp_path, monkeypatch):
 def test_the_noise_of_named_paths_is_the_same_with_and_without(stage):
     """So that a study is paired: a path that nothing merges with comes out with the same error."""
     stage, _ = stage
-    radio, receiver = RadioConfig(), ReceiverConfig(merge=False)
+    radio, receiver = RadioConfig(), ReceiverConfig(estimator="bound", merge=False)
     faint = replace(stage.extras, gain=1e-9 * stage.extras.gain)
     clutter = Clutter(faint, np.zeros(faint.valid.shape))
     plain, who = measure(stage.paths, 0, 0.3, radio, receiver, rng=np.random.default_rng(1))

@@ -19,7 +19,13 @@ from rislam_rt.report.room import draw_above
 from rislam_rt.report.verdict import panel_found_at
 from rislam_rt.shipped import find_pipeline, find_room
 
-SET = ["channel=image_source", "depth=1", "design.method=coordinate", "receiver.alternation=true"]
+SET = [
+    "channel=image_source",
+    "depth=1",
+    "design.method=coordinate",
+    "receiver.alternation=true",
+    "receiver.estimator=bound",
+]
 
 
 def run(cycles: int, *keys: str, **about):

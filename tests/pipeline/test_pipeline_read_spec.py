@@ -36,7 +36,7 @@ def test_defaults_are_those_of_the_records(write):
     ("section", "record", "without"),
     [
         (SlamSection, SlamConfig, set()),
-        (ReceiverSection, ReceiverConfig, {"slot", "panels"}),  # `budget.measure_s`, and the room's
+        (ReceiverSection, ReceiverConfig, {"slot", "panels"}),  # it is `budget.measure_s`
         (HardwareSection, HardwareConfig, set()),
         (DesignSection, DesignConfig, {"certify"}),
     ],

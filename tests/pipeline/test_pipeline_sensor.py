@@ -96,7 +96,7 @@ def test_what_is_told_wrong_is_believed() -> None:
 @pytest.mark.parametrize("rate", [0.5, 5.0])
 def test_filter_and_rival_expect_the_false_components_that_the_receiver_makes(rate: float) -> None:
     """Density of strangers without new paths, over the volume in which components lie, against a count."""
-    config, radio = ReceiverConfig(clutter_rate=rate), RadioConfig()
+    config, radio = ReceiverConfig(estimator="bound", clutter_rate=rate), RadioConfig()
     sensor, rng = build_sensor(radio, config), np.random.default_rng(3)
     false = [measure(faint_paths(radio, 0.0), 0, 0.0, radio, config, rng=rng)[0] for _ in range(400)]
     count = np.mean([len(m) for m in false])

@@ -133,7 +133,7 @@ class Precision:
         return error
 
     def _patterns(self, paths: Paths, cycle: Integers, path: Integers) -> Floats:
-        """(M,) what the antennas' patterns may be off: a half-wave dipole's is a difference over the sine to its axis."""
+        """(M,) what the antennas' patterns may be off: a half-wave dipole's is a difference over a sine."""
         error, antennas = np.zeros(len(path)), self.radio.antennas
         for pattern, ray in ((antennas.tx, paths.departure), (antennas.rx, paths.arrival)):
             if pattern == "hw_dipole":

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.returns import linearise
+from rislam_rt.slam.returns import TX, linearise
 from rislam_rt.slam.window import gauss, tracks
 from rislam_rt.slam.window.book import enter, idents
 from rislam_rt.slam.window.context import Context, resolve
@@ -45,14 +45,20 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     over = [(row, value, 0 <= panel == int(forms[0, 0])) for row, value, forms in told]
     verdicts, shares = judge(context, ats, histories, known, over, lonely)
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
-    looked = context.tracks.looked.copy()
+    looked, returns = context.tracks.looked.copy(), context.scene.use_vt
     for (row, _, forms), share in zip(told, shares, strict=True):
         if share > LEVELS.born:
+            if not returns and forms[0, 0] == TX:  # what it is is known, and that is all it is asked for
+                gone[rows[row]] = True
+                continue
             context = _assign(context, ats[row], idents(context.book, forms), histories.scatter[row])
             gone[rows[row]] = True
     born = -1
     for row, verdict in enumerate(verdicts):
         if gone[rows[row]]:
+            continue
+        if not returns and verdict.is_return:
+            looked[rows[row]] = context.tracks.hits[rows[row]]
             continue
         if born < 0 and wanted(verdict, float(histories.mean[0][row, 0])):
             context, fine = _enter(context, ats[row], verdict, histories, row)
@@ -148,6 +154,7 @@ def _explain(
     weight = weight / weight.sum()
     value = np.einsum("r,krj->kj", weight, linear.seen)
     by_pose = np.einsum("r,krij->kij", weight, linear.by_pose) @ histories.doubt[row, used]
+    by_pose = np.concatenate([by_pose, histories.twist[row, used]], axis=-1)
     wide = linear.by_feature.reshape(*linear.seen.shape, features.size)
     by_map = np.einsum("r,krij->kij", weight, wide) @ root
     extra = groups.disturbance[column] + groups.share_variance[column] * gap**2

@@ -12,7 +12,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.tracks import PANEL
-from rislam_rt.slam.window.gauss import Window, now, poses
+from rislam_rt.slam.window.gauss import HEAD, TURN, Window, now, pose_design, poses
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log
 
@@ -45,6 +45,8 @@ class Digest(NamedTuple):
     """(3,) where the agent is now: the anchor of new walls."""
     speed: float
     """[m/s] of the agent, and something for its doubt."""
+    twist: Floats
+    """(T, B, 3, H) square root of the covariance with which the heading's error moves what is seen; H = 0 if known."""
 
     @property
     def mean(self) -> tuple[Floats, Floats, Floats]:
@@ -85,8 +87,10 @@ def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: 
         np.zeros((count, POINTS, 3)), np.zeros((count, POINTS, 3)), np.zeros((count, POINTS)),
         np.zeros((count, POINTS, 3)) + ends.tx[-1], np.zeros((count, POINTS, 3)) + ends.rx[-1],
         np.zeros((count, POINTS, 3, 6)), np.array([log.log_amplitude[at].mean() for at in rows]), scatter,
-        mean[:3].copy(), float(np.linalg.norm(mean[3:6])) + 0.05,
+        mean[:3].copy(), float(np.linalg.norm(mean[3:6])) + 0.05, np.zeros((count, POINTS, 3, 0)),
     )  # fmt: skip
+    heads = heading_roots(window)
+    turned = np.zeros((count, POINTS, heads.shape[1]))
     for row, (at, slot) in enumerate(zip(rows, slots, strict=True)):
         bins = np.arange(len(at)) * min(POINTS, len(at)) // len(at)
         start = np.searchsorted(bins, np.arange(bins[-1] + 1))
@@ -99,9 +103,23 @@ def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: 
         found.time[row, :used] = np.add.reduceat(time[slot] - time[-1], start) / many[:, 0]
         found.tx[row, :used] = np.add.reduceat(ends.tx[slot], start) / many
         found.rx[row, :used] = np.add.reduceat(ends.rx[slot], start) / many
+        turned[row, :used] = np.add.reduceat(heads[slot], start) / many
     scale = np.maximum(np.diag(covariance)[:6], 1e-14)
     root = np.linalg.cholesky(covariance[:6, :6] + np.diag(1e-6 * scale + 1e-14))
+    across = np.stack([0.0 * found.seen[..., 0], found.seen[..., 2], -found.seen[..., 1]], axis=-1)
+    found = found._replace(twist=across[..., None] * turned[:, :, None])
     return found._replace(doubt=np.asarray(root[:3] + found.time[..., None, None] * root[3:6], dtype=np.float64))
+
+
+def heading_roots(window: Window) -> Floats:
+    """(K, H) square root of the covariance of the headings, in its three strongest directions; H = 0 if known."""
+    if TURN not in window.axes:
+        return np.zeros((window.num_poses, 0))
+    size = len(window.head)
+    motion = np.concatenate([np.arange(HEAD), np.arange(size, len(window.covariance))])
+    rows = pose_design(window.step, window.axes)[:, TURN]
+    value, vector = np.linalg.eigh(rows @ window.covariance[np.ix_(motion, motion)] @ rows.T)
+    return np.asarray(vector[:, -3:] * np.sqrt(np.maximum(value[-3:], 0.0)))
 
 
 def _turned(seen: Floats, heading: Floats) -> Floats:

@@ -8,6 +8,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los, stranger_density
+from rislam_rt.slam.returns import TX
 from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window import gauss, motion, tracks
 from rislam_rt.slam.window.births import births
@@ -38,11 +39,12 @@ class WindowState(NamedTuple):
     tracks: Tracks
     sights: Sights
     gait: Floats
-    """(2, L) probabilities of the liveliness of the step before the window's first, across and upwards."""
+    """(2, L) probabilities of the liveliness of the step before the window's first, across and upwards; (3, L) with
+    the rate of turn, where the heading is not known."""
     level: Floats
-    """(2, L) of the last step's, filtered."""
+    """(2, L) or (3, L) of the last step's, filtered."""
     heading: Floats
-    """(K,) [rad] that the compass told."""
+    """(K,) [rad] that the compass told; where it is not asked, what offsets are against."""
     shift: Floats
     """(3,) [m] standard deviation of the start's position: what no measurement tells."""
     scene: Scene
@@ -59,12 +61,15 @@ def init(
     *, rng: np.random.Generator,
 ) -> WindowState:  # fmt: skip
     """The start prior, and an empty map."""
-    axes, free = np.arange(3), np.array([1.0, 1.0, float(config.height == "estimated")])
-    compass = start.heading_std if config.heading == "estimated" else 0.0
-    std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [compass]])
+    free = np.array([1.0, 1.0, float(config.height == "estimated")])
+    doubt = start.heading_std if config.heading == "estimated" else 0.0
+    axes = np.arange(3) if config.heading == "known" else np.append(np.arange(3), gauss.TURN)
+    std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [doubt]])
     window = gauss.begin(start.position, start.velocity, axes, std)
     scene = Scene(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
-    gait = np.stack([motion.first_gait(config.sigma_a), motion.first_gait(0.0)])
+    # what turns at all does so by ten times what a random walk of the heading tells in a cycle
+    lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if gauss.TURN in axes else ()))
+    gait = np.stack([motion.first_gait(level) for level in lively])
     return WindowState(
         0, config, window, empty_book(), empty_log(), tracks.no_tracks(), no_sights(), gait, gait,
         np.array([start.heading]), start.position_std * free, scene, 0.0, (None,), np.zeros((0, 3)),
@@ -76,7 +81,9 @@ def step(
     *, rng: np.random.Generator,
 ) -> tuple[WindowState, StepInfo]:  # fmt: skip
     """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied."""
-    turn = heading - state.heading[-1]
+    if config.heading != "known":
+        heading = float(state.heading[-1])
+    turn = heading - float(state.heading[-1])
     state = _move(state, dt, heading)
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
     scene, book = state.scene, state.book
@@ -94,16 +101,17 @@ def step(
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(LEVELS.stay))))
 
     log = append(state.log, glance, state.cycle, state.cycle - state.window.num_poses + 1)
-    log = _explain(log, expected, groups, book, scatter, row, pick, len(glance.seen))
+    # wall returns that are thrown away are known for what they are, and move nothing
+    used = np.ones(len(row), dtype=np.bool_) if config.use_vt else expected.forms[groups.leader[row], 0] != TX
+    log = _explain(log, expected, groups, book, scatter, row[used], pick[used], len(glance.seen))
     state = state._replace(log=log)
     state, left, nis = _solve(state)
-    raw = np.zeros(len(row))
-    if len(row):
-        at = np.searchsorted(left.row, len(log.cycle) - len(glance.seen) + pick)
-        raw = np.mean(left.left[at] ** 2 * (1.0 + log.extra[left.row[at]] / log.std[left.row[at]] ** 2), axis=1)
+    raw = scatter[groups.leader[row]]
+    raw[used] = _squares(left, log, len(log.cycle) - len(glance.seen) + pick[used])
 
     taken = np.zeros(len(glance.seen), dtype=np.bool_)
     taken[pick] = True
+    turn += float(np.diff(gauss.poses(state.window)[-2:, 3]).sum())
     followed = _follow(state, mean, glance, (~taken).nonzero()[0], dt, turn, bend)
     state = state._replace(tracks=followed.tracks, log=followed.log)
     if book.panel < 0:  # once it is known, no track needs to be it
@@ -112,7 +120,7 @@ def step(
         state.sights, book, state.window, expected, groups, shows, row, pick, raw, glance, poses, scene, code
     )
     state = state._replace(sights=sights, book=book)
-    landmark[free[pick]] = _names(state.book, expected, groups, row)
+    landmark[free[pick]] = np.where(used, _names(state.book, expected, groups, row), REMOVED)
 
     context = Context(
         state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle, state.sights, state.codes
@@ -142,7 +150,8 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = gauss.slide(window), headings[1:]
     level = state.level @ motion.transition(LEVELS.stay)
-    window = gauss.extend(window, dt, motion.expected_precision(level)[[0, 0, 1]])
+    columns = COLUMNS[: len(window.axes)]
+    window = gauss.extend(window, dt, np.array([motion.prior_precision(level[group], group == 2) for group in columns]))
     return state._replace(window=window, gait=gait, heading=np.append(headings, heading), passed=passed)
 
 
@@ -175,7 +184,8 @@ def _notice(
     if (best.surprise > MISSED or best.strain > STRAINED) and len(state.window.step):
         for steps, liveliness in START:
             precision = state.window.precision.copy()
-            precision[-steps:, :2] = np.minimum(precision[-steps:, :2], liveliness**-2.0)
+            lively = COLUMNS[: precision.shape[1]] != 1
+            precision[-steps:, lively] = np.minimum(precision[-steps:, lively], liveliness**-2.0)
             trial = gauss.solve(state.window._replace(precision=precision))
             view = view_of(trial)
             if view.score + LOG_START > best.score:
@@ -188,8 +198,10 @@ def _notice(
 
 LOST = 10.0
 """Log odds against the map from which on the agent is lost: some cycles that strangers explain better."""
-GROUPS = (np.array([0, 1]), np.array([2]))
+GROUPS = (np.array([0, 1]), np.array([2]), np.array([gauss.TURN]))
 """Axes that are as lively as each other: an agent that turns does not climb."""
+COLUMNS = np.array([0, 0, 1, 2])
+"""Group of each axis."""
 
 
 def _liveliness(window: Window, gait: Floats) -> list[tuple[Floats, Floats]]:
@@ -198,7 +210,7 @@ def _liveliness(window: Window, gait: Floats) -> list[tuple[Floats, Floats]]:
     count = len(window.accel)
     block = window.covariance[size:, size:].reshape(count, free, count, free)[np.arange(count), :, np.arange(count)]
     found = []
-    for group, before in zip(GROUPS, gait, strict=True):
+    for group, before in zip(GROUPS[: len(gait)], gait, strict=True):
         inside = block[:, group[:, None], group]
         like = motion.log_likelihood(window.accel[:, group], inside, window.precision[:, group[0]])
         found.append(motion.smooth(before, like, LEVELS.stay))
@@ -231,6 +243,14 @@ def _explain(
     return log._replace(form=form, share=shares, extra=extra)
 
 
+def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:
+    """Mean squares (A,) of the residuals of some explained rows of the log, in reported deviations."""
+    if not len(rows):
+        return np.zeros(0)
+    at = np.searchsorted(left.row, rows)
+    return np.asarray(np.mean(left.left[at] ** 2 * (1.0 + log.extra[rows] / log.std[rows] ** 2), axis=1))
+
+
 def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
     """The window after this cycle's components: two Gauss-Newton steps; the whole of it again now and then."""
     window, log, book, body = state.window, state.log, state.book, state.scene.body
@@ -249,11 +269,12 @@ def liven(state: WindowState) -> WindowState:
     window = state.window
     if not len(window.accel):
         return state
-    across, upwards = _liveliness(window, state.gait)
-    fresh = np.stack([motion.expected_precision(found[0]) for found in (across, across, upwards)], axis=1)
+    found = _liveliness(window, state.gait)
+    columns = COLUMNS[: len(window.axes)]
+    fresh = np.stack([motion.prior_precision(found[group][0], group == 2) for group in columns], axis=1)
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
-    level = np.stack([across[1][-1], upwards[1][-1]])
+    level = np.stack([filtered[-1] for _, filtered in found])
     return state._replace(window=window._replace(precision=precision), level=level)
 
 
@@ -279,6 +300,8 @@ def _follow(
     spare = np.setdiff1d(free, picks)
     reach = np.maximum(glance.seen[spare, 0], 0.5)
     rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * (speed + 0.05)
+    if len(state.level) > 2:  # what turns without a compass turns all that it sees
+        rate[:, 1:] += np.sqrt(motion.expected_variance(state.level[2]))
     found, fresh = tracks.start(found, glance, spare, rate, state.cycle)
     base = len(state.log.cycle) - len(glance.seen)
     track = state.log.track.copy()

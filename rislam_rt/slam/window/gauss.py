@@ -6,6 +6,8 @@ their prior singular):
 
     p_k = p_0 + t_k v_0 + sum_{i < k} (T_i^2 / 2 + T_i (t_k - t_{i+1})) a_i .
 
+Where the heading is not known either, each step has a rate of turn, likewise constant over it.
+
 Unknowns: the head (first position, its velocity, offset of the compass; then the features, three numbers each) and
 the accelerations. All of them live in vector spaces, so that no manifold is needed. What left the window stands as a
 quadratic on the head (`prior`); each cycle inside it as a quadratic on its own pose and the features (`slots`), which
@@ -22,6 +24,8 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 
 HEAD = 7
 """Numbers of the head before the features: position, velocity, offset of the compass."""
+TURN = 3
+"""Axis of the rate of turn, after those of the room."""
 POSE = 4
 """Numbers of a pose that measurements depend on: position, offset of the compass."""
 
@@ -70,13 +74,13 @@ class Window(NamedTuple):
     head: Floats
     """(7 + 3F,)."""
     accel: Floats
-    """(K - 1, A) [m/s^2] over the steps between the poses, along the axes that move freely."""
+    """(K - 1, A) [m/s^2] over the steps between the poses, along the free axes; of `TURN`, rates [rad/s]."""
     precision: Floats
     """(K - 1, A) [s^4/m^2] of each acceleration's prior (see `motion`)."""
     step: Floats
     """(K - 1,) [s]."""
     axes: Integers
-    """(A,) axes that move freely."""
+    """(A,) axes that move freely; `TURN` where the heading does."""
     prior: Quadratic
     """On the head."""
     slots: Quadratic
@@ -125,9 +129,10 @@ def pose_design(step: Floats, axes: Integers) -> Floats:
         design[:, axis, axis], design[:, axis, 3 + axis] = 1.0, time
     design[:, 3, 6] = 1.0
     lag = time[:, None] - time[1:]
-    reach = np.where(np.arange(count)[:, None] > np.arange(len(step)), 0.5 * step**2 + step * lag, 0.0)
+    after = np.arange(count)[:, None] > np.arange(len(step))
+    reach = np.where(after, 0.5 * step**2 + step * lag, 0.0)
     for place, axis in enumerate(axes):
-        design[:, axis, HEAD + place :: free] = reach
+        design[:, axis, HEAD + place :: free] = np.where(after, step, 0.0) if axis == TURN else reach
     return design
 
 
@@ -142,7 +147,8 @@ def velocity_design(window: Window) -> Floats:
     design = np.zeros((3, HEAD + window.accel.size))
     design[:, 3:6] = np.eye(3)
     for place, axis in enumerate(window.axes):
-        design[axis, HEAD + place :: len(window.axes)] = window.step
+        if axis != TURN:
+            design[axis, HEAD + place :: len(window.axes)] = window.step
     return design
 
 
@@ -153,8 +159,7 @@ def now(window: Window) -> tuple[Floats, Floats]:
     design = np.zeros((size, total))
     motion = np.concatenate([np.arange(count), np.arange(size, total)])
     last = pose_design(window.step, window.axes)[-1]
-    design[:3, motion], design[3:6, motion] = last[:3], velocity_design(window)
-    design[6, 6] = 1.0
+    design[:3, motion], design[3:6, motion], design[6, motion] = last[:3], velocity_design(window), last[3]
     design[HEAD:size, HEAD:size] = np.eye(size - HEAD)
     mean = design @ np.concatenate([window.head, window.accel.ravel()])
     return mean, design @ window.covariance @ design.T
@@ -193,21 +198,29 @@ def slide(window: Window) -> Window:
     change = np.eye(size, size + free)
     change[:3, 3:6] = -dt * np.eye(3)
     for place, axis in enumerate(window.axes):
-        change[axis, size + place], change[3 + axis, size + place] = 0.5 * dt**2, -dt
+        if axis == TURN:
+            change[6, size + place] = -dt
+        else:
+            change[axis, size + place], change[3 + axis, size + place] = 0.5 * dt**2, -dt
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
     steep[size:] += window.precision[0] * accel
     gain = np.linalg.solve(wide[size:, size:], wide[size:, :size]).T
     head = window.head.copy()
     head[:3] += dt * head[3:6]
-    head[window.axes] += 0.5 * dt**2 * accel
-    head[3 + window.axes] += dt * accel
+    moves = window.axes != TURN
+    head[window.axes[moves]] += 0.5 * dt**2 * accel[moves]
+    head[3 + window.axes[moves]] += dt * accel[moves]
+    head[6] += dt * accel[~moves].sum()
     left = wide[:size, :size] - gain @ wide[size:, :size]
     prior = Quadratic(0.5 * (left + left.T), steep[:size] - gain @ steep[size:], head)
     back = np.eye(size + window.accel.size)
     back[:3, 3:6] = dt * np.eye(3)
     for place, axis in enumerate(window.axes):
-        back[axis, size + place], back[3 + axis, size + place] = 0.5 * dt**2, dt
+        if axis == TURN:
+            back[6, size + place] = dt
+        else:
+            back[axis, size + place], back[3 + axis, size + place] = 0.5 * dt**2, dt
     covariance = back @ window.covariance @ back.T
     kept = np.concatenate([np.arange(size), np.arange(size + free, len(covariance))])
     return window._replace(

@@ -13,10 +13,13 @@ from rislam_rt.slam.window.trial import Trials
 
 KINDS = (
     "wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same",
-    "two walls", "wall beside its edge",
+    "two walls", "wall beside its edge", "known point, wall",
 )  # fmt: skip
 """Names of the kinds, by their number."""
-WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS, BESIDE = range(len(KINDS))
+WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS, BESIDE, IMAGE = range(len(KINDS))
+
+WALLS = (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE, IMAGE)
+"""Kinds whose new feature is a wall."""
 
 
 class Known(NamedTuple):
@@ -38,7 +41,7 @@ class Hypotheses(NamedTuple):
     kind: Integers
     """(H,)."""
     known: Integers
-    """(H,) row of the known wall, -1 for none."""
+    """(H,) row of the known wall (of the known point, for its image in a wall), -1 for none."""
     trials: Trials
 
 
@@ -72,8 +75,8 @@ def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
     return np.asarray(-2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]))
 
 
-def hypotheses(digest: Digest, known: Known, book: Book) -> Hypotheses:
-    """Every kind for every track, with its first guess."""
+def hypotheses(digest: Digest, known: Known, book: Book, use_vt: bool) -> Hypotheses:
+    """Every kind for every track, with its first guess; images of known points where wall returns tell no walls."""
     count, walls = len(digest.seen), book.walls
     seen, tx, rx = digest.mean
     ray, length = digest.direction, seen[:, 0]
@@ -123,13 +126,28 @@ def hypotheses(digest: Digest, known: Known, book: Book) -> Hypotheses:
         turned = (pair @ tx[..., None])[..., 0]
         add(TWO_WALLS, NONE, image - turned, NONE, NONE, (tx, tx))
         turns[-1] = np.stack([pair, np.broadcast_to(AXES, (count, 3, 3))], axis=1)
+    for point in book.points.tolist() if not use_vt else []:
+        start, *parts = _image(digest, known.place[point], known.root[point])
+        add(IMAGE, point, start, NONE, NONE, (tx, tx))
+        turns[-1], shifts[-1], doubts[-1] = parts
     kind, walled = np.concatenate(kinds), np.concatenate(knowns)
     trials = Trials(
-        np.concatenate(tracks), (kind <= WALL_KNOWN) | (kind == BESIDE), kind == TWO_WALLS, np.concatenate(starts),
+        np.concatenate(tracks), np.isin(kind, WALLS), kind == TWO_WALLS, np.concatenate(starts),
         np.concatenate(turns), np.concatenate(shifts), np.concatenate(doubts), kind == BESIDE,
-        _beyond(kind, walled, known),
+        _beyond(kind, walled, known), kind == IMAGE,
     )  # fmt: skip
     return Hypotheses(kind, walled, trials)
+
+
+def _image(digest: Digest, spot: Floats, root: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """First guess of the wall (T, 3) that mirrors a point (3,), known to `root` (3, 3), and the `Trials` of that."""
+    (seen, tx, rx), count = digest.mean, len(digest.seen)
+    reach = np.maximum(seen[:, 0] - np.linalg.norm(spot - tx, axis=1), 0.1)
+    anchor = np.broadcast_to(digest.middle, rx.shape)
+    start = reflect(anchor, rx + reach[:, None] * digest.direction, np.broadcast_to(spot, rx.shape))
+    parts = ((np.zeros((3, 3)), AXES), (spot, np.zeros(3)), (root, np.zeros((3, 3))))
+    turn, shift, doubt = (np.tile(np.stack(pair), (count, *(1,) * (pair[1].ndim + 1))) for pair in parts)
+    return start, turn, shift, doubt
 
 
 def _beyond(kind: Integers, walled: Integers, known: Known) -> Floats:

@@ -33,12 +33,12 @@ class Identified(NamedTuple):
 def identify(context: Context, ats: list[Integers], table: Hypotheses, fits: Fits, evidence: Floats) -> Identified:
     """The tracks whose components are the log's rows `ats`: what comes of its being the panel that throws them."""
     found = Identified(np.zeros(len(evidence)), unknown(len(evidence)), np.full(len(ats), -CERTAIN))
-    scene, named = context.scene, float(context.book.ris_probability.max(initial=0.0))
+    scene, book = context.scene, context.book
     if scene.ris is None:
         found.identity.log_ris[:] = -np.inf
         return found
     point = np.isin(table.kind, (POINT, OVER_RX, OVER_TX, OVER_SAME))
-    taken = np.log1p(-min(named, 1.0 - 1e-6))  # there is but one panel
+    taken = -np.logaddexp.reduce(np.append(book.log_ris[book.points], 0.0))  # there is but one panel
     for track, at in enumerate(ats):
         rows = (point & (table.trials.track == track)).nonzero()[0]
         if (context.log.side[at] == OTHER).all():

@@ -14,14 +14,14 @@ from rislam_rt.slam.window.expect import Scene
 from rislam_rt.slam.window.gauss import Holds, no_holds
 from rislam_rt.slam.window.guesses import (
     BESIDE,
-    KNOWN_WALL,
+    IMAGE,
     LEVEL_TURN,
     OVER_SAME,
     OVER_TX,
     POINT,
     TWO_WALLS,
     WALL,
-    WALL_KNOWN,
+    WALLS,
     Hypotheses,
     Known,
     hypotheses,
@@ -31,8 +31,8 @@ from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.panel import Identity, unknown
 from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
 
-LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15]))
-"""Log prior of each kind; over known walls, of all walls together."""
+LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 0.2]))
+"""Log prior of each kind; over known walls, of all walls together; of known points in walls, of all points together."""
 LOG_NONE = np.log(0.05)
 """Of a path of no kind here: over walls that the map lacks."""
 OVER_PANEL = 0.2
@@ -52,7 +52,7 @@ class Verdict(NamedTuple):
     """-1: of no kind here."""
     probability: float
     known: int
-    """Row of the known wall, -1 for none."""
+    """Row of the known wall or point, -1 for none."""
     place: Floats
     """(3,) of the new feature."""
     covariance: Floats
@@ -75,18 +75,23 @@ class Verdict(NamedTuple):
     @property
     def is_wall(self) -> bool:
         """Whether the new feature is one."""
-        return self.kind in (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE)
+        return self.kind in WALLS
+
+    @property
+    def is_return(self) -> bool:
+        """Whether the track is a wall return: the Tx's own image."""
+        return self.kind >= 0 and _TEMPLATES[self.kind][0] == TX
 
 
 NEW = -5
 """In a form: the feature that is sought."""
 KNOWN = -6
-"""In a template: the known wall."""
+"""In a template: the known wall, or the known point."""
 _TEMPLATES = (
     (TX, NONE, NONE, NEW, NONE), (TX, NONE, NONE, KNOWN, NEW), (TX, NONE, NONE, NEW, KNOWN),
     (NEW, NONE, NONE, NONE, NONE), (NEW, NONE, NONE, KNOWN, NONE), (NEW, KNOWN, NONE, NONE, NONE),
     (NEW, KNOWN, NONE, KNOWN, NONE), (TX, NONE, NONE, NONE, NONE),
-    (TX, NONE, NONE, NEW, NONE),
+    (TX, NONE, NONE, NEW, NONE), (KNOWN, NONE, NONE, NEW, NONE),
 )  # fmt: skip
 """Form of each kind."""
 
@@ -103,10 +108,11 @@ def judge(
     returns beside it.
     """
     book, scene = context.book, context.scene
-    table = hypotheses(digest, known, book)
+    table = hypotheses(digest, known, book, scene.use_vt)
     fits = try_all(table.trials, digest)
     track = table.trials.track
     rivals = np.where(table.known >= 0, np.log(max(len(book.walls), 1)), 0.0)
+    rivals[table.kind == IMAGE] = np.log(max(len(book.points), 1))
     evidence = fits.log_evidence - LOG_VOLUME - np.where(table.trials.is_wall | table.trials.is_pair, np.log(8.0), 0.0)
     evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair, lonely[track], 0.0)
     evidence += _amplitudes(table, fits, digest, book, scene) + _opacity(table, fits, digest, known, book)
@@ -115,6 +121,8 @@ def judge(
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
     over = identify(context, ats, table, fits, evidence)
     evidence += over.gain
+    if (panel := book.panel) >= 0:
+        evidence += np.where((table.kind == IMAGE) & (table.known == panel), over.elsewhere[track], 0.0)
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
@@ -237,7 +245,21 @@ def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: Book, scene
     point = -0.5 * (level - mean) ** 2 / spread - 0.5 * np.log(spread)
     double, wide = free + 2.0 * LEVELS.wall_ratio, 2.0 * LEVELS.wall_ratio_std**2 + LEVELS.fading**2
     pair = -0.5 * (level - double) ** 2 / wide - 0.5 * np.log(wide) - 20.0 * surplus**2
-    return np.where(table.trials.is_wall, wall, np.where(table.trials.is_pair, pair, point))
+    amplitude = np.where(table.trials.is_wall, wall, np.where(table.trials.is_pair, pair, point))
+    image = (table.kind == IMAGE).nonzero()[0]
+    amplitude[image] = _image_amplitudes(table, image, digest, book, scene)
+    return amplitude
+
+
+def _image_amplitudes(table: Hypotheses, rows: Integers, digest: Digest, book: Book, scene: Scene) -> Floats:
+    """The same of images of known points in new walls, hypotheses `rows` (R,); the panel's hangs on codes."""
+    track, point = table.trials.track[rows], table.known[rows]
+    first = np.maximum(np.linalg.norm(table.trials.shift[rows, 0] - digest.mean[1][track], axis=1), 0.05)
+    unit = point_amplitude(np.ones(len(rows)), first, np.maximum(digest.mean[0][track, 0] - first, 0.05), scene.radio)
+    strength, doubt = (field[point] for field in book.log_strength)
+    mean, variance = np.log(unit) + strength + LEVELS.wall_ratio, doubt**2 + LEVELS.wall_ratio_std**2 + LEVELS.fading**2
+    off = np.where(point == book.panel, 0.0, digest.log_amplitude[track] - mean)
+    return np.asarray(-0.5 * off**2 / variance - 0.5 * np.log(variance))
 
 
 def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: Book) -> Floats:

@@ -68,6 +68,11 @@ def expected_precision(posterior: Floats) -> Floats:
     return np.asarray(posterior @ LADDER**-2.0)
 
 
+def prior_precision(posterior: Floats, is_turn: bool) -> Floats:
+    """(...,) of a step: the expected precision; of turns, of which nothing is told beforehand, by the variance."""
+    return 1.0 / expected_variance(posterior) if is_turn else expected_precision(posterior)
+
+
 def expected_variance(posterior: Floats) -> Floats:
     """(...,) [m^2/s^4]."""
     return np.asarray(posterior @ LADDER**2)

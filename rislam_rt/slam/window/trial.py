@@ -2,6 +2,7 @@
 
 Known walls are affine maps here. What is sought is a wall `w` (as image of the agent's place), with the Tx's image
 `m = S_out R_w(S_in x + t_in) + t_out`, or a point `p`, seen by the Rx at `S_r p + t_r` and by the Tx at `S_t p + t_t`.
+With `S_in = 0` the wall mirrors a known point `t_in`, which the Tx sees as it is.
 What two unknown walls throw together is `m = S_in x + d`, the shift `d` being sought: opposite walls turn nothing, at
 right angles they turn by half a turn about their edge.
 """
@@ -44,6 +45,8 @@ class Trials(NamedTuple):
     """(H,) whether it comes out as one with what a known wall makes of it (`beyond`), at an unknown share between."""
     beyond: Floats
     """(H, 3, 4) turn and shift of that wall."""
+    fixed: Booleans
+    """(H,) whether the wall mirrors a known point, which is `shift[:, 0]`, and not the Tx; on the leg to the Rx."""
 
 
 class Fits(NamedTuple):
@@ -70,23 +73,24 @@ def try_all(trials: Trials, digest: Digest) -> Fits:
     cost, log_det = np.full(count, np.inf), np.zeros(count)
     covariance, held = np.tile(AXES, (count, 1, 1)), np.tile(AXES, (count, 1, 1))
     trust = np.ones((count, digest.seen.shape[1]))
-    place, error = trials.start.copy(), np.zeros((count, COMMON))
+    common = COMMON + digest.twist.shape[-1]
+    place, error = trials.start.copy(), np.zeros((count, common))
     for turn in range(STEPS + 1):
         now = _equations(trials, digest, active, place[active], error[active], trust[active])
         cost[active] = now.cost
         if turn >= 2 or turn == STEPS:
             inverse = np.linalg.inv(now.normal)
-            covariance[active] = inverse[:, COMMON:, COMMON:]
-            held[active] = np.linalg.inv(now.normal[:, COMMON:, COMMON:])
+            covariance[active] = inverse[:, common:, common:]
+            held[active] = np.linalg.inv(now.normal[:, common:, common:])
             log_det[active] = np.linalg.slogdet(now.normal)[1]
         if turn == STEPS:
             break
         trust[active] = now.trust
         step = np.linalg.solve(now.normal, now.slope[..., None])[..., 0]
-        length = np.sqrt(np.vecdot(step[:, COMMON:], step[:, COMMON:]))[:, None]
+        length = np.sqrt(np.vecdot(step[:, common:], step[:, common:]))[:, None]
         short = np.minimum(1.0, 1.5 / np.maximum(length, 1e-12))
-        place[active] += short * step[:, COMMON:]
-        error[active] += short * step[:, :COMMON]
+        place[active] += short * step[:, common:]
+        error[active] += short * step[:, :common]
         if turn == 1:
             best = np.full(len(digest.seen), np.inf)
             np.minimum.at(best, trials.track, cost)
@@ -102,7 +106,7 @@ def try_all(trials: Trials, digest: Digest) -> Fits:
 
 
 COMMON = 13
-"""Unknowns beside the place: errors of pose and velocity, of the two maps, and of the share."""
+"""Unknowns beside the place: errors of pose and velocity, of the two maps, and of the share; headings come on top."""
 SHARE, SHARE_STD = 0.35, 0.35
 """Share of the weaker of two in the place of both: amplitudes a wall's loss apart, and a phase that hardly turns."""
 
@@ -144,7 +148,7 @@ def _equations(
     by_image = _by_image(arrival, reach)
     # the point's leg to the Tx
     far = place[:, None, :] @ np.swapaxes(first, 1, 2) + shift[:, None, 0]
-    to_tx = np.where(moving[:, None, None], 0.0, far - tx)
+    to_tx = np.where((moving & ~trials.fixed[rows])[:, None, None], 0.0, far - tx)
     leg = np.sqrt(np.vecdot(to_tx, to_tx))
     toward = to_tx / np.maximum(leg, 1e-6)[..., None]
     seen = np.concatenate([(reach + leg)[..., None], cosines], axis=-1)
@@ -157,21 +161,23 @@ def _equations(
     maps_in = by_image @ inside[:, None]
     maps_in[..., 0, :] += (toward[..., None, :] @ doubt[:, None, 0])[..., 0, :]
     split = _mix(trials, rows, rx, image, error, (by_place, by_tx), (seen, new, pose))
-    wide = np.concatenate([pose @ digest.doubt[track], maps_in, maps_out, split, new], axis=-1)
+    wide = np.concatenate(
+        [digest.twist[track], pose @ digest.doubt[track], maps_in, maps_out, split, new], axis=-1
+    )  # fmt: skip
     weight = digest.weight[track]
     wide *= weight[..., None]
     # the share stands in the prediction itself, the other errors are linear
-    left = (digest.seen[track] - seen) * weight - (wide[..., : COMMON - 1] @ error[:, None, :-1, None])[..., 0]
+    left = (digest.seen[track] - seen) * weight - (wide[..., : error.shape[1] - 1] @ error[:, None, :-1, None])[..., 0]
     squared = np.vecdot(left, left)
     heavy = wide * trust[..., None, None]
     size = wide.shape[-1]
     flat, thick = wide.reshape(len(rows), -1, size), heavy.reshape(len(rows), -1, size)
     normal = np.swapaxes(thick, 1, 2) @ flat
     slope = (np.swapaxes(thick, 1, 2) @ left.reshape(len(rows), -1, 1))[..., 0]
-    common, own = np.arange(COMMON), np.arange(COMMON, size)
+    common, own = np.arange(error.shape[1]), np.arange(error.shape[1], size)
     normal[:, common, common] += 1.0
     normal[:, own, own] += RIDGE
-    slope[:, :COMMON] -= error
+    slope[:, common] -= error
     tail = LEVELS.tail
     cost = (tail + 3.0) * np.log1p(squared / tail).sum(axis=1) + np.vecdot(error, error)
     return _Equations(normal, slope, cost, (tail + 3.0) / (tail + squared))

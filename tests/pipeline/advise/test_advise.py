@@ -45,7 +45,7 @@ def office() -> Scene:
 
 @pytest.mark.parametrize("changed", [(), ("receiver.alternation=true",)])
 def test_the_chance_of_being_heard_is_the_share_of_the_receivers_own_draws(paper: Scene, changed: tuple[str]) -> None:
-    looked = survey(paper, settings("radio.reference_snr_db=0", *changed), places=3)
+    looked = survey(paper, settings("receiver.estimator=bound", "radio.reference_snr_db=0", *changed), places=3)
     rng, draws = np.random.default_rng(5), 200
     assert paper.ris is not None
     paths = under(looked.paths, paper.ris.spec, aimed_codes(looked.paths, paper.ris.spec, looked.settings.radio))

@@ -22,13 +22,16 @@ def _digest(count, *, std=0.01, rng):
     weight = np.full((1, count, 3), 1.0 / std)
     return Digest(
         np.zeros((1, count, 3)), weight, time[None], ends.tx[None], ends.rx[None], wide[None],
-        np.zeros(1), np.ones((1, 3)), place[-1], 0.4,
+        np.zeros(1), np.ones((1, 3)), place[-1], 0.4, np.zeros((1, count, 3, 0)),
     )  # fmt: skip
 
 
 def _wall(middle):
     normal = np.array([0.9, 0.3, 0.1]) / np.linalg.norm([0.9, 0.3, 0.1])
     return middle + 2.0 * 2.5 * normal
+
+
+SPOT = np.array([1.5, -1.0, 2.0])
 
 
 def _mirror(middle, wall):
@@ -38,10 +41,13 @@ def _mirror(middle, wall):
 
 
 def _trials(kind, digest, rng):
-    """One hypothesis of a kind: `wall`, `point`, `pair`, `edge` (a wall beside its edge with a known one)."""
+    """One hypothesis of a kind: `wall`, `point`, `pair`, `edge` (a wall beside its edge with a known one), `image`."""
     turn, shift = np.tile(AXES, (1, 2, 1, 1)), np.zeros((1, 2, 3))
     known = _mirror(digest.middle, digest.middle + np.array([-3.0, 1.0, 0.5]))
     if kind == "edge":
+        start = _wall(digest.middle)
+    elif kind == "image":
+        turn[0, 0], shift[0, 0] = 0.0, SPOT
         start = _wall(digest.middle)
     elif kind == "wall":
         turn[0, 1], shift[0, 1] = known
@@ -55,11 +61,13 @@ def _trials(kind, digest, rng):
     doubt = 1e-3 * rng.standard_normal((1, 2, 3, 3))
     if kind == "pair":
         doubt[:] = 0.0
-    flags = np.array([kind in ("wall", "edge")]), np.array([kind == "pair"])
+    flags = np.array([kind in ("wall", "edge", "image")]), np.array([kind == "pair"])
     mixed = np.array([kind == "edge"])
     beyond = np.zeros((1, 3, 4))
     beyond[0, :, :3], beyond[0, :, 3] = _mirror(digest.middle, digest.middle + np.array([0.2, 0.0, 3.0]))
-    return Trials(np.zeros(1, dtype=np.int64), *flags, start[None], turn, shift, doubt, mixed, beyond)
+    return Trials(
+        np.zeros(1, dtype=np.int64), *flags, start[None], turn, shift, doubt, mixed, beyond, np.array([kind == "image"])
+    )
 
 
 def _left(trials, digest, place, error):
@@ -71,7 +79,7 @@ def _left(trials, digest, place, error):
 
 def test_slopes_are_those_of_the_cost():
     rng = np.random.default_rng(1)
-    for kind in ("wall", "point", "pair", "edge"):
+    for kind in ("wall", "point", "pair", "edge", "image"):
         # measurements far off in metres and next to nothing in deviations: a slope, and tails that do not count
         digest = _digest(6, rng=rng)._replace(weight=np.full((1, 6, 3), 1e-3))
         trials = _trials(kind, digest, rng)
@@ -100,9 +108,10 @@ def test_the_kernel_sees_what_the_measurement_library_sees():
     for kind, form, start in (
         ("wall", (TX, NONE, NONE, 1, 0), new),
         ("point", (1, 0, NONE, NONE, NONE), np.array([1.5, -1.0, 2.0])),
+        ("image", (2, NONE, NONE, 1, NONE), new),
     ):
         trials = _trials(kind, digest, rng)
-        features = np.stack([known, start, start + 1.0])
+        features = np.stack([known, start, SPOT])
         wanted = linearise(compile_forms(np.array([form])), features, anchors, poses).seen[:, 0]
         found = digest._replace(seen=wanted[None], weight=np.ones(digest.weight.shape))
         # at the very place the cost is that of residuals of zero

@@ -83,6 +83,52 @@ def test_hindsight_is_no_worse_and_ends_where_the_filter_does(run):
     assert np.sqrt(np.mean(off[0] ** 2)) < np.sqrt(np.mean(off[1] ** 2))
 
 
+def _walk(config, cycles, *, start, turn=0.0, landmarks=True, rng):
+    """Some cycles of the paper's room without its panel: estimates and the true motion, of a body that turns."""
+    scene = load_scene(ROOM)
+    motion = scene.agent[:cycles]
+    motion = replace(
+        motion, position=motion.position + np.array([1.7, 0.9, 0.4]),
+        heading=motion.heading[0] + turn * (motion.time - motion.time[0]),
+    )  # fmt: skip
+    radio = with_reference_snr(RadioConfig(), 13.0)
+    room = replace(scene, agent=motion, scatterers=scene.scatterers if landmarks else ())
+    paths = without_panel(ImageSourceChannel(room, radio, 2).paths(motion))
+    state = slam.init(start(motion), motion.body, None, SensorModel(radio), config, rng=rng)
+    found = []
+    for cycle in range(cycles):
+        heard, _ = measure(paths, cycle, float(motion.heading[cycle]), radio, ReceiverConfig(), rng=rng)
+        state, _ = slam.step(state, heard, None, 0.1 if cycle else 0.0, 0.0, config, rng=rng)
+        found.append(slam.estimate(state, config))
+    return found, motion
+
+
+def _told(motion):
+    push = np.array([0.008, 0.006, 0.0])
+    return StartPrior(motion.position[0], motion.velocity[0] + push, float(motion.heading[0]))
+
+
+def test_wall_returns_that_are_thrown_away_move_nothing():
+    rng = np.random.default_rng(5)
+    # a room of walls alone: nothing but their returns is heard
+    found, motion = _walk(replace(CONFIG, use_vt=False), 16, start=_told, landmarks=False, rng=rng)
+    told = _told(motion)
+    reckoned = told.position + np.outer(motion.time - motion.time[0], told.velocity)
+    np.testing.assert_allclose([estimate.position for estimate in found], reckoned, atol=1e-9)
+    assert not len(found[-1].map.wall_offset)
+
+
+@pytest.mark.slow
+def test_a_turning_body_needs_no_compass():
+    rng, config = np.random.default_rng(6), replace(CONFIG, heading="estimated")
+    found, motion = _walk(config, 40, start=_told, turn=0.2, rng=rng)
+    off = np.array([estimate.heading for estimate in found]) - motion.heading
+    # a wall's direction is told to about 0.02 rad by one component; there are four walls and more
+    assert np.abs(off[25:]).max() < 0.02
+    assert np.linalg.norm(found[-1].position - motion.position[-1]) < 0.02
+    assert len(found[-1].map.wall_offset) >= 3
+
+
 @pytest.mark.slow
 def test_start_error_stays_in_the_covariance(run):
     found, *_ = run

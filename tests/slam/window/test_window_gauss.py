@@ -130,3 +130,31 @@ def test_the_likelihood_of_a_level_is_that_of_the_measured_acceleration():
         spread = noise + level**2 * np.eye(2)
         wanted.append(-0.5 * seen @ np.linalg.solve(spread, seen) - 0.5 * np.linalg.slogdet(spread)[1])
     np.testing.assert_allclose(found - found[0], np.array(wanted) - wanted[0], atol=1e-8)
+
+
+@pytest.mark.parametrize("keep", [20, 4])
+def test_a_heading_that_turns_is_filtered_as_a_batch_does(keep):
+    rng, rate = np.random.default_rng(11), 0.3
+    seen, weight = 0.1 * rng.standard_normal(CYCLES), rng.uniform(10.0, 1e3, CYCLES)
+    std = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.2])
+    window = gauss.begin(np.zeros(3), np.zeros(3), np.arange(4), std)
+    for cycle in range(CYCLES):
+        if cycle:
+            while window.num_poses >= keep:
+                window = gauss.slide(window)
+            window = gauss.extend(window, DT, np.full(4, rate**-2.0))
+        hessian, gradient, middle = (field.copy() for field in window.slots)
+        hessian[-1, 3, 3] = weight[cycle]
+        gradient[-1, 3], middle[-1] = (
+            weight[cycle] * (gauss.poses(window)[-1, 3] - seen[cycle]),
+            gauss.poses(window)[-1],
+        )
+        window = gauss.solve(window._replace(slots=Quadratic(hessian, gradient, middle)))
+    # the batch: the first heading and every rate
+    rows = np.concatenate([np.ones((CYCLES, 1)), DT * np.tri(CYCLES, CYCLES - 1, -1)], axis=1)
+    prior = np.concatenate([[0.2**-2.0], np.full(CYCLES - 1, rate**-2.0)])
+    covariance = np.linalg.inv(rows.T @ (weight[:, None] * rows) + np.diag(prior))
+    wanted = rows @ covariance @ rows.T @ (weight * seen)
+    mean, spread = gauss.now(window)
+    np.testing.assert_allclose(mean[6], wanted[-1], atol=1e-9)
+    np.testing.assert_allclose(spread[6, 6], rows[-1] @ covariance @ rows[-1], rtol=1e-9)
