@@ -139,7 +139,8 @@ BAD: dict[str, tuple[str, bytes | str | dict[str, Any], str]] = {
     "geojson no numbers": ("room.geojson", '{"type": "LineString", "coordinates": [["a", "b"]]}', "coordinates"),
     "geojson degrees": (
         "room.geojson",
-        '{"type": "Polygon", "coordinates": [[[13.4, 52.5], [13.40005, 52.5], [13.40005, 52.50004]]]}', "longitude and latitude",
+        '{"type": "Polygon", "coordinates": [[[13.4, 52.5], [13.40005, 52.5], [13.40005, 52.50004]]]}',
+        "longitude and latitude",
     ),
     "geojson material": (
         "room.geojson", '{"type": "Feature", "properties": {"kind": "wall", "material": "itu:cheese"}, "geometry": '
