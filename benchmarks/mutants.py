@@ -21,8 +21,19 @@ from typing import Any, NamedTuple
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PARTS = ("rislam_rt", "tests", "pipelines", "scenes", "benchmarks", "docs", "README.md", "CHANGELOG.md", "Makefile")
-ALSO = ("pyproject.toml", "mkdocs.yml", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "requirements.lock")
+PARTS = (
+    "rislam_rt",
+    "tests",
+    "pipelines",
+    "scenes",
+    "benchmarks",
+    "docs",
+    "notebooks",
+    "README.md",
+    "CHANGELOG.md",
+    "Makefile",
+)
+ALSO = ("pyproject.toml", "mkdocs.yml", ".ci", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "requirements.lock")
 
 
 class Mutant(NamedTuple):

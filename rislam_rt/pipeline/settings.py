@@ -3,11 +3,11 @@
 import ast
 import inspect
 import re
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import is_dataclass, replace
 from difflib import get_close_matches
 from functools import cache
-from textwrap import dedent
 from typing import Any, Literal, NamedTuple, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -111,14 +111,20 @@ def _owner(model: type[BaseModel], name: str) -> tuple[type, type | None]:
 @cache
 def _meanings(declared: type) -> dict[str, str]:
     """The docstrings under a class's fields, in one line each, by name."""
-    (body,) = ast.parse(dedent(inspect.getsource(declared))).body
-    assert isinstance(body, ast.ClassDef)
+    body = _classes(declared.__module__)[declared.__name__]
     found = {}
     for field, doc in zip(body.body, body.body[1:], strict=False):
         if isinstance(field, ast.AnnAssign) and isinstance(doc, ast.Expr) and isinstance(doc.value, ast.Constant):
             assert isinstance(field.target, ast.Name)
             found[field.target.id] = " ".join(str(doc.value.value).split())
     return found
+
+
+@cache
+def _classes(module: str) -> dict[str, ast.ClassDef]:
+    """A module's classes as they stand in its file, by name."""
+    body = ast.parse(inspect.getsource(sys.modules[module])).body
+    return {node.name: node for node in body if isinstance(node, ast.ClassDef)}
 
 
 def _kind(annotation: Any) -> str:
