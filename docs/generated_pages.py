@@ -11,6 +11,9 @@ from rislam_rt.pipeline.settings import Setting, list_settings
 from rislam_rt.pipeline.studies import load_any
 from rislam_rt.shipped import first_sentence, shipped_pipelines
 
+WIDTHS = ".md-typeset td:first-child code {white-space: nowrap} .md-typeset td:nth-child(2) {min-width: 9rem}"
+"""Of the table of settings: names are not broken in the middle, and what they mean has room on a narrow screen."""
+
 
 def on_files(files: Files, config: Any) -> Files:
     """Add the pages before the site is put together."""
@@ -28,12 +31,12 @@ def cli_page() -> Iterator[str]:
     for name, command in group.commands.items():
         context = command.context_class(command, info_name=f"rislam-rt {name}")
         yield f"## {name}\n\n```\n{' '.join(command.get_usage(context).split())}\n```\n"
-        yield f"{command.help}\n"
+        yield f"{_escaped(command.help)}\n"
         yield "| argument | meaning |\n| --- | --- |"
         for parameter in command.params:
             record = parameter.get_help_record(context)
             if record is not None:
-                yield f"| `{_cell(record[0])}` | {_cell(record[1])} |"
+                yield f"| `{_cell(record[0])}` | {_text(record[1])} |"
         yield ""
 
 
@@ -42,6 +45,7 @@ def settings_page() -> Iterator[str]:
     yield "# Settings\n"
     yield "What a pipeline file may say. `rislam-rt config [PIPELINE]` prints the same as a file to edit,"
     yield "`rislam-rt config --explain KEY` one of them; `--set KEY=VALUE` changes one on the command line.\n"
+    yield f"<style>{WIDTHS}</style>\n"
     seen: set[type] = set()
     for file in sorted(shipped_pipelines().values(), key=lambda file: file.stem != "trace_then_slam"):
         model = type(load_any(file))
@@ -49,19 +53,28 @@ def settings_page() -> Iterator[str]:
             continue
         seen.add(model)
         yield f"## {file.stem}\n\n{first_sentence(file)}\n"
-        yield "| setting | default | unit | allowed | meaning |\n| --- | --- | --- | --- | --- |"
+        yield "| setting | meaning | default | allowed |\n| --- | --- | --- | --- |"
         yield from map(_row, list_settings(model))
         yield ""
 
 
 def _row(one: Setting) -> str:
     default = "required" if one.required else f"`{_short(one.default)}`"
-    return "| " + " | ".join((f"`{one.key}`", default, one.unit, *map(_cell, (one.allowed, one.meaning)))) + " |"
+    return "| " + " | ".join((f"`{one.key}`", _text(one.meaning), f"{default} {one.unit}", _text(one.allowed))) + " |"
 
 
 def _short(value: Any) -> str:
     text = "not set" if value is None else str(value) or '""'
     return _cell(text if len(text) <= 40 else text[:37] + "...")
+
+
+def _text(text: str) -> str:
+    return _escaped(_cell(text))
+
+
+def _escaped(text: str) -> str:
+    """A word in angle brackets is not HTML, outside of code."""
+    return text.replace("<", "&lt;")
 
 
 def _cell(text: str) -> str:

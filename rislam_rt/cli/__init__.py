@@ -51,7 +51,7 @@ def _run(heard: list[int]) -> int:
         # Wrong usage: the parser's exceptions have no public base class, but all can say what is wrong.
         if not hasattr(error, "format_message"):
             raise
-        return _say(f"error: {error.format_message()}; see rislam-rt --help", 2)
+        return _say(f"error: {error.format_message().rstrip('.')}; see rislam-rt --help", 2)
     if code == EXIT_CODE:  # an interrupt that no command has answered
         return _say("interrupted", EXIT_CODE)
     return code if isinstance(code, int) else 0

@@ -71,7 +71,7 @@ def command(
     summary = _summary(inputs, answers, true)
     _write(folder, inputs, answers)
     for name, value in summary.items():
-        typer.echo(f"{name}: {value}")
+        typer.echo(f"{name}: {f'{value:.4g}' if isinstance(value, float) else value}")
     typer.echo(f"folder: {folder}")
     write_json(json, summary)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.errors import ConfigError
+from rislam_rt.errors import ConfigError, StoreError
 from rislam_rt.information import amplitude_std, measurement_std
 from rislam_rt.model import Body, Measurement, RadioConfig
 from rislam_rt.pipeline.dataset import read_dataset
@@ -87,16 +87,21 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
     """
     file = Path(file)
     if _is_netcdf(file):
-        data = read_dataset(file)
+        try:
+            data = read_dataset(file)
+        except StoreError:
+            what = "not a readable NetCDF file" if file.exists() else "no such file"
+            raise ConfigError(f"{file}: {what}; give one as a run folder's measurements_<scheme>.nc") from None
         try:
             return checked(dataset_to_inputs(data), str(file))
         except (KeyError, ValueError, TypeError) as error:
             raise ConfigError(
                 f"{file}: {type(error).__name__} {str(error)[:80]}; give one as a run folder's measurements_<scheme>.nc"
             ) from None
+    table = _read_csv(file)
     if start is None:
         raise ConfigError(f"{file}: a CSV file does not say where the agent starts; give --start X,Y,Z")
-    return inputs_of(_read_csv(file), start, radio, body, place=str(file))
+    return inputs_of(table, start, radio, body, place=str(file))
 
 
 def inputs_of(
@@ -156,8 +161,8 @@ def checked(inputs: Inputs, place: str) -> Inputs:
                 f"{where}: delay of {one.tau.max():g} s received; delays are in seconds, a room's below "
                 f"{LONGEST_DELAY:g} (were these nanoseconds, or metres?)"
             )
-        if (one.tau <= 0.0).any():
-            raise ConfigError(f"{where}: delay of {one.tau.min():g} s received; give positive ones")
+        if (one.tau < 0.0).any():  # 0: a false component at the edge of a receiver's window
+            raise ConfigError(f"{where}: delay of {one.tau.min():g} s received; give none below 0")
         reach = np.abs(one.cosines).max(initial=0.0)
         if reach > 1.0:
             raise ConfigError(f"{where}: cosine of {reach:g} received; give direction cosines from -1 to 1, not angles")

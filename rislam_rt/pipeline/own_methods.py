@@ -93,7 +93,8 @@ def load_own(name: str) -> Any:
     except (Exception, SystemExit) as error:  # a user's file may raise anything while it is read
         raise ConfigError(f"'{name}': {place} cannot be loaded ({type(error).__name__}: {error}); mend it") from None
     if not hasattr(module, attribute):
-        raise ConfigError(f"'{name}': module '{place}' has no '{attribute}'; mend either name")
+        where = f" ({module.__file__})" if getattr(module, "__file__", None) else ""
+        raise ConfigError(f"'{name}': module '{place}'{where} has no '{attribute}'; mend either name")
     return _made(name, getattr(module, attribute))
 
 
@@ -108,8 +109,10 @@ def at_work(name: str) -> Iterator[None]:
     """
     try:
         yield
-    except RislamError:
-        raise
+    except RislamError as error:  # ours, from what the method gave us
+        if str(error).startswith(f"'{name}'"):
+            raise
+        raise ConfigError(f"'{name}': {error}") from error
     except (Exception, SystemExit) as error:  # a user's method may raise anything
         frames = traceback.extract_tb(error.__traceback__)
         own = [frame for frame in frames if frame.filename == _file(load_own(name))]
@@ -202,6 +205,8 @@ def _entry_point(name: str) -> Any:
 def _made(name: str, found: Any) -> Any:
     """What a name stands for, ready for use: an estimator made, a function or a class of a channel as it is."""
     if not hasattr(found, "step"):
+        if hasattr(found, "init") and hasattr(found, "estimate"):
+            raise ConfigError(f"'{name}': has 'init' and 'estimate' and no 'step'; a filter has all three")
         if callable(found) or hasattr(found, "estimator"):
             return found
         raise ConfigError(f"'{name}': {type(found).__name__} received; give a function, a filter or a channel's class")

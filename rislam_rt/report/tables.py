@@ -189,11 +189,14 @@ def _show(title: str, table: Table) -> None:
 
 
 def _metres(value: float | None) -> str:
-    return "not found" if value is None else f"{value:.3f} m"
+    """As the sentences and the map of the report: centimetres below a metre."""
+    if value is None:
+        return "not found"
+    return f"{100.0 * value:.1f} cm" if value < 1.0 else f"{value:.2f} m"
 
 
 def _wall(score: Mapping[str, Any]) -> str:
-    return "not found" if score["rmse_m"] is None else f"{score['rmse_m']:.3f} m, {score['angle_deg']:.1f}°"
+    return "not found" if score["rmse_m"] is None else f"{_metres(score['rmse_m'])}, {score['angle_deg']:.1f}°"
 
 
 def _point(point: "Floats") -> str:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from rislam_rt.scene.findings import Fault, Faults, one_line
+from rislam_rt.shipped import shipped_rooms
 from rislam_rt.toml import parse_toml
 
 MAX_SCENE_BYTES = 4_000_000
@@ -311,7 +312,9 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
         The file cannot be read or its content is not a scene.
     """
     if not path.is_file():
-        raise Fault("no such scene file", "give a scene folder or its scene.toml")
+        near = get_close_matches(path.parent.name, shipped_rooms(), 1)
+        hint = f"did you mean '{near[0]}'? " if near else ""
+        raise Fault("no such scene file", f"{hint}give a scene folder, its scene.toml, or the name of a built-in room")
     try:
         with path.open("rb") as file:
             content = file.read(MAX_SCENE_BYTES + 1)

@@ -140,6 +140,7 @@ def test_bad_input_is_one_line_and_exit_2(run, arguments, tmp_path):
     lines = [line for line in err.splitlines() if not line.startswith("warning: ")]
     assert code == 2
     assert len(lines) <= 1
+    assert ".;" not in err
     assert "Traceback" not in err
     assert list(tmp_path.iterdir()) == []
 

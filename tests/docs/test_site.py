@@ -37,3 +37,4 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     settings = (tmp_path / "reference" / "settings.html").read_text()
     assert all(f"<code>{one.key}</code>" in settings for one in list_settings(PipelineSpec))
     assert "run_slam" in (tmp_path / "reference" / "api.html").read_text()
+    assert "runs/&lt;pipeline&gt;-" in (tmp_path / "reference" / "cli.html").read_text()

@@ -134,7 +134,7 @@ def test_two_cosines_of_no_direction_are_refused(table: Table, spec: PipelineSpe
     ("name", "values", "said"),
     [
         ("delay_s", 33.0, "delays are in seconds"),
-        ("delay_s", -1e-9, "give positive ones"),
+        ("delay_s", -1e-9, "give none below 0"),
         ("cos_x", 1.7, "direction cosines from -1 to 1"),
         ("delay_std_s", -1e-10, "tau_std of -1e-10 received"),
         ("delay_std_s", np.inf, "tau_std: not a finite number"),
@@ -201,3 +201,26 @@ def test_a_folder_by_another_name_is_not_written_over(tmp_path: Path, monkeypatc
     for folder in ("missing/..", "x" * 300):
         with pytest.raises(ConfigError, match="--out"):
             _new_folder(Path(folder))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("missing.csv", "no such file; give a CSV or NetCDF file"),
+        ("missing.nc", "no such file; give one as a run folder's"),
+        ("damaged.nc", "not a readable NetCDF file; give one as a run folder's"),
+        ("mine.csv", "give --start X,Y,Z"),
+    ],
+)
+def test_a_wrong_file_is_told_before_a_missing_start(tmp_path: Path, spec: PipelineSpec, name: str, said: str) -> None:
+    for there in ("damaged.nc", "mine.csv"):
+        (tmp_path / there).write_text("time_s,delay_s,cos_x,cos_y,snr_db\n0,6e-9,0.1,0.1,30\n")
+    with pytest.raises(ConfigError, match=said):
+        read_inputs(tmp_path / name, None, build_radio(spec.radio))
+
+
+def test_a_delay_at_the_edge_of_the_window_passes(table: Table, spec: PipelineSpec) -> None:
+    """0 s, as our own receiver reports a false component at times: the file of a run is not refused for it."""
+    rows = {**table, "delay_s": [0.0] * len(table["time_s"])}
+    given = inputs_of(rows, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
+    assert max(one.tau.max(initial=0.0) for one in given.measurements) == 0.0

@@ -42,6 +42,10 @@ class WantsArguments:
 class StepAlone:
     def step(self): ...
 
+class NoStep:
+    def init(self): ...
+    def estimate(self): ...
+
 class Nothing:
     def init(self, *given, **named): ...
     def step(self, *given, **named): ...
@@ -52,6 +56,10 @@ class Away(Nothing):
         return body
     def estimate(self, state):
         return pose_estimate(np.full(3, 1e200), np.zeros(3), 0.0, np.eye(6), state)
+
+class Lost(Away):
+    def estimate(self, state):
+        return pose_estimate(np.full(3, np.nan), np.zeros(3), 0.0, np.eye(6), state)
 
 class Negative(Away):
     def estimate(self, state):
@@ -148,7 +156,7 @@ def test_the_file_is_part_of_the_identity(mine: Path) -> None:
     ("schemes", "said"),
     [
         ('["optimised"]', "did you mean 'optimized'"),
-        ('["mine:nobody"]', "module 'mine' has no 'nobody'"),
+        ('["mine:nobody"]', "module 'mine' .*mine.py. has no 'nobody'"),
         ('["nowhere:f"]', "put nowhere.py beside the pipeline file"),
         ('["mine:bad"]', r"give whole numbers \(6, 6\) from 0 to 3"),
         ('["mine:raises"]', "raised ValueError: first line second line in line [0-9]+ of .*mine.py; mend it"),
@@ -160,6 +168,8 @@ def test_the_file_is_part_of_the_identity(mine: Path) -> None:
         ('["math:sin"]', "raised TypeError"),
         ('["mine:WantsArguments"]', "cannot be made"),
         ('["mine:StepAlone"]', "has 'step' and no 'init'"),
+        ('["mine:NoStep"]', "has 'init' and 'estimate' and no 'step'"),
+        ('["mine:Lost"]', "'mine:Lost': SlamEstimate.position: NaN"),
         ('["mine:Nothing"]', "estimate: NoneType received; give a SlamEstimate"),
         ('["mine:Away"]', "estimate: a position of 1e[+]200 m"),
         ('["mine:Negative"]', "estimate: a covariance with an eigenvalue of -0.001"),

@@ -232,6 +232,7 @@ def test_scene_file_that_is_none(room: Path, content: bytes) -> None:
 
 def test_no_scene_at_all(tmp_path: Path) -> None:
     assert "no such scene file" in refusal(tmp_path)
+    assert "did you mean 'two_scatterers'" in refusal(tmp_path / "two_scaterers")
     (tmp_path / "scene.toml").mkdir()
     assert "no such scene file" in refusal(tmp_path)
 
