@@ -6,13 +6,14 @@ from typing import Annotated, Literal
 import typer
 
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the files of a folder that exists.")]
+_ROOM = "paper_room"
 
 
 def command(
     scene: Annotated[
         Path, typer.Argument(metavar="SCENE", help="Folder to make; it must not exist yet.", show_default=False)
     ],
-    template: Annotated[str, typer.Option(help="Built-in room to start from.")] = "paper_room",
+    template: Annotated[str, typer.Option(help="Built-in room to start from.")] = _ROOM,
     overwrite: Overwrite = False,
     seed: Annotated[
         int | None, typer.Option(min=0, help="A random room instead: the one that 'unseen' draws from this number.")
@@ -66,6 +67,7 @@ def command(
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene import new_scene, write_scene
 
+    _one_origin(source, floorplan, seed, template)
     if source is not None and is_xml(source):
         own = {"--units": units, "--up": up, "--origin": origin != "0,0,0", "--material": material}
         _from_xml(source, scene, within, [name for name, value in own.items() if value], overwrite)
@@ -74,8 +76,6 @@ def command(
         raise ConfigError("--within: only XML scenes are cut to a window; leave it out")
     needless = {"--units": units, "--up": up, "--material": material, "--origin": origin != "0,0,0", "--scan": scan}
     useless = [name for name, value in needless.items() if value]
-    if source is not None and floorplan is not None:
-        raise ConfigError("--floorplan: a room comes from it or from --from; leave one out")
     if source is None and floorplan is None and useless:
         raise ConfigError(f"{useless[0]}: it says how a file lies; give --from FILE, or leave it out")
     if source is not None or floorplan is not None:
@@ -103,6 +103,22 @@ def command(
         typer.echo(f"{scene}: random room {seed} ({room.shape}, {room.motion}); edit its scene.toml")
         return
     typer.echo(f"{new_scene(template, scene, overwrite=overwrite)}: made from '{template}'; edit its scene.toml")
+
+
+def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, template: str) -> None:
+    """A room comes from one thing.
+
+    Raises
+    ------
+    ConfigError
+        From two.
+    """
+    from rislam_rt.errors import ConfigError
+
+    origins = {"--from": source, "--floorplan": floorplan, "--seed": seed, "--template": template}
+    given = [name for name, value in origins.items() if value not in (None, _ROOM)]
+    if len(given) > 1:
+        raise ConfigError(f"{given[1]}: a room comes from it or from {given[0]}; leave one out")
 
 
 def is_xml(source: Path) -> bool:

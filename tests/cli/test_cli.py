@@ -127,6 +127,8 @@ def test_settings_are_printed_without_what_only_a_run_needs():
         ["new", "room", "--from", "missing.glb", "--material", "floor=cheese"],
         ["new", "room", "--from", "missing.glb", "--floorplan", "0,0 4,0 4,3"],
         ["new", "room", "--floorplan", "0,0 4,0"],
+        ["new", "room", "--floorplan", "0,0 4,0 4,3 0,3", "--seed", "3"],
+        ["new", "room", "--seed", "3", "--template", "office"],
         ["new", "room", "--units", "mm"],
         ["new", ROOT / "docs", "--floorplan", "0,0 4,0 4,3 0,3"],
         ["report", ROOT / "docs"],

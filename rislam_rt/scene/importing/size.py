@@ -50,6 +50,8 @@ def check_size(diagonal: float, units: str | None) -> None:
     fitting = [u for u, length in UNITS.items() if USUAL[0] <= diagonal * length <= USUAL[1] and u != "m"]
     words = " or ".join(f"--units {u} ({diagonal * UNITS[u]:.2g} m)" for u in fitting)
     mend = f"give {words}, or --units m if it is meant" if words else "give --units mm, cm, m or in"
+    if not words and diagonal < SMALLEST_ROOM:
+        mend += "; degrees of longitude and latitude have to be projected to metres first"
     raise Fault(f"in metres it would measure {diagonal:.4g} m across", mend)
 
 

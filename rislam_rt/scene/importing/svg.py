@@ -22,6 +22,13 @@ _WORDS = {
 }
 _SHAPES = ("rect", "polygon", "polyline", "line", "path")
 _KEYS = ("material", "open", "bottom", "top", "name")
+_REFUSED = {
+    "circle": "a circle; draw it as a polygon, or leave it out",
+    "ellipse": "an ellipse; draw it as a polygon, or leave it out",
+    "use": "a copy of another shape ('use'); make it a shape of its own (Inkscape: unlink clones)",
+    "svg": "a drawing within the drawing; ungroup it, or save it as plain SVG",
+}
+_HIDDEN = re.compile(r"display\s*:\s*none")
 _DEEPEST = 200
 
 
@@ -30,12 +37,12 @@ def parse_svg(content: bytes) -> list[Shape]:
 
     A shape is a room, wall, door or window by the words in its `class`, `id`, label or `data-kind`, or those of the
     groups around it; without any, closed shapes are rooms and open ones walls. `data-material`, `data-open`,
-    `data-bottom` and `data-top` say more.
+    `data-bottom` and `data-top` say more. What is not displayed is not there.
 
     Raises
     ------
     Fault
-        Not SVG, or a shape with curves.
+        Not SVG, a shape with curves, or one that is drawn by reference.
     """
     if b"<!ENTITY" in content:
         raise Fault("the drawing defines entities", "save it as plain SVG")
@@ -59,6 +66,10 @@ def _walk(element: Tree.Element, matrix: Floats, inherited: str, depth: int) -> 
     tag = str(element.tag).rpartition("}")[2]
     if tag in ("defs", "clipPath", "mask", "symbol", "marker", "pattern", "metadata"):
         return
+    if element.get("display", "").strip() == "none" or _HIDDEN.search(element.get("style", "")):
+        return
+    if tag in _REFUSED and depth > 0:
+        raise Fault(*_REFUSED[tag].split("; "))
     matrix = matrix @ _matrix(element.get("transform", ""))
     kind = _kind(element) or inherited
     if tag in _SHAPES:
@@ -89,6 +100,8 @@ def _outline(tag: str, element: Tree.Element) -> Iterator[tuple[Floats, bool]]:
         yield from _path(element.get("d", ""))
         return
     if tag == "rect":
+        if any(_length(element, key) > 0.0 for key in ("rx", "ry") if element.get(key, "auto").strip() != "auto"):
+            raise Fault("a rectangle with round corners", "take its rx and ry away")
         x, y, w, h = (_length(element, key) for key in ("x", "y", "width", "height"))
         if w > 0.0 and h > 0.0:
             yield np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]]), True
@@ -105,9 +118,9 @@ def _outline(tag: str, element: Tree.Element) -> Iterator[tuple[Floats, bool]]:
 
 def _length(element: Tree.Element, key: str) -> float:
     text = element.get(key, "0")
-    found = _NUMBER.match(text.strip())
+    found = _NUMBER.fullmatch(text.strip().removesuffix("px"))
     if found is None:
-        raise Fault(f"{key} = '{one_line(text)[:30]}'", "give numbers in the drawing's units")
+        raise Fault(f"{key} = '{one_line(text)[:30]}'", "give numbers in the drawing's units, without a unit")
     return float(found[0])
 
 

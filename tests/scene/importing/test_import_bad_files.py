@@ -123,6 +123,12 @@ BAD: dict[str, tuple[str, bytes | str | dict[str, Any], str]] = {
     "svg nothing": ("room.svg", "<svg><text>room</text></svg>", "no lines"),
     "svg points": ("room.svg", '<svg><polygon points="1,2 3"/></svg>', "give x,y pairs"),
     "svg skew": ("room.svg", '<svg><rect width="4" height="3" transform="skewX(3)"/></svg>', "transform 'skewX'"),
+    "svg circle": ("room.svg", '<svg><circle class="room" r="3"/></svg>', "a circle"),
+    "svg copy": ("room.svg", '<svg><defs><rect id="r" width="4" height="3"/></defs><use href="#r"/></svg>', "'use'"),
+    "svg in svg": ("room.svg", '<svg><svg x="3"><rect width="4" height="3"/></svg></svg>', "within the drawing"),
+    "svg round": ("room.svg", '<svg><rect width="4" height="3" rx="1"/></svg>', "round corners"),
+    "svg percent": ("room.svg", '<svg><rect width="60%" height="3"/></svg>', "width = '60%'"),
+    "svg hidden": ("room.svg", '<svg><g style="display:none"><rect width="4" height="3"/></g></svg>', "no lines"),
     "svg deep": ("room.svg", "<svg>" + "<g>" * 300 + "</g>" * 300 + "</svg>", "groups 200 deep"),
     "svg door in the air": (
         "room.svg", '<svg><rect width="4" height="3"/><line class="door" x1="1" y1="1.5" x2="2" y2="1.5"/></svg>',
@@ -133,7 +139,8 @@ BAD: dict[str, tuple[str, bytes | str | dict[str, Any], str]] = {
     "geojson no numbers": ("room.geojson", '{"type": "LineString", "coordinates": [["a", "b"]]}', "coordinates"),
     "geojson degrees": (
         "room.geojson",
-        '{"type": "Polygon", "coordinates": [[[13.4, 52.5], [13.40005, 52.5], [13.40005, 52.50004]]]}', "give --units",
+        '{"type": "Polygon", "coordinates": [[[13.4, 52.5], [13.40005, 52.5], [13.40005, 52.50004]]]}',
+        "longitude and latitude",
     ),
     "geojson material": (
         "room.geojson", '{"type": "Feature", "properties": {"kind": "wall", "material": "itu:cheese"}, "geometry": '
