@@ -54,13 +54,18 @@ def import_corners(
     Raises
     ------
     SceneError
-        The corners enclose nothing, or the folder exists.
+        The corners enclose nothing or have no room's size, or the folder exists.
     StoreError
         The disk refused.
     """
-    plan = build_plan(parse_corners(corners), UNITS[options.units or "m"], height)
-    draft = extrude(plan, height, options)
-    return write_room(draft, folder, "Made from the corners of a floor plan.", options, overwrite=overwrite)
+    shapes = parse_corners(corners)
+    try:
+        plan = build_plan(shapes, UNITS[options.units or "m"], height)
+        check_size(float(np.linalg.norm(np.ptp(shapes[0].points, axis=0))), options.units)
+        draft = extrude(plan, height, options)
+        return write_room(draft, folder, "Made from the corners of a floor plan.", options, overwrite=overwrite)
+    except Fault as fault:
+        raise SceneError(f"--floorplan: {fault}") from None
 
 
 def _read_plan(file: Path, options: ImportOptions, height: float) -> RoomDraft:

@@ -116,7 +116,8 @@ def test_thick_walls_have_frames(tmp_path: Path) -> None:
     [
         ("0,0 4,0", "2 corners"), ("0,0 4,4 4,0 0,4", "crosses itself"), ("0,0 4,0 x,3", "is no corner"),
         ("", "0 corners"), ("0,0 1e9,0 4,3", "beyond 100 km"), ("0,0 nan,0 4,3", "not finite"),
-        ("0,0 0.2,0 0.2,0.2 0,0.2", "no free place"),
+        ("0,0 400,0 400,300 0,300", "--floorplan: in metres it would measure 500 m across; give --units cm"),
+        ("0,0 0.2,0 0.2,2 0,2", "no free place"),
     ],
 )  # fmt: skip
 def test_corners_that_enclose_nothing(tmp_path: Path, corners: str, says: str) -> None:
