@@ -18,6 +18,11 @@ READY := $(VENV)/.ready
 demo: $(READY)
 	@$(BIN)/rislam-rt run pipelines/demo.toml
 
+# Two processes test at a time: threads of the linear algebra would fight over the same two cores, and take twice the time.
+test slow newest interop: export OPENBLAS_NUM_THREADS = 1
+test slow newest interop: export OMP_NUM_THREADS = 1
+test slow newest interop: export MKL_NUM_THREADS = 1
+
 test: $(READY)
 	@$(BIN)/python -m pytest -n 2 --dist worksteal
 
