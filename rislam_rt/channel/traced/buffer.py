@@ -9,7 +9,7 @@ from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.traced.rows import Rows
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
-from rislam_rt.channel.traced.stage import Stage, as_points
+from rislam_rt.channel.traced.tracer_scene import Stage, as_points
 
 
 def fill_buffer(stage: Stage, sequences: Integers, rows: Rows, vertices: Floats | None = None) -> PathsBuffer:

@@ -53,7 +53,7 @@ class TracedChannel:
         if depth < 0:
             raise ConfigError(f"depth: {depth} received; give the largest number of bounces, 0 or more")
         start_tracer()
-        from rislam_rt.channel.traced.stage import build_stage
+        from rislam_rt.channel.traced.tracer_scene import build_stage
 
         self.scene = scene
         self.radio = radio

@@ -15,7 +15,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.traced.buffer import as_indices
 
 if TYPE_CHECKING:
-    from rislam_rt.channel.traced.stage import Stage
+    from rislam_rt.channel.traced.tracer_scene import Stage
 
 NEAR = 0.02
 """Side of the cells that positions are gathered in, as a share of the room's longest side."""

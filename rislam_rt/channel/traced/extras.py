@@ -126,7 +126,7 @@ def _rough_stage(scene: Scene, carrier: float, origin: Floats, scattering: float
     import sionna.rt as rt
 
     from rislam_rt.channel.traced.rough import rough_material
-    from rislam_rt.channel.traced.stage import build_mesh
+    from rislam_rt.channel.traced.tracer_scene import build_mesh
 
     stage = rt.load_scene()
     stage.frequency = carrier

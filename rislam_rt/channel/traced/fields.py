@@ -20,7 +20,7 @@ from rislam_rt.channel.traced.course import Course, segment_directions
 from rislam_rt.channel.traced.material import ConstantReflection
 from rislam_rt.channel.traced.problem import Ends
 from rislam_rt.channel.traced.sequences import NO_WALL
-from rislam_rt.channel.traced.stage import Stage
+from rislam_rt.channel.traced.tracer_scene import Stage
 from rislam_rt.channel.walls import Walls
 from rislam_rt.model import Antennas
 

@@ -82,7 +82,7 @@ def _differentiate(channel: TracedChannel, legs: MovingLegs, spared: int) -> Flo
     import drjit as dr
     import mitsuba as mi
 
-    from rislam_rt.channel.traced.stage import as_points
+    from rislam_rt.channel.traced.tracer_scene import as_points
     from rislam_rt.channel.traced.visibility import attached_vertices
 
     count = len(legs.device)

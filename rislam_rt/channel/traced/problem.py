@@ -16,7 +16,7 @@ from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 
 if TYPE_CHECKING:
-    from rislam_rt.channel.traced.stage import Stage
+    from rislam_rt.channel.traced.tracer_scene import Stage
 
 
 class Problem(NamedTuple):

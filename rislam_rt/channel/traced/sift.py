@@ -14,7 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.traced.buffer import as_indices
 from rislam_rt.channel.traced.sequences import NO_WALL
-from rislam_rt.channel.traced.stage import Stage, as_points
+from rislam_rt.channel.traced.tracer_scene import Stage, as_points
 
 _NO_WALL = NO_WALL % 2**32
 

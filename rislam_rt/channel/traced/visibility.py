@@ -23,7 +23,7 @@ from rislam_rt.channel.traced.buffer import fill_buffer, read_vertices, turned_v
 from rislam_rt.channel.traced.limits import SEGMENT_LIMIT
 from rislam_rt.channel.traced.rows import Rows
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
-from rislam_rt.channel.traced.stage import NO_SHADE, Stage, as_points
+from rislam_rt.channel.traced.tracer_scene import NO_SHADE, Stage, as_points
 from rislam_rt.errors import TraceError
 
 
