@@ -9,10 +9,10 @@ from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.traced.rows import Rows
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
-from rislam_rt.channel.traced.tracer_scene import Stage, as_points
+from rislam_rt.channel.traced.tracer_scene import TracerScene, as_points
 
 
-def fill_buffer(stage: Stage, sequences: Integers, rows: Rows, vertices: Floats | None = None) -> PathsBuffer:
+def fill_buffer(stage: TracerScene, sequences: Integers, rows: Rows, vertices: Floats | None = None) -> PathsBuffer:
     """Paths from far ends (sources) to devices (targets) over `sequences` (N, D), which run the other way.
 
     `vertices` (N, D, 3) [m] are in the order from device to far end; without them any point of each wall's plane, which
@@ -36,7 +36,7 @@ def fill_buffer(stage: Stage, sequences: Integers, rows: Rows, vertices: Floats 
     return buffer
 
 
-def read_vertices(stage: Stage, buffer: PathsBuffer, keep: Integers, sequences: Integers) -> Floats:
+def read_vertices(stage: TracerScene, buffer: PathsBuffer, keep: Integers, sequences: Integers) -> Floats:
     """Bounce points (N, D, 3) [m] of the paths `keep`, from device to far end over `sequences` (N, D)."""
     columns = [np.array(getattr(buffer, f"vertices_{axis}"), dtype=np.float64) for axis in "xyz"]
     return turned_vertices(np.stack(columns, axis=-1)[keep, : sequences.shape[1]] + stage.origin, sequences)

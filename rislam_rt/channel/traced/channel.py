@@ -53,7 +53,7 @@ class TracedChannel:
         if depth < 0:
             raise ConfigError(f"depth: {depth} received; give the largest number of bounces, 0 or more")
         start_tracer()
-        from rislam_rt.channel.traced.tracer_scene import build_stage
+        from rislam_rt.channel.traced.tracer_scene import build_tracer_scene
 
         self.scene = scene
         self.radio = radio
@@ -65,7 +65,7 @@ class TracedChannel:
         shades = {n: s.shade.triangles for n, s in enumerate(scene.scatterers) if s.shade is not None}
         if scene.shades:
             shades[ALONE] = np.concatenate([shade.triangles for shade in scene.shades])
-        self.stage = build_stage(self.walls, radio.carrier, room_center(scene), shades)
+        self.stage = build_tracer_scene(self.walls, radio.carrier, room_center(scene), shades)
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Every path of every cycle, with the panel at level 0."""

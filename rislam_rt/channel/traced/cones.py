@@ -15,7 +15,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.traced.buffer import as_indices
 
 if TYPE_CHECKING:
-    from rislam_rt.channel.traced.tracer_scene import Stage
+    from rislam_rt.channel.traced.tracer_scene import TracerScene
 
 NEAR = 0.02
 """Side of the cells that positions are gathered in, as a share of the room's longest side."""
@@ -31,7 +31,7 @@ class Ball(NamedTuple):
 class Cones(NamedTuple):
     """Where the ends of the sequences are, in the walls of a stage."""
 
-    stage: "Stage"
+    stage: "TracerScene"
     far: list[Ball]
     device: list[tuple[Ball, Ball]]
     """Each device ball with its far ball."""
@@ -71,7 +71,7 @@ class Cones(NamedTuple):
         return keep
 
 
-def build_cones(stage: "Stage", device: Floats, far: Floats) -> Cones:
+def build_cones(stage: "TracerScene", device: Floats, far: Floats) -> Cones:
     """Gather positions (N, 3) and their far ends (N, 3), or the single one (1, 3), in balls."""
     device, far = device - stage.origin, far - stage.origin
     cell = NEAR * 2.0 * (stage.sieve.margin * 1e3 - 1.0)  # the margin is a thousandth of 1 m + half the longest side
@@ -100,7 +100,7 @@ def _columns(walls: Integers) -> list[Any]:
     return columns
 
 
-def _wall_ball(stage: "Stage", wall: Any) -> tuple[Any, Any]:
+def _wall_ball(stage: "TracerScene", wall: Any) -> tuple[Any, Any]:
     """Centre and radius of a ball about walls (N,)."""
     half = dr.gather(mi.Vector3f, stage.sieve.half, wall)
     return dr.gather(mi.Point3f, stage.sieve.center, wall), dr.norm(half)

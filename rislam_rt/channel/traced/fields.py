@@ -20,7 +20,7 @@ from rislam_rt.channel.traced.course import Course, segment_directions
 from rislam_rt.channel.traced.material import ConstantReflection
 from rislam_rt.channel.traced.problem import Ends
 from rislam_rt.channel.traced.sequences import NO_WALL
-from rislam_rt.channel.traced.tracer_scene import Stage
+from rislam_rt.channel.traced.tracer_scene import TracerScene
 from rislam_rt.channel.walls import Walls
 from rislam_rt.model import Antennas
 
@@ -30,7 +30,7 @@ is then 0, for all segments of a leg alike."""
 
 
 def leg_coefficients(
-    stage: Stage, walls: Walls, sequences: Integers, ends: Ends, course: Course, antennas: Antennas
+    stage: TracerScene, walls: Walls, sequences: Integers, ends: Ends, course: Course, antennas: Antennas
 ) -> Complexes:
     """Field (N,) of legs over `sequences` (N, D), without spreading loss and carrier phase.
 

@@ -16,7 +16,7 @@ from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 
 if TYPE_CHECKING:
-    from rislam_rt.channel.traced.tracer_scene import Stage
+    from rislam_rt.channel.traced.tracer_scene import TracerScene
 
 
 class Problem(NamedTuple):
@@ -89,7 +89,7 @@ class Batch(NamedTuple):
         """(S, D) of all problems."""
         return np.concatenate(self.sequences)
 
-    def candidates(self, stage: "Stage") -> Iterator[Rows]:
+    def candidates(self, stage: "TracerScene") -> Iterator[Rows]:
         """All rows worth tracing."""
         from rislam_rt.channel.traced.sift import sift_rows
 
@@ -131,7 +131,7 @@ class Batch(NamedTuple):
         return result
 
 
-def build_batch(problems: Sequence[Problem], stage: "Stage", sides: Integers, depth: int) -> Batch:
+def build_batch(problems: Sequence[Problem], stage: "TracerScene", sides: Integers, depth: int) -> Batch:
     """Enumerate the wall sequences of every problem up to `depth` bounces."""
     from rislam_rt.channel.traced.cones import build_cones
 

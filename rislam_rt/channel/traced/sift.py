@@ -14,7 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.traced.buffer import as_indices
 from rislam_rt.channel.traced.sequences import NO_WALL
-from rislam_rt.channel.traced.tracer_scene import Stage, as_points
+from rislam_rt.channel.traced.tracer_scene import TracerScene, as_points
 
 _NO_WALL = NO_WALL % 2**32
 
@@ -22,7 +22,9 @@ BLOCK = 4_000_000
 """Candidates sifted at once: bounds the memory."""
 
 
-def sift_rows(stage: Stage, sequences: Integers, device: Floats, far: Floats) -> Iterator[tuple[Integers, Integers]]:
+def sift_rows(
+    stage: TracerScene, sequences: Integers, device: Floats, far: Floats
+) -> Iterator[tuple[Integers, Integers]]:
     """Pairs (device, sequence), in blocks, out of all devices (N, 3) with all sequences (S, D).
 
     Far ends (N, 3) go with their devices, a single one (1, 3) with all.
@@ -45,7 +47,7 @@ def sift_rows(stage: Stage, sequences: Integers, device: Floats, far: Floats) ->
         yield kept % count, kept // count + first
 
 
-def _near_walls(stage: Stage, walls: list[mi.UInt], device: mi.Point3f, far: mi.Point3f) -> mi.Bool:
+def _near_walls(stage: TracerScene, walls: list[mi.UInt], device: mi.Point3f, far: mi.Point3f) -> mi.Bool:
     """Whether the mirror path over `walls` could bounce on every one of them.
 
     The margin is a thousandth of the room: hundreds of times what float32 leaves uncertain. Where both ends of a bounce

@@ -23,7 +23,7 @@ NO_SHADE = -1
 """Key of the view with everything in it."""
 
 
-class Sieve(NamedTuple):
+class WallBoxes(NamedTuple):
     """Planes and boxes of the walls, on the tracer's side."""
 
     normal: mi.Vector3f
@@ -39,7 +39,7 @@ class Sieve(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stage:
+class TracerScene:
     """A Sionna RT scene and the correspondence of its (shape, primitive) pairs with walls."""
 
     scene: rt.Scene
@@ -62,7 +62,7 @@ class Stage:
     """All radio materials of walls."""
     material_of_wall: Integers
     """(W,) index into `materials`."""
-    sieve: Sieve
+    sieve: WallBoxes
     views: dict[int, mi.Scene]
     """Everything (`NO_SHADE`), and for each scatterer with a shade everything but that shade."""
     shades: dict[int, mi.Scene]
@@ -104,7 +104,7 @@ class Stage:
         return inside_any(points, self.walls.triangles[self.walls.wall_of_triangle == wall], SURFACE_TOLERANCE)
 
 
-def build_stage(walls: Walls, carrier: float, origin: Floats, shades: Mapping[int, Floats]) -> Stage:
+def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, shades: Mapping[int, Floats]) -> TracerScene:
     """Put walls and shades on stage at the carrier [Hz]: meshes built in memory about `origin`, faces in their order.
 
     Parameters
@@ -158,7 +158,7 @@ def _numbered(
     materials: tuple[tuple[rt.RadioMaterialBase, ...], Integers],
     views: dict[int, mi.Scene],
     shades: dict[int, mi.Scene],
-) -> Stage:
+) -> TracerScene:
     """Number the triangles of all shapes (M,) and pick each wall's largest."""
     order = np.argsort(ids)
     rows = np.concatenate([members[m] for m in order] or [np.zeros(0, dtype=np.int64)])
@@ -171,7 +171,7 @@ def _numbered(
     area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=-1)
     by_size = np.lexsort((-area, walls.wall_of_triangle))
     largest = by_size[np.unique(walls.wall_of_triangle[by_size], return_index=True)[1]]
-    return Stage(
+    return TracerScene(
         scene,
         walls,
         origin,
@@ -188,14 +188,14 @@ def _numbered(
     )
 
 
-def _sieve(walls: Walls, origin: Floats) -> Sieve:
+def _sieve(walls: Walls, origin: Floats) -> WallBoxes:
     """Planes and bounds about the origin."""
     low, high = np.full((len(walls), 3), np.inf), np.full((len(walls), 3), -np.inf)
     np.minimum.at(low, walls.wall_of_triangle, walls.triangles.min(axis=1) - origin)
     np.maximum.at(high, walls.wall_of_triangle, walls.triangles.max(axis=1) - origin)
     margin = 1e-3 * (1.0 + np.abs([low, high]).max(initial=0.0))
     offset = mi.Float((walls.offset - walls.normal @ origin).astype(np.float32))
-    return Sieve(
+    return WallBoxes(
         mi.Vector3f(as_points(walls.normal)),
         offset,
         as_points(0.5 * (low + high)),

@@ -23,7 +23,7 @@ from rislam_rt.channel.traced.buffer import fill_buffer, read_vertices, turned_v
 from rislam_rt.channel.traced.limits import SEGMENT_LIMIT
 from rislam_rt.channel.traced.rows import Rows
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
-from rislam_rt.channel.traced.tracer_scene import NO_SHADE, Stage, as_points
+from rislam_rt.channel.traced.tracer_scene import NO_SHADE, TracerScene, as_points
 from rislam_rt.errors import TraceError
 
 
@@ -46,7 +46,7 @@ class SingleRays:
 
 
 def visible_rows(
-    stage: Stage, sequences: Integers, far: Floats, device: Floats, rows: Rows, spared: int = NO_SHADE
+    stage: TracerScene, sequences: Integers, far: Floats, device: Floats, rows: Rows, spared: int = NO_SHADE
 ) -> tuple[Rows, Floats]:
     """The candidates that exist, and their bounce points (N, D, 3) [m] from device to far end.
 
@@ -75,7 +75,7 @@ def visible_rows(
     return rows.only(clear), vertices[clear]
 
 
-def _clear_of_shade(stage: Stage, spared: int, sequences: Integers, device: Floats, vertices: Floats) -> Integers:
+def _clear_of_shade(stage: TracerScene, spared: int, sequences: Integers, device: Floats, vertices: Floats) -> Integers:
     """Legs whose segments up to the last bounce miss a scatterer's shade."""
     clear = np.ones(len(device), dtype=np.bool_)
     last = device
@@ -88,7 +88,7 @@ def _clear_of_shade(stage: Stage, spared: int, sequences: Integers, device: Floa
 
 
 def attached_vertices(
-    stage: Stage, sequences: Integers, far: mi.Point3f, device: mi.Point3f, rows: Rows, spared: int
+    stage: TracerScene, sequences: Integers, far: mi.Point3f, device: mi.Point3f, rows: Rows, spared: int
 ) -> list[mi.Point3f]:
     """Bounce points from far end to device, bounce by bounce, that keep their dependence on the ends' positions.
 
@@ -110,7 +110,7 @@ def attached_vertices(
 
 
 def _trace(
-    stage: Stage,
+    stage: TracerScene,
     candidates: Integers,
     far: mi.Point3f,
     device: mi.Point3f,
@@ -130,7 +130,7 @@ def _trace(
         )
 
 
-def _confirmed(stage: Stage, sequences: Integers, traced: PathsBuffer) -> Integers:
+def _confirmed(stage: TracerScene, sequences: Integers, traced: PathsBuffer) -> Integers:
     """Rows that the tracer found visible with every bounce on the wall asked for.
 
     The image method also accepts a hit on another wall in the same plane; that is another path's business. Where walls
