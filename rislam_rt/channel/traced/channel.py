@@ -7,9 +7,9 @@ import numpy as np
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.shades import ALONE
-from rislam_rt.channel.traced.course import refined_course, traced_course
 from rislam_rt.channel.traced.extras import ExtraConfig, ExtraPaths, trace_extras
 from rislam_rt.channel.traced.limits import room_center
+from rislam_rt.channel.traced.path_geometry import refined_course, traced_course
 from rislam_rt.channel.traced.problem import Batch, Found, Problem, build_batch, join_found
 from rislam_rt.channel.traced.rows import Rows, in_blocks
 from rislam_rt.channel.traced.sequences import wall_sides

@@ -14,7 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
-from rislam_rt.channel.traced.course import traced_course
+from rislam_rt.channel.traced.path_geometry import traced_course
 from rislam_rt.channel.traced.start import start_tracer
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import SPEED_OF_LIGHT
