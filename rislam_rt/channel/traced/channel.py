@@ -9,7 +9,7 @@ from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.shades import ALONE
 from rislam_rt.channel.traced.extras import ExtraConfig, ExtraPaths, trace_extras
 from rislam_rt.channel.traced.limits import room_center
-from rislam_rt.channel.traced.path_geometry import refined_course, traced_course
+from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
 from rislam_rt.channel.traced.problem import Batch, Found, Problem, build_batch, join_found
 from rislam_rt.channel.traced.rows import Rows, in_blocks
 from rislam_rt.channel.traced.sequences import wall_sides
@@ -114,7 +114,7 @@ class TracedChannel:
 
         rows, vertices = visible_rows(self.stage, batch.all_sequences, batch.far, batch.device, candidates, spared)
         sequences, ends = batch.all_sequences[rows.sequence], batch.ends(rows)
-        exact = refined_course(self.walls, sequences, ends.device, ends.far)
+        exact = refined_geometry(self.walls, sequences, ends.device, ends.far)
         coefficient = leg_coefficients(self.stage, self.walls, sequences, ends, exact, self.antennas)
-        course = exact if self.refine else traced_course(sequences, ends.device, ends.far, vertices)
+        course = exact if self.refine else traced_geometry(sequences, ends.device, ends.far, vertices)
         return Found(rows, course, coefficient)

@@ -14,7 +14,7 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import mirror, mirror_direction, signed_distance
 
 
-class Course(NamedTuple):
+class PathGeometry(NamedTuple):
     """N legs."""
 
     vertices: Floats
@@ -27,7 +27,7 @@ class Course(NamedTuple):
     """(N, 3) unit vectors from the far end along the leg."""
 
 
-def refined_course(walls: Walls, sequences: Integers, device: Floats, far: Floats) -> Course:
+def refined_geometry(walls: Walls, sequences: Integers, device: Floats, far: Floats) -> PathGeometry:
     """Legs between devices and far ends (N, 3) [m] over `sequences` (N, D), exact on the walls' planes.
 
     The far end is mirrored in the walls from its own end on; the straight line from the device to the last image meets
@@ -50,7 +50,7 @@ def refined_course(walls: Walls, sequences: Integers, device: Floats, far: Float
         point = np.where(is_real, point + fraction[:, None] * (image - point), point)
         direction = np.where(is_real, mirror_direction(direction, normal[:, bounce]), direction)
         vertices[:, bounce] = np.where(is_real, point, 0.0)
-    return Course(vertices, np.linalg.norm(images[0] - device, axis=-1), at_device, -direction)
+    return PathGeometry(vertices, np.linalg.norm(images[0] - device, axis=-1), at_device, -direction)
 
 
 def segment_directions(walls: Walls, sequences: Integers, at_device: Floats) -> Floats:
@@ -63,13 +63,13 @@ def segment_directions(walls: Walls, sequences: Integers, at_device: Floats) -> 
     return np.stack(travel, axis=1)
 
 
-def traced_course(sequences: Integers, device: Floats, far: Floats, vertices: Floats) -> Course:
+def traced_geometry(sequences: Integers, device: Floats, far: Floats, vertices: Floats) -> PathGeometry:
     """Legs over the bounce points (N, D, 3) that the tracer left."""
     points = polyline(sequences, device, far, vertices)
     bounces = (sequences != NO_WALL).sum(axis=1)
     length = np.linalg.norm(np.diff(points, axis=1), axis=-1).sum(axis=1)
     before_last = points[np.arange(len(points)), bounces]
-    return Course(vertices, length, unit(points[:, 1] - device), unit(before_last - far))
+    return PathGeometry(vertices, length, unit(points[:, 1] - device), unit(before_last - far))
 
 
 def polyline(sequences: Integers, device: Floats, far: Floats, vertices: Floats) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
-from rislam_rt.channel.traced.path_geometry import traced_course
+from rislam_rt.channel.traced.path_geometry import traced_geometry
 from rislam_rt.channel.traced.start import start_tracer
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import SPEED_OF_LIGHT
@@ -140,7 +140,7 @@ def _legs(rows: list[Row], device: Floats, far: Floats, depth: int, radio: Radio
     field: Complexes = np.array([row.field for row in first.values()], dtype=np.complex128)
     vertices = np.array([row.vertices for row in first.values()]).reshape(-1, depth, 3)
     vertices = np.where((table[column] >= 0)[..., None], vertices, 0.0)
-    course = traced_course(table[column], device[cycle], far[cycle], vertices)
+    course = traced_geometry(table[column], device[cycle], far[cycle], vertices)
     place, shape = (cycle, column), (len(device), len(columns))
 
     def dense(part: Any) -> Any:

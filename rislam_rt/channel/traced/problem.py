@@ -9,7 +9,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.traced.limits import LIFT
-from rislam_rt.channel.traced.path_geometry import Course
+from rislam_rt.channel.traced.path_geometry import PathGeometry
 from rislam_rt.channel.traced.rows import Rows, join_rows
 from rislam_rt.channel.traced.sequences import point_sides, possible_sequences
 from rislam_rt.channel.walls import Walls
@@ -62,13 +62,13 @@ class Found(NamedTuple):
     """N legs that the tracer confirmed."""
 
     rows: Rows
-    course: Course
+    course: PathGeometry
     coefficient: Complexes
     """(N,) field without spreading loss and carrier phase: the product of the reflections."""
 
     def only(self, keep: Integers) -> "Found":
         """The legs chosen."""
-        return Found(self.rows.only(keep), Course(*(part[keep] for part in self.course)), self.coefficient[keep])
+        return Found(self.rows.only(keep), PathGeometry(*(part[keep] for part in self.course)), self.coefficient[keep])
 
 
 class Batch(NamedTuple):
@@ -152,7 +152,7 @@ def join_found(parts: list[Found]) -> Found:
     courses = zip(*(part.course for part in parts), strict=True)
     return Found(
         join_rows([part.rows for part in parts]),
-        Course(*(np.concatenate(column) for column in courses)),
+        PathGeometry(*(np.concatenate(column) for column in courses)),
         np.concatenate([part.coefficient for part in parts]),
     )
 
