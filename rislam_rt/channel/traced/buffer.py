@@ -7,7 +7,7 @@ import sionna.rt as rt
 from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.rows import Rows
+from rislam_rt.channel.traced.candidate_indices import Rows
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
 from rislam_rt.channel.traced.tracer_scene import TracerScene, as_points
 

@@ -7,11 +7,11 @@ import numpy as np
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.shades import ALONE
+from rislam_rt.channel.traced.candidate_indices import Rows, in_blocks
 from rislam_rt.channel.traced.extras import ExtraConfig, ExtraPaths, trace_extras
 from rislam_rt.channel.traced.limits import room_center
 from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
 from rislam_rt.channel.traced.problem import Batch, Found, Problem, build_batch, join_found
-from rislam_rt.channel.traced.rows import Rows, in_blocks
 from rislam_rt.channel.traced.sequences import wall_sides
 from rislam_rt.channel.traced.start import start_tracer
 from rislam_rt.channel.walls import build_walls

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.traced.candidate_indices import Rows
 from rislam_rt.channel.traced.channel import TracedChannel
-from rislam_rt.channel.traced.rows import Rows
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
 from rislam_rt.errors import TraceError
 from rislam_rt.model import Paths, Trajectory

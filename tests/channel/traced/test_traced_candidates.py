@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.traced import TracedChannel, sequences
-from rislam_rt.channel.traced.rows import Rows, in_blocks
+from rislam_rt.channel.traced.candidate_indices import Rows, in_blocks
 from rislam_rt.channel.traced.sequences import (
     BACK,
     FRONT,
