@@ -7,12 +7,14 @@ import sionna.rt as rt
 from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.candidate_indices import Rows
+from rislam_rt.channel.traced.candidate_indices import CandidateIndices
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
 from rislam_rt.channel.traced.tracer_scene import TracerScene, as_points
 
 
-def fill_buffer(stage: TracerScene, sequences: Integers, rows: Rows, vertices: Floats | None = None) -> PathsBuffer:
+def fill_buffer(
+    stage: TracerScene, sequences: Integers, rows: CandidateIndices, vertices: Floats | None = None
+) -> PathsBuffer:
     """Paths from far ends (sources) to devices (targets) over `sequences` (N, D), which run the other way.
 
     `vertices` (N, D, 3) [m] are in the order from device to far end; without them any point of each wall's plane, which

@@ -8,31 +8,31 @@ import numpy as np
 from rislam_rt.arrays import Integers
 
 
-class Rows(NamedTuple):
+class CandidateIndices(NamedTuple):
     """N candidates or legs, as indices into tables of far ends, devices and sequences, (N,) each."""
 
     far: Integers
     device: Integers
     sequence: Integers
 
-    def only(self, keep: Integers | slice) -> "Rows":
+    def only(self, keep: Integers | slice) -> "CandidateIndices":
         """The rows chosen."""
-        return Rows(self.far[keep], self.device[keep], self.sequence[keep])
+        return CandidateIndices(self.far[keep], self.device[keep], self.sequence[keep])
 
 
-def in_blocks(parts: Iterable[Rows], size: int) -> Iterator[Rows]:
+def in_blocks(parts: Iterable[CandidateIndices], size: int) -> Iterator[CandidateIndices]:
     """The same rows in blocks of `size`, the last one shorter."""
-    waiting: list[Rows] = []
+    waiting: list[CandidateIndices] = []
     for part in parts:
         waiting.append(part)
         while (count := sum(len(rows.far) for rows in waiting)) >= size:
-            together = join_rows(waiting)
+            together = join_indices(waiting)
             yield together.only(slice(0, size))
             waiting = [together.only(slice(size, count))]
     if waiting:
-        yield join_rows(waiting)
+        yield join_indices(waiting)
 
 
-def join_rows(parts: list[Rows]) -> Rows:
+def join_indices(parts: list[CandidateIndices]) -> CandidateIndices:
     """All rows, one part after the other."""
-    return Rows(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    return CandidateIndices(*(np.concatenate(column) for column in zip(*parts, strict=True)))

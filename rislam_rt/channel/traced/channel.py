@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.shades import ALONE
-from rislam_rt.channel.traced.candidate_indices import Rows, in_blocks
+from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_blocks
 from rislam_rt.channel.traced.extras import ExtraConfig, ExtraPaths, trace_extras
 from rislam_rt.channel.traced.limits import room_center
 from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
@@ -107,7 +107,7 @@ class TracedChannel:
             legs |= dict(zip(chosen, batch.legs(found), strict=True))
         return [legs[number] for number in range(len(problems))], complete
 
-    def _solve(self, batch: Batch, candidates: Rows, spared: int) -> Found:
+    def _solve(self, batch: Batch, candidates: CandidateIndices, spared: int) -> Found:
         """Ask the tracer which candidates exist, and what their walls do to the signal."""
         from rislam_rt.channel.traced.fields import leg_coefficients
         from rislam_rt.channel.traced.visibility import visible_rows

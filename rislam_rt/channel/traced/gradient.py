@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.traced.candidate_indices import Rows
+from rislam_rt.channel.traced.candidate_indices import CandidateIndices
 from rislam_rt.channel.traced.channel import TracedChannel
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
 from rislam_rt.errors import TraceError
@@ -94,7 +94,9 @@ def _differentiate(channel: TracedChannel, legs: MovingLegs, spared: int) -> Flo
     device = as_points(legs.device - origin) + shift
     far = as_points(legs.far - origin) + dr.select(mi.Bool(legs.far_moves), shift, mi.Point3f(0.0))
     index = np.arange(count)
-    points = attached_vertices(channel.stage, legs.sequences, far, device, Rows(index, index, index), spared)
+    points = attached_vertices(
+        channel.stage, legs.sequences, far, device, CandidateIndices(index, index, index), spared
+    )
     bounces = (legs.sequences != NO_WALL).sum(axis=1)
     length, last = mi.Float(0.0), far
     for number, point in enumerate(points):

@@ -8,7 +8,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.legs import Legs
-from rislam_rt.channel.traced.candidate_indices import Rows, join_rows
+from rislam_rt.channel.traced.candidate_indices import CandidateIndices, join_indices
 from rislam_rt.channel.traced.limits import LIFT
 from rislam_rt.channel.traced.path_geometry import PathGeometry
 from rislam_rt.channel.traced.sequences import point_sides, possible_sequences
@@ -61,7 +61,7 @@ class Ends(NamedTuple):
 class Found(NamedTuple):
     """N legs that the tracer confirmed."""
 
-    rows: Rows
+    rows: CandidateIndices
     course: PathGeometry
     coefficient: Complexes
     """(N,) field without spreading loss and carrier phase: the product of the reflections."""
@@ -89,7 +89,7 @@ class Batch(NamedTuple):
         """(S, D) of all problems."""
         return np.concatenate(self.sequences)
 
-    def candidates(self, stage: "TracerScene") -> Iterator[Rows]:
+    def candidates(self, stage: "TracerScene") -> Iterator[CandidateIndices]:
         """All rows worth tracing."""
         from rislam_rt.channel.traced.sift import sift_rows
 
@@ -97,12 +97,12 @@ class Batch(NamedTuple):
         for problem, sequences in zip(self.problems, self.sequences, strict=True):
             for device, sequence in sift_rows(stage, sequences, problem.device, problem.far):
                 far = device if problem.paired else np.zeros_like(device)
-                yield Rows(far + first_far, device + first_device, sequence + first_sequence)
+                yield CandidateIndices(far + first_far, device + first_device, sequence + first_sequence)
             first_device += len(problem.device)
             first_far += len(problem.far)
             first_sequence += len(sequences)
 
-    def ends(self, rows: Rows) -> Ends:
+    def ends(self, rows: CandidateIndices) -> Ends:
         """The two ends of each row."""
         sizes = [len(problem.device) for problem in self.problems]
         far = np.concatenate([problem.far for problem in self.problems])
@@ -151,7 +151,7 @@ def join_found(parts: list[Found]) -> Found:
     """All legs, one part after the other."""
     courses = zip(*(part.course for part in parts), strict=True)
     return Found(
-        join_rows([part.rows for part in parts]),
+        join_indices([part.rows for part in parts]),
         PathGeometry(*(np.concatenate(column) for column in courses)),
         np.concatenate([part.coefficient for part in parts]),
     )

@@ -20,7 +20,7 @@ from sionna.rt.utils import spawn_ray_to
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.traced.buffer import fill_buffer, read_vertices, turned_vertices
-from rislam_rt.channel.traced.candidate_indices import Rows
+from rislam_rt.channel.traced.candidate_indices import CandidateIndices
 from rislam_rt.channel.traced.limits import SEGMENT_LIMIT
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
 from rislam_rt.channel.traced.tracer_scene import NO_SHADE, TracerScene, as_points
@@ -46,8 +46,8 @@ class SingleRays:
 
 
 def visible_rows(
-    stage: TracerScene, sequences: Integers, far: Floats, device: Floats, rows: Rows, spared: int = NO_SHADE
-) -> tuple[Rows, Floats]:
+    stage: TracerScene, sequences: Integers, far: Floats, device: Floats, rows: CandidateIndices, spared: int = NO_SHADE
+) -> tuple[CandidateIndices, Floats]:
     """The candidates that exist, and their bounce points (N, D, 3) [m] from device to far end.
 
     Parameters
@@ -88,7 +88,7 @@ def _clear_of_shade(stage: TracerScene, spared: int, sequences: Integers, device
 
 
 def attached_vertices(
-    stage: TracerScene, sequences: Integers, far: mi.Point3f, device: mi.Point3f, rows: Rows, spared: int
+    stage: TracerScene, sequences: Integers, far: mi.Point3f, device: mi.Point3f, rows: CandidateIndices, spared: int
 ) -> list[mi.Point3f]:
     """Bounce points from far end to device, bounce by bounce, that keep their dependence on the ends' positions.
 
@@ -114,7 +114,7 @@ def _trace(
     candidates: Integers,
     far: mi.Point3f,
     device: mi.Point3f,
-    rows: Rows,
+    rows: CandidateIndices,
     method: ImageMethod,
     spared: int,
 ) -> PathsBuffer:
@@ -131,7 +131,7 @@ def _trace(
 
 
 def _confirmed(stage: TracerScene, sequences: Integers, traced: PathsBuffer) -> Integers:
-    """Rows that the tracer found visible with every bounce on the wall asked for.
+    """CandidateIndices that the tracer found visible with every bounce on the wall asked for.
 
     The image method also accepts a hit on another wall in the same plane; that is another path's business. Where walls
     lie on each other the ray meets any of them, and the one on top reflects.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.traced import TracedChannel, sequences
-from rislam_rt.channel.traced.candidate_indices import Rows, in_blocks
+from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_blocks
 from rislam_rt.channel.traced.sequences import (
     BACK,
     FRONT,
@@ -66,7 +66,7 @@ def test_nothing_that_the_tracer_would_confirm_is_left_out(rooms, room, paired):
     everything = np.array([(a, b) for a, b in itertools.product(range(count), repeat=2) if a != b])
     everything = np.concatenate([np.full((1, 2), NO_WALL), [[a, NO_WALL] for a in range(count)], everything])
     row, column = (index.ravel() for index in np.indices((len(device), len(everything))))
-    rows = Rows(row if paired else np.zeros_like(row), row, column)
+    rows = CandidateIndices(row if paired else np.zeros_like(row), row, column)
     confirmed, _ = visible_rows(channel.stage, everything, far, device, rows)
     exists = {(int(d), tuple(everything[s])) for d, s in zip(confirmed.device, confirmed.sequence, strict=True)}
     assert len(exists) > 150
@@ -91,7 +91,7 @@ def test_sieve_in_blocks(rooms, monkeypatch):
 
 
 def test_rows_in_blocks():
-    parts = [Rows(*(np.arange(a, b) for _ in range(3))) for a, b in ((0, 5), (5, 5), (5, 7), (7, 20))]
+    parts = [CandidateIndices(*(np.arange(a, b) for _ in range(3))) for a, b in ((0, 5), (5, 5), (5, 7), (7, 20))]
     blocks = list(in_blocks(parts, 6))
     assert [len(block.far) for block in blocks] == [6, 6, 6, 2]
     np.testing.assert_array_equal(np.concatenate([block.device for block in blocks]), np.arange(20))
