@@ -91,7 +91,7 @@ class Batch(NamedTuple):
 
     def candidates(self, stage: "TracerScene") -> Iterator[CandidateIndices]:
         """All rows worth tracing."""
-        from rislam_rt.channel.traced.sift import sift_rows
+        from rislam_rt.channel.traced.culling import sift_rows
 
         first_device = first_far = first_sequence = 0
         for problem, sequences in zip(self.problems, self.sequences, strict=True):

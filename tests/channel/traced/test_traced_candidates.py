@@ -56,7 +56,7 @@ def test_nothing_that_the_tracer_would_confirm_is_left_out(rooms, room, paired):
     """Ask the tracer about every sequence of two walls at every pose, and compare with what survives the sieve."""
     scene = getattr(rooms, room)()
     channel = TracedChannel(scene, RadioConfig(), 2)
-    from rislam_rt.channel.traced.sift import sift_rows
+    from rislam_rt.channel.traced.culling import sift_rows
     from rislam_rt.channel.traced.visibility import visible_rows
 
     rng = np.random.default_rng(8)
@@ -86,7 +86,7 @@ def test_sieve_in_blocks(rooms, monkeypatch):
     channel = TracedChannel(rooms.paper(), RadioConfig(), 2)
     trajectory = rooms.at([[1.3, 2.1, 0.8], [4.4, 0.9, 2.2]])
     whole = channel.paths(trajectory)
-    monkeypatch.setattr("rislam_rt.channel.traced.sift.BLOCK", 11)
+    monkeypatch.setattr("rislam_rt.channel.traced.culling.BLOCK", 11)
     np.testing.assert_array_equal(whole.gain, channel.paths(trajectory).gain)
 
 
