@@ -22,7 +22,7 @@ BLOCK = 4_000_000
 """Candidates sifted at once: bounds the memory."""
 
 
-def sift_rows(
+def cull_candidates(
     stage: TracerScene, sequences: Integers, device: Floats, far: Floats
 ) -> Iterator[tuple[Integers, Integers]]:
     """Pairs (device, sequence), in blocks, out of all devices (N, 3) with all sequences (S, D).

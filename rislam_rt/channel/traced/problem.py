@@ -91,11 +91,11 @@ class Batch(NamedTuple):
 
     def candidates(self, stage: "TracerScene") -> Iterator[CandidateIndices]:
         """All rows worth tracing."""
-        from rislam_rt.channel.traced.culling import sift_rows
+        from rislam_rt.channel.traced.culling import cull_candidates
 
         first_device = first_far = first_sequence = 0
         for problem, sequences in zip(self.problems, self.sequences, strict=True):
-            for device, sequence in sift_rows(stage, sequences, problem.device, problem.far):
+            for device, sequence in cull_candidates(stage, sequences, problem.device, problem.far):
                 far = device if problem.paired else np.zeros_like(device)
                 yield CandidateIndices(far + first_far, device + first_device, sequence + first_sequence)
             first_device += len(problem.device)

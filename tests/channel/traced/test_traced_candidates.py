@@ -56,7 +56,7 @@ def test_nothing_that_the_tracer_would_confirm_is_left_out(rooms, room, paired):
     """Ask the tracer about every sequence of two walls at every pose, and compare with what survives the sieve."""
     scene = getattr(rooms, room)()
     channel = TracedChannel(scene, RadioConfig(), 2)
-    from rislam_rt.channel.traced.culling import sift_rows
+    from rislam_rt.channel.traced.culling import cull_candidates
     from rislam_rt.channel.traced.visibility import visible_rows
 
     rng = np.random.default_rng(8)
@@ -75,7 +75,7 @@ def test_nothing_that_the_tracer_would_confirm_is_left_out(rooms, room, paired):
     table, _ = possible_sequences(wall_sides(channel.walls), *ends, 2)
     asked = {
         (int(d), tuple(table[s]))
-        for devices, chosen in sift_rows(channel.stage, table, device, far)
+        for devices, chosen in cull_candidates(channel.stage, table, device, far)
         for d, s in zip(devices, chosen, strict=True)
     }
     assert exists <= asked
