@@ -14,7 +14,7 @@ _BODY = Body(np.array([-0.04, -0.02, 0.01]), np.array([0.05, 0.03, -0.02]))
 
 
 @dataclass(frozen=True, slots=True)
-class BoxProof:
+class SelfTest:
     """Outcome of `trace_small_box`."""
 
     num_paths: int
@@ -32,7 +32,7 @@ class BoxProof:
         return self.num_paths == self.expected_paths and max(self.los_error_db, self.wall_error_db) < 1e-3
 
 
-def trace_small_box() -> BoxProof:
+def trace_small_box() -> SelfTest:
     """Trace LOS and wall returns up to two bounces in a box held in memory, and compare with theory.
 
     Raises
@@ -54,7 +54,7 @@ def trace_small_box() -> BoxProof:
     expected[1:] *= reflection
     expected = np.sort(expected)[::-1]
     errors = np.abs(20.0 * np.log10(gain / expected)) if len(gain) == len(expected) else np.full(7, np.inf)
-    return BoxProof(int(paths.valid.sum()), 25, float(errors[0]), float(errors[1:].max()), perf_counter() - start)
+    return SelfTest(int(paths.valid.sum()), 25, float(errors[0]), float(errors[1:].max()), perf_counter() - start)
 
 
 def _box(reflection: float) -> Reflector:
