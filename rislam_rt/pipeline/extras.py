@@ -55,7 +55,7 @@ def trace_clutter(scene: Scene, radio: RadioConfig, motion: Trajectory, section:
     if not section.wanted:
         return None
     from rislam_rt.channel.traced.cells import as_paths
-    from rislam_rt.channel.traced.extras import ExtraConfig, trace_extras
+    from rislam_rt.channel.traced.diffuse_paths import ExtraConfig, trace_extras
 
     if not section.diffuse:
         smooth = [replace(r, material=replace(r.material, scattering=0.0)) for r in scene.reflectors]

@@ -7,7 +7,7 @@ resolution cell of delay and both cosines nothing tells them from one wave with 
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.extras import ExtraPaths
+from rislam_rt.channel.traced.diffuse_paths import ExtraPaths
 from rislam_rt.geometry.angles import rotation_z, unit
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 

@@ -8,7 +8,7 @@ from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.shades import ALONE
 from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_blocks
-from rislam_rt.channel.traced.extras import ExtraConfig, ExtraPaths, trace_extras
+from rislam_rt.channel.traced.diffuse_paths import ExtraConfig, ExtraPaths, trace_extras
 from rislam_rt.channel.traced.limits import room_center
 from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
 from rislam_rt.channel.traced.problem import Batch, Found, Problem, build_batch, join_found

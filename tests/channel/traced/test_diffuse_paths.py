@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.traced import ExtraConfig, ExtraKind, TracedChannel
-from rislam_rt.channel.traced.extras import trace_extras
+from rislam_rt.channel.traced.diffuse_paths import trace_extras
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Material, RadioConfig
