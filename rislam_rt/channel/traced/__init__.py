@@ -14,7 +14,7 @@ How a trajectory of K cycles becomes few solves:
 """
 
 from rislam_rt.channel.traced.channel import TracedChannel
-from rislam_rt.channel.traced.diffuse_paths import ExtraConfig, ExtraKind, ExtraPaths
+from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, DiffuseKind, DiffusePaths
 from rislam_rt.channel.traced.limits import shortest_segment
 from rislam_rt.channel.traced.self_test import SelfTest, trace_small_box
 from rislam_rt.model import Antennas
@@ -22,9 +22,9 @@ from rislam_rt.model import Antennas
 __all__ = [
     "Antennas",
     "SelfTest",
-    "ExtraConfig",
-    "ExtraKind",
-    "ExtraPaths",
+    "DiffuseConfig",
+    "DiffuseKind",
+    "DiffusePaths",
     "TracedChannel",
     "shortest_segment",
     "trace_small_box",

@@ -7,7 +7,7 @@ resolution cell of delay and both cosines nothing tells them from one wave with 
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.diffuse_paths import ExtraPaths
+from rislam_rt.channel.traced.diffuse_paths import DiffusePaths
 from rislam_rt.geometry.angles import rotation_z, unit
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 
@@ -15,7 +15,7 @@ CELLS = 2.0
 """Cells to a resolution cell, along each axis."""
 
 
-def as_paths(extras: ExtraPaths, trajectory: Trajectory, radio: RadioConfig) -> Paths:
+def as_paths(extras: DiffusePaths, trajectory: Trajectory, radio: RadioConfig) -> Paths:
     """The cells of all cycles that hold something, as paths without an identity: a column means nothing from one cycle
     to the next.
 
@@ -58,7 +58,7 @@ def as_paths(extras: ExtraPaths, trajectory: Trajectory, radio: RadioConfig) -> 
     )
 
 
-def _cells(extras: ExtraPaths, trajectory: Trajectory, radio: RadioConfig) -> tuple[Integers, Integers]:
+def _cells(extras: DiffusePaths, trajectory: Trajectory, radio: RadioConfig) -> tuple[Integers, Integers]:
     """Number of each ray's cell (N,), and each cell's cycle (C,), ascending."""
     array = radio.array
     body = np.einsum("ni,nij->nj", extras.arrival, rotation_z(trajectory.heading[extras.cycle]))

@@ -8,7 +8,7 @@ from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
 from rislam_rt.channel.shades import ALONE
 from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_blocks
-from rislam_rt.channel.traced.diffuse_paths import ExtraConfig, ExtraPaths, trace_extras
+from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, DiffusePaths, trace_diffuse_paths
 from rislam_rt.channel.traced.limits import room_center
 from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
 from rislam_rt.channel.traced.problem import Batch, Found, Problem, build_batch, join_found
@@ -89,9 +89,9 @@ class TracedChannel:
         """The same paths under another code, without tracing again."""
         return rephase(paths, code)
 
-    def extra_paths(self, trajectory: Trajectory, config: ExtraConfig) -> ExtraPaths:
+    def extra_paths(self, trajectory: Trajectory, config: DiffuseConfig) -> DiffusePaths:
         """Diffuse scattering and diffraction, if switched on: paths without an analytic twin, apart from `paths`."""
-        return trace_extras(self.scene, self.radio, trajectory, config)
+        return trace_diffuse_paths(self.scene, self.radio, trajectory, config)
 
     def _trace(self, problems: Sequence[Problem]) -> tuple[list[Legs], bool]:
         """Solve problems of one view of the room together, block by block; also whether all sequences were asked."""

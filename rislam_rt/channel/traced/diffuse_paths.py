@@ -19,7 +19,7 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.model import RadioConfig, Scene, Trajectory
 
 
-class ExtraKind(IntEnum):
+class DiffuseKind(IntEnum):
     """What a path without an analytic twin went through."""
 
     DIFFUSE = 0
@@ -27,7 +27,7 @@ class ExtraKind(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class ExtraConfig:
+class DiffuseConfig:
     """Switches of the tracer, all off at first."""
 
     scattering: float = 0.0
@@ -51,13 +51,13 @@ class ExtraConfig:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ExtraPaths:
+class DiffusePaths:
     """N paths of all cycles."""
 
     cycle: Integers
     """(N,)."""
     kind: Integers
-    """(N,) values of `ExtraKind`; a path that was both scattered and diffracted counts as diffracted."""
+    """(N,) values of `DiffuseKind`; a path that was both scattered and diffracted counts as diffracted."""
     tau: Floats
     """(N,) [s]."""
     departure: Floats
@@ -87,8 +87,8 @@ class ExtraPaths:
         return len(self.cycle)
 
 
-class Solved(NamedTuple):
-    """One position's paths, as `ExtraPaths` without the cycle."""
+class SolvedPaths(NamedTuple):
+    """One position's paths, as `DiffusePaths` without the cycle."""
 
     kind: Integers
     tau: Floats
@@ -98,7 +98,9 @@ class Solved(NamedTuple):
     vertices: Floats
 
 
-def trace_extras(scene: Scene, radio: RadioConfig, trajectory: Trajectory, config: ExtraConfig) -> ExtraPaths:
+def trace_diffuse_paths(
+    scene: Scene, radio: RadioConfig, trajectory: Trajectory, config: DiffuseConfig
+) -> DiffusePaths:
     """Scattered and diffracted paths from Tx to Rx at every cycle, one solve each (0.1 s and more).
 
     Raises
@@ -116,9 +118,9 @@ def trace_extras(scene: Scene, radio: RadioConfig, trajectory: Trajectory, confi
         for cycle, (tx, rx) in enumerate(zip(trajectory.tx - origin, trajectory.rx - origin, strict=True)):
             solved.append(_solve(stage, tx, rx, origin, config, config.scattering > 0.0 or own))
             cycles.append(np.full(len(solved[-1].kind), cycle))
-    columns = Solved(*(np.concatenate(column) for column in zip(*solved, strict=True)))
+    columns = SolvedPaths(*(np.concatenate(column) for column in zip(*solved, strict=True)))
     antennas = np.sqrt(radio.tx_gain * radio.rx_gain) * np.exp(-2j * np.pi * radio.carrier * columns.tau)
-    return ExtraPaths(np.concatenate(cycles), **columns._replace(gain=columns.gain * antennas)._asdict())
+    return DiffusePaths(np.concatenate(cycles), **columns._replace(gain=columns.gain * antennas)._asdict())
 
 
 def _rough_stage(scene: Scene, carrier: float, origin: Floats, scattering: float) -> Any:
@@ -149,7 +151,7 @@ def _rough_stage(scene: Scene, carrier: float, origin: Floats, scattering: float
     return stage
 
 
-def _solve(stage: Any, tx: Floats, rx: Floats, origin: Floats, config: ExtraConfig, diffuse: bool) -> Solved:
+def _solve(stage: Any, tx: Floats, rx: Floats, origin: Floats, config: DiffuseConfig, diffuse: bool) -> SolvedPaths:
     """Sionna's paths between positions about the origin, the purely specular ones left out."""
     import sionna.rt as rt
 
@@ -179,11 +181,11 @@ def _solve(stage: Any, tx: Floats, rx: Floats, origin: Floats, config: ExtraConf
     first, last = vertices[:, 0], vertices[np.arange(len(keep)), bounces - 1]
     gain = np.empty(len(tau), dtype=np.complex128)
     gain.real, gain.imag = (np.array(part).ravel() for part in paths.a)
-    kind = np.where(diffracted, ExtraKind.DIFFRACTED, ExtraKind.DIFFUSE)
-    return Solved(kind[keep], tau[keep], unit(first - origin - tx), unit(last - origin - rx), gain[keep], vertices)
+    kind = np.where(diffracted, DiffuseKind.DIFFRACTED, DiffuseKind.DIFFUSE)
+    return SolvedPaths(kind[keep], tau[keep], unit(first - origin - tx), unit(last - origin - rx), gain[keep], vertices)
 
 
-def _nothing(depth: int) -> Solved:
+def _nothing(depth: int) -> SolvedPaths:
     """No paths."""
     none, points = np.zeros(0), np.zeros((0, 3))
-    return Solved(none.astype(np.int64), none, points, points, none.astype(np.complex128), np.zeros((0, depth, 3)))
+    return SolvedPaths(none.astype(np.int64), none, points, points, none.astype(np.complex128), np.zeros((0, depth, 3)))

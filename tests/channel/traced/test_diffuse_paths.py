@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rislam_rt.channel.traced import ExtraConfig, ExtraKind, TracedChannel
-from rislam_rt.channel.traced.diffuse_paths import trace_extras
+from rislam_rt.channel.traced import DiffuseConfig, DiffuseKind, TracedChannel
+from rislam_rt.channel.traced.diffuse_paths import trace_diffuse_paths
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Material, RadioConfig
@@ -14,7 +14,7 @@ RADIO = RadioConfig()
 
 def test_switches_off_add_nothing(rooms):
     channel, trajectory = TracedChannel(rooms.paper(), RADIO, 1), rooms.at([1.3, 2.1, 0.8])
-    extras = channel.extra_paths(trajectory, ExtraConfig())
+    extras = channel.extra_paths(trajectory, DiffuseConfig())
     assert len(extras) == 0
     assert extras.source == "traced, no analytic twin"
 
@@ -25,10 +25,10 @@ def test_scattered_power_is_the_lambertian_integral(rooms, scattering):
     side = 20.0
     floor = rooms.polygon("floor", [(-side, -side, 0), (side, -side, 0), (side, side, 0), (-side, side, 0)])
     trajectory = rooms.at([0.0, 0.0, 2.0], tx=(-0.5, 0.2, 0.1), rx=(0.4, -0.3, -0.3))
-    extras = trace_extras(
-        rooms.scene([floor], ()), RADIO, trajectory, ExtraConfig(scattering=scattering, samples=100_000)
+    extras = trace_diffuse_paths(
+        rooms.scene([floor], ()), RADIO, trajectory, DiffuseConfig(scattering=scattering, samples=100_000)
     )
-    assert set(extras.kind) == {ExtraKind.DIFFUSE}
+    assert set(extras.kind) == {DiffuseKind.DIFFUSE}
     cells = 1000
     line = ((np.arange(cells) + 0.5) / cells * 2.0 - 1.0) * side
     x, y = np.meshgrid(line, line)
@@ -46,7 +46,7 @@ def test_scattered_power_is_the_lambertian_integral(rooms, scattering):
 def test_scattered_paths_run_over_their_vertices(rooms):
     trajectory = rooms.at([[1.3, 2.1, 0.8], [4.4, 0.9, 2.2]])
     scene = rooms.paper(material=Material(itu="concrete", thickness=0.2))
-    extras = trace_extras(scene, RADIO, trajectory, ExtraConfig(scattering=0.5, samples=2000))
+    extras = trace_diffuse_paths(scene, RADIO, trajectory, DiffuseConfig(scattering=0.5, samples=2000))
     assert set(extras.cycle) == {0, 1}
     tx, rx = trajectory.tx[extras.cycle], trajectory.rx[extras.cycle]
     out, back = extras.vertices[:, 0] - tx, extras.vertices[:, 0] - rx
@@ -60,8 +60,10 @@ def test_diffraction_over_a_board_takes_the_shortest_way(rooms):
     """Fermat over each of the four edges, and a knife edge's loss over the highest."""
     board = rooms.polygon("board", [(3, -2, 0), (3, 2, 0), (3, 2, 2), (3, -2, 2)])
     trajectory = rooms.at([3.0, 0.0, 1.5], tx=(-2.0, 0.1, 0.0), rx=(2.0, -0.2, -0.2))
-    extras = trace_extras(rooms.scene([board], ()), RADIO, trajectory, ExtraConfig(diffraction=True, samples=20_000))
-    assert extras.kind.tolist() == [ExtraKind.DIFFRACTED] * 4
+    extras = trace_diffuse_paths(
+        rooms.scene([board], ()), RADIO, trajectory, DiffuseConfig(diffraction=True, samples=20_000)
+    )
+    assert extras.kind.tolist() == [DiffuseKind.DIFFRACTED] * 4
     tx, rx = trajectory.tx[0], trajectory.rx[0]
     corners = board.vertices
     expected = []
@@ -89,4 +91,4 @@ def test_diffraction_over_a_board_takes_the_shortest_way(rooms):
 )
 def test_bad_switches(setting, message):
     with pytest.raises(ConfigError, match=message):
-        ExtraConfig(**setting)
+        DiffuseConfig(**setting)
