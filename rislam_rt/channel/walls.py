@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.shades import Shades, build_shades
+from rislam_rt.channel.occluders import Shades, build_shades
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.flat import flat_parts
 from rislam_rt.geometry.planes import signed_distance

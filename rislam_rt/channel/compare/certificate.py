@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.facets import Facets, build_facets
-from rislam_rt.channel.shades import ALONE
+from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import Legs
-from rislam_rt.channel.shades import ALONE
+from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_blocks
 from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, DiffusePaths, trace_diffuse_paths
 from rislam_rt.channel.traced.limits import room_center

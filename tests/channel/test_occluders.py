@@ -7,7 +7,7 @@ import pytest
 
 from rislam_rt.channel.compare import compare_channels, compare_paths, random_poses
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.shades import build_shades
+from rislam_rt.channel.occluders import build_shades
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.model import PathKind, RadioConfig, Scatterer, Shade
