@@ -1,4 +1,4 @@
-"""Shades: meshes, of scatterers or alone, that hide what lies behind them and reflect nothing."""
+"""Occluders: meshes, of scatterers or alone, that hide what lies behind them and reflect nothing."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ _BLOCK = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shades:
+class Occluders:
     """S shades made of T triangles, shade by shade."""
 
     names: tuple[str, ...]
@@ -65,7 +65,7 @@ class Shades:
         return -distance if _crosses(start[None], end[None], triangles)[0] else distance
 
 
-def build_shades(scene: Scene) -> Shades:
+def build_occluders(scene: Scene) -> Occluders:
     """Collect the shades of a scene's scatterers, and those that stand alone."""
     owners = [n for n, scatterer in enumerate(scene.scatterers) if scatterer.shade is not None]
     meshes = [s.shade.triangles for s in scene.scatterers if s.shade is not None]
@@ -74,7 +74,7 @@ def build_shades(scene: Scene) -> Shades:
     meshes += [shade.triangles for shade in scene.shades]
     center = np.array([(m.min(axis=(0, 1)) + m.max(axis=(0, 1))) / 2.0 for m in meshes]).reshape(-1, 3)
     reach = [np.linalg.norm(m - c, axis=-1).max() for m, c in zip(meshes, center, strict=True)]
-    return Shades(
+    return Occluders(
         tuple(names),
         np.array(owners, dtype=np.int64),
         np.cumsum([0] + [len(m) for m in meshes]),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.occluders import Shades, build_shades
+from rislam_rt.channel.occluders import Occluders, build_occluders
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.flat import flat_parts
 from rislam_rt.geometry.planes import signed_distance
@@ -35,7 +35,7 @@ class Walls:
     """(W,) for each wall those that lie on it: where they are, they reflect and it does not."""
     hosts: tuple[int, ...]
     """The wall behind each panel, -1 where there is none."""
-    shades: Shades
+    shades: Occluders
     """What hides but is no wall: it never reflects."""
 
     def __len__(self) -> int:
@@ -75,7 +75,7 @@ def build_walls(scene: Scene) -> Walls:
         stack.plane,
         stack.over,
         tuple(_host(panel, scene, np.repeat(np.arange(len(counts)), counts), normal, offset) for panel in scene.panels),
-        build_shades(scene),
+        build_occluders(scene),
     )
 
 

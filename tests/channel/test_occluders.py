@@ -7,7 +7,7 @@ import pytest
 
 from rislam_rt.channel.compare import compare_channels, compare_paths, random_poses
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.occluders import build_shades
+from rislam_rt.channel.occluders import build_occluders
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.model import PathKind, RadioConfig, Scatterer, Shade
@@ -43,7 +43,7 @@ def clipped(start, end, scatterer):
 @pytest.mark.parametrize("scatterer", [BALL, POST], ids=lambda s: s.name)
 def test_crossings_of_convex_solids(rooms, scatterer):
     rng = np.random.default_rng(3)
-    shades = build_shades(shaded(rooms, scatterer))
+    shades = build_occluders(shaded(rooms, scatterer))
     start = scatterer.position + 2.0 * unit(rng.normal(size=(20_000, 3)))
     start[:10_000] *= [1.0, 1.0, 3.0]
     end = scatterer.position + rng.normal(size=(20_000, 3)) * [0.6, 0.6, 1.0]
@@ -59,7 +59,7 @@ def test_crossings_of_convex_solids(rooms, scatterer):
 
 def test_no_ray_slips_through_a_seam(rooms):
     """Through vertices and edge midpoints of the near side, exactly at the middle."""
-    shades = build_shades(shaded(rooms, BALL))
+    shades = build_occluders(shaded(rooms, BALL))
     triangles = BALL.shade.triangles
     aims = np.concatenate([triangles.reshape(-1, 3), ((triangles + np.roll(triangles, 1, axis=1)) / 2).reshape(-1, 3)])
     start = CENTER + 3.0 * (aims - CENTER)
@@ -69,7 +69,7 @@ def test_no_ray_slips_through_a_seam(rooms):
 
 def test_margin_is_the_distance_from_the_outline(rooms):
     """Of a sphere: radius against the line's distance from the centre; the mesh is within 2 % of the radius."""
-    shades, rng = build_shades(shaded(rooms, BALL)), np.random.default_rng(5)
+    shades, rng = build_occluders(shaded(rooms, BALL)), np.random.default_rng(5)
     for _ in range(200):
         direction = unit(rng.normal(size=3))
         aside = unit(np.cross(direction, rng.normal(size=3)))
@@ -84,7 +84,7 @@ def test_margin_is_the_distance_from_the_outline(rooms):
 
 
 def test_scenes_without_shades_have_none(rooms):
-    shades = build_shades(rooms.paper())
+    shades = build_occluders(rooms.paper())
     assert len(shades) == 0
     assert not shades.hides(np.zeros((3, 3)), np.ones((3, 3))).any()
 

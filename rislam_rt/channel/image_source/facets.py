@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.image_source.rectangles import Rectangles, bounding_rectangles
-from rislam_rt.channel.occluders import Shades
+from rislam_rt.channel.occluders import Occluders
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.geometry.triangles import edge_planes
@@ -50,7 +50,7 @@ class Facets:
     """(W,) of `Walls.plane`."""
     over: tuple[Integers, ...]
     """(W,) of `Walls.over`."""
-    shades: Shades
+    shades: Occluders
     """What hides but is no wall."""
 
     def __len__(self) -> int:
