@@ -11,7 +11,7 @@ from rislam_rt.errors import SceneError
 from rislam_rt.model import RisPanel, Scene, join_panels
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.check.panel import panel_errors
-from rislam_rt.scene.check.soup import build_soup
+from rislam_rt.scene.check.triangle_array import build_soup
 from rislam_rt.shipped import find_room
 
 Damage = Callable[[str, str], Path]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from rislam_rt.scene.check.probe import touching
-from rislam_rt.scene.check.soup import MIN_CLEARANCE, Soup, without_area
+from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, Soup, without_area
 from rislam_rt.scene.findings import Finding
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import RadioConfig, Shade
 from rislam_rt.scene.check.probe import crossings, winding
-from rislam_rt.scene.check.soup import Soup, without_area
+from rislam_rt.scene.check.triangle_array import Soup, without_area
 from rislam_rt.scene.findings import Finding
 
 

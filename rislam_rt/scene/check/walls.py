@@ -11,7 +11,7 @@ from rislam_rt.geometry.flat import FlatParts, flat_parts
 from rislam_rt.geometry.stack import Lying, stack_walls, tracer_gap
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.scene.check.probe import winding
-from rislam_rt.scene.check.soup import MIN_CLEARANCE, Soup
+from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, Soup
 from rislam_rt.scene.findings import Finding
 
 NEARLY_FLAT = 1e-2

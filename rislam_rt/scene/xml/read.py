@@ -12,7 +12,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError
 from rislam_rt.model import Material
-from rislam_rt.scene.check.soup import without_area
+from rislam_rt.scene.check.triangle_array import without_area
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.meshes import MAX_FACES, Mesh
 from rislam_rt.scene.xml.clip import clip_mesh
