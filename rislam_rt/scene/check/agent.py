@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import RadioConfig
 from rislam_rt.scene.check.probe import components, crossings, ray_hits, sphere_directions, touching, winding
-from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, Soup
+from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 
 NUM_PROBES = 400
@@ -17,7 +17,7 @@ MAX_SPEED = 10.0
 """[m/s] Indoors, more is a wrong unit."""
 
 
-def agent_errors(soup: Soup) -> Iterator[Finding]:
+def agent_errors(soup: TriangleArray) -> Iterator[Finding]:
     """Start or path outside the meshes' bounds, on a surface, inside an object, or through a wall."""
     motion = soup.scene.agent
     places = {"agent": motion.position, "Tx": motion.tx, "Rx": motion.rx}
@@ -33,7 +33,7 @@ def agent_errors(soup: Soup) -> Iterator[Finding]:
     yield from _inside_object(soup)
 
 
-def agent_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
+def agent_warnings(soup: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
     """An open room, a speed in wrong units, scatterers inside objects or below an array that looks up."""
     motion = soup.scene.agent
     directions = sphere_directions(NUM_PROBES)
@@ -57,7 +57,7 @@ def agent_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
             yield soup.warning(field, f"it lies inside '{name}', where no ray reaches it", "move it out")
 
 
-def _on_surface(soup: Soup, places: dict[str, Floats]) -> Iterator[Finding]:
+def _on_surface(soup: TriangleArray, places: dict[str, Floats]) -> Iterator[Finding]:
     for part, points in places.items():
         cycles, near = touching(points, soup.triangles, MIN_CLEARANCE)
         if len(cycles):
@@ -66,7 +66,7 @@ def _on_surface(soup: Soup, places: dict[str, Floats]) -> Iterator[Finding]:
             return
 
 
-def _through_wall(soup: Soup) -> Iterator[Finding]:
+def _through_wall(soup: TriangleArray) -> Iterator[Finding]:
     motion = soup.scene.agent
     cycles, walls = crossings(motion.position[:-1], motion.position[1:], soup.triangles)
     if len(cycles):
@@ -79,7 +79,7 @@ def _through_wall(soup: Soup) -> Iterator[Finding]:
         yield soup.error(_field(int(cycles[0])), message, "keep further away from it")
 
 
-def _inside_object(soup: Soup) -> Iterator[Finding]:
+def _inside_object(soup: TriangleArray) -> Iterator[Finding]:
     """The start only: the path crosses no surface, or that was found before."""
     start = soup.scene.agent.position[0]
     name = _enclosing(soup, start, holding=soup.scene.landmark_positions)
@@ -87,7 +87,7 @@ def _inside_object(soup: Soup) -> Iterator[Finding]:
         yield soup.error("agent.start", f"{start.tolist()} lies inside the object '{name}'", "move the start out of it")
 
 
-def _enclosing(soup: Soup, point: Floats, holding: Floats) -> str:
+def _enclosing(soup: TriangleArray, point: Floats, holding: Floats) -> str:
     """Name of an object around a point, if any.
 
     An object is a connected piece that takes up less than a tenth of the scene's box and, so that a room of a larger

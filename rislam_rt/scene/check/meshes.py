@@ -6,11 +6,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from rislam_rt.scene.check.probe import touching
-from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, Soup, without_area
+from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray, without_area
 from rislam_rt.scene.findings import Finding
 
 
-def name_errors(soup: Soup) -> Iterator[Finding]:
+def name_errors(soup: TriangleArray) -> Iterator[Finding]:
     """Two parts of one name."""
     names = [r.name for r in soup.scene.reflectors] + list(soup.scene.landmarks)
     names += [shade.name for shade in soup.scene.shades]
@@ -19,7 +19,7 @@ def name_errors(soup: Soup) -> Iterator[Finding]:
             yield soup.error("name", f"{count} parts are called '{name}'", "give every part a name of its own")
 
 
-def face_errors(soup: Soup) -> Iterator[Finding]:
+def face_errors(soup: TriangleArray) -> Iterator[Finding]:
     """Faces without area."""
     bad = without_area(soup.triangles)
     for number in np.unique(soup.owner[bad]):
@@ -28,7 +28,7 @@ def face_errors(soup: Soup) -> Iterator[Finding]:
         yield soup.error(f"reflector[{number}].mesh ({name})", message, "remove degenerate faces from the mesh")
 
 
-def scatterer_errors(soup: Soup) -> Iterator[Finding]:
+def scatterer_errors(soup: TriangleArray) -> Iterator[Finding]:
     """Outside the meshes' bounds, on a surface, or larger than the room."""
     diagonal = float(np.linalg.norm(soup.bounds[1] - soup.bounds[0]))
     for number, scatterer in enumerate(soup.scene.scatterers):
@@ -46,13 +46,13 @@ def scatterer_errors(soup: Soup) -> Iterator[Finding]:
             yield soup.error(field, message, f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces")
 
 
-def mesh_warnings(soup: Soup) -> Iterator[Finding]:
+def mesh_warnings(soup: TriangleArray) -> Iterator[Finding]:
     """A size in wrong units, doubled faces."""
     yield from _size(soup)
     yield from _coincident(soup)
 
 
-def _size(soup: Soup) -> Iterator[Finding]:
+def _size(soup: TriangleArray) -> Iterator[Finding]:
     diagonal = float(np.linalg.norm(soup.bounds[1] - soup.bounds[0]))
     if diagonal > 200.0 or diagonal < 0.2:
         guess = "millimetres" if diagonal > 200.0 else "kilometres"
@@ -61,7 +61,7 @@ def _size(soup: Soup) -> Iterator[Finding]:
         )
 
 
-def _coincident(soup: Soup) -> Iterator[Finding]:
+def _coincident(soup: TriangleArray) -> Iterator[Finding]:
     """Doubled faces of one mesh; those of two meshes are for the check of walls."""
     corners = np.round(soup.triangles, 6) + 0.0
     order = np.lexsort(np.moveaxis(corners, -1, 0)[::-1], axis=-1)
@@ -73,6 +73,6 @@ def _coincident(soup: Soup) -> Iterator[Finding]:
         yield soup.warning("reflector", message, "leave the doubles out")
 
 
-def _box(soup: Soup) -> str:
+def _box(soup: TriangleArray) -> str:
     low, high = np.round(soup.bounds, 3).tolist()
     return f"{low} to {high}"

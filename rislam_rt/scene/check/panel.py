@@ -9,14 +9,14 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.model import RadioConfig, RisPanel
 from rislam_rt.scene.check.probe import ray_hits, touching
-from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, Soup
+from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding, panel_key
 
 MAX_TURN = 1e-2
 """[rad] Largest angle between panel and host."""
 
 
-def panel_errors(soup: Soup) -> Iterator[Finding]:
+def panel_errors(soup: TriangleArray) -> Iterator[Finding]:
     """Outside the bounds, off its host, facing out of the room, or over another panel."""
     for panel, key in _keyed(soup):
         at = panel.center
@@ -36,7 +36,7 @@ def panel_errors(soup: Soup) -> Iterator[Finding]:
             yield soup.error(f"{key}.center", message, "move the panels apart")
 
 
-def panel_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
+def panel_warnings(soup: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
     """Never seen from the front; reflecting more than a plate; ambiguous; delay spread above 1 / B."""
     for panel, key in _keyed(soup):
         spec, motion = panel.spec, soup.scene.agent
@@ -51,7 +51,7 @@ def panel_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
             yield soup.warning(f"{key}.rows", message, "take a smaller panel or a smaller bandwidth")
 
 
-def _keyed(soup: Soup) -> list[tuple[RisPanel, str]]:
+def _keyed(soup: TriangleArray) -> list[tuple[RisPanel, str]]:
     """The panels, each with its key in the scene file."""
     panels = soup.scene.panels
     return [(panel, panel_key(number, len(panels))) for number, panel in enumerate(panels)]
@@ -70,7 +70,7 @@ def _overlap(one: RisPanel, other: RisPanel) -> bool:
     return all(abs(gap @ axis) < sum(np.abs(axis @ half).sum() for half in halves) - MIN_CLEARANCE for axis in axes)
 
 
-def _implausible(soup: Soup, panel: RisPanel, key: str, radio: RadioConfig) -> Iterator[Finding]:
+def _implausible(soup: TriangleArray, panel: RisPanel, key: str, radio: RadioConfig) -> Iterator[Finding]:
     """Reflecting more than a plate; elements so far apart that their beams are ambiguous."""
     spec = panel.spec
     area = float(spec.spacing[0] * spec.spacing[1])
@@ -87,7 +87,7 @@ def _implausible(soup: Soup, panel: RisPanel, key: str, radio: RadioConfig) -> I
         yield soup.warning(f"{key}.spacing_m", message, "take half a wavelength or less")
 
 
-def _on_host(soup: Soup, panel: RisPanel, key: str) -> Iterator[Finding]:
+def _on_host(soup: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
     names = [r.name for r in soup.scene.reflectors]
     _, near = touching(panel.center[None], soup.triangles, MIN_CLEARANCE)
     behind = sorted({soup.name(int(t)) for t in near})
@@ -116,14 +116,14 @@ def _on_host(soup: Soup, panel: RisPanel, key: str) -> Iterator[Finding]:
         )
 
 
-def _gap(soup: Soup, panel: RisPanel) -> float:
+def _gap(soup: TriangleArray, panel: RisPanel) -> float:
     """Distance [m] from the nearest plane of the host."""
     host = [r.name for r in soup.scene.reflectors].index(panel.host or "")
     normal, offset = triangle_planes(soup.triangles[soup.owner == host])
     return float(np.abs(normal @ panel.center - offset).min())
 
 
-def _facing(soup: Soup, panel: RisPanel, key: str) -> Iterator[Finding]:
+def _facing(soup: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
     """The room is where rays hit something: a panel with nothing before and something behind it looks out; unless the
     agent is before it, in a room that is open there (a street).
     """
@@ -137,7 +137,7 @@ def _facing(soup: Soup, panel: RisPanel, key: str) -> Iterator[Finding]:
         yield soup.error(f"{key}.normal", f"{panel.spec.normal.tolist()} points out of the room", "reverse it")
 
 
-def _delay_spread(soup: Soup, panel: RisPanel) -> float:
+def _delay_spread(soup: TriangleArray, panel: RisPanel) -> float:
     """Largest difference [s] over elements of the delay Tx, element, Rx, at 50 cycles of the motion."""
     motion = soup.scene.agent
     cycles = np.unique(np.linspace(0, len(motion) - 1, 50).astype(np.int64))

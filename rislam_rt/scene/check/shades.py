@@ -7,11 +7,11 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import RadioConfig, Shade
 from rislam_rt.scene.check.probe import crossings, winding
-from rislam_rt.scene.check.triangle_array import Soup, without_area
+from rislam_rt.scene.check.triangle_array import TriangleArray, without_area
 from rislam_rt.scene.findings import Finding
 
 
-def shade_face_errors(soup: Soup) -> Iterator[Finding]:
+def shade_face_errors(soup: TriangleArray) -> Iterator[Finding]:
     """Faces without area."""
     for field, _, shade in _shades(soup):
         bad = without_area(shade.triangles)
@@ -20,7 +20,7 @@ def shade_face_errors(soup: Soup) -> Iterator[Finding]:
             yield soup.error(field, message, "remove degenerate faces from the mesh")
 
 
-def shade_errors(soup: Soup) -> Iterator[Finding]:
+def shade_errors(soup: TriangleArray) -> Iterator[Finding]:
     """A mesh that is not about its own scatterer, that encloses another landmark, or that the agent runs into."""
     marks, motion = soup.scene.landmark_positions, soup.scene.agent
     for field, number, shade in _shades(soup):
@@ -41,7 +41,7 @@ def shade_errors(soup: Soup) -> Iterator[Finding]:
                 break
 
 
-def cylinder_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
+def cylinder_warnings(soup: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
     """A cylinder whose far field the agent is not in: its cross-section is one for plane waves."""
     motion = soup.scene.agent
     for number, scatterer in enumerate(soup.scene.scatterers):
@@ -56,7 +56,7 @@ def cylinder_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
             )
 
 
-def _shades(soup: Soup) -> Iterator[tuple[str, int | None, Shade]]:
+def _shades(soup: TriangleArray) -> Iterator[tuple[str, int | None, Shade]]:
     """Field and shade of every scatterer that has one, with its number, and of those that stand alone."""
     for number, scatterer in enumerate(soup.scene.scatterers):
         if scatterer.shade is not None:

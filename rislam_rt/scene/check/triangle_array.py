@@ -16,7 +16,7 @@ MIN_ALTITUDE = 1e-6
 """[m] A triangle with a smaller height has no usable normal."""
 
 
-class Soup(NamedTuple):
+class TriangleArray(NamedTuple):
     """All triangles of a scene, and whose they are."""
 
     file: str
@@ -50,12 +50,12 @@ class Soup(NamedTuple):
         return Finding("note", self.file, field, message, mend)
 
 
-def build_soup(scene: Scene, file: str) -> Soup:
+def build_triangle_array(scene: Scene, file: str) -> TriangleArray:
     """The triangles of a scene that was read from `file`."""
     triangles = np.concatenate([r.triangles for r in scene.reflectors])
     owner = np.repeat(np.arange(len(scene.reflectors)), [len(r.faces) for r in scene.reflectors])
     corners = triangles.reshape(-1, 3)
-    return Soup(file, scene, triangles, owner, np.stack([corners.min(axis=0), corners.max(axis=0)]))
+    return TriangleArray(file, scene, triangles, owner, np.stack([corners.min(axis=0), corners.max(axis=0)]))
 
 
 def without_area(triangles: Floats) -> Booleans:

@@ -11,7 +11,7 @@ from rislam_rt.geometry.flat import FlatParts, flat_parts
 from rislam_rt.geometry.stack import Lying, stack_walls, tracer_gap
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.scene.check.probe import winding
-from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, Soup
+from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 
 NEARLY_FLAT = 1e-2
@@ -32,7 +32,7 @@ class Parts(NamedTuple):
         return int(np.searchsorted(self.first, wall, side="right")) - 1
 
 
-def build_parts(soup: Soup) -> Parts:
+def build_parts(soup: TriangleArray) -> Parts:
     """Part every mesh into walls, as the channels do."""
     flat = [flat_parts(r.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for r in soup.scene.reflectors]
     first = np.cumsum([0, *(len(part.offset) for part in flat)])
@@ -40,7 +40,7 @@ def build_parts(soup: Soup) -> Parts:
     return Parts(flat, first, owner)
 
 
-def wall_findings(soup: Soup) -> Iterator[Finding]:
+def wall_findings(soup: TriangleArray) -> Iterator[Finding]:
     """Meshes that lie on each other, meshes that are nearly flat, and how many walls a mesh has."""
     parts = build_parts(soup)
     yield from _stacked(soup, parts)
@@ -58,7 +58,7 @@ def wall_findings(soup: Soup) -> Iterator[Finding]:
             )
 
 
-def _stacked(soup: Soup, parts: Parts) -> Iterator[Finding]:
+def _stacked(soup: TriangleArray, parts: Parts) -> Iterator[Finding]:
     """One finding for each pair of meshes, with the largest gap of their walls; a note where nobody sees it."""
     normal = np.concatenate([part.normal for part in parts.flat])
     offset = np.concatenate([part.offset for part in parts.flat])
@@ -76,7 +76,7 @@ def _stacked(soup: Soup, parts: Parts) -> Iterator[Finding]:
         yield (soup.warning if seen else soup.note)(f"reflector[{upper}].mesh ({names[0]})", message, mend)
 
 
-def _is_seen(soup: Soup, wall: Floats, reflector: int) -> bool:
+def _is_seen(soup: TriangleArray, wall: Floats, reflector: int) -> bool:
     """Whether a wall (T, 3, 3) has a side in the room; the foot of a crate has its inside above and nothing below."""
     normal, _ = triangle_planes(wall)
     middle = wall.mean(axis=1)
