@@ -12,9 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
-from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.joint import joint_errors
-from rislam_rt.measurement.parts import (
+from rislam_rt.measurement.components import (
     Parts,
     audible,
     blind_axes,
@@ -24,6 +22,8 @@ from rislam_rt.measurement.parts import (
     merge,
     single,
 )
+from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.joint import joint_errors
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sensor import build_sensor
 from rislam_rt.measurement.sides import Found, panel_probability

@@ -8,6 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import measurement_std
 from rislam_rt.measurement.atoms import Sounding, build_sounding
+from rislam_rt.measurement.components import capped, into_disc
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.detect import Grid, build_grid
 from rislam_rt.measurement.doubt import crowding, luck, mirror_variance, unmirrored
@@ -16,7 +17,6 @@ from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_swing, in_step
 from rislam_rt.measurement.identify import identify
 from rislam_rt.measurement.joint import LEAST_CERTAINTY
-from rislam_rt.measurement.parts import capped, into_disc
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sides import Found, panel_probability
 from rislam_rt.measurement.signal import num_tones, tones

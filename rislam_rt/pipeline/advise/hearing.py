@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.measurement import Received, receive
 from rislam_rt.measurement.bound import NEGLIGIBLE
-from rislam_rt.measurement.parts import Parts, audible, merge, single
+from rislam_rt.measurement.components import Parts, audible, merge, single
 from rislam_rt.measurement.slot import split
 from rislam_rt.model import Paths, SensorModel
 from rislam_rt.pipeline.spec import Settings
