@@ -13,7 +13,7 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.measurement.components import (
-    Parts,
+    NoiselessComponents,
     audible,
     blind_axes,
     capped,
@@ -121,6 +121,6 @@ def _clutter(sensor: SensorModel, rng: np.random.Generator) -> Components:
     snr = sensor.threshold + rng.exponential(size=count)
     phase = np.exp(2j * np.pi * rng.uniform(size=count))
     gain = phase * np.sqrt(snr * radio.noise_psd / (radio.array.num_antennas * radio.energy))
-    parts = Parts(np.full(count, -1), tau, cosines, gain)
+    parts = NoiselessComponents(np.full(count, -1), tau, cosines, gain)
     errors = lone_errors(parts, radio, np.zeros((count, 5)))
     return Components(parts.path, np.column_stack([tau, cosines]), errors.deviation, gain, errors.gain_std)

@@ -14,7 +14,7 @@ DISC_STD = 0.5
 cosine along which the array has no aperture."""
 
 
-class Parts(NamedTuple):
+class NoiselessComponents(NamedTuple):
     """N components of one cycle before noise: single paths, or several that cannot be resolved."""
 
     path: Integers
@@ -27,7 +27,7 @@ class Parts(NamedTuple):
     """(N,)."""
 
 
-class Errors(NamedTuple):
+class ComponentErrors(NamedTuple):
     """What the bound does to N components."""
 
     error: Floats
@@ -47,7 +47,7 @@ def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:
     return bound.tau, np.minimum(bound.cosines, DISC_STD)
 
 
-def merge(received: Received, sensor: SensorModel) -> Parts:
+def merge(received: Received, sensor: SensorModel) -> NoiselessComponents:
     """Join paths of one capture closer than a resolution cell in delay and both cosines, from the strongest down."""
     cell = np.ones((len(received.tau), len(received.tau)), dtype=bool)
     for value in in_cells(received, sensor.radio).T:  # axis by axis: half the time of one three-dimensional array
@@ -55,7 +55,7 @@ def merge(received: Received, sensor: SensorModel) -> Parts:
     return join(received, _leaders(np.abs(received.gain), cell))
 
 
-def join(received: Received, leader: Integers) -> Parts:
+def join(received: Received, leader: Integers) -> NoiselessComponents:
     """One component for all paths of the same leader (N,), a row of `received`.
 
     The joint gain is the sum. Delay and cosines are those at which one path fits the sum best, to first order
@@ -70,20 +70,20 @@ def join(received: Received, leader: Integers) -> Parts:
     weight = np.real(received.gain[order] * np.conj(np.repeat(gain, np.diff(start, append=len(order)))))
     joint = np.add.reduceat(weight[:, None] * points, start) / np.maximum(np.abs(gain) ** 2, 1e-300)[:, None]
     joint = np.clip(joint, np.minimum.reduceat(points, start), np.maximum.reduceat(points, start))
-    return Parts(received.path[rows], joint[:, 0], joint[:, 1:], gain)
+    return NoiselessComponents(received.path[rows], joint[:, 0], joint[:, 1:], gain)
 
 
-def single(received: Received) -> Parts:
+def single(received: Received) -> NoiselessComponents:
     """Every path on its own."""
-    return Parts(received.path, received.tau, received.direction[:, :2], received.gain)
+    return NoiselessComponents(received.path, received.tau, received.direction[:, :2], received.gain)
 
 
-def lone_errors(parts: Parts, radio: RadioConfig, draws: Floats) -> Errors:
+def lone_errors(parts: NoiselessComponents, radio: RadioConfig, draws: Floats) -> ComponentErrors:
     """Each component as if it were alone."""
     tau, cosines = path_std(radio.integrated_snr(parts.gain), radio)
     deviation = np.column_stack([tau, cosines])
     gain_std = np.full(len(tau), np.sqrt(2.0) * amplitude_std(radio))
-    return Errors(deviation * draws[:, 2:], deviation, gain_std)
+    return ComponentErrors(deviation * draws[:, 2:], deviation, gain_std)
 
 
 def audible(received: Received, keep: Booleans) -> Received:

@@ -1,10 +1,10 @@
-"""Errors from the joint bound of all paths: what overlapping signals cost each other, and what cannot be told apart."""
+"""ComponentErrors from the joint bound of all paths: what overlapping signals cost each other, and what cannot be told apart."""
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.measurement.atoms import Sounding, build_sounding
-from rislam_rt.measurement.components import Errors, Parts, in_cells, join
+from rislam_rt.measurement.components import ComponentErrors, NoiselessComponents, in_cells, join
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.inner import inner_of, waves_at
 from rislam_rt.measurement.received import Received
@@ -16,7 +16,9 @@ LEAST_CERTAINTY = 2.0
 """A path whose amplitude is less than this many times its standard deviation is not resolved from its neighbour."""
 
 
-def joint_errors(received: Received, radio: RadioConfig, config: ReceiverConfig, draws: Floats) -> tuple[Parts, Errors]:
+def joint_errors(
+    received: Received, radio: RadioConfig, config: ReceiverConfig, draws: Floats
+) -> tuple[NoiselessComponents, ComponentErrors]:
     """Components that can be resolved, and errors drawn from their joint bound.
 
     Paths merge until every component is certain enough, or has no neighbour to merge with.
@@ -49,7 +51,7 @@ def joint_errors(received: Received, radio: RadioConfig, config: ReceiverConfig,
         leader = merged
 
 
-def _bound(parts: Parts, sounding: Sounding, radio: RadioConfig, unit: float) -> tuple[Floats, Floats]:
+def _bound(parts: NoiselessComponents, sounding: Sounding, radio: RadioConfig, unit: float) -> tuple[Floats, Floats]:
     parameters = np.column_stack([parts.tau * radio.bandwidth, parts.cosines])
     return joint_bound(inner_of(sounding, waves_at(sounding, parameters)), parts.gain * unit)
 
@@ -75,7 +77,9 @@ def _paired(leader: Integers, doubtful: Integers, strength: Floats, near: Floats
     return merged
 
 
-def _draw(parts: Parts, covariance: Floats, gain_std: Floats, draws: Floats, radio: RadioConfig) -> Errors:
+def _draw(
+    parts: NoiselessComponents, covariance: Floats, gain_std: Floats, draws: Floats, radio: RadioConfig
+) -> ComponentErrors:
     """Correlated errors of all components from independent draws."""
     scale = np.sqrt(np.maximum(np.diagonal(covariance), np.finfo(np.float64).tiny))
     correlation = covariance / scale[:, None] / scale
@@ -84,4 +88,4 @@ def _draw(parts: Parts, covariance: Floats, gain_std: Floats, draws: Floats, rad
     root = (vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T
     units = np.array([1.0 / radio.bandwidth, 1.0, 1.0])
     error = (scale * (root @ draws[parts.path, 2:].T.ravel())).reshape(3, -1).T * units
-    return Errors(error, scale.reshape(3, -1).T * units, gain_std)
+    return ComponentErrors(error, scale.reshape(3, -1).T * units, gain_std)
