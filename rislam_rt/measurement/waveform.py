@@ -11,7 +11,6 @@ from rislam_rt.measurement.atoms import Sounding, build_sounding
 from rislam_rt.measurement.components import capped, into_disc
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.detect import Grid, build_grid
-from rislam_rt.measurement.doubt import crowding, luck, mirror_variance, unmirrored
 from rislam_rt.measurement.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_swing, in_step
@@ -21,6 +20,7 @@ from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sides import Found, panel_probability
 from rislam_rt.measurement.signal import num_tones, tones
 from rislam_rt.measurement.slot import codes_in_turn, split
+from rislam_rt.measurement.variance_inflation import crowding, luck, mirror_variance, unmirrored
 from rislam_rt.model import Measurement, PathTruth, RadioConfig
 
 
