@@ -22,7 +22,7 @@ UNSEEN = 0.4
 returns of the paper's room, tried on everything else (`benchmarks/receiver_room.py`)."""
 
 
-def luck(snr: Floats) -> Floats:
+def peak_bias(snr: Floats) -> Floats:
     """By how much the variances (...,) at the measured SNR over all antennas, linear, are too small."""
     return snr / np.maximum(snr - PEAK_EXCESS, 0.25 * snr)
 

@@ -20,7 +20,7 @@ from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sides import Found, panel_probability
 from rislam_rt.measurement.signal import num_tones, tones
 from rislam_rt.measurement.slot import codes_in_turn, split
-from rislam_rt.measurement.variance_inflation import crowding, luck, mirror_variance, unmirrored
+from rislam_rt.measurement.variance_inflation import crowding, mirror_variance, peak_bias, unmirrored
 from rislam_rt.model import Measurement, PathTruth, RadioConfig
 
 
@@ -184,7 +184,7 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
     found = estimate_paths(sounding, grid, samples, threshold, window, config.max_components, known)
     parameters, gain, deviation, amplitude_std = _resolved(found, one.samples.size, radio)
     cosines = into_disc(unmirrored(parameters[:, 1:], radio))
-    variance = deviation**2 * luck(np.abs(gain) ** 2 * one.samples.size)[:, None]
+    variance = deviation**2 * peak_bias(np.abs(gain) ** 2 * one.samples.size)[:, None]
     variance *= crowding(parameters, threshold, radio)
     mirrored = mirror_variance(cosines, np.sqrt(variance[:, 1:]), radio)
     scale = np.sqrt(one.noise_psd * one.samples.shape[1] / radio.energy)

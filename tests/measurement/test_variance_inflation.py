@@ -8,7 +8,7 @@ from rislam_rt.measurement.atoms import build_sounding
 from rislam_rt.measurement.inner import waves_at
 from rislam_rt.measurement.refine import accuracy, fit_amplitudes, refine
 from rislam_rt.measurement.signal import add_noise
-from rislam_rt.measurement.variance_inflation import UNSEEN, crowding, luck, mirror_variance, unmirrored
+from rislam_rt.measurement.variance_inflation import UNSEEN, crowding, mirror_variance, peak_bias, unmirrored
 from rislam_rt.model import PathKind, RadioConfig, RxArray
 
 RADIO = RadioConfig()
@@ -34,8 +34,8 @@ def test_errors_of_faint_paths_are_as_reported(make_paths, make_gain):
 
 
 def test_luck_vanishes_for_strong_paths():
-    assert luck(np.array([10.0, 1e4])) == pytest.approx([10.0 / 7.5, 1.0], rel=1e-3)
-    assert np.isfinite(luck(np.array([1.0, 0.1]))).all()
+    assert peak_bias(np.array([10.0, 1e4])) == pytest.approx([10.0 / 7.5, 1.0], rel=1e-3)
+    assert np.isfinite(peak_bias(np.array([1.0, 0.1]))).all()
 
 
 def test_unseen_neighbours_act_like_noise_of_their_power():
