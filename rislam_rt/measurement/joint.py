@@ -1,4 +1,4 @@
-"""ComponentErrors from the joint bound of all paths: what overlapping signals cost each other, and what cannot be told apart."""
+"""Errors from the joint bound of all paths: what overlapping signals cost each other, and what cannot be told apart."""
 
 import numpy as np
 

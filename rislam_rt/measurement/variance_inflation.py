@@ -1,4 +1,4 @@
-"""What the bound at an estimate leaves out: the luck of a peak, neighbours too faint to be found, mirrored directions.
+"""What the bound at an estimate leaves out: the bias of a peak, neighbours too faint to be found, mirrored directions.
 
 A bound knows the paths that were found and takes their amplitudes for true. The errors are larger, and a filter that
 believes the bound alone is sure of what is wrong.
@@ -61,9 +61,9 @@ def mirror_variance(cosines: Floats, deviation: Floats, radio: RadioConfig) -> F
     period = 1.0 / radio.array.spacing
     image = cosines - period * np.where(cosines < 0.0, -1.0, 1.0)
     other = cosines[:, ::-1]
-    sure, doubt = (
+    sure, inflation = (
         scipy.special.ndtr((np.sqrt(np.maximum(1.0 - other**2, 0.0)) - np.abs(x)) / np.maximum(deviation, 1e-12))
         for x in (cosines, image)
     )
     aperture = np.array([radio.array.rows, radio.array.cols]) > 1
-    return aperture * period**2 * doubt / np.maximum(sure + doubt, 1e-12)
+    return aperture * period**2 * inflation / np.maximum(sure + inflation, 1e-12)

@@ -65,7 +65,7 @@ class TracedChannel:
         shades = {n: s.shade.triangles for n, s in enumerate(scene.scatterers) if s.shade is not None}
         if scene.shades:
             shades[ALONE] = np.concatenate([shade.triangles for shade in scene.shades])
-        self.stage = build_tracer_scene(self.walls, radio.carrier, room_center(scene), shades)
+        self.tracer_scene = build_tracer_scene(self.walls, radio.carrier, room_center(scene), shades)
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Every path of every cycle, with the panel at level 0."""
@@ -76,7 +76,7 @@ class TracedChannel:
             panel, behind, front = self.scene.panel_number(number), -1, None
             if panel >= 0:
                 behind, front = self.walls.hosts[panel], self.scene.panels[panel].spec.normal
-            spared = number if number in self.stage.shades else -1
+            spared = number if number in self.tracer_scene.shades else -1
             for from_rx, device in ((False, tx), (True, rx)):
                 problems.append(Problem(device, point[None], heading, from_rx, False, behind, front, spared))
         (direct, *legs), complete = self._trace(problems)
@@ -100,9 +100,9 @@ class TracedChannel:
         for spared in dict.fromkeys(problem.spared for problem in problems):
             chosen = [number for number, problem in enumerate(problems) if problem.spared == spared]
             depth = self.depth if len(self.walls) else 0
-            batch = build_batch([problems[number] for number in chosen], self.stage, self._sides, depth)
+            batch = build_batch([problems[number] for number in chosen], self.tracer_scene, self._sides, depth)
             complete &= batch.complete
-            blocks = in_blocks(batch.candidates(self.stage), BLOCK_ROWS)
+            blocks = in_blocks(batch.candidates(self.tracer_scene), BLOCK_ROWS)
             found = join_found([self._solve(batch, rows, spared) for rows in blocks])
             legs |= dict(zip(chosen, batch.legs(found), strict=True))
         return [legs[number] for number in range(len(problems))], complete
@@ -112,9 +112,11 @@ class TracedChannel:
         from rislam_rt.channel.traced.fields import leg_coefficients
         from rislam_rt.channel.traced.visibility import visible_rows
 
-        rows, vertices = visible_rows(self.stage, batch.all_sequences, batch.far, batch.device, candidates, spared)
+        rows, vertices = visible_rows(
+            self.tracer_scene, batch.all_sequences, batch.far, batch.device, candidates, spared
+        )
         sequences, ends = batch.all_sequences[rows.sequence], batch.ends(rows)
         exact = refined_geometry(self.walls, sequences, ends.device, ends.far)
-        coefficient = leg_coefficients(self.stage, self.walls, sequences, ends, exact, self.antennas)
-        course = exact if self.refine else traced_geometry(sequences, ends.device, ends.far, vertices)
-        return Found(rows, course, coefficient)
+        coefficient = leg_coefficients(self.tracer_scene, self.walls, sequences, ends, exact, self.antennas)
+        geometry = exact if self.refine else traced_geometry(sequences, ends.device, ends.far, vertices)
+        return Found(rows, geometry, coefficient)

@@ -1,6 +1,6 @@
 """Candidates worth a ray: those whose bounces on the unbounded planes come near their walls.
 
-A lossless sieve in front of the tracer. In a furnished room one candidate in a hundred survives it, and asking the
+A lossless test in front of the tracer. In a furnished room one candidate in a hundred survives it, and asking the
 tracer costs twenty times as much as sifting.
 """
 
@@ -23,7 +23,7 @@ BLOCK = 4_000_000
 
 
 def cull_candidates(
-    stage: TracerScene, sequences: Integers, device: Floats, far: Floats
+    tracer_scene: TracerScene, sequences: Integers, device: Floats, far: Floats
 ) -> Iterator[tuple[Integers, Integers]]:
     """Pairs (device, sequence), in blocks, out of all devices (N, 3) with all sequences (S, D).
 
@@ -33,7 +33,7 @@ def cull_candidates(
     if count == 0:
         yield np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
         return
-    ends = as_points(device - stage.origin), as_points(far - stage.origin)
+    ends = as_points(device - tracer_scene.origin), as_points(far - tracer_scene.origin)
     step = max(1, BLOCK // count)
     for first in range(0, len(sequences), step):
         part = sequences[first : first + step]
@@ -43,20 +43,20 @@ def cull_candidates(
         device_point = dr.gather(mi.Point3f, ends[0], row)
         far_point = dr.gather(mi.Point3f, ends[1], row if len(far) > 1 else dr.zeros(mi.UInt, 1))
         walls = [dr.gather(mi.UInt, as_indices(wall), column) for wall in part.T]
-        kept = np.array(dr.compress(_near_walls(stage, walls, device_point, far_point)), dtype=np.int64)
+        kept = np.array(dr.compress(_near_walls(tracer_scene, walls, device_point, far_point)), dtype=np.int64)
         yield kept % count, kept // count + first
 
 
-def _near_walls(stage: TracerScene, walls: list[mi.UInt], device: mi.Point3f, far: mi.Point3f) -> mi.Bool:
+def _near_walls(tracer_scene: TracerScene, walls: list[mi.UInt], device: mi.Point3f, far: mi.Point3f) -> mi.Bool:
     """Whether the mirror path over `walls` could bounce on every one of them.
 
     The margin is a thousandth of the room: hundreds of times what float32 leaves uncertain. Where both ends of a bounce
     are that near the plane the bounce may be anywhere along, and stays.
     """
-    sieve, margin = stage.sieve, stage.sieve.margin
+    wall_boxes, margin = tracer_scene.wall_boxes, tracer_scene.wall_boxes.margin
     real = [wall != _NO_WALL for wall in walls]
-    normal = [dr.gather(mi.Vector3f, sieve.normal, wall, here) for wall, here in zip(walls, real, strict=True)]
-    offset = [dr.gather(mi.Float, sieve.offset, wall, here) for wall, here in zip(walls, real, strict=True)]
+    normal = [dr.gather(mi.Vector3f, wall_boxes.normal, wall, here) for wall, here in zip(walls, real, strict=True)]
+    offset = [dr.gather(mi.Float, wall_boxes.offset, wall, here) for wall, here in zip(walls, real, strict=True)]
     images: list[Any] = [far]
     for n, o, here in zip(normal[::-1], offset[::-1], real[::-1], strict=True):
         images.insert(0, dr.select(here, images[0] - 2.0 * (dr.dot(n, images[0]) - o) * n, images[0]))
@@ -66,8 +66,8 @@ def _near_walls(stage: TracerScene, walls: list[mi.UInt], device: mi.Point3f, fa
         a, b = dr.dot(n, point) - o, dr.dot(n, image) - o
         fraction = dr.clip(dr.select(a != b, a / (a - b), 0.5), 0.0, 1.0)
         hit = point + fraction * (image - point)
-        away = dr.abs(hit - dr.gather(mi.Point3f, sieve.center, wall, here))
-        inside = dr.all(away <= dr.gather(mi.Vector3f, sieve.half, wall, here) + margin)
+        away = dr.abs(hit - dr.gather(mi.Point3f, wall_boxes.center, wall, here))
+        inside = dr.all(away <= dr.gather(mi.Vector3f, wall_boxes.half, wall, here) + margin)
         along = dr.maximum(dr.abs(a), dr.abs(b)) < margin
         crosses = (a * b < 0.0) | (dr.minimum(dr.abs(a), dr.abs(b)) < margin)
         keep &= ~here | (crosses & inside) | along

@@ -114,9 +114,9 @@ def trace_diffuse_paths(
     if config.scattering > 0.0 or config.diffraction or own:
         start_tracer()
         origin = room_center(scene)
-        stage = _rough_stage(scene, radio.carrier, origin, config.scattering)
+        tracer_scene = _rough_stage(scene, radio.carrier, origin, config.scattering)
         for cycle, (tx, rx) in enumerate(zip(trajectory.tx - origin, trajectory.rx - origin, strict=True)):
-            solved.append(_solve(stage, tx, rx, origin, config, config.scattering > 0.0 or own))
+            solved.append(_solve(tracer_scene, tx, rx, origin, config, config.scattering > 0.0 or own))
             cycles.append(np.full(len(solved[-1].kind), cycle))
     columns = SolvedPaths(*(np.concatenate(column) for column in zip(*solved, strict=True)))
     antennas = np.sqrt(radio.tx_gain * radio.rx_gain) * np.exp(-2j * np.pi * radio.carrier * columns.tau)
@@ -130,9 +130,11 @@ def _rough_stage(scene: Scene, carrier: float, origin: Floats, scattering: float
     from rislam_rt.channel.traced.rough import rough_material
     from rislam_rt.channel.traced.tracer_scene import build_mesh
 
-    stage = rt.load_scene()
-    stage.frequency = carrier
-    stage.tx_array = stage.rx_array = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
+    tracer_scene = rt.load_scene()
+    tracer_scene.frequency = carrier
+    tracer_scene.tx_array = tracer_scene.rx_array = rt.PlanarArray(
+        num_rows=1, num_cols=1, pattern="iso", polarization="V"
+    )
     walls, absorber = build_walls(scene), rt.AbsorberRadioMaterial("shade")
     objects = []
     for scatterer in scene.scatterers:
@@ -147,17 +149,19 @@ def _rough_stage(scene: Scene, carrier: float, origin: Floats, scattering: float
         mesh = build_mesh(f"walls-{number}", walls.triangles[wanted] - origin)
         rough = rough_material(material, number, scattering)
         objects.append(rt.SceneObject(mesh, f"walls-{number}", radio_material=rough, remove_duplicate_vertices=True))
-    stage.add([*objects, rt.Transmitter("tx", [0.0, 0.0, 0.0]), rt.Receiver("rx", [0.0, 0.0, 0.0])])
-    return stage
+    tracer_scene.add([*objects, rt.Transmitter("tx", [0.0, 0.0, 0.0]), rt.Receiver("rx", [0.0, 0.0, 0.0])])
+    return tracer_scene
 
 
-def _solve(stage: Any, tx: Floats, rx: Floats, origin: Floats, config: DiffuseConfig, diffuse: bool) -> SolvedPaths:
+def _solve(
+    tracer_scene: Any, tx: Floats, rx: Floats, origin: Floats, config: DiffuseConfig, diffuse: bool
+) -> SolvedPaths:
     """Sionna's paths between positions about the origin, the purely specular ones left out."""
     import sionna.rt as rt
 
-    stage.get("tx").position, stage.get("rx").position = tx.tolist(), rx.tolist()
+    tracer_scene.get("tx").position, tracer_scene.get("rx").position = tx.tolist(), rx.tolist()
     paths = rt.PathSolver(deterministic=True)(
-        stage,
+        tracer_scene,
         max_depth=config.depth,
         max_num_paths_per_src=10 * config.samples,
         samples_per_src=config.samples,

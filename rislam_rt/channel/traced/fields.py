@@ -1,4 +1,4 @@
-"""What walls and antennas do to the signal along given courses: Sionna's materials and patterns, fields in float64.
+"""What walls and antennas do to the signal along given geometries: Sionna's materials and patterns, fields in float64.
 
 Sionna carries a field in the (theta, phi) basis of the ray's direction, in float32. That basis turns over at the pole:
 within 1e-3 rad of the vertical Sionna takes another one, in which a bounce off floor or ceiling is a mirror image, and
@@ -30,7 +30,7 @@ is then 0, for all segments of a leg alike."""
 
 
 def leg_coefficients(
-    stage: TracerScene, walls: Walls, sequences: Integers, ends: Ends, course: PathGeometry, antennas: Antennas
+    tracer_scene: TracerScene, walls: Walls, sequences: Integers, ends: Ends, geometry: PathGeometry, antennas: Antennas
 ) -> Complexes:
     """Field (N,) of legs over `sequences` (N, D), without spreading loss and carrier phase.
 
@@ -40,11 +40,11 @@ def leg_coefficients(
     """
     if len(sequences) == 0:
         return np.zeros(0, dtype=np.complex128)
-    travel = segment_directions(walls, sequences, course.at_device)
+    travel = segment_directions(walls, sequences, geometry.at_device)
     field = _radiated(antennas, travel[:, 0], ends.heading, ends.from_rx, antennas.of_tx)
     for bounce, wall in enumerate(sequences.T):
-        for number, material in enumerate(stage.materials):
-            rows = np.flatnonzero((wall != NO_WALL) & (stage.material_of_wall[wall] == number))
+        for number, material in enumerate(tracer_scene.materials):
+            rows = np.flatnonzero((wall != NO_WALL) & (tracer_scene.material_of_wall[wall] == number))
             if len(rows):
                 normal = walls.normal[wall[rows]]
                 jones = _jones(material, travel[rows, bounce], travel[rows, bounce + 1], normal)

@@ -46,7 +46,7 @@ def length_gradients(
         raise TraceError("path lengths: a gradient was asked for where there is no path; ask where `valid` holds")
     tx, rx = _tx_legs(channel, trajectory, paths, cycle, path), _rx_legs(channel, trajectory, paths, cycle, path)
     landmark = paths.landmark[path]
-    spared = np.where(np.isin(landmark, list(channel.stage.shades)), landmark, -1)
+    spared = np.where(np.isin(landmark, list(channel.tracer_scene.shades)), landmark, -1)
     gradient = np.zeros((len(path), 3))
     for shade in np.unique(spared):
         every, joined = np.flatnonzero(spared == shade), np.flatnonzero((spared == shade) & (landmark >= 0))
@@ -90,12 +90,12 @@ def _differentiate(channel: TracedChannel, legs: MovingLegs, spared: int) -> Flo
         return np.zeros((0, 3))
     shift = dr.zeros(mi.Point3f, count)
     dr.enable_grad(shift)
-    origin = channel.stage.origin
+    origin = channel.tracer_scene.origin
     device = as_points(legs.device - origin) + shift
     far = as_points(legs.far - origin) + dr.select(mi.Bool(legs.far_moves), shift, mi.Point3f(0.0))
     index = np.arange(count)
     points = attached_vertices(
-        channel.stage, legs.sequences, far, device, CandidateIndices(index, index, index), spared
+        channel.tracer_scene, legs.sequences, far, device, CandidateIndices(index, index, index), spared
     )
     bounces = (legs.sequences != NO_WALL).sum(axis=1)
     length, last = mi.Float(0.0), far

@@ -62,13 +62,15 @@ class Found(NamedTuple):
     """N legs that the tracer confirmed."""
 
     rows: CandidateIndices
-    course: PathGeometry
+    geometry: PathGeometry
     coefficient: Complexes
     """(N,) field without spreading loss and carrier phase: the product of the reflections."""
 
     def only(self, keep: Integers) -> "Found":
         """The legs chosen."""
-        return Found(self.rows.only(keep), PathGeometry(*(part[keep] for part in self.course)), self.coefficient[keep])
+        return Found(
+            self.rows.only(keep), PathGeometry(*(part[keep] for part in self.geometry)), self.coefficient[keep]
+        )
 
 
 class Batch(NamedTuple):
@@ -89,13 +91,13 @@ class Batch(NamedTuple):
         """(S, D) of all problems."""
         return np.concatenate(self.sequences)
 
-    def candidates(self, stage: "TracerScene") -> Iterator[CandidateIndices]:
+    def candidates(self, tracer_scene: "TracerScene") -> Iterator[CandidateIndices]:
         """All rows worth tracing."""
         from rislam_rt.channel.traced.culling import cull_candidates
 
         first_device = first_far = first_sequence = 0
         for problem, sequences in zip(self.problems, self.sequences, strict=True):
-            for device, sequence in cull_candidates(stage, sequences, problem.device, problem.far):
+            for device, sequence in cull_candidates(tracer_scene, sequences, problem.device, problem.far):
                 far = device if problem.paired else np.zeros_like(device)
                 yield CandidateIndices(far + first_far, device + first_device, sequence + first_sequence)
             first_device += len(problem.device)
@@ -131,14 +133,14 @@ class Batch(NamedTuple):
         return result
 
 
-def build_batch(problems: Sequence[Problem], stage: "TracerScene", sides: Integers, depth: int) -> Batch:
+def build_batch(problems: Sequence[Problem], tracer_scene: "TracerScene", sides: Integers, depth: int) -> Batch:
     """Enumerate the wall sequences of every problem up to `depth` bounces."""
     from rislam_rt.channel.traced.cones import build_cones
 
-    walls, sequences, complete = stage.walls, [], True
+    walls, sequences, complete = tracer_scene.walls, [], True
     for problem in problems:
         device_side, far_side = (np.bitwise_or.reduce(point_sides(walls, p)) for p in (problem.device, problem.far))
-        cones = partial(build_cones, stage, problem.device, problem.far)
+        cones = partial(build_cones, tracer_scene, problem.device, problem.far)
         table, all_of_them = possible_sequences(sides, device_side, far_side, depth, walls.beside(problem.host), cones)
         sequences.append(table)
         complete &= all_of_them
@@ -149,10 +151,10 @@ def build_batch(problems: Sequence[Problem], stage: "TracerScene", sides: Intege
 
 def join_found(parts: list[Found]) -> Found:
     """All legs, one part after the other."""
-    courses = zip(*(part.course for part in parts), strict=True)
+    geometries = zip(*(part.geometry for part in parts), strict=True)
     return Found(
         join_indices([part.rows for part in parts]),
-        PathGeometry(*(np.concatenate(column) for column in courses)),
+        PathGeometry(*(np.concatenate(column) for column in geometries)),
         np.concatenate([part.coefficient for part in parts]),
     )
 
@@ -168,10 +170,10 @@ def _lifted(problem: Problem, walls: Walls) -> Floats:
 
 def _as_legs(problem: Problem, sequences: Integers, device: Integers, column: Integers, found: Found) -> Legs:
     """Scatter found legs into dense arrays, one column a sequence that some device has."""
-    course = found.course
+    geometry = found.geometry
     keep = np.ones(len(device), dtype=np.bool_)
     if problem.front is not None:
-        keep = course.at_far_end @ problem.front > SURFACE_TOLERANCE
+        keep = geometry.at_far_end @ problem.front > SURFACE_TOLERANCE
     columns, place = np.unique(column[keep], return_inverse=True)
     shape = len(problem.device), len(columns)
 
@@ -183,9 +185,9 @@ def _as_legs(problem: Problem, sequences: Integers, device: Integers, column: In
     return Legs(
         walls=sequences[columns],
         valid=dense(np.ones(len(device), dtype=np.bool_)),
-        length=dense(course.length),
-        at_device=dense(course.at_device),
-        at_far_end=dense(course.at_far_end),
+        length=dense(geometry.length),
+        at_device=dense(geometry.at_device),
+        at_far_end=dense(geometry.at_far_end),
         coefficient=dense(found.coefficient),
-        vertices=dense(course.vertices),
+        vertices=dense(geometry.vertices),
     )

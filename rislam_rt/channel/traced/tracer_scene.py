@@ -62,7 +62,7 @@ class TracerScene:
     """All radio materials of walls."""
     material_of_wall: Integers
     """(W,) index into `materials`."""
-    sieve: WallBoxes
+    wall_boxes: WallBoxes
     views: dict[int, mi.Scene]
     """Everything (`NO_SHADE`), and for each scatterer with a shade everything but that shade."""
     shades: dict[int, mi.Scene]
@@ -105,7 +105,7 @@ class TracerScene:
 
 
 def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, shades: Mapping[int, Floats]) -> TracerScene:
-    """Put walls and shades on stage at the carrier [Hz]: meshes built in memory about `origin`, faces in their order.
+    """Put walls and shades into a scene of the tracer at the carrier [Hz]: meshes about `origin`, faces in order.
 
     Parameters
     ----------
@@ -182,13 +182,13 @@ def _numbered(
         first,
         walls.wall_of_triangle[rows],
         *materials,
-        _sieve(walls, origin),
+        _wall_boxes(walls, origin),
         views,
         shades,
     )
 
 
-def _sieve(walls: Walls, origin: Floats) -> WallBoxes:
+def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
     """Planes and bounds about the origin."""
     low, high = np.full((len(walls), 3), np.inf), np.full((len(walls), 3), -np.inf)
     np.minimum.at(low, walls.wall_of_triangle, walls.triangles.min(axis=1) - origin)

@@ -15,22 +15,22 @@ __all__ = ["find_errors", "find_warnings", "material_errors"]
 
 def find_errors(scene: Scene, file: str) -> list[Finding]:
     """What makes a scene unusable. Damaged meshes hide the rest, which could not be computed."""
-    soup = build_triangle_array(scene, file)
-    return [*name_errors(soup), *face_errors(soup), *shade_face_errors(soup)] or [
-        *scatterer_errors(soup),
-        *shade_errors(soup),
-        *panel_errors(soup),
-        *agent_errors(soup),
+    room = build_triangle_array(scene, file)
+    return [*name_errors(room), *face_errors(room), *shade_face_errors(room)] or [
+        *scatterer_errors(room),
+        *shade_errors(room),
+        *panel_errors(room),
+        *agent_errors(room),
     ]
 
 
 def find_warnings(scene: Scene, file: str, radio: RadioConfig) -> list[Finding]:
     """What may be meant but seldom is, and what is worth knowing, of a scene whose meshes are not damaged."""
-    soup = build_triangle_array(scene, file)
+    room = build_triangle_array(scene, file)
     return [
-        *mesh_warnings(soup),
-        *wall_findings(soup),
-        *panel_warnings(soup, radio),
-        *cylinder_warnings(soup, radio),
-        *agent_warnings(soup, radio),
+        *mesh_warnings(room),
+        *wall_findings(room),
+        *panel_warnings(room, radio),
+        *cylinder_warnings(room, radio),
+        *agent_warnings(room, radio),
     ]

@@ -32,57 +32,57 @@ class Parts(NamedTuple):
         return int(np.searchsorted(self.first, wall, side="right")) - 1
 
 
-def build_parts(soup: TriangleArray) -> Parts:
+def build_parts(room: TriangleArray) -> Parts:
     """Part every mesh into walls, as the channels do."""
-    flat = [flat_parts(r.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for r in soup.scene.reflectors]
+    flat = [flat_parts(r.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for r in room.scene.reflectors]
     first = np.cumsum([0, *(len(part.offset) for part in flat)])
     owner = np.concatenate([part.group + start for part, start in zip(flat, first, strict=False)])
     return Parts(flat, first, owner)
 
 
-def wall_findings(soup: TriangleArray) -> Iterator[Finding]:
+def wall_findings(room: TriangleArray) -> Iterator[Finding]:
     """Meshes that lie on each other, meshes that are nearly flat, and how many walls a mesh has."""
-    parts = build_parts(soup)
-    yield from _stacked(soup, parts)
+    parts = build_parts(room)
+    yield from _stacked(room, parts)
     for number, part in enumerate(parts.flat):
-        count, name = len(part.offset), soup.scene.reflectors[number].name
+        count, name = len(part.offset), room.scene.reflectors[number].name
         if count < 2:
             continue
         field = f"reflector[{number}].mesh ({name})"
-        yield soup.note(field, f"the mesh has {count} planes", f"its walls are {name}#0 to {name}#{count - 1}")
-        angle = _flattest(soup.triangles[soup.owner == number], part)
+        yield room.note(field, f"the mesh has {count} planes", f"its walls are {name}#0 to {name}#{count - 1}")
+        angle = _flattest(room.triangles[room.owner == number], part)
         if angle < NEARLY_FLAT:
             message = f"splits into {count} walls, of which neighbours meet at only {angle:.1e} rad"
-            yield soup.warning(
+            yield room.warning(
                 field, message, f"if that is one wall, make it flat to {COPLANAR_OFFSET} m and {COPLANAR_ANGLE} rad"
             )
 
 
-def _stacked(soup: TriangleArray, parts: Parts) -> Iterator[Finding]:
+def _stacked(room: TriangleArray, parts: Parts) -> Iterator[Finding]:
     """One finding for each pair of meshes, with the largest gap of their walls; a note where nobody sees it."""
     normal = np.concatenate([part.normal for part in parts.flat])
     offset = np.concatenate([part.offset for part in parts.flat])
-    limit = tracer_gap(soup.bounds)
+    limit = tracer_gap(room.bounds)
     worst: dict[tuple[int, int, bool], Lying] = {}
-    for pair in stack_walls(soup.triangles, parts.owner, normal, offset, limit).pairs:
+    for pair in stack_walls(room.triangles, parts.owner, normal, offset, limit).pairs:
         upper, lower = parts.reflector(pair.upper), parts.reflector(pair.lower)
-        key = upper, lower, _is_seen(soup, soup.triangles[parts.owner == pair.upper], upper)
+        key = upper, lower, _is_seen(room, room.triangles[parts.owner == pair.upper], upper)
         if key not in worst or worst[key].gap < pair.gap:
             worst[key] = pair
     for (upper, lower, seen), pair in worst.items():
-        names = soup.scene.reflectors[upper].name, soup.scene.reflectors[lower].name
+        names = room.scene.reflectors[upper].name, room.scene.reflectors[lower].name
         message = f"'{names[0]}' lies in the plane of '{names[1]}', {pair.gap:.1e} m apart"
         mend = f"where they overlap '{names[0]}' reflects; leave one out, or part them by more than {limit:.1e} m"
-        yield (soup.warning if seen else soup.note)(f"reflector[{upper}].mesh ({names[0]})", message, mend)
+        yield (room.warning if seen else room.note)(f"reflector[{upper}].mesh ({names[0]})", message, mend)
 
 
-def _is_seen(soup: TriangleArray, wall: Floats, reflector: int) -> bool:
+def _is_seen(room: TriangleArray, wall: Floats, reflector: int) -> bool:
     """Whether a wall (T, 3, 3) has a side in the room; the foot of a crate has its inside above and nothing below."""
     normal, _ = triangle_planes(wall)
     middle = wall.mean(axis=1)
     sides = np.concatenate([middle + MIN_CLEARANCE * normal, middle - MIN_CLEARANCE * normal])
-    inside = np.delete(sides, soup.outside(sides), axis=0)
-    own = soup.triangles[soup.owner == reflector]
+    inside = np.delete(sides, room.outside(sides), axis=0)
+    own = room.triangles[room.owner == reflector]
     return any(abs(winding(point, own)) < 0.5 for point in inside[:: max(1, len(inside) // 8)])
 
 

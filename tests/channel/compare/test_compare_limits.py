@@ -146,7 +146,7 @@ def test_float32_slabs_are_within_their_limit(rooms):
 
     cosine = np.linspace(2e-3, 1.0, 3001)
     assert len(materials) >= 30
-    for material, theirs in zip(materials, channel.stage.materials, strict=True):
+    for material, theirs in zip(materials, channel.tracer_scene.materials, strict=True):
         found = incidence_jones(theirs, cosine)
         permittivity = np.array(relative_permittivity(material.itu, RADIO.carrier))
         te, tm = slab_coefficients(cosine, permittivity, np.array(material.thickness), RADIO.carrier)

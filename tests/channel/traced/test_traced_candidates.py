@@ -67,7 +67,7 @@ def test_nothing_that_the_tracer_would_confirm_is_left_out(rooms, room, paired):
     everything = np.concatenate([np.full((1, 2), NO_WALL), [[a, NO_WALL] for a in range(count)], everything])
     row, column = (index.ravel() for index in np.indices((len(device), len(everything))))
     rows = CandidateIndices(row if paired else np.zeros_like(row), row, column)
-    confirmed, _ = visible_rows(channel.stage, everything, far, device, rows)
+    confirmed, _ = visible_rows(channel.tracer_scene, everything, far, device, rows)
     exists = {(int(d), tuple(everything[s])) for d, s in zip(confirmed.device, confirmed.sequence, strict=True)}
     assert len(exists) > 150
 
@@ -75,7 +75,7 @@ def test_nothing_that_the_tracer_would_confirm_is_left_out(rooms, room, paired):
     table, _ = possible_sequences(wall_sides(channel.walls), *ends, 2)
     asked = {
         (int(d), tuple(table[s]))
-        for devices, chosen in cull_candidates(channel.stage, table, device, far)
+        for devices, chosen in cull_candidates(channel.tracer_scene, table, device, far)
         for d, s in zip(devices, chosen, strict=True)
     }
     assert exists <= asked
