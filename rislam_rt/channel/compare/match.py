@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, Certifier, Identity
+from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, DifferenceExplainer, Identity
 from rislam_rt.channel.compare.limits import Limits, Precision, coherent_scale, with_mirrors
 from rislam_rt.channel.compare.report import OneSided, PathReport
 from rislam_rt.channel.image_source import ImageSourceChannel
@@ -79,7 +79,7 @@ def compare_paths(
     columns = _align(traced, analytic)
     in_traced, in_analytic = _valid(traced, columns.traced), _valid(analytic, columns.analytic)
     depth = min(traced.tx_walls.shape[1], analytic.tx_walls.shape[1])
-    certifier = Certifier.of(scene, trajectory, depth, shortest_segment)
+    certifier = DifferenceExplainer.of(scene, trajectory, depth, shortest_segment)
     one_sided = [
         _certify(certifier, columns.identity[path], int(cycle), bool(in_traced[cycle, path]))
         for cycle, path in np.argwhere(in_traced != in_analytic)
@@ -135,7 +135,7 @@ def _valid(paths: Paths, column: Integers) -> Booleans:
     return valid
 
 
-def _certify(certifier: Certifier, identity: Identity, cycle: int, is_traced: bool) -> OneSided:
+def _certify(certifier: DifferenceExplainer, identity: Identity, cycle: int, is_traced: bool) -> OneSided:
     """The record of one one-sided path."""
     side = "traced" if is_traced else "analytic"
     proof = certifier.explain(identity, cycle, side)
