@@ -41,7 +41,7 @@ SLAB_STEPS = 8.0
 """Roundings in a slab's coefficient, each worth u of it and, through the phase across the slab, of that phase."""
 
 
-class Limits(NamedTuple):
+class ErrorLimits(NamedTuple):
     """Largest errors (M,) that precision and geometry explain."""
 
     length: Floats
@@ -56,7 +56,7 @@ class Limits(NamedTuple):
     """[rad]."""
 
 
-class Shape(NamedTuple):
+class PathLegs(NamedTuple):
     """The two legs (M, 2) of matched paths; a path without a landmark has one, the other is all zeros."""
 
     length: Floats
@@ -73,7 +73,7 @@ class Shape(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Precision:
+class RoomPrecision:
     """What one room, one radio and one kind of numbers leave uncertain."""
 
     scene: Scene
@@ -92,7 +92,7 @@ class Precision:
     """(W,) error of the field at a bounce, relative to the incident one."""
 
     @classmethod
-    def of(cls, scene: Scene, radio: RadioConfig, *, single: bool) -> "Precision":
+    def of(cls, scene: Scene, radio: RadioConfig, *, single: bool) -> "RoomPrecision":
         """Precision of the tracer's own float32 numbers, which it computes about the room's middle, or of float64."""
         walls = build_walls(scene)
         u = SINGLE if single else DOUBLE
@@ -102,7 +102,9 @@ class Precision:
         field = np.array([field_error(m, radio.carrier) for m in walls.material])
         return cls(scene, radio, u, extent, RAY_OFFSET if single else 0.0, 2.0 * off, 4.0 * off / altitude, field)
 
-    def limits(self, paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, scale: Floats) -> Limits:
+    def limits(
+        self, paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, scale: Floats
+    ) -> ErrorLimits:
         """Limits of paths (cycle[i], path[i]) of the exact side; `scale` (M,) is their coherent scale."""
         shape = _shape(paths, cycle, path, trajectory, build_walls(self.scene).names)
         reach = self.extent + shape.length
@@ -123,9 +125,9 @@ class Precision:
         gain += self._landmark(paths, cycle, path, trajectory, turn) + self._patterns(paths, cycle, path)
         share = np.minimum(gain * scale / np.maximum(np.abs(paths.gain[cycle, path]), np.finfo(np.float64).tiny), 1.0)
         phase = 2.0 * np.pi / self.radio.wavelength * length + np.where(share < 1.0, np.arcsin(share), np.pi)
-        return Limits(length, gain, np.minimum(phase, np.pi), angle[:, 0], angle[:, 1])
+        return ErrorLimits(length, gain, np.minimum(phase, np.pi), angle[:, 0], angle[:, 1])
 
-    def _field(self, shape: Shape) -> Floats:
+    def _field(self, shape: PathLegs) -> Floats:
         """(M,) what the materials and antennas may be off, relative to the scale."""
         error = np.full(len(shape.length), 4.0 * FIELD_STEPS * SINGLE)
         for walls in shape.walls:
@@ -159,7 +161,7 @@ class Precision:
 
 
 def coherent_scale(
-    paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, precision: Precision
+    paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, precision: RoomPrecision
 ) -> Floats:
     """(M,) what errors of a gain are relative to: the sum of the magnitudes of all that contributes to it.
 
@@ -204,7 +206,7 @@ def _polyline(paths: Paths, cycle: Integers, path: Integers, trajectory: Traject
     return np.concatenate([tx, np.where(there[..., None], paths.vertices[cycle, path], rx), rx], axis=1)
 
 
-def _shape(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, names: tuple[str, ...]) -> Shape:
+def _shape(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, names: tuple[str, ...]) -> PathLegs:
     """Measure the legs of paths (cycle[i], path[i]); walls as numbers among `names`."""
     segment = np.linalg.norm(np.diff(_polyline(paths, cycle, path, trajectory), axis=1), axis=-1)
     row, on_tx = np.arange(len(path)), (paths.tx_walls[path] >= 0).sum(axis=1)
@@ -217,7 +219,7 @@ def _shape(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory
     segments = [there * first_leg, there * ~first_leg]
     number = np.array([names.index(name) for name in paths.walls] + [-1])
     walls = [number[paths.tx_walls[path]], number[paths.rx_walls[path]]]
-    return Shape(
+    return PathLegs(
         length, np.stack([(w >= 0).sum(axis=1) for w in walls], axis=-1), at_device, at_landmark, segments, walls
     )
 

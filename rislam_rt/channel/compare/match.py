@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, DifferenceExplainer, Identity
-from rislam_rt.channel.compare.limits import Limits, Precision, coherent_scale, with_mirrors
+from rislam_rt.channel.compare.limits import ErrorLimits, RoomPrecision, coherent_scale, with_mirrors
 from rislam_rt.channel.compare.report import OneSided, PathReport
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.image_source.antennas import peak_amplitude
@@ -40,7 +40,7 @@ class Matched(NamedTuple):
     """(M,) column."""
     scale: Floats
     """(M,) coherent scale of the gain."""
-    limits: Limits
+    limits: ErrorLimits
 
 
 _RADIO = RadioConfig()
@@ -85,7 +85,7 @@ def compare_paths(
         for cycle, path in np.argwhere(in_traced != in_analytic)
     ]
     cycle, path = np.nonzero(in_traced & in_analytic)
-    precision = Precision.of(scene, radio, single=is_single(traced.source))
+    precision = RoomPrecision.of(scene, radio, single=is_single(traced.source))
     scale = _scale(analytic, columns.identity, (cycle, columns.analytic[path], path), trajectory, precision)
     limits = precision.limits(analytic, cycle, columns.analytic[path], trajectory, scale)
     labels = tuple(certifier.label(identity) for identity in columns.identity)
@@ -98,7 +98,7 @@ def _scale(
     identity: list[Identity],
     matched: tuple[Integers, Integers, Integers],
     trajectory: Trajectory,
-    precision: Precision,
+    precision: RoomPrecision,
 ) -> Floats:
     """(M,) coherent scale of matched paths, given by cycle, analytic column and identity."""
     cycle, column, path = matched

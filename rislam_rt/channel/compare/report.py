@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers, freeze
-from rislam_rt.channel.compare.limits import Limits
+from rislam_rt.channel.compare.limits import ErrorLimits
 from rislam_rt.model import PathKind
 
 MOST_LISTED = 20
@@ -72,7 +72,7 @@ class PathReport:
     """(M,) [rad] angle between the directions of departure."""
     aoa_error: Floats
     """(M,) [rad] angle between the directions of arrival."""
-    limits: Limits
+    limits: ErrorLimits
     """Of `length_error`, `gain_error`, `phase_error`, `aod_error` and `aoa_error`."""
     one_sided: tuple[OneSided, ...]
     searched: dict[str, str]
