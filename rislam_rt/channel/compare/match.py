@@ -17,7 +17,7 @@ from rislam_rt.geometry.angles import angle_between
 from rislam_rt.model import Antennas, Paths, RadioConfig, Scene, Trajectory
 
 
-class Columns(NamedTuple):
+class IdentityColumns(NamedTuple):
     """For every identity that either side knows: its column on each side, -1 where it is unknown there."""
 
     identity: list[Identity]
@@ -112,12 +112,12 @@ def _scale(
     return peak_amplitude(antennas) * coherent_scale(unit, cycle, columns, trajectory, precision)
 
 
-def _align(traced: Paths, analytic: Paths) -> Columns:
+def _align(traced: Paths, analytic: Paths) -> IdentityColumns:
     """The union of both sides' identities."""
     sides = [{named_identity(paths, p): p for p in range(paths.num_paths)} for paths in (traced, analytic)]
     identity = sorted(sides[0].keys() | sides[1].keys())
     here = [np.array([side.get(i, -1) for i in identity], dtype=np.int64) for side in sides]
-    return Columns(identity, here[0], here[1])
+    return IdentityColumns(identity, here[0], here[1])
 
 
 def named_identity(paths: Paths, path: int) -> Identity:
