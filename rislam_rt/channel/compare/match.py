@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, DifferenceExplainer, Identity
 from rislam_rt.channel.compare.limits import ErrorLimits, RoomPrecision, coherent_scale, with_mirrors
-from rislam_rt.channel.compare.report import OneSided, PathReport
+from rislam_rt.channel.compare.report import OneSidedPath, PathReport
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.image_source.antennas import peak_amplitude
 from rislam_rt.constants import SPEED_OF_LIGHT
@@ -135,18 +135,18 @@ def _valid(paths: Paths, column: Integers) -> Booleans:
     return valid
 
 
-def _certify(certifier: DifferenceExplainer, identity: Identity, cycle: int, is_traced: bool) -> OneSided:
+def _certify(certifier: DifferenceExplainer, identity: Identity, cycle: int, is_traced: bool) -> OneSidedPath:
     """The record of one one-sided path."""
     side = "traced" if is_traced else "analytic"
     proof = certifier.explain(identity, cycle, side)
-    return OneSided(cycle, certifier.label(identity), side, proof.reason, proof.text, proof.size)
+    return OneSidedPath(cycle, certifier.label(identity), side, proof.reason, proof.text, proof.size)
 
 
 def _report(
     traced: Paths,
     analytic: Paths,
     matched: Matched,
-    one_sided: list[OneSided],
+    one_sided: list[OneSidedPath],
 ) -> PathReport:
     """Errors of the matched paths."""
     at_traced, at_analytic = (matched.cycle, matched.traced), (matched.cycle, matched.analytic)
