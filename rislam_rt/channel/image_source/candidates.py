@@ -6,7 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.image_source.beams import Balls, Found, enclosing_balls, group_positions, search_beams
+from rislam_rt.channel.image_source.beams import (
+    BoundingBalls,
+    FoundSequences,
+    enclosing_balls,
+    group_positions,
+    search_beams,
+)
 from rislam_rt.channel.image_source.clusters import Clusters, build_clusters
 from rislam_rt.channel.image_source.facets import Facets
 from rislam_rt.channel.image_source.sequences import wall_sequences
@@ -68,13 +74,13 @@ def candidate_rows(
     groups = group_positions(np.concatenate([device, far], axis=1) if len(far) > 1 else device, search.near)
     devices = enclosing_balls(device, groups)
     number = np.arange(len(groups))
-    far_balls = enclosing_balls(far, groups) if len(far) > 1 else Balls(far, np.zeros(1))
+    far_balls = enclosing_balls(far, groups) if len(far) > 1 else BoundingBalls(far, np.zeros(1))
     pairs = np.stack([number, number if len(far) > 1 else np.zeros_like(number)], axis=-1)
     for found in search_beams(search.clusters, devices, far_balls, pairs, depth, barred):
         yield from _rows(found, groups)
 
 
-def _rows(found: Found, groups: list[Integers]) -> Iterator[tuple[Integers, Integers]]:
+def _rows(found: FoundSequences, groups: list[Integers]) -> Iterator[tuple[Integers, Integers]]:
     """Every cycle of each device ball, in blocks."""
     if len(found.device) == 0:
         return
