@@ -29,7 +29,7 @@ _ROWS = 200_000
 SEARCHES = ("auto", "exhaustive", "beams")
 
 
-class Search(NamedTuple):
+class SequenceSearch(NamedTuple):
     """How sequences are looked for, and in which walls."""
 
     facets: Facets
@@ -44,16 +44,16 @@ class Search(NamedTuple):
         return "all wall sequences" if self.exhaustive else "mirrored beams"
 
 
-def build_search(facets: Facets, depth: int, how: str) -> Search:
+def build_search(facets: Facets, depth: int, how: str) -> SequenceSearch:
     """Choose by the number of sequences that W walls make, unless told."""
     count = sum(len(facets) * max(len(facets) - 1, 0) ** (bounces - 1) for bounces in range(1, depth + 1))
     diagonal = np.linalg.norm(facets.box[1].max(axis=0) - facets.box[0].min(axis=0)) if len(facets) else 0.0
     exhaustive = how == "exhaustive" or (how == "auto" and count <= FEW)
-    return Search(facets, build_clusters(facets), exhaustive, NEAR * float(diagonal))
+    return SequenceSearch(facets, build_clusters(facets), exhaustive, NEAR * float(diagonal))
 
 
 def candidate_rows(
-    search: Search, device: Floats, far: Floats, depth: int, host: int
+    search: SequenceSearch, device: Floats, far: Floats, depth: int, host: int
 ) -> Iterator[tuple[Integers, Integers]]:
     """Cycles (N,) and wall sequences (N, d) from device to far end, in blocks of one d each.
 

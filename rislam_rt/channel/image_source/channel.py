@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.image_source.antennas import Terminals
-from rislam_rt.channel.image_source.candidates import SEARCHES, Search, build_search
+from rislam_rt.channel.image_source.candidates import SEARCHES, SequenceSearch, build_search
 from rislam_rt.channel.image_source.facets import Facets, build_facets
 from rislam_rt.channel.image_source.fresnel import Coatings, build_coatings
 from rislam_rt.channel.image_source.images import find_legs
@@ -41,7 +41,7 @@ class ImageSourceChannel:
     walls: Walls = field(init=False)
     facets: Facets = field(init=False)
     coatings: Coatings = field(init=False)
-    looked: Search = field(init=False)
+    looked: SequenceSearch = field(init=False)
 
     def __post_init__(self) -> None:
         expect("scene", self.scene, Scene)

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.image_source.antennas import Terminals
-from rislam_rt.channel.image_source.candidates import Search, candidate_rows
+from rislam_rt.channel.image_source.candidates import SequenceSearch, candidate_rows
 from rislam_rt.channel.image_source.facets import SEAM, Facets
 from rislam_rt.channel.image_source.fresnel import Coatings
 from rislam_rt.channel.legs import Legs
@@ -29,7 +29,7 @@ class Rays(NamedTuple):
 
 
 def find_legs(
-    search: Search,
+    search: SequenceSearch,
     coatings: Coatings,
     device: Floats,
     far: Floats,
