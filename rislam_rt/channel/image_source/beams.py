@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.image_source.clusters import Clusters
+from rislam_rt.channel.image_source.clusters import WallClusters
 from rislam_rt.channel.image_source.rectangles import Rectangles
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.geometry.planes import mirror
@@ -78,7 +78,7 @@ class FoundSequences(NamedTuple):
 
 
 def search_beams(
-    clusters: Clusters, device: BoundingBalls, far: BoundingBalls, pairs: Integers, depth: int, barred: Booleans
+    clusters: WallClusters, device: BoundingBalls, far: BoundingBalls, pairs: Integers, depth: int, barred: Booleans
 ) -> Iterator[FoundSequences]:
     """Sequences of 1 to `depth` walls, in blocks.
 
@@ -104,7 +104,7 @@ def search_beams(
 
 
 def _followed(
-    clusters: Clusters, beams: Beams, device: BoundingBalls, far: BoundingBalls, pairs: Integers, more: int
+    clusters: WallClusters, beams: Beams, device: BoundingBalls, far: BoundingBalls, pairs: Integers, more: int
 ) -> Iterator[FoundSequences]:
     """The sequences of these beams, and of up to `more` walls put in front."""
     yield _reaching(beams, device, pairs)

@@ -13,7 +13,7 @@ from rislam_rt.channel.image_source.beams import (
     group_positions,
     search_beams,
 )
-from rislam_rt.channel.image_source.clusters import Clusters, build_clusters
+from rislam_rt.channel.image_source.clusters import WallClusters, build_clusters
 from rislam_rt.channel.image_source.facets import Facets
 from rislam_rt.channel.image_source.sequences import wall_sequences
 
@@ -33,7 +33,7 @@ class SequenceSearch(NamedTuple):
     """How sequences are looked for, and in which walls."""
 
     facets: Facets
-    clusters: Clusters
+    clusters: WallClusters
     exhaustive: bool
     near: float
     """[m] Largest radius of positions that share beams."""
