@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.image_source.facets import Facets, build_facets
+from rislam_rt.channel.image_source.facets import WallFacets, build_facets
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import RAY_OFFSET
@@ -76,7 +76,7 @@ class DifferenceExplainer:
     shortest: float
     """[m] Segments below this are lost by the tracer."""
     names: tuple[str, ...]
-    facets: Facets
+    facets: WallFacets
     edges: Floats
     """(E, 2, 3) [m] outline edges of all walls."""
     wall_of_edge: Integers
@@ -266,7 +266,7 @@ class DifferenceExplainer:
         return distance if inside else -distance
 
 
-def _tilts(facets: Facets, center: Floats) -> Floats:
+def _tilts(facets: WallFacets, center: Floats) -> Floats:
     """(W,) [rad] how far rounded corners can turn the normal of each wall's largest triangle."""
     corners = facets.corners - center
     sides = np.roll(corners, -1, axis=1) - corners

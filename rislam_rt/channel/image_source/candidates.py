@@ -14,7 +14,7 @@ from rislam_rt.channel.image_source.beams import (
     search_beams,
 )
 from rislam_rt.channel.image_source.clusters import WallClusters, build_clusters
-from rislam_rt.channel.image_source.facets import Facets
+from rislam_rt.channel.image_source.facets import WallFacets
 from rislam_rt.channel.image_source.sequences import wall_sequences
 
 FEW = 2000
@@ -32,7 +32,7 @@ SEARCHES = ("auto", "exhaustive", "beams")
 class SequenceSearch(NamedTuple):
     """How sequences are looked for, and in which walls."""
 
-    facets: Facets
+    facets: WallFacets
     clusters: WallClusters
     exhaustive: bool
     near: float
@@ -44,7 +44,7 @@ class SequenceSearch(NamedTuple):
         return "all wall sequences" if self.exhaustive else "mirrored beams"
 
 
-def build_search(facets: Facets, depth: int, how: str) -> SequenceSearch:
+def build_search(facets: WallFacets, depth: int, how: str) -> SequenceSearch:
     """Choose by the number of sequences that W walls make, unless told."""
     count = sum(len(facets) * max(len(facets) - 1, 0) ** (bounces - 1) for bounces in range(1, depth + 1))
     diagonal = np.linalg.norm(facets.box[1].max(axis=0) - facets.box[0].min(axis=0)) if len(facets) else 0.0

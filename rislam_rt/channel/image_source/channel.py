@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.image_source.antennas import Terminals
 from rislam_rt.channel.image_source.candidates import SEARCHES, SequenceSearch, build_search
-from rislam_rt.channel.image_source.facets import Facets, build_facets
+from rislam_rt.channel.image_source.facets import WallFacets, build_facets
 from rislam_rt.channel.image_source.fresnel import Coatings, build_coatings
 from rislam_rt.channel.image_source.images import find_legs
 from rislam_rt.channel.legs import Legs
@@ -39,7 +39,7 @@ class ImageSourceChannel:
     antennas: Antennas | None = None
     """Patterns and polarisation of the agent's antennas, if they are others than the radio's."""
     walls: Walls = field(init=False)
-    facets: Facets = field(init=False)
+    facets: WallFacets = field(init=False)
     coatings: Coatings = field(init=False)
     looked: SequenceSearch = field(init=False)
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.image_source.facets import Facets
+from rislam_rt.channel.image_source.facets import WallFacets
 from rislam_rt.channel.image_source.rectangles import Rectangles
 from rislam_rt.constants import SURFACE_TOLERANCE
 
@@ -47,7 +47,7 @@ class WallClusters(NamedTuple):
         return np.concatenate(rows_found), np.concatenate(walls_found)
 
 
-def build_clusters(facets: Facets) -> WallClusters:
+def build_clusters(facets: WallFacets) -> WallClusters:
     """Rectangles of all walls, parted into clusters by halving along the longer side of what they fill."""
     rectangles = facets.rectangles
     members: list[Integers] = []

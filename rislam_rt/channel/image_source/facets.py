@@ -25,7 +25,7 @@ FRONT, BACK = 1, 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Facets:
+class WallFacets:
     """W walls, their T triangles sorted by wall."""
 
     normal: Floats
@@ -155,7 +155,7 @@ class Facets:
         return bits
 
 
-def build_facets(walls: Walls) -> Facets:
+def build_facets(walls: Walls) -> WallFacets:
     """Sort the triangles by wall."""
     order = np.argsort(walls.wall_of_triangle, kind="stable")
     corners = walls.triangles[order]
@@ -168,7 +168,7 @@ def build_facets(walls: Walls) -> Facets:
         extent[:, rows] = distance.min(axis=1), distance.max(axis=1)
     starts = 3 * first[:-1]
     box = [op.reduceat(points, starts, axis=0) if len(points) else points for op in (np.minimum, np.maximum)]
-    return Facets(
+    return WallFacets(
         normal=walls.normal,
         offset=walls.offset,
         first=first,

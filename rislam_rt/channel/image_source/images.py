@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.image_source.antennas import Terminals
 from rislam_rt.channel.image_source.candidates import SequenceSearch, candidate_rows
-from rislam_rt.channel.image_source.facets import SEAM, Facets
+from rislam_rt.channel.image_source.facets import SEAM, WallFacets
 from rislam_rt.channel.image_source.fresnel import Coatings
 from rislam_rt.channel.legs import Legs
 from rislam_rt.constants import SURFACE_TOLERANCE
@@ -75,7 +75,7 @@ def _direct_rays(device: Floats, far: Floats) -> Rays:
     return Rays(np.arange(cycles), nothing, np.zeros((cycles, 0, 3)), np.broadcast_to(far, device.shape))
 
 
-def _reflected_rays(facets: Facets, cycle: Integers, walls: Integers, device: Floats, far: Floats) -> Rays:
+def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device: Floats, far: Floats) -> Rays:
     """The legs of cycles (N,) over walls (N, d) whose every bounce lies on its wall; occlusion is not looked at."""
     images = [far[cycle if len(far) > 1 else np.zeros_like(cycle)]]
     for wall in walls.T[::-1]:
@@ -105,7 +105,7 @@ def _plane_crossing(
 
 
 def _visible(
-    facets: Facets,
+    facets: WallFacets,
     rays: Rays,
     device: Floats,
     far: Floats,
@@ -133,7 +133,7 @@ def _visible(
 
 
 def _legs(
-    facets: Facets,
+    facets: WallFacets,
     coatings: Coatings,
     found: list[Rays],
     device: Floats,
