@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.compose import compose_paths
-from rislam_rt.channel.image_source.antennas import Terminals
+from rislam_rt.channel.image_source.antennas import LegEnds
 from rislam_rt.channel.image_source.candidates import SEARCHES, SequenceSearch, build_search
 from rislam_rt.channel.image_source.facets import WallFacets, build_facets
 from rislam_rt.channel.image_source.fresnel import Coatings, build_coatings
@@ -62,7 +62,7 @@ class ImageSourceChannel:
         tx, rx = trajectory.tx, trajectory.rx
         ends = self.antennas or self.radio.antennas
         at = {
-            end: None if ends.plain else Terminals(*pair, trajectory.heading)
+            end: None if ends.plain else LegEnds(*pair, trajectory.heading)
             for end, pair in (
                 ("direct", (ends.of_tx, ends.of_rx)),
                 ("tx", (ends.of_tx, ends.of_landmark)),
@@ -86,7 +86,7 @@ class ImageSourceChannel:
         """The same paths under another code."""
         return rephase(paths, code)
 
-    def _landmark_legs(self, device: Floats, number: int, terminals: Terminals | None) -> Legs:
+    def _landmark_legs(self, device: Floats, number: int, terminals: LegEnds | None) -> Legs:
         """Legs from device positions (K, 3) to a landmark; those to a panel arrive at its front."""
         panel = self.scene.panel_number(number)
         point = self.scene.landmark_positions[number : number + 1]

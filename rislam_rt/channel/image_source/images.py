@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.image_source.antennas import Terminals
+from rislam_rt.channel.image_source.antennas import LegEnds
 from rislam_rt.channel.image_source.candidates import SequenceSearch, candidate_rows
 from rislam_rt.channel.image_source.facets import SEAM, WallFacets
 from rislam_rt.channel.image_source.fresnel import Coatings
@@ -38,7 +38,7 @@ def find_legs(
     host: int = -1,
     front: Floats | None = None,
     landmark: int = -1,
-    terminals: Terminals | None = None,
+    terminals: LegEnds | None = None,
 ) -> Legs:
     """Every specular leg of up to `depth` bounces from device positions (K, 3) to far ends (K, 3) or (1, 3) [m].
 
@@ -139,7 +139,7 @@ def _legs(
     device: Floats,
     far: Floats,
     depth: int,
-    terminals: Terminals | None,
+    terminals: LegEnds | None,
 ) -> Legs:
     """Rays scattered into dense arrays, one column a sequence that some cycle has."""
     cycles = len(device)
