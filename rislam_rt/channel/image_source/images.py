@@ -15,7 +15,7 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import mirror, mirror_direction
 
 
-class Rays(NamedTuple):
+class ImageRays(NamedTuple):
     """N legs found, one row each: cycle (N,), walls (N, d), bounce points (N, d, 3) and the far end's image (N, 3)."""
 
     cycle: Integers
@@ -23,9 +23,9 @@ class Rays(NamedTuple):
     bounces: Floats
     image: Floats
 
-    def only(self, keep: Booleans) -> "Rays":
+    def only(self, keep: Booleans) -> "ImageRays":
         """The rows where `keep` (N,) holds."""
-        return Rays(self.cycle[keep], self.walls[keep], self.bounces[keep], self.image[keep])
+        return ImageRays(self.cycle[keep], self.walls[keep], self.bounces[keep], self.image[keep])
 
 
 def find_legs(
@@ -63,19 +63,19 @@ def find_legs(
     return _legs(facets, coatings, [rays for rays in visible if len(rays.cycle)], device, far, depth, terminals)
 
 
-def _joined(parts: list[Rays]) -> Rays:
+def _joined(parts: list[ImageRays]) -> ImageRays:
     """All rays of one number of bounces."""
-    return Rays(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    return ImageRays(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def _direct_rays(device: Floats, far: Floats) -> Rays:
+def _direct_rays(device: Floats, far: Floats) -> ImageRays:
     """The legs without a bounce."""
     cycles = len(device)
     nothing = np.zeros((cycles, 0), dtype=np.int64)
-    return Rays(np.arange(cycles), nothing, np.zeros((cycles, 0, 3)), np.broadcast_to(far, device.shape))
+    return ImageRays(np.arange(cycles), nothing, np.zeros((cycles, 0, 3)), np.broadcast_to(far, device.shape))
 
 
-def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device: Floats, far: Floats) -> Rays:
+def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device: Floats, far: Floats) -> ImageRays:
     """The legs of cycles (N,) over walls (N, d) whose every bounce lies on its wall; occlusion is not looked at."""
     images = [far[cycle if len(far) > 1 else np.zeros_like(cycle)]]
     for wall in walls.T[::-1]:
@@ -90,7 +90,7 @@ def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device
         on_wall = facets.reflects(hit, wall[crosses])
         row, point = row[np.flatnonzero(crosses)[on_wall]], hit[on_wall]
         bounces[row, bounce] = point
-    return Rays(cycle[row], walls[row], bounces[row], images[0][row])
+    return ImageRays(cycle[row], walls[row], bounces[row], images[0][row])
 
 
 def _plane_crossing(
@@ -106,14 +106,14 @@ def _plane_crossing(
 
 def _visible(
     facets: WallFacets,
-    rays: Rays,
+    rays: ImageRays,
     device: Floats,
     far: Floats,
     blockers: Integers,
     host: int,
     front: Floats | None,
     landmark: int,
-) -> Rays:
+) -> ImageRays:
     """The legs that nothing hides and that reach a panel at the far end from its front."""
     count, bounces = rays.walls.shape
     target = np.broadcast_to(far, device.shape)[rays.cycle]
@@ -135,7 +135,7 @@ def _visible(
 def _legs(
     facets: WallFacets,
     coatings: Coatings,
-    found: list[Rays],
+    found: list[ImageRays],
     device: Floats,
     far: Floats,
     depth: int,
@@ -144,7 +144,7 @@ def _legs(
     """Rays scattered into dense arrays, one column a sequence that some cycle has."""
     cycles = len(device)
     columns: list[Integers] = []
-    parts: list[tuple[Integers, Integers, Rays]] = []
+    parts: list[tuple[Integers, Integers, ImageRays]] = []
     for rays in found:
         unique, column = np.unique(rays.walls, axis=0, return_inverse=True)
         parts.append((rays.cycle, column.ravel() + sum(len(c) for c in columns), rays))
