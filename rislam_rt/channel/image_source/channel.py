@@ -9,7 +9,7 @@ from rislam_rt.channel.image_source.candidates import SEARCHES, SequenceSearch, 
 from rislam_rt.channel.image_source.facets import WallFacets, build_facets
 from rislam_rt.channel.image_source.fresnel import Coatings, build_coatings
 from rislam_rt.channel.image_source.images import find_legs
-from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.errors import ConfigError, expect
 from rislam_rt.model import Antennas, Paths, RadioConfig, RisCode, Scene, Trajectory
@@ -86,7 +86,7 @@ class ImageSourceChannel:
         """The same paths under another code."""
         return rephase(paths, code)
 
-    def _landmark_legs(self, device: Floats, number: int, terminals: LegEnds | None) -> Legs:
+    def _landmark_legs(self, device: Floats, number: int, terminals: LegEnds | None) -> SpecularLegs:
         """Legs from device positions (K, 3) to a landmark; those to a panel arrive at its front."""
         panel = self.scene.panel_number(number)
         point = self.scene.landmark_positions[number : number + 1]

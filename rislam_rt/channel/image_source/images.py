@@ -9,7 +9,7 @@ from rislam_rt.channel.image_source.antennas import LegEnds
 from rislam_rt.channel.image_source.candidates import SequenceSearch, candidate_rows
 from rislam_rt.channel.image_source.facets import SEAM, WallFacets
 from rislam_rt.channel.image_source.fresnel import Coatings
-from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import mirror, mirror_direction
@@ -39,7 +39,7 @@ def find_legs(
     front: Floats | None = None,
     landmark: int = -1,
     terminals: LegEnds | None = None,
-) -> Legs:
+) -> SpecularLegs:
     """Every specular leg of up to `depth` bounces from device positions (K, 3) to far ends (K, 3) or (1, 3) [m].
 
     Parameters
@@ -140,7 +140,7 @@ def _legs(
     far: Floats,
     depth: int,
     terminals: LegEnds | None,
-) -> Legs:
+) -> SpecularLegs:
     """Rays scattered into dense arrays, one column a sequence that some cycle has."""
     cycles = len(device)
     columns: list[Integers] = []
@@ -169,7 +169,7 @@ def _legs(
         else:
             coefficient[place] = terminals.coefficient(coatings, rays.walls, normals, unit(ray), cycle)
         vertices[cycle, column, : rays.walls.shape[1]] = rays.bounces
-    return Legs(walls, valid, length, at_device, at_far_end, coefficient, vertices)
+    return SpecularLegs(walls, valid, length, at_device, at_far_end, coefficient, vertices)
 
 
 def _followed(direction: Floats, normals: Floats) -> Floats:

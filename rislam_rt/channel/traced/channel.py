@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rislam_rt.channel.compose import compose_paths
-from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_blocks
 from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, DiffusePaths, trace_diffuse_paths
@@ -93,9 +93,9 @@ class TracedChannel:
         """Diffuse scattering and diffraction, if switched on: paths without an analytic twin, apart from `paths`."""
         return trace_diffuse_paths(self.scene, self.radio, trajectory, config)
 
-    def _trace(self, problems: Sequence[Problem]) -> tuple[list[Legs], bool]:
+    def _trace(self, problems: Sequence[Problem]) -> tuple[list[SpecularLegs], bool]:
         """Solve problems of one view of the room together, block by block; also whether all sequences were asked."""
-        legs: dict[int, Legs] = {}
+        legs: dict[int, SpecularLegs] = {}
         complete = True
         for spared in dict.fromkeys(problem.spared for problem in problems):
             chosen = [number for number, problem in enumerate(problems) if problem.spared == spared]

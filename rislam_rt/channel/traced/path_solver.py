@@ -13,7 +13,7 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.channel.compose import compose_paths
-from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.traced.path_geometry import traced_geometry
 from rislam_rt.channel.traced.start import start_tracer
 from rislam_rt.channel.walls import Walls, build_walls
@@ -129,7 +129,7 @@ def _solve(
     return found
 
 
-def _legs(rows: list[Row], device: Floats, far: Floats, depth: int, radio: RadioConfig) -> Legs:
+def _legs(rows: list[Row], device: Floats, far: Floats, depth: int, radio: RadioConfig) -> SpecularLegs:
     """Legs (K, S) of all rows; of two with one identity in one cycle the first."""
     first = {(row.cycle, row.walls): row for row in reversed(rows)}
     columns = sorted({walls for _, walls in first}, key=lambda walls: (len(walls), walls))
@@ -150,7 +150,7 @@ def _legs(rows: list[Row], device: Floats, far: Floats, depth: int, radio: Radio
         values[place] = part
         return values
 
-    return Legs(
+    return SpecularLegs(
         walls=table,
         valid=dense(np.ones(len(cycle), dtype=np.bool_)),
         length=dense(length),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
-from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.traced.candidate_indices import CandidateIndices, join_indices
 from rislam_rt.channel.traced.limits import LIFT
 from rislam_rt.channel.traced.path_geometry import PathGeometry
@@ -117,7 +117,7 @@ class Batch(NamedTuple):
         """Which problems start, and which end, at the Rx."""
         return [problem.from_rx for problem in self.problems], [problem.to_rx for problem in self.problems]
 
-    def legs(self, found: Found) -> list[Legs]:
+    def legs(self, found: Found) -> list[SpecularLegs]:
         """The tracer's answers, problem by problem."""
         result = []
         first_device = first_sequence = 0
@@ -168,7 +168,7 @@ def _lifted(problem: Problem, walls: Walls) -> Floats:
     return problem.far + np.maximum(LIFT - height, 0.0)[:, None] * problem.front
 
 
-def _as_legs(problem: Problem, sequences: Integers, device: Integers, column: Integers, found: Found) -> Legs:
+def _as_legs(problem: Problem, sequences: Integers, device: Integers, column: Integers, found: Found) -> SpecularLegs:
     """Scatter found legs into dense arrays, one column a sequence that some device has."""
     geometry = found.geometry
     keep = np.ones(len(device), dtype=np.bool_)
@@ -182,7 +182,7 @@ def _as_legs(problem: Problem, sequences: Integers, device: Integers, column: In
         values[device[keep], place] = part[keep]
         return values
 
-    return Legs(
+    return SpecularLegs(
         walls=sequences[columns],
         valid=dense(np.ones(len(device), dtype=np.bool_)),
         length=dense(geometry.length),
