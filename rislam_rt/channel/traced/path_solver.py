@@ -22,7 +22,7 @@ from rislam_rt.errors import TraceError
 from rislam_rt.model import Paths, RadioConfig, Scene, Trajectory
 
 
-class Row(NamedTuple):
+class SolverLeg(NamedTuple):
     """One leg of one cycle as Sionna has it."""
 
     cycle: int
@@ -55,7 +55,7 @@ def solve_file(
     tracer_scene, number_of = _load(Path(file), scene, radio)
     points = scene.landmark_positions
     ends = {"tx": trajectory.tx, "rx": trajectory.rx}
-    rows: dict[tuple[str, int], list[Row]] = {(end, far): [] for end in ends for far in range(len(points) + 1)}
+    rows: dict[tuple[str, int], list[SolverLeg]] = {(end, far): [] for end in ends for far in range(len(points) + 1)}
     for n, point in enumerate([trajectory.rx[0], *points]):
         tracer_scene.add(_receiver(f"far-{n}", point))
     for cycle in range(len(trajectory)):
@@ -103,7 +103,7 @@ def _receiver(name: str, point: Floats) -> Any:
 
 def _solve(
     tracer_scene: Any, cycle: int, depth: int, samples: int, number_of: dict[int, int], walls: Walls
-) -> list[tuple[int, Row]]:
+) -> list[tuple[int, SolverLeg]]:
     """(far end, leg) of all that Sionna finds from one place of a device."""
     import sionna.rt as rt
 
@@ -124,12 +124,12 @@ def _solve(
         met = [(int(objects[step, far, p]), int(primitives[step, far, p])) for step in steps]
         if all(thing in number_of for thing, _ in met):  # what only hides reflects nothing
             sequence = tuple(int(walls.wall_of_triangle[number_of[thing] + t]) for thing, t in met)
-            row = Row(cycle, sequence, float(tau[far, p]), complex(field[far, p]), vertices[:, far, p])
+            row = SolverLeg(cycle, sequence, float(tau[far, p]), complex(field[far, p]), vertices[:, far, p])
             found.append((int(far), row))
     return found
 
 
-def _legs(rows: list[Row], device: Floats, far: Floats, depth: int, radio: RadioConfig) -> SpecularLegs:
+def _legs(rows: list[SolverLeg], device: Floats, far: Floats, depth: int, radio: RadioConfig) -> SpecularLegs:
     """Legs (K, S) of all rows; of two with one identity in one cycle the first."""
     first = {(row.cycle, row.walls): row for row in reversed(rows)}
     columns = sorted({walls for _, walls in first}, key=lambda walls: (len(walls), walls))
