@@ -11,7 +11,7 @@ from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_bloc
 from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, DiffusePaths, trace_diffuse_paths
 from rislam_rt.channel.traced.limits import room_center
 from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
-from rislam_rt.channel.traced.problem import Batch, Found, Problem, build_batch, join_found
+from rislam_rt.channel.traced.problem import FoundLegs, LegQuery, QueryBatch, build_batch, join_found
 from rislam_rt.channel.traced.sequences import wall_sides
 from rislam_rt.channel.traced.start import start_tracer
 from rislam_rt.channel.walls import build_walls
@@ -71,14 +71,14 @@ class TracedChannel:
         """Every path of every cycle, with the panel at level 0."""
         expect("trajectory", trajectory, Trajectory)
         tx, rx, heading = trajectory.tx, trajectory.rx, trajectory.heading
-        problems = [Problem(tx, rx, heading, to_rx=True)]
+        problems = [LegQuery(tx, rx, heading, to_rx=True)]
         for number, point in enumerate(self.scene.landmark_positions):
             panel, behind, front = self.scene.panel_number(number), -1, None
             if panel >= 0:
                 behind, front = self.walls.hosts[panel], self.scene.panels[panel].spec.normal
             spared = number if number in self.tracer_scene.shades else -1
             for from_rx, device in ((False, tx), (True, rx)):
-                problems.append(Problem(device, point[None], heading, from_rx, False, behind, front, spared))
+                problems.append(LegQuery(device, point[None], heading, from_rx, False, behind, front, spared))
         (direct, *legs), complete = self._trace(problems)
         tx_legs, rx_legs = legs[0::2], legs[1::2]
         searched = "all wall sequences" if complete else "wall sequences in cones"
@@ -93,7 +93,7 @@ class TracedChannel:
         """Diffuse scattering and diffraction, if switched on: paths without an analytic twin, apart from `paths`."""
         return trace_diffuse_paths(self.scene, self.radio, trajectory, config)
 
-    def _trace(self, problems: Sequence[Problem]) -> tuple[list[SpecularLegs], bool]:
+    def _trace(self, problems: Sequence[LegQuery]) -> tuple[list[SpecularLegs], bool]:
         """Solve problems of one view of the room together, block by block; also whether all sequences were asked."""
         legs: dict[int, SpecularLegs] = {}
         complete = True
@@ -107,7 +107,7 @@ class TracedChannel:
             legs |= dict(zip(chosen, batch.legs(found), strict=True))
         return [legs[number] for number in range(len(problems))], complete
 
-    def _solve(self, batch: Batch, candidates: CandidateIndices, spared: int) -> Found:
+    def _solve(self, batch: QueryBatch, candidates: CandidateIndices, spared: int) -> FoundLegs:
         """Ask the tracer which candidates exist, and what their walls do to the signal."""
         from rislam_rt.channel.traced.fields import leg_coefficients
         from rislam_rt.channel.traced.visibility import visible_rows
@@ -119,4 +119,4 @@ class TracedChannel:
         exact = refined_geometry(self.walls, sequences, ends.device, ends.far)
         coefficient = leg_coefficients(self.tracer_scene, self.walls, sequences, ends, exact, self.antennas)
         geometry = exact if self.refine else traced_geometry(sequences, ends.device, ends.far, vertices)
-        return Found(rows, geometry, coefficient)
+        return FoundLegs(rows, geometry, coefficient)

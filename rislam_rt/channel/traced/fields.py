@@ -18,7 +18,7 @@ from sionna.rt.utils import spectrum_to_matrix_4f
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.traced.material import ConstantReflection
 from rislam_rt.channel.traced.path_geometry import PathGeometry, segment_directions
-from rislam_rt.channel.traced.problem import Ends
+from rislam_rt.channel.traced.problem import LegEndpoints
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.traced.tracer_scene import TracerScene
 from rislam_rt.channel.walls import Walls
@@ -30,7 +30,12 @@ is then 0, for all segments of a leg alike."""
 
 
 def leg_coefficients(
-    tracer_scene: TracerScene, walls: Walls, sequences: Integers, ends: Ends, geometry: PathGeometry, antennas: Antennas
+    tracer_scene: TracerScene,
+    walls: Walls,
+    sequences: Integers,
+    ends: LegEndpoints,
+    geometry: PathGeometry,
+    antennas: Antennas,
 ) -> Complexes:
     """Field (N,) of legs over `sequences` (N, D), without spreading loss and carrier phase.
 

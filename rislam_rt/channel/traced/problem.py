@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rislam_rt.channel.traced.tracer_scene import TracerScene
 
 
-class Problem(NamedTuple):
+class LegQuery(NamedTuple):
     """Legs sought: devices (N, 3) each to its far end (N, 3), or all to one (1, 3) [m]."""
 
     device: Floats
@@ -43,7 +43,7 @@ class Problem(NamedTuple):
         return len(self.far) != 1
 
 
-class Ends(NamedTuple):
+class LegEndpoints(NamedTuple):
     """What the two ends of N legs are."""
 
     device: Floats
@@ -58,7 +58,7 @@ class Ends(NamedTuple):
     """(N,)."""
 
 
-class Found(NamedTuple):
+class FoundLegs(NamedTuple):
     """N legs that the tracer confirmed."""
 
     rows: CandidateIndices
@@ -66,17 +66,17 @@ class Found(NamedTuple):
     coefficient: Complexes
     """(N,) field without spreading loss and carrier phase: the product of the reflections."""
 
-    def only(self, keep: Integers) -> "Found":
+    def only(self, keep: Integers) -> "FoundLegs":
         """The legs chosen."""
-        return Found(
+        return FoundLegs(
             self.rows.only(keep), PathGeometry(*(part[keep] for part in self.geometry)), self.coefficient[keep]
         )
 
 
-class Batch(NamedTuple):
+class QueryBatch(NamedTuple):
     """Several problems in one set of tables, so that one solve serves them all."""
 
-    problems: Sequence[Problem]
+    problems: Sequence[LegQuery]
     sequences: list[Integers]
     """For each problem (S, D)."""
     device: Floats
@@ -104,20 +104,20 @@ class Batch(NamedTuple):
             first_far += len(problem.far)
             first_sequence += len(sequences)
 
-    def ends(self, rows: CandidateIndices) -> Ends:
+    def ends(self, rows: CandidateIndices) -> LegEndpoints:
         """The two ends of each row."""
         sizes = [len(problem.device) for problem in self.problems]
         far = np.concatenate([problem.far for problem in self.problems])
         heading = np.concatenate([problem.heading for problem in self.problems])
         from_rx, to_rx = (np.repeat(np.array(flag, dtype=np.bool_), sizes) for flag in self._flags())
         device = rows.device
-        return Ends(self.device[device], far[rows.far], heading[device], from_rx[device], to_rx[device])
+        return LegEndpoints(self.device[device], far[rows.far], heading[device], from_rx[device], to_rx[device])
 
     def _flags(self) -> tuple[list[bool], list[bool]]:
         """Which problems start, and which end, at the Rx."""
         return [problem.from_rx for problem in self.problems], [problem.to_rx for problem in self.problems]
 
-    def legs(self, found: Found) -> list[SpecularLegs]:
+    def legs(self, found: FoundLegs) -> list[SpecularLegs]:
         """The tracer's answers, problem by problem."""
         result = []
         first_device = first_sequence = 0
@@ -133,7 +133,7 @@ class Batch(NamedTuple):
         return result
 
 
-def build_batch(problems: Sequence[Problem], tracer_scene: "TracerScene", sides: Integers, depth: int) -> Batch:
+def build_batch(problems: Sequence[LegQuery], tracer_scene: "TracerScene", sides: Integers, depth: int) -> QueryBatch:
     """Enumerate the wall sequences of every problem up to `depth` bounces."""
     from rislam_rt.channel.traced.cones import build_cones
 
@@ -146,20 +146,20 @@ def build_batch(problems: Sequence[Problem], tracer_scene: "TracerScene", sides:
         complete &= all_of_them
     device = np.concatenate([problem.device for problem in problems])
     far = np.concatenate([_lifted(problem, walls) for problem in problems])
-    return Batch(problems, sequences, device, far, complete)
+    return QueryBatch(problems, sequences, device, far, complete)
 
 
-def join_found(parts: list[Found]) -> Found:
+def join_found(parts: list[FoundLegs]) -> FoundLegs:
     """All legs, one part after the other."""
     geometries = zip(*(part.geometry for part in parts), strict=True)
-    return Found(
+    return FoundLegs(
         join_indices([part.rows for part in parts]),
         PathGeometry(*(np.concatenate(column) for column in geometries)),
         np.concatenate([part.coefficient for part in parts]),
     )
 
 
-def _lifted(problem: Problem, walls: Walls) -> Floats:
+def _lifted(problem: LegQuery, walls: Walls) -> Floats:
     """Far ends (F, 3), a panel's at least `LIFT` in front of its host wall."""
     if problem.host < 0 or problem.front is None:
         return problem.far
@@ -168,7 +168,9 @@ def _lifted(problem: Problem, walls: Walls) -> Floats:
     return problem.far + np.maximum(LIFT - height, 0.0)[:, None] * problem.front
 
 
-def _as_legs(problem: Problem, sequences: Integers, device: Integers, column: Integers, found: Found) -> SpecularLegs:
+def _as_legs(
+    problem: LegQuery, sequences: Integers, device: Integers, column: Integers, found: FoundLegs
+) -> SpecularLegs:
     """Scatter found legs into dense arrays, one column a sequence that some device has."""
     geometry = found.geometry
     keep = np.ones(len(device), dtype=np.bool_)
