@@ -21,7 +21,7 @@ NEAR = 0.02
 """Side of the cells that positions are gathered in, as a share of the room's longest side."""
 
 
-class Ball(NamedTuple):
+class PositionBall(NamedTuple):
     """A ball of positions in the tracer's frame."""
 
     center: tuple[float, float, float]
@@ -32,8 +32,8 @@ class Cones(NamedTuple):
     """Where the ends of the sequences are, in the walls of a tracer scene."""
 
     tracer_scene: "TracerScene"
-    far: list[Ball]
-    device: list[tuple[Ball, Ball]]
+    far: list[PositionBall]
+    device: list[tuple[PositionBall, PositionBall]]
     """Each device ball with its far ball."""
 
     def lead_on(self, walls: Integers) -> Booleans:
@@ -54,7 +54,7 @@ class Cones(NamedTuple):
             keep |= np.array(self._in_cones(columns, ball, target, dr.opaque(mi.Float, device.radius)), dtype=np.bool_)
         return keep
 
-    def _in_cones(self, columns: list[Any], far: Ball, target: Any, size: Any) -> Any:
+    def _in_cones(self, columns: list[Any], far: PositionBall, target: Any, size: Any) -> Any:
         """Whether a target ball meets the cones from a far ball over all the walls, the last being the first met."""
         wall_boxes = self.tracer_scene.wall_boxes
         image: Any = mi.Point3f(*(dr.opaque(mi.Float, x) for x in far.center))
@@ -91,11 +91,11 @@ def build_cones(tracer_scene: "TracerScene", device: Floats, far: Floats) -> Con
     return Cones(tracer_scene, fars, list(zip(devices, fars, strict=True)))
 
 
-def _ball(points: Floats) -> Ball:
+def _ball(points: Floats) -> PositionBall:
     """The ball about the middle of some points (N, 3)."""
     middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
     x, y, z = middle.tolist()
-    return Ball((x, y, z), float(np.linalg.norm(points - middle, axis=-1).max()))
+    return PositionBall((x, y, z), float(np.linalg.norm(points - middle, axis=-1).max()))
 
 
 def _columns(walls: Integers) -> list[Any]:
