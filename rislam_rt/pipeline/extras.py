@@ -54,8 +54,8 @@ def trace_clutter(scene: Scene, radio: RadioConfig, motion: Trajectory, section:
     """
     if not section.wanted:
         return None
-    from rislam_rt.channel.traced.cells import as_paths
     from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, trace_diffuse_paths
+    from rislam_rt.channel.traced.resolution_cells import as_paths
 
     if not section.diffuse:
         smooth = [replace(r, material=replace(r.material, scattering=0.0)) for r in scene.reflectors]
