@@ -13,7 +13,7 @@ from rislam_rt.channel.traced.leg_query import FoundLegs, LegQuery, QueryBatch, 
 from rislam_rt.channel.traced.limits import room_center
 from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
 from rislam_rt.channel.traced.sequences import wall_sides
-from rislam_rt.channel.traced.start import start_tracer
+from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError, expect
 from rislam_rt.model import Antennas, Paths, RadioConfig, RisCode, Scene, Trajectory

@@ -12,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers, freeze
 from rislam_rt.channel.traced.limits import room_center
-from rislam_rt.channel.traced.start import start_tracer
+from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import unit

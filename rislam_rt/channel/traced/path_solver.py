@@ -15,7 +15,7 @@ from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.traced.path_geometry import traced_geometry
-from rislam_rt.channel.traced.start import start_tracer
+from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import TraceError

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.traced import TracedChannel
-from rislam_rt.channel.traced.start import start_tracer
+from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import PathKind, RadioConfig
 
