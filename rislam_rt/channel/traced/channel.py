@@ -9,8 +9,8 @@ from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_blocks
 from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, DiffusePaths, trace_diffuse_paths
+from rislam_rt.channel.traced.float32_limits import room_center
 from rislam_rt.channel.traced.leg_query import FoundLegs, LegQuery, QueryBatch, build_batch, join_found
-from rislam_rt.channel.traced.limits import room_center
 from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
 from rislam_rt.channel.traced.sequences import wall_sides
 from rislam_rt.channel.traced.tracer_startup import start_tracer

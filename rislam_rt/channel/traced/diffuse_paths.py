@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers, freeze
-from rislam_rt.channel.traced.limits import room_center
+from rislam_rt.channel.traced.float32_limits import room_center
 from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError

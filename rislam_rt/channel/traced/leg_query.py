@@ -9,7 +9,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.traced.candidate_indices import CandidateIndices, join_indices
-from rislam_rt.channel.traced.limits import LIFT
+from rislam_rt.channel.traced.float32_limits import LIFT
 from rislam_rt.channel.traced.path_geometry import PathGeometry
 from rislam_rt.channel.traced.sequences import point_sides, possible_sequences
 from rislam_rt.channel.walls import Walls
