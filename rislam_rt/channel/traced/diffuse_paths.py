@@ -127,7 +127,7 @@ def _rough_stage(scene: Scene, carrier: float, origin: Floats, scattering: float
     """The room with scattering walls; corners of one material are joined, so that their edges are known."""
     import sionna.rt as rt
 
-    from rislam_rt.channel.traced.rough import rough_material
+    from rislam_rt.channel.traced.scattering_materials import rough_material
     from rislam_rt.channel.traced.tracer_scene import build_mesh
 
     tracer_scene = rt.load_scene()

@@ -11,7 +11,7 @@ import sionna.rt as rt
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.traced.material import ConstantReflection
-from rislam_rt.channel.traced.rough import PolarisedReflection, slab_of_ones_own
+from rislam_rt.channel.traced.scattering_materials import PolarisedReflection, slab_of_ones_own
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
