@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers, freeze
-from rislam_rt.channel.compare.limits import ErrorLimits
+from rislam_rt.channel.compare.error_limits import ErrorLimits
 from rislam_rt.model import PathKind
 
 MOST_LISTED = 20

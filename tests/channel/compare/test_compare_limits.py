@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.compare import compare_paths
-from rislam_rt.channel.compare.limits import DOUBLE, SINGLE, RoomPrecision, field_error
+from rislam_rt.channel.compare.error_limits import DOUBLE, SINGLE, RoomPrecision, field_error
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.image_source.fresnel import relative_permittivity, slab_coefficients
 from rislam_rt.constants import SPEED_OF_LIGHT
