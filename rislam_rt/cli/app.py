@@ -18,7 +18,7 @@ from rislam_rt.cli import (
     sweep,
     trace,
 )
-from rislam_rt.cli.loudness import with_loudness
+from rislam_rt.cli.verbosity import with_loudness
 
 app = typer.Typer(
     name="rislam-rt",

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
-from rislam_rt.cli.loudness import loudness
+from rislam_rt.cli.verbosity import loudness
 
 if TYPE_CHECKING:
     from rich.progress import TaskID

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.loudness import warn
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, write_json
 from rislam_rt.cli.study import StudyOptions
+from rislam_rt.cli.verbosity import warn
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

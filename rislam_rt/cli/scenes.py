@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rislam_rt.cli.loudness import warn
+from rislam_rt.cli.verbosity import warn
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
