@@ -59,9 +59,9 @@ def _run(heard: list[int]) -> int:
 
 def _tell(error: "RislamError") -> int:
     """Every fault on a line of its own; returns the exit code."""
-    from rislam_rt.cli.verbosity import loudness
+    from rislam_rt.cli.verbosity import verbosity
 
-    if loudness().verbose:
+    if verbosity().verbose:
         import traceback
 
         traceback.print_exception(error)

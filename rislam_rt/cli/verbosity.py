@@ -13,17 +13,17 @@ Verbose = Annotated[
 ]
 
 
-class Loudness(NamedTuple):
+class Verbosity(NamedTuple):
     """What was asked for."""
 
     quiet: bool = False
     verbose: bool = False
 
 
-_now = Loudness()
+_now = Verbosity()
 
 
-def loudness() -> Loudness:
+def verbosity() -> Verbosity:
     """That of the command that runs."""
     return _now
 
@@ -31,7 +31,7 @@ def loudness() -> Loudness:
 def reset() -> None:
     """As before any command."""
     global _now
-    _now = Loudness()
+    _now = Verbosity()
 
 
 def warn(line: str) -> None:
@@ -40,13 +40,13 @@ def warn(line: str) -> None:
         typer.echo(f"warning: {line}", err=True)
 
 
-def with_loudness(command: Callable[..., Any]) -> Callable[..., Any]:
+def with_verbosity(command: Callable[..., Any]) -> Callable[..., Any]:
     """The command with `-q` and `-v` behind its own options."""
 
     @wraps(command)
     def wrapped(*arguments: Any, quiet: bool = False, verbose: bool = False, **options: Any) -> Any:
         global _now
-        _now = Loudness(quiet, verbose)
+        _now = Verbosity(quiet, verbose)
         if not verbose:
             return command(*arguments, **options)
         return _watched(command, *arguments, **options)
