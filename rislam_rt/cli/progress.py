@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rislam_rt.pipeline.sweeps import Cost, Told
 
 
-class Tell(Protocol):
+class ProgressReport(Protocol):
     """Takes news of the work."""
 
     def __call__(self, stage: str, at: int, total: int) -> None:
@@ -21,7 +21,7 @@ class Tell(Protocol):
 
 
 @contextmanager
-def show_progress() -> Iterator[Tell]:
+def show_progress() -> Iterator[ProgressReport]:
     """Show a bar for every stage that news comes of."""
     from rich.console import Console
     from rich.progress import (
