@@ -15,7 +15,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import DataSheet, PathKind, Paths, RadioConfig, RisCode
 
 
-class Interval(NamedTuple):
+class GainInterval(NamedTuple):
     """A curve over K places with its spread."""
 
     middle: Floats
@@ -29,9 +29,9 @@ class Interval(NamedTuple):
 class GainCurves(NamedTuple):
     """Gain of the direct panel path at K places [dB]."""
 
-    optimized: Interval
+    optimized: GainInterval
     """Under the designer's codes: median and quantiles over its seeds."""
-    random: Interval
+    random: GainInterval
     """Under random codes: root mean square (exact), and quantiles over draws."""
     exact: Floats
     """(K,) largest gain that any code of the panel's levels reaches."""
@@ -76,7 +76,7 @@ def gain_curves(
         random[place] = _db(np.sqrt(np.sum(np.abs(target) ** 2))), *np.quantile(drawn, tail[1:])
         exact[place] = _db(exact_code(target, problem.levels)[1])
         continuous[place] = _db(np.abs(target).sum())
-    return GainCurves(Interval(*optimized.T), Interval(*random.T), exact, continuous)
+    return GainCurves(GainInterval(*optimized.T), GainInterval(*random.T), exact, continuous)
 
 
 def direct_only(problem: DesignProblem) -> DesignProblem:
