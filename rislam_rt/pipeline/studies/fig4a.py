@@ -8,7 +8,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.design import DesignProblem, GainCurves, direct_only, gain_curves, problem_from_paths
-from rislam_rt.design.curves import GainInterval
+from rislam_rt.design.gain_curves import GainInterval
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Paths, RadioConfig, RisPanel, Scatterer, Scene, Trajectory
 from rislam_rt.pipeline.radio import build_radio
