@@ -3,7 +3,7 @@
 from rislam_rt.design.belief import design_code, problem_from_belief
 from rislam_rt.design.bound import best_magnitudes, relaxation_bound
 from rislam_rt.design.designers import DESIGNERS, designer
-from rislam_rt.design.dual import dual_bound
+from rislam_rt.design.dual_bound import dual_bound
 from rislam_rt.design.gain_curves import GainCurves, GainInterval, design_along, direct_only, gain_curves
 from rislam_rt.design.objective import Objective, build_objective
 from rislam_rt.design.problem import DesignProblem
