@@ -96,7 +96,7 @@ MUTANTS = (
         "        slope[:, 2 * axes :] = root * measured.unknown", "        slope[:, 2 * axes :] = 0.0",
     ),
     Mutant(
-        "the best code is turned by a level", "design/single.py",
+        "the best code is turned by a level", "design/single_path.py",
         "(passed < best[..., None]) - turn[..., None]) % levels",
         "(passed < best[..., None]) - turn[..., None] + (passed % 2)) % levels",
     ),

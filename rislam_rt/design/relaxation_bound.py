@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.design.objective import Objective
 from rislam_rt.design.problem import DesignProblem
-from rislam_rt.design.single import exact_code
+from rislam_rt.design.single_path import exact_code
 
 
 def best_magnitudes(problem: DesignProblem) -> Floats:

@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.design.single import exact_code
+from rislam_rt.design.single_path import exact_code
 from rislam_rt.model import RadioConfig, RisCode, RisSpec, SlamEstimate
 from rislam_rt.ris import leg_response
 
