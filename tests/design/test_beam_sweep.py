@@ -7,7 +7,7 @@ import pytest
 
 from rislam_rt.arrays import Complexes
 from rislam_rt.design import exact_code
-from rislam_rt.design.search import HOLD, LOOK_ROUND, SETTLED, search_code, sweep_codes
+from rislam_rt.design.beam_sweep import HOLD, LOOK_ROUND, SETTLED, search_code, sweep_codes
 from rislam_rt.model import RisCode, RisSpec, Suspect, empty_map
 from rislam_rt.ris import leg_response
 
