@@ -15,7 +15,7 @@ _BLOCK = 200_000
 """Pairs of triangles looked at in one go."""
 
 
-class Lying(NamedTuple):
+class CoplanarPair(NamedTuple):
     """Wall `upper` lies on wall `lower`."""
 
     upper: int
@@ -24,10 +24,10 @@ class Lying(NamedTuple):
     """[m] Largest distance of the upper's corners from the lower's plane."""
 
 
-class Stack(NamedTuple):
+class CoplanarStack(NamedTuple):
     """What lies on what among W walls."""
 
-    pairs: list[Lying]
+    pairs: list[CoplanarPair]
     plane: Integers
     """(W,) the wall whose plane each has: its own number where it lies on nothing and nothing lies on it."""
     over: tuple[Integers, ...]
@@ -43,7 +43,7 @@ def tracer_gap(bounds: Floats) -> float:
     return RAY_OFFSET * (1.0 + 0.5 * float(np.ptp(bounds, axis=0).max()))
 
 
-def stack_walls(triangles: Floats, owner: Integers, normal: Floats, offset: Floats, gap: float) -> Stack:
+def stack_walls(triangles: Floats, owner: Integers, normal: Floats, offset: Floats, gap: float) -> CoplanarStack:
     """Find walls that overlap in one plane.
 
     Two walls lie on each other when their normals (W, 3) agree within `COPLANAR_ANGLE`, all corners of the smaller are
@@ -65,9 +65,9 @@ def stack_walls(triangles: Floats, owner: Integers, normal: Floats, offset: Floa
         corners = triangles[members[upper]]
         apart = float(np.abs(signed_distance(corners, normal[lower], offset[lower])).max())
         if apart <= gap and overlap(corners, triangles[members[lower]], normal[lower], gap):
-            pairs.append(Lying(upper, lower, apart))
+            pairs.append(CoplanarPair(upper, lower, apart))
     over = tuple(np.array(sorted(p.upper for p in pairs if p.lower == w), dtype=np.int64) for w in range(count))
-    return Stack(pairs, _joint_planes(pairs, area), over)
+    return CoplanarStack(pairs, _joint_planes(pairs, area), over)
 
 
 def overlap(a: Floats, b: Floats, normal: Floats, depth: float) -> bool:
@@ -140,7 +140,7 @@ def _members(owner: Integers, count: int) -> list[Integers]:
     return np.split(order, np.searchsorted(owner[order], np.arange(1, count)))[:count]
 
 
-def _joint_planes(pairs: list[Lying], area: Floats) -> Integers:
+def _joint_planes(pairs: list[CoplanarPair], area: Floats) -> Integers:
     """(W,) the largest wall of all that hang together with each."""
     plane = np.arange(len(area))
     for _ in pairs:  # a chain of n pairs settles within n rounds

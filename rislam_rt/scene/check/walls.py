@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.flat import FlatParts, flat_parts
-from rislam_rt.geometry.stack import Lying, stack_walls, tracer_gap
+from rislam_rt.geometry.stack import CoplanarPair, stack_walls, tracer_gap
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.scene.check.probe import winding
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
@@ -63,7 +63,7 @@ def _stacked(room: TriangleArray, parts: Parts) -> Iterator[Finding]:
     normal = np.concatenate([part.normal for part in parts.flat])
     offset = np.concatenate([part.offset for part in parts.flat])
     limit = tracer_gap(room.bounds)
-    worst: dict[tuple[int, int, bool], Lying] = {}
+    worst: dict[tuple[int, int, bool], CoplanarPair] = {}
     for pair in stack_walls(room.triangles, parts.owner, normal, offset, limit).pairs:
         upper, lower = parts.reflector(pair.upper), parts.reflector(pair.lower)
         key = upper, lower, _is_seen(room, room.triangles[parts.owner == pair.upper], upper)
