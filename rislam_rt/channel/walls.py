@@ -7,9 +7,9 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.occluders import Occluders, build_occluders
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
+from rislam_rt.geometry.coplanar import stack_walls, tracer_gap
 from rislam_rt.geometry.flat import flat_parts
 from rislam_rt.geometry.planes import signed_distance
-from rislam_rt.geometry.stack import stack_walls, tracer_gap
 from rislam_rt.model import Material, RisPanel, Scene
 
 

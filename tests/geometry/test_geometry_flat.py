@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET, RAY_OFFSET
+from rislam_rt.geometry.coplanar import overlap, stack_walls, tracer_gap
 from rislam_rt.geometry.flat import fit_plane, flat_parts
-from rislam_rt.geometry.stack import overlap, stack_walls, tracer_gap
 
 LIMITS = COPLANAR_ANGLE, COPLANAR_OFFSET
 
