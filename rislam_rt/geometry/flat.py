@@ -18,7 +18,7 @@ _GENERIC = np.array([0.36, 0.48, 0.80])
 """A unit vector in no special direction, along which normals are sorted."""
 
 
-class FlatParts(NamedTuple):
+class PlanarRegions(NamedTuple):
     """G planes of T triangles, numbered in the order of first appearance."""
 
     group: Integers
@@ -49,10 +49,10 @@ class _Mesh(NamedTuple):
 
 def planar_groups(triangles: Floats, angle: float, offset: float) -> Integers:
     """Number (T,) of the plane each triangle (T, 3, 3) lies in, counted in the order of first appearance."""
-    return flat_parts(triangles, angle, offset).group
+    return planar_regions(triangles, angle, offset).group
 
 
-def flat_parts(triangles: Floats, angle: float, offset: float) -> FlatParts:
+def planar_regions(triangles: Floats, angle: float, offset: float) -> PlanarRegions:
     """Part a mesh (T, 3, 3) into planes, and fit each to all its corners.
 
     A triangle belongs to a plane when its normal agrees up to sign within `angle` [rad], and what float32 corners do to
@@ -60,7 +60,7 @@ def flat_parts(triangles: Floats, angle: float, offset: float) -> FlatParts:
     triangle whose normal is surest, fitted anew to whatever they gain.
     """
     if len(triangles) == 0:
-        return FlatParts(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0))
+        return PlanarRegions(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0))
     order, mesh = _sorted_mesh(triangles, angle)
     group = np.full(len(triangles), -1, dtype=np.int64)
     for count, seed in enumerate(_seeds(mesh.slack, group)):
@@ -117,7 +117,7 @@ def _grown(mesh: _Mesh, seed: int, free: Booleans, angle: float, offset: float) 
         normal, distance = fit_plane(mesh.triangles[members].reshape(-1, 3), normal)
 
 
-def _fitted(triangles: Floats, group: Integers) -> FlatParts:
+def _fitted(triangles: Floats, group: Integers) -> PlanarRegions:
     """The plane of every group: that of its first triangle where it is exact, else the fit to all corners."""
     normal, offset = triangle_planes(triangles)
     _, first = np.unique(group, return_index=True)
@@ -130,4 +130,4 @@ def _fitted(triangles: Floats, group: Integers) -> FlatParts:
     for number in np.flatnonzero(worst > EXACT * float(np.abs(triangles).max())):
         corners = triangles[members[ends[number] : ends[number + 1]]].reshape(-1, 3)
         normal[number], offset[number] = fit_plane(corners, normal[number])
-    return FlatParts(group, normal, offset)
+    return PlanarRegions(group, normal, offset)

@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.coplanar import CoplanarPair, stack_walls, tracer_gap
-from rislam_rt.geometry.flat import FlatParts, flat_parts
+from rislam_rt.geometry.flat import PlanarRegions, planar_regions
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.scene.check.probe import winding
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
@@ -21,7 +21,7 @@ NEARLY_FLAT = 1e-2
 class Parts(NamedTuple):
     """The walls of a scene, reflector by reflector."""
 
-    flat: list[FlatParts]
+    flat: list[PlanarRegions]
     first: Integers
     """(R + 1,) walls of reflector r are first[r] : first[r + 1]."""
     owner: Integers
@@ -34,7 +34,7 @@ class Parts(NamedTuple):
 
 def build_parts(room: TriangleArray) -> Parts:
     """Part every mesh into walls, as the channels do."""
-    flat = [flat_parts(r.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for r in room.scene.reflectors]
+    flat = [planar_regions(r.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for r in room.scene.reflectors]
     first = np.cumsum([0, *(len(part.offset) for part in flat)])
     owner = np.concatenate([part.group + start for part, start in zip(flat, first, strict=False)])
     return Parts(flat, first, owner)
@@ -86,7 +86,7 @@ def _is_seen(room: TriangleArray, wall: Floats, reflector: int) -> bool:
     return any(abs(winding(point, own)) < 0.5 for point in inside[:: max(1, len(inside) // 8)])
 
 
-def _flattest(triangles: Floats, part: FlatParts) -> float:
+def _flattest(triangles: Floats, part: PlanarRegions) -> float:
     """Smallest angle [rad] at which two walls of a mesh meet in an edge, infinite where none do."""
     _, corner = np.unique(np.round(triangles.reshape(-1, 3), 6) + 0.0, axis=0, return_inverse=True)
     corner = corner.reshape(-1, 3)

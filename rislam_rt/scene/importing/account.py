@@ -4,7 +4,7 @@ from collections import Counter
 from typing import Any
 
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
-from rislam_rt.geometry.flat import flat_parts
+from rislam_rt.geometry.flat import planar_regions
 from rislam_rt.scene.importing.facets import Facets
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.surfaces import Sorted, Surface
@@ -17,7 +17,7 @@ def account(
 ) -> list[str]:  # fmt: skip
     """What became of the mesh, in numbers."""
     walls = sum(
-        len(flat_parts(mesh.vertices[mesh.faces], COPLANAR_ANGLE, COPLANAR_OFFSET).offset)
+        len(planar_regions(mesh.vertices[mesh.faces], COPLANAR_ANGLE, COPLANAR_OFFSET).offset)
         for mesh, _ in reflectors.values()
     )
     total, waves = float(facets.area.sum()), found.narrow / options.wavelength
