@@ -20,9 +20,9 @@ from rislam_rt.information.gradient import (
     vertex_gradient,
 )
 from rislam_rt.information.landmarks import (
-    Chain,
     LandmarkModel,
-    Rows,
+    LinearMeasurements,
+    MirrorChain,
     WallSpread,
     build_landmark_model,
     mirror_chain,
@@ -37,17 +37,17 @@ from rislam_rt.information.resolution import certainty_share, resolved_probabili
 
 __all__ = [
     "Bound",
-    "Chain",
     "DiffuseTail",
     "Equivalent",
     "EquivalentPosition",
     "GradientMode",
     "LandmarkModel",
+    "LinearMeasurements",
     "MeasurementStd",
+    "MirrorChain",
     "MotionPrior",
     "Outcome",
     "PosteriorBound",
-    "Rows",
     "WallSpread",
     "amplitude_std",
     "build_landmark_model",

@@ -23,7 +23,7 @@ from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 Unknown = Literal["known", "planes", "images"]
 
 
-class Rows(NamedTuple):
+class LinearMeasurements(NamedTuple):
     """M scalar measurements of one cycle."""
 
     agent: Floats
@@ -43,7 +43,7 @@ class WallSpread(NamedTuple):
     """[m] along the normal, at one point of the wall."""
 
 
-class Chain(NamedTuple):
+class MirrorChain(NamedTuple):
     """A point mirrored in D walls, one after the other."""
 
     image: Floats
@@ -54,7 +54,7 @@ class Chain(NamedTuple):
     """(..., D, 3, 3): wall, coordinate, and two tilts [1/rad] and the offset [1] of that wall."""
 
 
-def mirror_chain(point: Floats, normal: Floats, offset: Floats) -> Chain:
+def mirror_chain(point: Floats, normal: Floats, offset: Floats) -> MirrorChain:
     """Mirror points (..., 3) in planes (D, 3), (D,) in turn, with derivatives by the chain rule."""
     depth = len(offset)
     linear = np.eye(3)
@@ -68,7 +68,7 @@ def mirror_chain(point: Floats, normal: Floats, offset: Floats) -> Chain:
         planes[..., d, :, 2] = 2.0 * normal[d]
         point = mirror(point, normal[d], offset[d])
         linear = reflection @ linear
-    return Chain(point, linear, planes)
+    return MirrorChain(point, linear, planes)
 
 
 def plane_tangents(normal: Floats) -> tuple[Floats, Floats]:
@@ -131,7 +131,9 @@ class LandmarkModel:
             found[self.paths.walls[wall]] = WallSpread(float(angle), float(distance))
         return found
 
-    def rows(self, least_snr: float = 10.0, *, angles: bool = True, use_vt: bool = False) -> Iterator[Rows]:
+    def rows(
+        self, least_snr: float = 10.0, *, angles: bool = True, use_vt: bool = False
+    ) -> Iterator[LinearMeasurements]:
         """Measurements of each cycle in turn.
 
         Parameters
@@ -146,7 +148,7 @@ class LandmarkModel:
         for cycle in range(self.paths.num_cycles):
             yield self._rows_of(cycle, least_snr, angles, use_vt)
 
-    def _rows_of(self, cycle: int, least_snr: float, angles: bool, use_vt: bool) -> Rows:
+    def _rows_of(self, cycle: int, least_snr: float, angles: bool, use_vt: bool) -> LinearMeasurements:
         snr = self.radio.integrated_snr(self.paths.gain[cycle])
         heard = self.paths.valid[cycle] & (snr >= least_snr)
         joined = np.flatnonzero(heard & (self.tx_point >= 0))
@@ -165,7 +167,7 @@ class LandmarkModel:
             axis=1,
         )
         count = 3 if angles else 1
-        return Rows(
+        return LinearMeasurements(
             agent[:, :count].reshape(-1, 3),
             unknown[:, :count].reshape(-1, self.num_unknowns),
             information[:, :count].ravel(),

@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, freeze
 from rislam_rt.errors import ConfigError
-from rislam_rt.information.landmarks import Rows
+from rislam_rt.information.landmarks import LinearMeasurements
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class PosteriorBound:
 
 
 def posterior_bound(
-    rows: Iterable[Rows], time: Floats, motion: MotionPrior, unknown_std: Floats
+    rows: Iterable[LinearMeasurements], time: Floats, motion: MotionPrior, unknown_std: Floats
 ) -> PosteriorBound:  # fmt: skip
     """Run the recursion along a trajectory, linearised at the truth.
 
