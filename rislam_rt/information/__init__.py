@@ -19,7 +19,7 @@ from rislam_rt.information.gradient import (
     path_gradient,
     vertex_gradient,
 )
-from rislam_rt.information.landmarks import (
+from rislam_rt.information.landmark_model import (
     LandmarkModel,
     LinearMeasurements,
     MirrorChain,

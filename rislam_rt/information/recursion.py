@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, freeze
 from rislam_rt.errors import ConfigError
-from rislam_rt.information.landmarks import LinearMeasurements
+from rislam_rt.information.landmark_model import LinearMeasurements
 
 
 @dataclass(frozen=True, slots=True)
