@@ -30,13 +30,12 @@ from rislam_rt.information.landmark_model import (
 )
 from rislam_rt.information.maps import dilution, position_error_map
 from rislam_rt.information.outcome import Outcome
-from rislam_rt.information.position import Bound, position_bound, position_information, range_information
+from rislam_rt.information.position import PositionBound, position_bound, position_information, range_information
 from rislam_rt.information.prior import prior_from_covariance, prior_from_particles
 from rislam_rt.information.recursion import MotionPrior, PosteriorBound, posterior_bound
 from rislam_rt.information.resolution import certainty_share, resolved_probability
 
 __all__ = [
-    "Bound",
     "DiffuseTail",
     "Equivalent",
     "EquivalentPosition",
@@ -47,6 +46,7 @@ __all__ = [
     "MirrorChain",
     "MotionPrior",
     "Outcome",
+    "PositionBound",
     "PosteriorBound",
     "WallSpread",
     "amplitude_std",

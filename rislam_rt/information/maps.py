@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.information.gradient import GradientMode, vertex_gradient
-from rislam_rt.information.position import Bound, position_bound, position_information
+from rislam_rt.information.position import PositionBound, position_bound, position_information
 from rislam_rt.model import PathKind, Paths, RadioConfig
 
 LANDMARK_PATHS = (PathKind.PS, PathKind.VS, PathKind.RIS, PathKind.VRIS)
@@ -21,7 +21,7 @@ def position_error_map(
     prior: Floats | float = 0.0,
     least_snr: float = 0.0,
     use_vt: bool = False,
-) -> Bound:
+) -> PositionBound:
     """Horizontal position bound (K,) at K places, for the code that the paths' gains carry; the map is known.
 
     Parameters
@@ -44,7 +44,7 @@ def position_error_map(
     return position_bound(position_information(gradient, np.where(heard, snr, 0.0), radio), prior)
 
 
-def dilution(gradient: Floats, heard: Booleans) -> Bound:
+def dilution(gradient: Floats, heard: Booleans) -> PositionBound:
     """Geometric dilution of precision (...,): the bound when every heard path's length is known to 1 m.
 
     `gradient` (..., P, D), `heard` (..., P). The result's `rms` is the GDOP, without unit.
