@@ -2,7 +2,7 @@
 
 from rislam_rt.information.accuracy import MeasurementStd, amplitude_std, cosine_information, measurement_std
 from rislam_rt.information.delay_gain import (
-    Equivalent,
+    EquivalentDelayInformation,
     delay_gain_information,
     delay_information,
     eliminate_gains,
@@ -37,7 +37,7 @@ from rislam_rt.information.resolution import certainty_share, resolved_probabili
 
 __all__ = [
     "DiffuseTail",
-    "Equivalent",
+    "EquivalentDelayInformation",
     "EquivalentPosition",
     "GradientMode",
     "LandmarkModel",
