@@ -10,7 +10,11 @@ from rislam_rt.information.delay_gain import (
     steering,
 )
 from rislam_rt.information.diffuse import DiffuseTail, diffuse_snr
-from rislam_rt.information.equivalent import EquivalentPosition, equivalent_information, uncertain_range_information
+from rislam_rt.information.equivalent_information import (
+    EquivalentPosition,
+    equivalent_information,
+    uncertain_range_information,
+)
 from rislam_rt.information.gradient import (
     GradientMode,
     cosine_gradient,
