@@ -10,6 +10,7 @@ from rislam_rt.information.delay_gain import (
     steering,
 )
 from rislam_rt.information.diffuse import DiffuseTail, diffuse_snr
+from rislam_rt.information.dilution_maps import dilution, position_error_map
 from rislam_rt.information.equivalent_information import (
     EquivalentPosition,
     equivalent_information,
@@ -32,7 +33,6 @@ from rislam_rt.information.landmark_model import (
     mirror_chain,
     plane_tangents,
 )
-from rislam_rt.information.maps import dilution, position_error_map
 from rislam_rt.information.outcome import Outcome
 from rislam_rt.information.position import PositionBound, position_bound, position_information, range_information
 from rislam_rt.information.prior import prior_from_covariance, prior_from_particles
