@@ -22,7 +22,7 @@ from rislam_rt.evaluate.intervals import (
     rms_over_runs,
     share_interval,
 )
-from rislam_rt.evaluate.sets import Gospa, Ospa, gospa, match_points, ospa
+from rislam_rt.evaluate.set_distances import Gospa, Ospa, gospa, match_points, ospa
 
 __all__ = [
     "AssociationScore",
