@@ -87,12 +87,12 @@ MUTANTS = (
         "        forms[0] = [-1, -1, -1, new, -1] if not verdict.is_wall else [new, -1, -1, -1, -1]\n",
     ),
     Mutant(
-        "half the bound", "information/posterior_bound.py",
+        "half the bound", "information/posterior_crlb.py",
         "        agent[cycle] = spread[: 2 * axes] @ spread[: 2 * axes].T",
         "        agent[cycle] = 0.25 * spread[: 2 * axes] @ spread[: 2 * axes].T",
     ),
     Mutant(
-        "the bound knows the map", "information/posterior_bound.py",
+        "the bound knows the map", "information/posterior_crlb.py",
         "        slope[:, 2 * axes :] = root * measured.unknown", "        slope[:, 2 * axes :] = 0.0",
     ),
     Mutant(

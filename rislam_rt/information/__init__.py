@@ -35,7 +35,7 @@ from rislam_rt.information.landmark_model import (
 )
 from rislam_rt.information.outcome import Outcome
 from rislam_rt.information.position import PositionBound, position_bound, position_information, range_information
-from rislam_rt.information.posterior_bound import MotionPrior, PosteriorBound, posterior_bound
+from rislam_rt.information.posterior_crlb import MotionPrior, PosteriorBound, posterior_bound
 from rislam_rt.information.prior import prior_from_covariance, prior_from_particles
 from rislam_rt.information.resolution import certainty_share, resolved_probability
 
