@@ -11,7 +11,7 @@ from rislam_rt.information.delay_gain import (
 )
 from rislam_rt.information.diffuse import DiffuseTail, diffuse_snr
 from rislam_rt.information.dilution_maps import dilution, position_error_map
-from rislam_rt.information.equivalent_information import (
+from rislam_rt.information.equivalent_fim import (
     EquivalentPosition,
     equivalent_information,
     uncertain_range_information,
