@@ -1,8 +1,8 @@
 """Floor 5: which code to set the panel to. Designers, their bound, and the problem as the agent believes it."""
 
 from rislam_rt.design.belief import design_code, problem_from_belief
+from rislam_rt.design.convex_dual import dual_bound
 from rislam_rt.design.designers import DESIGNERS, designer
-from rislam_rt.design.dual_bound import dual_bound
 from rislam_rt.design.gain_curves import GainCurves, GainInterval, design_along, direct_only, gain_curves
 from rislam_rt.design.objective import Objective, build_objective
 from rislam_rt.design.problem import DesignProblem
