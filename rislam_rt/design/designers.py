@@ -11,7 +11,7 @@ from rislam_rt.design.coordinate import coordinate_search, exact_codes
 from rislam_rt.design.genetic import genetic_search
 from rislam_rt.design.objective import Objective, build_objective
 from rislam_rt.design.problem import DesignProblem
-from rislam_rt.design.relaxation_bound import best_magnitudes, relaxation_bound
+from rislam_rt.design.relaxation import best_magnitudes, relaxation_bound
 from rislam_rt.design.result import Design, DesignConfig, Designer
 from rislam_rt.design.single_path import continuous_phases, nearest_code
 from rislam_rt.errors import ConfigError
