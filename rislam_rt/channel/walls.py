@@ -8,7 +8,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.occluders import Occluders, build_occluders
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.coplanar import stack_walls, tracer_gap
-from rislam_rt.geometry.planar_regions import planar_regions
+from rislam_rt.geometry.plane_segmentation import planar_regions
 from rislam_rt.geometry.planes import signed_distance
 from rislam_rt.model import Material, RisPanel, Scene
 

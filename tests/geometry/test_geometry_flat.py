@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET, RAY_OFFSET
 from rislam_rt.geometry.coplanar import overlap, stack_walls, tracer_gap
-from rislam_rt.geometry.planar_regions import fit_plane, planar_regions
+from rislam_rt.geometry.plane_segmentation import fit_plane, planar_regions
 
 LIMITS = COPLANAR_ANGLE, COPLANAR_OFFSET
 

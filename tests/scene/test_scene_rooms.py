@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rislam_rt.geometry.planar_regions import planar_groups
+from rislam_rt.geometry.plane_segmentation import planar_groups
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.scene import check_scene, load_scene
 from rislam_rt.scene.build import main

@@ -11,7 +11,7 @@ from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit
-from rislam_rt.geometry.planar_regions import FLOAT32_ROUNDING
+from rislam_rt.geometry.plane_segmentation import FLOAT32_ROUNDING
 from rislam_rt.geometry.planes import mirror
 from rislam_rt.geometry.triangles import distance_to_edges, outline_edges
 from rislam_rt.model import PathKind, Scene, Trajectory

@@ -4,7 +4,7 @@ from collections import Counter
 from typing import Any
 
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
-from rislam_rt.geometry.planar_regions import planar_regions
+from rislam_rt.geometry.plane_segmentation import planar_regions
 from rislam_rt.scene.importing.facets import Facets
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.surfaces import Sorted, Surface
