@@ -18,15 +18,15 @@ from rislam_rt.measurement.received import Clutter, Received, receive, twin
 from rislam_rt.measurement.sensor import build_sensor
 from rislam_rt.measurement.signal import num_tones, pulse_samples, to_samples, to_tones, tones
 from rislam_rt.measurement.tracking import TrackInfo, TrackingConfig, TrackState, init_tracks, step_tracks
-from rislam_rt.measurement.waveform import Capture, Components, capture, find_components
+from rislam_rt.measurement.waveform import Capture, DetectedComponents, capture, find_components
 from rislam_rt.model import detection_probability
 
 __all__ = [
     "NO_COMPONENT",
     "Capture",
     "Clutter",
-    "Components",
     "Correction",
+    "DetectedComponents",
     "FrontEnd",
     "HardwareConfig",
     "Received",

@@ -36,7 +36,7 @@ class Capture(NamedTuple):
     turns within the slot."""
 
 
-class Components(NamedTuple):
+class DetectedComponents(NamedTuple):
     """N components found, in the order of their delays."""
 
     tau: Floats
@@ -107,16 +107,16 @@ def _signed_sum(parts: list[Complexes], signs: Floats) -> Complexes:
 
 def find_components(
     captures: list[Capture], radio: RadioConfig, config: ReceiverConfig, previous: Measurement | None = None
-) -> Components:
+) -> DetectedComponents:
     """All components in the captures of one cycle; the search begins with those of the previous one, if given."""
     return by_delay([_find(one, radio, config, _known(one, radio, previous)) for one in captures])
 
 
-def by_delay(parts: list[Components]) -> Components:
+def by_delay(parts: list[DetectedComponents]) -> DetectedComponents:
     """Components of several captures in the order of their delays."""
     joined = [np.concatenate(fields) for fields in zip(*parts, strict=True)]
     order = np.argsort(joined[0])
-    return Components._make(field[order] for field in joined)
+    return DetectedComponents._make(field[order] for field in joined)
 
 
 def measure_waveform(
@@ -135,7 +135,7 @@ def measure_waveform(
     return to_measurement(found, radio, config), PathTruth(true_paths(found, received, radio, config))
 
 
-def true_paths(found: Components, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
+def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
     """Column (N,) of the path that each component most likely is, by what its capture holds; -1 for none."""
     path = np.full(len(found.tau), -1)
     for number, heard in enumerate(split(received, config)):
@@ -144,7 +144,7 @@ def true_paths(found: Components, received: Received, radio: RadioConfig, config
     return path
 
 
-def to_measurement(found: Components, radio: RadioConfig, config: ReceiverConfig) -> Measurement:
+def to_measurement(found: DetectedComponents, radio: RadioConfig, config: ReceiverConfig) -> Measurement:
     """What the agent gets to see of the components."""
     told: tuple[Any, ...] = ()
     if config.alternation:
@@ -175,7 +175,7 @@ def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Fl
     return np.column_stack([previous.tau * radio.bandwidth, previous.cosines])[mine]
 
 
-def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Floats) -> Components:
+def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Floats) -> DetectedComponents:
     """Components of one capture: what is told apart, with deviations that count what cannot be seen."""
     window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
     sounding, grid = _searched(one.samples.shape[1], window, radio, config)
@@ -188,7 +188,7 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
     variance *= crowding(parameters, threshold, radio)
     mirrored = mirror_variance(cosines, np.sqrt(variance[:, 1:]), radio)
     scale = np.sqrt(one.noise_psd * one.samples.shape[1] / radio.energy)
-    return Components(
+    return DetectedComponents(
         np.clip(parameters[:, 0], *window) / radio.bandwidth,
         cosines,
         scale * gain,
