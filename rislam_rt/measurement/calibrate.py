@@ -17,7 +17,7 @@ from rislam_rt.arrays import Booleans, Complexes, Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.measurement.atoms import Sounding, build_sounding, tone_response
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.detect import Grid, build_grid
+from rislam_rt.measurement.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimate import estimate_paths
 from rislam_rt.measurement.hardware import Correction, mirrored
 from rislam_rt.measurement.refine import fit_amplitudes
@@ -42,7 +42,7 @@ class CalibrationReference(NamedTuple):
     """What calibration starts from."""
 
     sounding: Sounding
-    grid: Grid
+    grid: MatchedFilterGrid
     window: tuple[float, float]
     direct: Floats
     """(3,) delay of the direct path in cells, and its two cosines."""

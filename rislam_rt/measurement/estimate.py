@@ -12,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats
 from rislam_rt.measurement.atoms import Sounding
-from rislam_rt.measurement.detect import Grid, into_range, pick_peaks
+from rislam_rt.measurement.detect import MatchedFilterGrid, into_range, pick_peaks
 from rislam_rt.measurement.refine import (
     Accuracy,
     Fit,
@@ -57,7 +57,7 @@ class Estimate(NamedTuple):
 
 def estimate_paths(
     sounding: Sounding,
-    grid: Grid,
+    grid: MatchedFilterGrid,
     samples: Complexes,
     threshold: float,
     window: tuple[float, float],

@@ -10,7 +10,7 @@ from rislam_rt.information import measurement_std
 from rislam_rt.measurement.atoms import Sounding, build_sounding
 from rislam_rt.measurement.components import capped, into_disc
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.detect import Grid, build_grid
+from rislam_rt.measurement.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_swing, in_step
@@ -202,7 +202,7 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
 @lru_cache(maxsize=16)
 def _searched(
     count: int, window: tuple[float, float], radio: RadioConfig, config: ReceiverConfig
-) -> tuple[Sounding, Grid]:
+) -> tuple[Sounding, MatchedFilterGrid]:
     """Sounding of so many tones, and the grid that is searched in a window of delays, in cells."""
     sounding = build_sounding(count, radio, element_exact=config.element_exact)
     return sounding, build_grid(sounding, window)
