@@ -13,7 +13,7 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.measurement.atoms import Sounding, tone_response
 
 
-class Waves(NamedTuple):
+class PathSignals(NamedTuple):
     """Signals of P paths, products over tones, rows and columns."""
 
     parameters: Floats
@@ -25,9 +25,9 @@ class Waves(NamedTuple):
     col: Complexes
     """(C, P)."""
 
-    def take(self, rows: Booleans | Integers) -> "Waves":
+    def take(self, rows: Booleans | Integers) -> "PathSignals":
         """Some of the paths."""
-        return Waves(self.parameters[rows], self.delay[:, rows], self.row[:, rows], self.col[:, rows])
+        return PathSignals(self.parameters[rows], self.delay[:, rows], self.row[:, rows], self.col[:, rows])
 
     @property
     def antennas(self) -> Complexes:
@@ -51,7 +51,7 @@ class Waves(NamedTuple):
         return np.asarray((self.antennas * amplitude) @ self.delay.T)
 
 
-class Inner(NamedTuple):
+class InnerProducts(NamedTuple):
     """Inner products of P signals `a` and their derivatives `d`."""
 
     signal: Floats
@@ -61,19 +61,19 @@ class Inner(NamedTuple):
     slope: Floats
     """(3, P, 3, P) `d_i^H d_j`."""
 
-    def take(self, keep: Booleans | Integers) -> "Inner":
+    def take(self, keep: Booleans | Integers) -> "InnerProducts":
         """Some of the paths."""
-        return Inner(self.signal[keep][:, keep], self.mixed[keep][..., keep], self.slope[:, keep][..., keep])
+        return InnerProducts(self.signal[keep][:, keep], self.mixed[keep][..., keep], self.slope[:, keep][..., keep])
 
 
-def waves_at(sounding: Sounding, parameters: Floats) -> Waves:
+def waves_at(sounding: Sounding, parameters: Floats) -> PathSignals:
     """Signals of paths at parameters (P, 3)."""
     delay, u, v = parameters.T
     row, col = (np.exp(2j * np.pi * np.multiply.outer(x, c)) for x, c in ((sounding.row, u), (sounding.col, v)))
-    return Waves(parameters, tone_response(sounding.frequency, delay), row, col)
+    return PathSignals(parameters, tone_response(sounding.frequency, delay), row, col)
 
 
-def inner_of(sounding: Sounding, waves: Waves) -> Inner:
+def inner_of(sounding: Sounding, waves: PathSignals) -> InnerProducts:
     """All inner products, parameter by parameter."""
     (f0, f1, f2), (x0, x1, x2), (y0, y1, y2) = (
         _axis_products(wave, place)
@@ -90,7 +90,7 @@ def inner_of(sounding: Sounding, waves: Waves) -> Inner:
     slope[0, :, 0], slope[1, :, 1], slope[2, :, 2] = f2 * xy, x2 * fy, y2 * fx
     for a, b, value in ((0, 1, f1 * x1.T * y0), (0, 2, f1 * y1.T * x0), (1, 2, x1 * y1.T * f0)):
         slope[b, :, a], slope[a, :, b] = value, value.T
-    return Inner(fx * y0, mixed, slope)
+    return InnerProducts(fx * y0, mixed, slope)
 
 
 def _axis_products(wave: Complexes, place: Floats) -> tuple[Floats, Floats, Floats]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.measurement.atoms import Sounding
-from rislam_rt.measurement.inner import Inner, Waves, inner_of, waves_at
+from rislam_rt.measurement.inner import InnerProducts, PathSignals, inner_of, waves_at
 from rislam_rt.measurement.positive import RIDGE, inverse, solve
 from rislam_rt.measurement.waves import correlate_waves, wave_signals
 
@@ -39,9 +39,9 @@ DAMPING, LEAST_DAMPING = 1e-3, 1e-6
 class LeastSquaresFit(NamedTuple):
     """P paths fitted to samples whose noise has unit variance."""
 
-    waves: Waves
+    waves: PathSignals
     """Their signals."""
-    inner: Inner
+    inner: InnerProducts
     """Inner products of those."""
     exact: Complexes | None
     """(L M, P) their signals without approximations, where the sounding asks for it."""
@@ -82,7 +82,7 @@ def fit_amplitudes(sounding: Sounding, parameters: Floats, samples: Complexes) -
     return _fit(waves, inner, waves.correlate(sounding, samples), energy)
 
 
-def _fit(waves: Waves, inner: Inner, seen: Complexes, energy: float) -> LeastSquaresFit:
+def _fit(waves: PathSignals, inner: InnerProducts, seen: Complexes, energy: float) -> LeastSquaresFit:
     """From the products (4, P) of signals and derivatives with samples of this energy."""
     count, matched = len(waves.parameters), seen[0]
     covariance = inverse(inner.signal)
@@ -92,7 +92,9 @@ def _fit(waves: Waves, inner: Inner, seen: Complexes, energy: float) -> LeastSqu
     return LeastSquaresFit(waves, inner, None, seen, covariance, amplitude, slopes, energy, float(cost))
 
 
-def _exact_fit(sounding: Sounding, waves: Waves, inner: Inner, samples: Complexes, energy: float) -> LeastSquaresFit:
+def _exact_fit(
+    sounding: Sounding, waves: PathSignals, inner: InnerProducts, samples: Complexes, energy: float
+) -> LeastSquaresFit:
     """Likewise with the signals of `waves.wave_signals`."""
     exact = wave_signals(sounding, waves.parameters)
     products = exact.conj().T @ exact + RIDGE * sounding.num_samples * np.eye(exact.shape[1])
@@ -214,7 +216,7 @@ def accuracy(fit: LeastSquaresFit) -> Accuracy:
     return Accuracy(deviations, np.sqrt(variance))
 
 
-def joint_bound(inner: Inner, amplitude: Complexes, known: Floats | None = None) -> tuple[Floats, Floats]:
+def joint_bound(inner: InnerProducts, amplitude: Complexes, known: Floats | None = None) -> tuple[Floats, Floats]:
     """Covariance (3P, 3P) of the parameters, parameter by parameter, and variance (P,) of the complex amplitudes.
 
     At unit noise, everything unknown; `known` is the amplitudes' covariance (P, P) at known parameters, if at hand.
@@ -247,7 +249,7 @@ def without_idle(fit: LeastSquaresFit, threshold: float) -> Booleans:
     return keep
 
 
-def information_matrix(inner: Inner, covariance: Floats, amplitude: Complexes) -> Floats:
+def information_matrix(inner: InnerProducts, covariance: Floats, amplitude: Complexes) -> Floats:
     """Half the Fisher information (3P, 3P) on the parameters at unit noise, parameter by parameter, then path by path.
 
     With the amplitudes unknown; `covariance` (P, P) is theirs at known parameters.
