@@ -6,7 +6,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.measurement.atoms import Sounding, build_sounding
 from rislam_rt.measurement.components import ComponentErrors, NoiselessComponents, in_cells, join
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.inner import inner_of, waves_at
+from rislam_rt.measurement.inner_products import inner_of, waves_at
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.refine import joint_bound
 from rislam_rt.measurement.signal import num_tones

@@ -12,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.measurement.atoms import Sounding
-from rislam_rt.measurement.inner import InnerProducts, PathSignals, inner_of, waves_at
+from rislam_rt.measurement.inner_products import InnerProducts, PathSignals, inner_of, waves_at
 from rislam_rt.measurement.positive import RIDGE, inverse, solve
 from rislam_rt.measurement.waves import correlate_waves, wave_signals
 

@@ -6,7 +6,7 @@ import pytest
 from rislam_rt.information import certainty_share, resolved_probability
 from rislam_rt.information.resolution import PHASES
 from rislam_rt.measurement.atoms import build_sounding
-from rislam_rt.measurement.inner import inner_of, waves_at
+from rislam_rt.measurement.inner_products import inner_of, waves_at
 from rislam_rt.measurement.refine import joint_bound
 from rislam_rt.model import RadioConfig, RxArray, SensorModel
 

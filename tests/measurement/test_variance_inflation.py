@@ -5,7 +5,7 @@ import pytest
 
 from rislam_rt.measurement import ReceiverConfig, measure
 from rislam_rt.measurement.atoms import build_sounding
-from rislam_rt.measurement.inner import waves_at
+from rislam_rt.measurement.inner_products import waves_at
 from rislam_rt.measurement.refine import accuracy, fit_amplitudes, refine
 from rislam_rt.measurement.signal import add_noise
 from rislam_rt.measurement.variance_inflation import UNSEEN, crowding, mirror_variance, peak_bias, unmirrored
