@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
-from rislam_rt.measurement.atoms import Sounding
 from rislam_rt.measurement.inner_products import InnerProducts, PathSignals, inner_of, waves_at
 from rislam_rt.measurement.positive import RIDGE, inverse, solve
+from rislam_rt.measurement.sounding import Sounding
 from rislam_rt.measurement.waves import correlate_waves, wave_signals
 
 PRIOR = np.array([0.0, 2.0, 2.0])

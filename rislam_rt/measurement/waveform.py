@@ -7,7 +7,6 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import measurement_std
-from rislam_rt.measurement.atoms import Sounding, build_sounding
 from rislam_rt.measurement.components import capped, into_disc
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.detect import MatchedFilterGrid, build_grid
@@ -20,6 +19,7 @@ from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sides import Found, panel_probability
 from rislam_rt.measurement.signal import num_tones, tones
 from rislam_rt.measurement.slot import codes_in_turn, split
+from rislam_rt.measurement.sounding import Sounding, build_sounding
 from rislam_rt.measurement.variance_inflation import crowding, mirror_variance, peak_bias, unmirrored
 from rislam_rt.model import Measurement, PathTruth, RadioConfig
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from rislam_rt.measurement import refine as refinement
-from rislam_rt.measurement.atoms import Sounding, build_sounding
 from rislam_rt.measurement.inner_products import waves_at
 from rislam_rt.measurement.positive import inverse, solve
 from rislam_rt.measurement.refine import (
@@ -18,6 +17,7 @@ from rislam_rt.measurement.refine import (
     residual,
 )
 from rislam_rt.measurement.signal import add_noise
+from rislam_rt.measurement.sounding import Sounding, build_sounding
 from rislam_rt.model import RadioConfig
 
 PLANE = build_sounding(128, RadioConfig())
