@@ -14,7 +14,7 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.measurement.inner_products import InnerProducts, PathSignals, inner_of, waves_at
 from rislam_rt.measurement.positive import RIDGE, inverse, solve
 from rislam_rt.measurement.sounding import Sounding
-from rislam_rt.measurement.waves import correlate_waves, wave_signals
+from rislam_rt.measurement.spherical_waves import correlate_waves, wave_signals
 
 PRIOR = np.array([0.0, 2.0, 2.0])
 """Half the information that lying in the unit disc gives on a cosine (standard deviation 0.5): it matters only along an

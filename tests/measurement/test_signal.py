@@ -16,7 +16,7 @@ from rislam_rt.measurement.signal import (
     tones,
 )
 from rislam_rt.measurement.sounding import build_sounding
-from rislam_rt.measurement.waves import correlate_waves, wave_signals
+from rislam_rt.measurement.spherical_waves import correlate_waves, wave_signals
 from rislam_rt.model import PathKind, Paths, RadioConfig, RxArray
 
 RADIO = RadioConfig()
