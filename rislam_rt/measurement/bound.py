@@ -27,7 +27,7 @@ from rislam_rt.measurement.joint import joint_errors
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sensor import build_sensor
 from rislam_rt.measurement.sides import Found, panel_probability
-from rislam_rt.measurement.slot import split
+from rislam_rt.measurement.slot_motion import split
 from rislam_rt.model import Measurement, PathTruth, RadioConfig, SensorModel
 
 NEGLIGIBLE = 1e-3

@@ -12,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.slot import look_signs, slot_mean
+from rislam_rt.measurement.slot_motion import look_signs, slot_mean
 from rislam_rt.model import RadioConfig
 
 DENSITY = 0.5

@@ -18,7 +18,7 @@ from rislam_rt.measurement.joint import LEAST_CERTAINTY
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sides import Found, panel_probability
 from rislam_rt.measurement.signal import num_tones, tones
-from rislam_rt.measurement.slot import codes_in_turn, split
+from rislam_rt.measurement.slot_motion import codes_in_turn, split
 from rislam_rt.measurement.sounding import Sounding, build_sounding
 from rislam_rt.measurement.variance_inflation import crowding, mirror_variance, peak_bias, unmirrored
 from rislam_rt.model import Measurement, PathTruth, RadioConfig

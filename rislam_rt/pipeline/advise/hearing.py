@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.measurement import Received, receive
 from rislam_rt.measurement.bound import NEGLIGIBLE
 from rislam_rt.measurement.components import NoiselessComponents, audible, merge, single
-from rislam_rt.measurement.slot import split
+from rislam_rt.measurement.slot_motion import split
 from rislam_rt.model import Paths, SensorModel
 from rislam_rt.pipeline.spec import Settings
 

@@ -10,7 +10,7 @@ from rislam_rt.channel.doppler import advance_paths, doppler_shift
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import ReceiverConfig, measure
 from rislam_rt.measurement.config import ORDERS
-from rislam_rt.measurement.slot import look_signs, slot_weights
+from rislam_rt.measurement.slot_motion import look_signs, slot_weights
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.scene import load_scene
 
