@@ -12,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.measurement.inner_products import InnerProducts, PathSignals, inner_of, waves_at
-from rislam_rt.measurement.positive import RIDGE, inverse, solve
+from rislam_rt.measurement.positive_definite import RIDGE, inverse, solve
 from rislam_rt.measurement.sounding import Sounding
 from rislam_rt.measurement.spherical_waves import correlate_waves, wave_signals
 

@@ -5,7 +5,7 @@ import pytest
 
 from rislam_rt.measurement import refine as refinement
 from rislam_rt.measurement.inner_products import waves_at
-from rislam_rt.measurement.positive import inverse, solve
+from rislam_rt.measurement.positive_definite import inverse, solve
 from rislam_rt.measurement.refine import (
     LeastSquaresFit,
     accuracy,
