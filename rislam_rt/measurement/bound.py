@@ -23,7 +23,7 @@ from rislam_rt.measurement.components import (
     single,
 )
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.joint import joint_errors
+from rislam_rt.measurement.joint_bound import joint_errors
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sensor import build_sensor
 from rislam_rt.measurement.sides import Found, panel_probability

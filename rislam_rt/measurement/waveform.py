@@ -14,7 +14,7 @@ from rislam_rt.measurement.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_swing, in_step
 from rislam_rt.measurement.identify import identify
-from rislam_rt.measurement.joint import LEAST_CERTAINTY
+from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sides import Found, panel_probability
 from rislam_rt.measurement.signal import num_tones, tones
