@@ -15,7 +15,7 @@ from rislam_rt.measurement.noise import (
     with_reference_snr,
 )
 from rislam_rt.measurement.received import Clutter, Received, receive, twin
-from rislam_rt.measurement.sensor import build_sensor
+from rislam_rt.measurement.sensor_model import build_sensor
 from rislam_rt.measurement.signal import num_tones, pulse_samples, to_samples, to_tones, tones
 from rislam_rt.measurement.tracking import TrackInfo, TrackingConfig, TrackState, init_tracks, step_tracks
 from rislam_rt.measurement.waveform import Capture, DetectedComponents, capture, find_components
