@@ -24,9 +24,9 @@ from rislam_rt.measurement.components import (
 )
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.joint_bound import joint_errors
+from rislam_rt.measurement.panel_probability import Found, panel_probability
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sensor_model import build_sensor
-from rislam_rt.measurement.sides import Found, panel_probability
 from rislam_rt.measurement.slot_motion import split
 from rislam_rt.model import Measurement, PathTruth, RadioConfig, SensorModel
 
