@@ -24,7 +24,7 @@ from rislam_rt.measurement.components import (
 )
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.joint_bound import joint_errors
-from rislam_rt.measurement.panel_probability import Found, panel_probability
+from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sensor_model import build_sensor
 from rislam_rt.measurement.slot_motion import split
@@ -77,7 +77,7 @@ def measure_bound(
     found = ReportedComponents._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
     order = np.argsort(found.points[:, 0])
     found, side = ReportedComponents._make(field[order] for field in found), side[order]
-    told = panel_probability(Found(*found[1:], side), radio, config) if config.alternation else ()
+    told = panel_probability(ComponentSides(*found[1:], side), radio, config) if config.alternation else ()
     measurement = Measurement(
         found.points[:, 0],
         into_disc(blind_axes(found.points[:, 1:], radio)),

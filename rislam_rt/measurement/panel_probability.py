@@ -30,7 +30,7 @@ SUREST = 1e-6
 """No probability is nearer to 0 or 1: the model has its own errors."""
 
 
-class Found(NamedTuple):
+class ComponentSides(NamedTuple):
     """N components."""
 
     points: Floats
@@ -45,7 +45,9 @@ class Found(NamedTuple):
     """(N,) 0 for the sum, 1 + q for the difference of panel q."""
 
 
-def panel_probability(found: Found, radio: RadioConfig, config: ReceiverConfig) -> tuple[Floats, Integers | None]:
+def panel_probability(
+    found: ComponentSides, radio: RadioConfig, config: ReceiverConfig
+) -> tuple[Floats, Integers | None]:
     """(N,) probability that each component, if a path made it, ran over a panel, and which (N,): the likeliest.
 
     Where there is one panel the second is None.
@@ -77,7 +79,7 @@ def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: 
     return np.asarray(slot_mean(shift, signs[into] * signs[of], config) / slot_mean(shift, signs[0], config))
 
 
-def _leak_odds(found: Found, sources: Found, factors: Complexes, radio: RadioConfig) -> Floats:
+def _leak_odds(found: ComponentSides, sources: ComponentSides, factors: Complexes, radio: RadioConfig) -> Floats:
     """(A,) odds of each component for being a leak of one of the sources, against a path of its own kind."""
     cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * radio.array.spacing) for n in _shape(radio))])
     gap = found.points[:, None] - sources.points
@@ -96,5 +98,5 @@ def _shape(radio: RadioConfig) -> tuple[int, int]:
     return radio.array.rows, radio.array.cols
 
 
-def _pick(found: Found, rows: Booleans) -> Found:
-    return Found._make(field[rows] for field in found)
+def _pick(found: ComponentSides, rows: Booleans) -> ComponentSides:
+    return ComponentSides._make(field[rows] for field in found)

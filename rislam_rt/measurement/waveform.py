@@ -14,7 +14,7 @@ from rislam_rt.measurement.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_swing, in_step
 from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
-from rislam_rt.measurement.panel_probability import Found, panel_probability
+from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.signal import num_tones, tones
 from rislam_rt.measurement.slot_motion import codes_in_turn, split
@@ -151,7 +151,7 @@ def to_measurement(found: DetectedComponents, radio: RadioConfig, config: Receiv
         points, deviation = (
             np.column_stack(pair) for pair in ((found.tau, found.cosines), (found.tau_std, found.cosines_std))
         )
-        seen = Found(points, deviation, found.gain, np.sqrt(2.0) * found.amplitude_std, found.capture)
+        seen = ComponentSides(points, deviation, found.gain, np.sqrt(2.0) * found.amplitude_std, found.capture)
         told = panel_probability(seen, radio, config)
     return Measurement(
         found.tau,
