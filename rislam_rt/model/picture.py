@@ -16,7 +16,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Of ways, one after the other (Okabe and Ito's)."""
 
 
-class Plan(NamedTuple):
+class PlanView(NamedTuple):
     """What is drawn, all in metres and seen from above."""
 
     bounds: Floats
@@ -29,7 +29,7 @@ class Plan(NamedTuple):
     """Names and courses (K, 3)."""
 
 
-def plan_svg(plan: Plan) -> str:
+def plan_svg(plan: PlanView) -> str:
     """The plan as an SVG element; names appear on hovering."""
     low = plan.bounds[0, :2]
     size = np.maximum(plan.bounds[1, :2] - low, 1e-9)
@@ -82,6 +82,6 @@ def _open_edges(vertices: Floats, faces: Integers) -> Floats:
     return np.asarray(points[edges[~flat]], dtype=np.float64)
 
 
-def html_with(text: str, plan: Plan) -> str:
+def html_with(text: str, plan: PlanView) -> str:
     """A line of text over the plan, as a notebook shows it."""
     return f"<div><code>{escape(text)}</code><br>{plan_svg(plan)}</div>"
