@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, freeze, show_point
 from rislam_rt.errors import SceneError
-from rislam_rt.model.picture import PlanView, html_with, outline
+from rislam_rt.model.plan_view import PlanView, html_with, outline
 from rislam_rt.model.ris import RisPanel, RisPanels
 from rislam_rt.model.trajectory import Trajectory
 
