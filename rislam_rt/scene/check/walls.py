@@ -18,7 +18,7 @@ NEARLY_FLAT = 1e-2
 """[rad] Neighbours in one mesh that meet at less than this: half a degree looks flat to whoever made it."""
 
 
-class Parts(NamedTuple):
+class WallParts(NamedTuple):
     """The walls of a scene, reflector by reflector."""
 
     flat: list[PlanarRegions]
@@ -32,12 +32,12 @@ class Parts(NamedTuple):
         return int(np.searchsorted(self.first, wall, side="right")) - 1
 
 
-def build_parts(room: TriangleArray) -> Parts:
+def build_parts(room: TriangleArray) -> WallParts:
     """Part every mesh into walls, as the channels do."""
     flat = [planar_regions(r.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for r in room.scene.reflectors]
     first = np.cumsum([0, *(len(part.offset) for part in flat)])
     owner = np.concatenate([part.group + start for part, start in zip(flat, first, strict=False)])
-    return Parts(flat, first, owner)
+    return WallParts(flat, first, owner)
 
 
 def wall_findings(room: TriangleArray) -> Iterator[Finding]:
@@ -58,7 +58,7 @@ def wall_findings(room: TriangleArray) -> Iterator[Finding]:
             )
 
 
-def _stacked(room: TriangleArray, parts: Parts) -> Iterator[Finding]:
+def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
     """One finding for each pair of meshes, with the largest gap of their walls; a note where nobody sees it."""
     normal = np.concatenate([part.normal for part in parts.flat])
     offset = np.concatenate([part.offset for part in parts.flat])
