@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.triangles import distance_to_triangles
-from rislam_rt.scene.check.probe import ray_hits, sphere_directions
+from rislam_rt.scene.check.mesh_queries import ray_hits, sphere_directions
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.rooms.room import BASELINE
 

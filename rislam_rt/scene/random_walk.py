@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.triangles import distance_to_triangles
-from rislam_rt.scene.check.probe import crossings
+from rislam_rt.scene.check.mesh_queries import crossings
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.waypoints import Way, round_corners
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import RadioConfig
-from rislam_rt.scene.check.probe import components, crossings, ray_hits, sphere_directions, touching, winding
+from rislam_rt.scene.check.mesh_queries import components, crossings, ray_hits, sphere_directions, touching, winding
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rislam_rt.scene.check.probe import touching
+from rislam_rt.scene.check.mesh_queries import touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray, without_area
 from rislam_rt.scene.findings import Finding
 

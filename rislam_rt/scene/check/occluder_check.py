@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import RadioConfig, Shade
-from rislam_rt.scene.check.probe import crossings, winding
+from rislam_rt.scene.check.mesh_queries import crossings, winding
 from rislam_rt.scene.check.triangle_array import TriangleArray, without_area
 from rislam_rt.scene.findings import Finding
 

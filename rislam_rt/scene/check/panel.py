@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.model import RadioConfig, RisPanel
-from rislam_rt.scene.check.probe import ray_hits, touching
+from rislam_rt.scene.check.mesh_queries import ray_hits, touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding, panel_key
 

@@ -10,7 +10,7 @@ from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.coplanar import CoplanarPair, stack_walls, tracer_gap
 from rislam_rt.geometry.plane_segmentation import PlanarRegions, planar_regions
 from rislam_rt.geometry.triangles import triangle_planes
-from rislam_rt.scene.check.probe import winding
+from rislam_rt.scene.check.mesh_queries import winding
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 

@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import triangle_planes
-from rislam_rt.scene.check.probe import ray_hits
+from rislam_rt.scene.check.mesh_queries import ray_hits
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.free_space import Free, find_free
 from rislam_rt.scene.meshes import Mesh

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import distance_to_triangles, triangle_planes
-from rislam_rt.scene.check.probe import crossings, ray_hits, sphere_directions
+from rislam_rt.scene.check.mesh_queries import crossings, ray_hits, sphere_directions
 
 HEIGHTS = (1.0, 1.4, 0.6)
 """[m] Heights above the floor that are tried: that of a trolley or a hand, then higher, then lower."""

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import RisPanel, RisSpec, Scatterer
-from rislam_rt.scene.check.probe import crossings
+from rislam_rt.scene.check.mesh_queries import crossings
 from rislam_rt.scene.random_rooms.furniture import Ground, Piece, draw_piece, fits
 from rislam_rt.scene.random_rooms.plan import depth_inside
 from rislam_rt.scene.random_rooms.shell import ceiling_normal, wall_normal
