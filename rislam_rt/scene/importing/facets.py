@@ -36,7 +36,7 @@ class Edges(NamedTuple):
     """(E,) [rad] angle at which they meet, zero in one plane, whichever way either is turned."""
 
 
-class Facets(NamedTuple):
+class FlatRegions(NamedTuple):
     """R flat regions of a welded mesh."""
 
     mesh: Welded
@@ -79,7 +79,7 @@ def weld(triangles: list[Floats]) -> Welded:
     return Welded(vertices, faces[keep], part[keep])
 
 
-def find_facets(mesh: Welded) -> Facets:
+def find_facets(mesh: Welded) -> FlatRegions:
     """Part a welded mesh into flat regions: neighbours of one part that meet at less than `FLAT_ANGLE`."""
     triangles = mesh.vertices[mesh.faces]
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -96,16 +96,16 @@ def find_facets(mesh: Welded) -> Facets:
     component = np.asarray(np.unique(piece[biggest], return_inverse=True)[1], dtype=np.int64)
     total = np.asarray(np.bincount(region, area, count), dtype=np.float64)
     turned = mesh._replace(faces=faces)
-    return Facets(turned, region, plane, offset, total, width, residual, component, edges)
+    return FlatRegions(turned, region, plane, offset, total, width, residual, component, edges)
 
 
-def bounds_of(facets: Facets, regions: Integers) -> Floats:
+def bounds_of(facets: FlatRegions, regions: Integers) -> Floats:
     """(2, 3) [m] lowest and highest corner of regions."""
     corners = facets.mesh.vertices[facets.faces_of(regions)].reshape(-1, 3)
     return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 
-def crease_groups(facets: Facets, chosen: Booleans, low: float, high: float) -> Integers:
+def crease_groups(facets: FlatRegions, chosen: Booleans, low: float, high: float) -> Integers:
     """Number (R,) of the patch of chosen regions that hang together by edges that meet at `low` to `high` [rad]."""
     edges, region = facets.edges, facets.region
     a, b = region[edges.a], region[edges.b]

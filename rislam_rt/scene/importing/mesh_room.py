@@ -9,7 +9,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.account import account
 from rislam_rt.scene.importing.draft import RoomDraft
-from rislam_rt.scene.importing.facets import Facets, find_facets, weld
+from rislam_rt.scene.importing.facets import FlatRegions, find_facets, weld
 from rislam_rt.scene.importing.free_space import find_free, is_seen
 from rislam_rt.scene.importing.materials import Palette, itu_by_word
 from rislam_rt.scene.importing.options import ImportOptions
@@ -42,7 +42,7 @@ def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
     return build_draft(facets, parts, [*notes, *more], options)
 
 
-def build_draft(facets: Facets, parts: list[Part], notes: list[str], options: ImportOptions) -> RoomDraft:
+def build_draft(facets: FlatRegions, parts: list[Part], notes: list[str], options: ImportOptions) -> RoomDraft:
     """Walls, things and clutter, of flat regions or of the planes of a scan."""
     if options.scan or (options.scan is None and looks_scanned(facets, options)):
         found, about = sort_scan(facets.mesh, options)

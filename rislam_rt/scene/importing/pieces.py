@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
-from rislam_rt.scene.importing.facets import FLAT_ANGLE, Facets, bounds_of, connected
+from rislam_rt.scene.importing.facets import FLAT_ANGLE, FlatRegions, bounds_of, connected
 
 SPAN = 0.6
 """A piece that spans this share of the room along two axes is its shell."""
@@ -32,7 +32,7 @@ class Piece(NamedTuple):
     shell: bool
 
 
-def find_pieces(facets: Facets, nodes: list[str]) -> list[Piece]:
+def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[Piece]:
     """All pieces, the shell first; `nodes` are the node names of the mesh's parts.
 
     A node with a name of its own is one piece; whatever has none is parted into what hangs together.
@@ -72,7 +72,7 @@ def find_pieces(facets: Facets, nodes: list[str]) -> list[Piece]:
     return [Piece("", "", np.array(sorted(shell), dtype=np.int64), True), *others]
 
 
-def _continues(facets: Facets, regions: Integers, shell: Integers) -> bool:
+def _continues(facets: FlatRegions, regions: Integers, shell: Integers) -> bool:
     """Whether a thing is one flat region in the plane of a wall that it touches: the piece above a door."""
     if len(regions) != 1:
         return False
@@ -86,7 +86,7 @@ def _continues(facets: Facets, regions: Integers, shell: Integers) -> bool:
     return any(bool(((box[0] <= high + TOUCH) & (box[1] >= low - TOUCH)).all()) for box in boxes)
 
 
-def _touching(facets: Facets, things: list[Integers]) -> list[Integers]:
+def _touching(facets: FlatRegions, things: list[Integers]) -> list[Integers]:
     """Things whose boxes touch, together: a seat and its legs are a chair."""
     if not things:
         return []

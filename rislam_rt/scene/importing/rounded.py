@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import unit
-from rislam_rt.scene.importing.facets import FLAT_ANGLE, Facets, crease_groups
+from rislam_rt.scene.importing.facets import FLAT_ANGLE, FlatRegions, crease_groups
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.rooms.shapes import joined, quad
 
@@ -34,7 +34,7 @@ class Round(NamedTuple):
     """[rad] from where to where it goes round; all the way if that is 2 pi."""
 
 
-def find_round(facets: Facets) -> list[Round]:
+def find_round(facets: FlatRegions) -> list[Round]:
     """All round patches: facets narrower than `WIDEST` that meet their neighbours at less than `CREASE`."""
     narrow = facets.width < WIDEST
     group = crease_groups(facets, narrow, float(FLAT_ANGLE), float(CREASE))
@@ -75,7 +75,7 @@ def across(axis: Floats) -> tuple[Floats, Floats]:
     return u, np.cross(axis, u)
 
 
-def _cylinder(facets: Facets, regions: Integers) -> Round:
+def _cylinder(facets: FlatRegions, regions: Integers) -> Round:
     """The cylinder through the corners of a patch, if they lie on one and it covers it."""
     normal, area = facets.normal[regions], facets.area[regions]
     values, vectors = np.linalg.eigh(np.einsum("r,ri,rj->ij", area, normal, normal) / area.sum())

@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.importing.facets import Facets, Welded
+from rislam_rt.scene.importing.facets import FlatRegions, Welded
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.scan import WIDTHS, ScanPlane, find_planes, thin_cloud
 from rislam_rt.scene.importing.scan_outline import BRIDGE, CELL, Outline, outline_planes
@@ -17,7 +17,7 @@ CLOSE = 0.05
 """[m] What lies this near a plane is explained by it, whatever the noise: skirting boards, frames, sockets."""
 
 
-def looks_scanned(facets: Facets, options: ImportOptions) -> bool:
+def looks_scanned(facets: FlatRegions, options: ImportOptions) -> bool:
     """Whether a mesh has the noise of a scan: hardly any of it is flat."""
     flat = facets.area[(facets.width >= options.narrow) & (facets.residual < 1e-3)].sum()
     return bool(flat < FLAT_SHARE * facets.area.sum())

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
 from rislam_rt.geometry.triangles import distance_to_triangles
-from rislam_rt.scene.importing.facets import FLAT_ANGLE, Facets
+from rislam_rt.scene.importing.facets import FLAT_ANGLE, FlatRegions
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.pieces import Piece
 from rislam_rt.scene.importing.rounded import Round, prism
@@ -63,7 +63,7 @@ class Sorted(NamedTuple):
     """Radius [m], flat sides and error [m] of each."""
 
 
-def sort_regions(facets: Facets, pieces: list[Piece], rounds: list[Round], options: ImportOptions) -> Sorted:
+def sort_regions(facets: FlatRegions, pieces: list[Piece], rounds: list[Round], options: ImportOptions) -> Sorted:
     """Decide for every region whether it reflects, shades or goes."""
     owner = np.zeros(len(facets.area), dtype=np.int64)
     for number, piece in enumerate(pieces):
@@ -93,7 +93,7 @@ def sort_regions(facets: Facets, pieces: list[Piece], rounds: list[Round], optio
     return _with_clutter(facets, pieces, rounds, surfaces, mirror, resting, narrow, options)
 
 
-def _mirrors(facets: Facets, rounded: Booleans, options: ImportOptions) -> tuple[Booleans, float]:
+def _mirrors(facets: FlatRegions, rounded: Booleans, options: ImportOptions) -> tuple[Booleans, float]:
     """Which regions reflect like planes, and the width [m] from which on they do."""
     flat = ~rounded & (facets.residual <= OUTLINE * options.wavelength)
     width = np.minimum(facets.width, np.sqrt(facets.area))
@@ -104,7 +104,7 @@ def _mirrors(facets: Facets, rounded: Booleans, options: ImportOptions) -> tuple
     return flat & (width >= narrow), narrow
 
 
-def _resting(facets: Facets, pieces: list[Piece], mirror: Booleans) -> Booleans:
+def _resting(facets: FlatRegions, pieces: list[Piece], mirror: Booleans) -> Booleans:
     """Regions of things that lie on walls of the shell, their thing rising from there."""
     resting = np.zeros(len(mirror), dtype=np.bool_)
     walls = pieces[0].regions[mirror[pieces[0].regions]]
@@ -125,7 +125,7 @@ def _resting(facets: Facets, pieces: list[Piece], mirror: Booleans) -> Booleans:
     return resting
 
 
-def _coplanar(facets: Facets, shell: Integers, mirror: Booleans, part: Integers) -> Integers:
+def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Integers) -> Integers:
     """Number (R,) of the wall each region belongs to: those of the shell in one plane and of one part are one."""
     group = np.arange(len(mirror))
     rows = shell[mirror[shell]]
@@ -145,7 +145,7 @@ def _coplanar(facets: Facets, shell: Integers, mirror: Booleans, part: Integers)
 
 
 def _with_clutter(
-    facets: Facets, pieces: list[Piece], rounds: list[Round], surfaces: list[Surface], mirror: Booleans,
+    facets: FlatRegions, pieces: list[Piece], rounds: list[Round], surfaces: list[Surface], mirror: Booleans,
     resting: Booleans, narrow: float, options: ImportOptions,
 ) -> Sorted:  # fmt: skip
     """Cylinders as prisms and all else that does not reflect in cells."""

@@ -4,13 +4,13 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.triangles import distance_to_edges
-from rislam_rt.scene.importing.facets import Facets
+from rislam_rt.scene.importing.facets import FlatRegions
 from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
 from rislam_rt.scene.importing.rounded import across
 from rislam_rt.scene.meshes import Mesh
 
 
-def corners_kept(facets: Facets, label: Integers) -> Booleans:
+def corners_kept(facets: FlatRegions, label: Integers) -> Booleans:
     """(V,) corners where three regions (numbered by `label` (R,)) meet, or two at an open edge: none may be moved."""
     faces, mine = facets.mesh.faces, label[facets.region]
     pairs = np.unique(np.column_stack([faces.ravel(), np.repeat(mine, 3)]), axis=0)
@@ -21,7 +21,7 @@ def corners_kept(facets: Facets, label: Integers) -> Booleans:
     return count >= 3
 
 
-def region_mesh(facets: Facets, regions: Integers, kept: Booleans, tolerance: float) -> tuple[Mesh, float]:
+def region_mesh(facets: FlatRegions, regions: Integers, kept: Booleans, tolerance: float) -> tuple[Mesh, float]:
     """One flat mesh of regions in one plane, and its largest error [m].
 
     Outlines are thinned within a tolerance [m] and filled anew; where an outline crosses itself the triangles stay as
