@@ -5,7 +5,7 @@ from typing import Any
 
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.plane_segmentation import planar_regions
-from rislam_rt.scene.importing.facets import FlatRegions
+from rislam_rt.scene.importing.flat_regions import FlatRegions
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.surfaces import Sorted, Surface
 from rislam_rt.scene.meshes import Mesh

@@ -9,7 +9,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.account import account
 from rislam_rt.scene.importing.draft import RoomDraft
-from rislam_rt.scene.importing.facets import FlatRegions, find_facets, weld
+from rislam_rt.scene.importing.flat_regions import FlatRegions, find_facets, weld
 from rislam_rt.scene.importing.free_space import find_free, is_seen
 from rislam_rt.scene.importing.materials import Palette, itu_by_word
 from rislam_rt.scene.importing.options import ImportOptions

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import unit
-from rislam_rt.scene.importing.facets import FLAT_ANGLE, FlatRegions, crease_groups
+from rislam_rt.scene.importing.flat_regions import FLAT_ANGLE, FlatRegions, crease_groups
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.rooms.shapes import joined, quad
 

@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.importing.facets import FlatRegions, Welded
+from rislam_rt.scene.importing.flat_regions import FlatRegions, Welded
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.scan import WIDTHS, ScanPlane, find_planes, thin_cloud
 from rislam_rt.scene.importing.scan_outline import BRIDGE, CELL, Outline, outline_planes

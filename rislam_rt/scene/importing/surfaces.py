@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
 from rislam_rt.geometry.triangles import distance_to_triangles
-from rislam_rt.scene.importing.facets import FLAT_ANGLE, FlatRegions
+from rislam_rt.scene.importing.flat_regions import FLAT_ANGLE, FlatRegions
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.pieces import Piece
 from rislam_rt.scene.importing.rounded import Round, prism

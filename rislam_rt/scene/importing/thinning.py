@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.triangles import distance_to_edges
-from rislam_rt.scene.importing.facets import FlatRegions
+from rislam_rt.scene.importing.flat_regions import FlatRegions
 from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
 from rislam_rt.scene.importing.rounded import across
 from rislam_rt.scene.meshes import Mesh
