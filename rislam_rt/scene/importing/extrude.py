@@ -11,7 +11,7 @@ from rislam_rt.scene.importing.draft import RoomDraft
 from rislam_rt.scene.importing.materials import Palette
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.pieces import numbered, plain_name
-from rislam_rt.scene.importing.plan import Opening, Plan
+from rislam_rt.scene.importing.plan import FloorPlan, Opening
 from rislam_rt.scene.importing.polygons import inside_loop, triangulate
 from rislam_rt.scene.importing.thinning import as_mesh
 from rislam_rt.scene.meshes import Mesh
@@ -58,7 +58,7 @@ class Line(NamedTuple):
         return np.asarray((points - self.start) @ self.across)
 
 
-def extrude(plan: Plan, height: float, options: ImportOptions) -> RoomDraft:
+def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft:
     """The room of a plan.
 
     Raises
@@ -93,7 +93,7 @@ def extrude(plan: Plan, height: float, options: ImportOptions) -> RoomDraft:
     return _named([*levels, *walls, *entries], plan, options)
 
 
-def _named(entries: list[Entry], plan: Plan, options: ImportOptions) -> RoomDraft:
+def _named(entries: list[Entry], plan: FloorPlan, options: ImportOptions) -> RoomDraft:
     palette = Palette(options.materials, options.rest)
     names = numbered([plain_name(name) or "wall" for name, _, _ in entries])
     reflectors = {}
@@ -110,7 +110,7 @@ def _named(entries: list[Entry], plan: Plan, options: ImportOptions) -> RoomDraf
     return RoomDraft(reflectors, {}, remarks + palette.remarks())
 
 
-def _wall_lines(plan: Plan) -> list[Line]:
+def _wall_lines(plan: FloorPlan) -> list[Line]:
     """Walls along one line, joined; those drawn by themselves come before the edges of rooms, which yield to them."""
     drawn = [(line, material, name) for line, material, name in plan.walls]
     edges = [np.stack([a, b]) for room in plan.rooms for a, b in zip(room, np.roll(room, -1, axis=0), strict=True)]
@@ -242,7 +242,7 @@ def _frame(opening: Opening, lines: list[Line], thresholds: dict[float, list[Mes
     return found
 
 
-def _floor_triangles(plan: Plan, lines: list[Line]) -> Floats:
+def _floor_triangles(plan: FloorPlan, lines: list[Line]) -> Floats:
     """(T, 3, 2) [m] of all rooms; of the rectangle about all walls where no room is drawn."""
     found = []
     for room in plan.rooms:
@@ -263,7 +263,7 @@ def _at_height(triangles: Floats, height: float) -> Mesh:
     return as_mesh(np.concatenate([triangles, np.full((*triangles.shape[:2], 1), height)], axis=-1))
 
 
-def _line_name(line: Line, plan: Plan) -> str:
+def _line_name(line: Line, plan: FloorPlan) -> str:
     """`wall_north` where a room lies on one side only, `partition` between two; the drawn name if there is one."""
     if line.name:
         return line.name

@@ -21,7 +21,7 @@ CLOSED_WITH = {"door": "itu:wood", "window": "itu:glass"}
 MAX_SHAPES = 5_000
 
 
-class Shape(NamedTuple):
+class PlanShape(NamedTuple):
     """A line or an area of a plan, with what the file says about it."""
 
     kind: str
@@ -45,7 +45,7 @@ class Opening(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plan:
+class FloorPlan:
     """A floor plan [m]."""
 
     rooms: list[Floats]
@@ -55,7 +55,7 @@ class Plan:
     openings: list[Opening]
 
 
-def parse_corners(text: str) -> list[Shape]:
+def parse_corners(text: str) -> list[PlanShape]:
     """One room from `0,0 4,0 4,3 0,3`.
 
     Raises
@@ -72,10 +72,10 @@ def parse_corners(text: str) -> list[Shape]:
                 f"--floorplan: '{one_line(word)[:40]}' is no corner", 'give x,y in metres, e.g. "0,0 4,0 4,3 0,3"'
             ) from None
         corners.append([x, y])
-    return [Shape("room", np.array(corners).reshape(-1, 2), True, {})]
+    return [PlanShape("room", np.array(corners).reshape(-1, 2), True, {})]
 
 
-def parse_geojson(content: bytes) -> list[Shape]:
+def parse_geojson(content: bytes) -> list[PlanShape]:
     """Shapes of a GeoJSON file: polygons are rooms, lines are walls, unless a feature's `kind` says otherwise.
 
     Raises
@@ -108,7 +108,7 @@ def _features(table: Any) -> Iterator[tuple[Any, Any]]:
         yield table, {}
 
 
-def _shapes(geometry: Any, about: dict[str, Any]) -> Iterator[Shape]:
+def _shapes(geometry: Any, about: dict[str, Any]) -> Iterator[PlanShape]:
     kind, found = geometry["type"], geometry.get("coordinates")
     many = {"MultiPolygon": "Polygon", "MultiLineString": "LineString"}
     if kind in many:
@@ -122,10 +122,10 @@ def _shapes(geometry: Any, about: dict[str, Any]) -> Iterator[Shape]:
     points = np.array([[float(x) for x in row[:2]] for row in rows]).reshape(-1, 2)
     if closed and len(found) > 1:
         raise Fault("a room with a hole in it", "draw what stands in it as walls")
-    yield Shape(str(about.get("kind", "room" if closed else "wall")).lower(), points, closed, about)
+    yield PlanShape(str(about.get("kind", "room" if closed else "wall")).lower(), points, closed, about)
 
 
-def build_plan(shapes: list[Shape], unit: float, height: float) -> Plan:
+def build_plan(shapes: list[PlanShape], unit: float, height: float) -> FloorPlan:
     """A plan in metres, each shape checked.
 
     Raises
@@ -137,7 +137,7 @@ def build_plan(shapes: list[Shape], unit: float, height: float) -> Plan:
         raise Fault("no room and no wall in it", "draw rooms as closed shapes, or walls as lines")
     if len(shapes) > MAX_SHAPES:
         raise Fault(f"{len(shapes)} shapes", f"leave furniture and lettering out: {MAX_SHAPES} are the most")
-    plan = Plan([], [], [])
+    plan = FloorPlan([], [], [])
     for number, shape in enumerate(shapes):
         if shape.kind not in KINDS:
             raise Fault(f"shape {number} is a '{one_line(shape.kind)[:30]}'", f"give one of {', '.join(KINDS)}")
@@ -150,7 +150,7 @@ def build_plan(shapes: list[Shape], unit: float, height: float) -> Plan:
     return plan
 
 
-def _add(plan: Plan, shape: Shape, unit: float, height: float) -> None:
+def _add(plan: FloorPlan, shape: PlanShape, unit: float, height: float) -> None:
     points = shape.points * unit
     if not np.isfinite(points).all() or np.abs(points).max(initial=0.0) > 1e5:
         raise Fault("a coordinate is not finite or beyond 100 km", "give metres, or --units")
@@ -184,7 +184,7 @@ def _room(points: Floats) -> Floats:
     return points
 
 
-def _material(shape: Shape) -> dict[str, Any] | None:
+def _material(shape: PlanShape) -> dict[str, Any] | None:
     """What a wall is of, or what closes an opening; doors are open unless they say otherwise, windows are glass."""
     text = shape.about.get("material")
     given = shape.about.get("open")
@@ -196,7 +196,7 @@ def _material(shape: Shape) -> dict[str, Any] | None:
     return parse_material(str(text))
 
 
-def _number(shape: Shape, key: str, usual: float) -> float:
+def _number(shape: PlanShape, key: str, usual: float) -> float:
     try:
         value = float(shape.about.get(key, usual))
     except (TypeError, ValueError):
