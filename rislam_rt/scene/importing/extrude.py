@@ -8,10 +8,10 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.draft import RoomDraft
+from rislam_rt.scene.importing.floor_plan import FloorPlan, Opening
 from rislam_rt.scene.importing.materials import Palette
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.pieces import numbered, plain_name
-from rislam_rt.scene.importing.plan import FloorPlan, Opening
 from rislam_rt.scene.importing.polygons import inside_loop, triangulate
 from rislam_rt.scene.importing.thinning import as_mesh
 from rislam_rt.scene.meshes import Mesh
