@@ -7,12 +7,12 @@ from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.plane_segmentation import planar_regions
 from rislam_rt.scene.importing.flat_regions import FlatRegions
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.surfaces import Sorted, Surface
+from rislam_rt.scene.importing.surfaces import SortedSurfaces, Surface
 from rislam_rt.scene.meshes import Mesh
 
 
 def account(
-    facets: FlatRegions, found: Sorted, surfaces: list[Surface], unseen: float, reflectors: dict[str, Any],
+    facets: FlatRegions, found: SortedSurfaces, surfaces: list[Surface], unseen: float, reflectors: dict[str, Any],
     shades: dict[str, Mesh], options: ImportOptions, *, scanned: bool,
 ) -> list[str]:  # fmt: skip
     """What became of the mesh, in numbers."""

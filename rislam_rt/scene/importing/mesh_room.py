@@ -18,7 +18,7 @@ from rislam_rt.scene.importing.rounded import find_round
 from rislam_rt.scene.importing.scan_room import looks_scanned, sort_scan
 from rislam_rt.scene.importing.size import place_parts
 from rislam_rt.scene.importing.source import Part, read_source
-from rislam_rt.scene.importing.surfaces import Sorted, Surface, sort_regions
+from rislam_rt.scene.importing.surfaces import SortedSurfaces, Surface, sort_regions
 from rislam_rt.scene.importing.thinning import as_mesh
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.rooms.shapes import joined
@@ -66,7 +66,7 @@ def build_draft(facets: FlatRegions, parts: list[Part], notes: list[str], option
     return RoomDraft(reflectors, shades, remarks + palette.remarks())
 
 
-def _seen(found: Sorted) -> tuple[list[Surface], float]:
+def _seen(found: SortedSurfaces) -> tuple[list[Surface], float]:
     """The surfaces that an agent inside can see, and the area [m^2] of the others: outer skins, insides of boards."""
     triangles = np.concatenate([
         *(s.mesh.vertices[s.mesh.faces] for s in found.surfaces), *(c.triangles for c in found.clutter)
@@ -107,7 +107,7 @@ def _reflectors(
     return found
 
 
-def _shades(found: Sorted, pieces: list[Piece], taken: list[str]) -> dict[str, Mesh]:
+def _shades(found: SortedSurfaces, pieces: list[Piece], taken: list[str]) -> dict[str, Mesh]:
     """Clutter by the piece that it belongs to."""
     by_piece: dict[int, list[Floats]] = {}
     for clutter in found.clutter:

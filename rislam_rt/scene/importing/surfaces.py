@@ -37,18 +37,18 @@ class Surface(NamedTuple):
     """[m]."""
 
 
-class Clutter(NamedTuple):
+class ClutterMesh(NamedTuple):
     """Triangles (T, 3, 3) [m] of a piece that shade."""
 
     piece: int
     triangles: Floats
 
 
-class Sorted(NamedTuple):
+class SortedSurfaces(NamedTuple):
     """A mesh as what reflects and what shades."""
 
     surfaces: list[Surface]
-    clutter: list[Clutter]
+    clutter: list[ClutterMesh]
     shade_error: float
     """[m]."""
     cell: float
@@ -63,7 +63,9 @@ class Sorted(NamedTuple):
     """Radius [m], flat sides and error [m] of each."""
 
 
-def sort_regions(facets: FlatRegions, pieces: list[Piece], rounds: list[Round], options: ImportOptions) -> Sorted:
+def sort_regions(
+    facets: FlatRegions, pieces: list[Piece], rounds: list[Round], options: ImportOptions
+) -> SortedSurfaces:
     """Decide for every region whether it reflects, shades or goes."""
     owner = np.zeros(len(facets.area), dtype=np.int64)
     for number, piece in enumerate(pieces):
@@ -147,7 +149,7 @@ def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Inte
 def _with_clutter(
     facets: FlatRegions, pieces: list[Piece], rounds: list[Round], surfaces: list[Surface], mirror: Booleans,
     resting: Booleans, narrow: float, options: ImportOptions,
-) -> Sorted:  # fmt: skip
+) -> SortedSurfaces:  # fmt: skip
     """Cylinders as prisms and all else that does not reflect in cells."""
     wavelength, cylinders, prisms = options.wavelength, [], []
     rest = ~mirror & ~resting
@@ -167,25 +169,25 @@ def _with_clutter(
             area = float(facets.area[found.regions].sum())
             surfaces.append(Surface(thing, int(part[first]), facets.normal[first], mesh, area, error))
         else:
-            prisms.append(Clutter(thing, mesh.vertices[mesh.faces]))
+            prisms.append(ClutterMesh(thing, mesh.vertices[mesh.faces]))
     gone = float(facets.area[resting].sum())
     raw, planes = [], _shell_planes(surfaces)
     for number, piece in enumerate(pieces):
         regions = piece.regions[rest[piece.regions]]
         triangles = off_planes(facets.mesh.vertices[facets.faces_of(regions)], planes)
         if len(triangles) and np.ptp(triangles.reshape(-1, 3), axis=0).max() >= narrow:
-            raw.append(Clutter(number, triangles))
+            raw.append(ClutterMesh(number, triangles))
         else:
             gone += float(facets.area[regions].sum())
             rest[regions] = False
     thin, error, cell = in_cells(raw, wavelength)
     shading = float(facets.area[rest].sum()) + sum(surface_area(clutter.triangles) for clutter in prisms)
-    thin = [Clutter(c.piece, off_planes(c.triangles, planes)) for c in (*prisms, *thin)]
+    thin = [ClutterMesh(c.piece, off_planes(c.triangles, planes)) for c in (*prisms, *thin)]
     thin = [clutter for clutter in thin if len(clutter.triangles)]
-    return Sorted(surfaces, thin, error, cell, narrow, shading, gone, cylinders)
+    return SortedSurfaces(surfaces, thin, error, cell, narrow, shading, gone, cylinders)
 
 
-def in_cells(raw: list[Clutter], cell: float) -> tuple[list[Clutter], float, float]:
+def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], float, float]:
     """Clutter thinned in cells of one size, the smallest with which it is few enough."""
     while True:
         found = [(clutter.piece, *clustered(clutter.triangles, cell)) for clutter in raw]
@@ -193,7 +195,7 @@ def in_cells(raw: list[Clutter], cell: float) -> tuple[list[Clutter], float, flo
             break
         cell *= np.sqrt(2.0)
     error = max((moved for _, triangles, moved in found if len(triangles)), default=0.0)
-    return [Clutter(piece, triangles) for piece, triangles, _ in found], error, cell
+    return [ClutterMesh(piece, triangles) for piece, triangles, _ in found], error, cell
 
 
 def _shell_planes(surfaces: list[Surface]) -> list[tuple[Floats, float]]:
