@@ -17,7 +17,7 @@ from rislam_rt.scene.importing.pieces import Piece, find_pieces, numbered, place
 from rislam_rt.scene.importing.rounded import find_round
 from rislam_rt.scene.importing.scan_room import looks_scanned, sort_scan
 from rislam_rt.scene.importing.size import place_parts
-from rislam_rt.scene.importing.source import Part, read_source
+from rislam_rt.scene.importing.source import MeshPart, read_source
 from rislam_rt.scene.importing.surfaces import SortedSurfaces, Surface, sort_regions
 from rislam_rt.scene.importing.thinning import as_mesh
 from rislam_rt.scene.meshes import Mesh
@@ -42,7 +42,7 @@ def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
     return build_draft(facets, parts, [*notes, *more], options)
 
 
-def build_draft(facets: FlatRegions, parts: list[Part], notes: list[str], options: ImportOptions) -> RoomDraft:
+def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], options: ImportOptions) -> RoomDraft:
     """Walls, things and clutter, of flat regions or of the planes of a scan."""
     if options.scan or (options.scan is None and looks_scanned(facets, options)):
         found, about = sort_scan(facets.mesh, options)
@@ -81,7 +81,7 @@ def _seen(found: SortedSurfaces) -> tuple[list[Surface], float]:
 
 
 def _reflectors(
-    surfaces: list[Surface], pieces: list[Piece], parts: list[Part], palette: Palette
+    surfaces: list[Surface], pieces: list[Piece], parts: list[MeshPart], palette: Palette
 ) -> dict[str, tuple[Mesh, dict[str, Any]]]:
     """Named meshes with their materials: each wall of the shell by itself, each thing as one."""
     shell = sorted((s for s in surfaces if s.piece == 0), key=lambda s: -s.area)

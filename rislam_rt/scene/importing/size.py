@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.source import Part
+from rislam_rt.scene.importing.source import MeshPart
 from rislam_rt.scene.lying import UNITS, place_points
 
 SMALLEST_ROOM, LARGEST_ROOM = 1.0, 200.0
@@ -14,7 +14,7 @@ USUAL = (2.0, 60.0)
 """[m] Diagonals of the rooms that a wrong unit is mended to."""
 
 
-def place_parts(parts: list[Part], suffix: str, options: ImportOptions) -> tuple[list[Floats], list[str]]:
+def place_parts(parts: list[MeshPart], suffix: str, options: ImportOptions) -> tuple[list[Floats], list[str]]:
     """The parts' triangles (T, 3, 3) [m], z up, and remarks.
 
     Raises

@@ -24,7 +24,7 @@ _COMPRESSED = ("draco", "meshopt", "quantization")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Part:
+class MeshPart:
     """Triangles of one node and one material."""
 
     node: str
@@ -33,7 +33,7 @@ class Part:
     """(T, 3, 3) in the file's units and axes."""
 
 
-def read_source(path: Path) -> tuple[list[Part], list[str]]:
+def read_source(path: Path) -> tuple[list[MeshPart], list[str]]:
     """The parts of a mesh file, and remarks on what it names and does not hold.
 
     Raises
@@ -51,15 +51,15 @@ def read_source(path: Path) -> tuple[list[Part], list[str]]:
         parts = _from_gltf(content, suffix, path.parent)
     elif suffix == ".obj":
         found, library = read_obj(content)
-        parts = [Part(node, material, triangles) for node, material, triangles in found]
+        parts = [MeshPart(node, material, triangles) for node, material, triangles in found]
         if library and not (path.parent / library).is_file():
             notes.append(f"'{library[:60]}' is not there: materials are known by their names in the OBJ file alone")
     else:
         mesh = MeshReader().parse(content, path.name, max_faces=MAX_IMPORT_FACES, reach=ANY_UNIT)
-        parts = [Part("", "", mesh.vertices[mesh.faces])]
+        parts = [MeshPart("", "", mesh.vertices[mesh.faces])]
     if not parts:
         raise Fault("the file has no triangles", "export it with its meshes")
-    return [Part(part.node, part.material, _sound(part)) for part in parts], notes
+    return [MeshPart(part.node, part.material, _sound(part)) for part in parts], notes
 
 
 def read_content(path: Path, limit: int = MAX_MESH_BYTES) -> bytes:
@@ -84,13 +84,13 @@ def read_content(path: Path, limit: int = MAX_MESH_BYTES) -> bytes:
     return content
 
 
-def _sound(part: Part) -> Floats:
+def _sound(part: MeshPart) -> Floats:
     corners = part.triangles.reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)
     return sound_mesh(Mesh(corners, faces), MAX_IMPORT_FACES, ANY_UNIT).vertices[faces]
 
 
-def _from_gltf(content: bytes, suffix: str, folder: Path) -> list[Part]:
+def _from_gltf(content: bytes, suffix: str, folder: Path) -> list[MeshPart]:
     """Parts of a glTF file, its buffers from beside it, pictures left where they are."""
     content = _plain_glb(content) if suffix == ".glb" else _joined_glb(content, folder)
     check_glb(content, MAX_IMPORT_FACES, MAX_IMPORT_NODES)
@@ -106,7 +106,7 @@ def _from_gltf(content: bytes, suffix: str, folder: Path) -> list[Part]:
         vertices = np.asarray(mesh.vertices, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
         mesh_checked = sound_mesh(Mesh(vertices, faces.astype(np.int64)), MAX_IMPORT_FACES, ANY_UNIT)
         material = getattr(getattr(mesh.visual, "material", None), "name", None)
-        parts.append(Part(str(name), str(material or ""), mesh_checked.vertices[mesh_checked.faces]))
+        parts.append(MeshPart(str(name), str(material or ""), mesh_checked.vertices[mesh_checked.faces]))
     return parts
 
 
