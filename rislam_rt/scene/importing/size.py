@@ -4,8 +4,8 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.importing.mesh_source import MeshPart
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.source import MeshPart
 from rislam_rt.scene.lying import UNITS, place_points
 
 SMALLEST_ROOM, LARGEST_ROOM = 1.0, 200.0
