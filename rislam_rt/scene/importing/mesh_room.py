@@ -14,7 +14,7 @@ from rislam_rt.scene.importing.free_space import find_free, is_seen
 from rislam_rt.scene.importing.materials import Palette, itu_by_word
 from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.pieces import Piece, find_pieces, numbered, place_free_name, wall_name
+from rislam_rt.scene.importing.pieces import RegionGroup, find_pieces, numbered, place_free_name, wall_name
 from rislam_rt.scene.importing.rounded import find_round
 from rislam_rt.scene.importing.scan_room import looks_scanned, sort_scan
 from rislam_rt.scene.importing.size import place_parts
@@ -46,7 +46,7 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
     """Walls, things and clutter, of flat regions or of the planes of a scan."""
     if options.scan or (options.scan is None and looks_scanned(facets, options)):
         found, about = sort_scan(facets.mesh, options)
-        pieces = [Piece("", "", np.zeros(0, dtype=np.int64), True)]
+        pieces = [RegionGroup("", "", np.zeros(0, dtype=np.int64), True)]
     else:
         pieces, about = find_pieces(facets, [part.node for part in parts]), []
         found = sort_regions(facets, pieces, find_round(facets), options)
@@ -81,7 +81,7 @@ def _seen(found: SortedSurfaces) -> tuple[list[Surface], float]:
 
 
 def _reflectors(
-    surfaces: list[Surface], pieces: list[Piece], parts: list[MeshPart], palette: Palette
+    surfaces: list[Surface], pieces: list[RegionGroup], parts: list[MeshPart], palette: Palette
 ) -> dict[str, tuple[Mesh, dict[str, Any]]]:
     """Named meshes with their materials: each wall of the shell by itself, each thing as one."""
     shell = sorted((s for s in surfaces if s.piece == 0), key=lambda s: -s.area)
@@ -107,7 +107,7 @@ def _reflectors(
     return found
 
 
-def _shades(found: SortedSurfaces, pieces: list[Piece], taken: list[str]) -> dict[str, Mesh]:
+def _shades(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str]) -> dict[str, Mesh]:
     """Clutter by the piece that it belongs to."""
     by_piece: dict[int, list[Floats]] = {}
     for clutter in found.clutter:

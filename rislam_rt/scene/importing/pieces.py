@@ -23,7 +23,7 @@ _NAMELESS = re.compile(
 _SHELL = re.compile(r"(?i)(^|[^a-z])(walls?|floors?|ceilings?|roof|wand|boden|decke)([^a-z]|$)")
 
 
-class Piece(NamedTuple):
+class RegionGroup(NamedTuple):
     """Regions that are one thing."""
 
     name: str
@@ -32,7 +32,7 @@ class Piece(NamedTuple):
     shell: bool
 
 
-def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[Piece]:
+def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
     """All pieces, the shell first; `nodes` are the node names of the mesh's parts.
 
     A node with a name of its own is one piece; whatever has none is parted into what hangs together.
@@ -42,7 +42,7 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[Piece]:
     node = np.array([plain_name(nodes[p]) for p in range(len(nodes))], dtype=object)[part]
     box = bounds_of(facets, np.arange(len(part)))
     shell: list[int] = []
-    others: list[Piece] = []
+    others: list[RegionGroup] = []
     whole = node == ""
     for name in sorted(set(node) - {""}):
         regions = np.flatnonzero(node == name)
@@ -51,7 +51,7 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[Piece]:
         elif _is_shell(bounds_of(facets, regions), box):
             whole[regions] = True  # a whole room under one name
         else:
-            others.append(Piece(name, name, regions, False))
+            others.append(RegionGroup(name, name, regions, False))
     loose = np.flatnonzero(whole)
     things: list[Integers] = []
     for component in np.unique(facets.component[loose]):
@@ -68,8 +68,8 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[Piece]:
         if _is_shell(bounds, box):  # walls that were drawn apart
             shell += regions.tolist()
         else:
-            others.append(Piece(guess_kind(bounds, box), "", regions, False))
-    return [Piece("", "", np.array(sorted(shell), dtype=np.int64), True), *others]
+            others.append(RegionGroup(guess_kind(bounds, box), "", regions, False))
+    return [RegionGroup("", "", np.array(sorted(shell), dtype=np.int64), True), *others]
 
 
 def _continues(facets: FlatRegions, regions: Integers, shell: Integers) -> bool:
