@@ -18,7 +18,7 @@ FEWEST = 5
 """Facets of a patch: fewer are a bevel."""
 
 
-class Round(NamedTuple):
+class RoundPatch(NamedTuple):
     """A patch of facets that is round; a cylinder if it has a radius."""
 
     regions: Integers
@@ -34,7 +34,7 @@ class Round(NamedTuple):
     """[rad] from where to where it goes round; all the way if that is 2 pi."""
 
 
-def find_round(facets: FlatRegions) -> list[Round]:
+def find_round(facets: FlatRegions) -> list[RoundPatch]:
     """All round patches: facets narrower than `WIDEST` that meet their neighbours at less than `CREASE`."""
     narrow = facets.width < WIDEST
     group = crease_groups(facets, narrow, float(FLAT_ANGLE), float(CREASE))
@@ -49,7 +49,7 @@ def sides_for(radius: float, sagitta: float, arc: float) -> int:
     return max(int(np.ceil(arc / step)), 1)
 
 
-def prism(found: Round, sagitta: float) -> tuple[Mesh, float]:
+def prism(found: RoundPatch, sagitta: float) -> tuple[Mesh, float]:
     """A cylinder's flat sides, without ends, and how far they are off it [m].
 
     All the way round the girth is the true one, so that its shadow is (Cauchy); an arc has its corners on the circle.
@@ -75,13 +75,13 @@ def across(axis: Floats) -> tuple[Floats, Floats]:
     return u, np.cross(axis, u)
 
 
-def _cylinder(facets: FlatRegions, regions: Integers) -> Round:
+def _cylinder(facets: FlatRegions, regions: Integers) -> RoundPatch:
     """The cylinder through the corners of a patch, if they lie on one and it covers it."""
     normal, area = facets.normal[regions], facets.area[regions]
     values, vectors = np.linalg.eigh(np.einsum("r,ri,rj->ij", area, normal, normal) / area.sum())
     axis = vectors[:, 0] * (1.0 if vectors[np.argmax(np.abs(vectors[:, 0])), 0] > 0.0 else -1.0)
     points = facets.mesh.vertices[np.unique(facets.faces_of(regions))]
-    other = Round(regions, axis, points.mean(axis=0), 0.0, (0.0, 0.0), (0.0, 0.0))
+    other = RoundPatch(regions, axis, points.mean(axis=0), 0.0, (0.0, 0.0), (0.0, 0.0))
     if values[0] > 0.01:
         return other
     u, v = across(axis)
@@ -105,4 +105,4 @@ def _cylinder(facets: FlatRegions, regions: Integers) -> Round:
     if abs(area.sum() - radius * (arc[1] - arc[0]) * height) > 0.1 * area.sum():
         return other
     center = (middle + solution[:2]) @ np.stack([u, v])
-    return Round(regions, axis, center, radius, (float(along.min()), float(along.max())), arc)
+    return RoundPatch(regions, axis, center, radius, (float(along.min()), float(along.max())), arc)

@@ -10,7 +10,7 @@ from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene.importing.flat_regions import FLAT_ANGLE, FlatRegions
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.region_groups import RegionGroup
-from rislam_rt.scene.importing.rounded import Round, prism
+from rislam_rt.scene.importing.rounded import RoundPatch, prism
 from rislam_rt.scene.importing.thinning import clustered, corners_kept, has_area, region_mesh
 from rislam_rt.scene.meshes import Mesh
 
@@ -64,7 +64,7 @@ class SortedSurfaces(NamedTuple):
 
 
 def sort_regions(
-    facets: FlatRegions, pieces: list[RegionGroup], rounds: list[Round], options: ImportOptions
+    facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], options: ImportOptions
 ) -> SortedSurfaces:
     """Decide for every region whether it reflects, shades or goes."""
     owner = np.zeros(len(facets.area), dtype=np.int64)
@@ -147,7 +147,7 @@ def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Inte
 
 
 def _with_clutter(
-    facets: FlatRegions, pieces: list[RegionGroup], rounds: list[Round], surfaces: list[Surface], mirror: Booleans,
+    facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], surfaces: list[Surface], mirror: Booleans,
     resting: Booleans, narrow: float, options: ImportOptions,
 ) -> SortedSurfaces:  # fmt: skip
     """Cylinders as prisms and all else that does not reflect in cells."""
