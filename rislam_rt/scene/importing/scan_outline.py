@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
-from rislam_rt.scene.importing.rounded import across
+from rislam_rt.scene.importing.round_surfaces import across
 from rislam_rt.scene.importing.scan import PointCloud, ScanPlane
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.rooms.shapes import joined
