@@ -10,7 +10,7 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.scene.check.mesh_queries import ray_hits
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.importing.free_space import Free, find_free
+from rislam_rt.scene.importing.free_space import FreeSpace, find_free
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.names import safe_name
 from rislam_rt.scene.rooms.room import BASELINE, CYCLES, Room, panel, reflector
@@ -74,7 +74,7 @@ def _reflector(name: str, material: dict[str, Any]) -> dict[str, Any]:
     return reflector(name, material) | {"mesh": f"meshes/{safe_name(name)}.ply"}
 
 
-def propose_panel(draft: RoomDraft, free: Free) -> tuple[dict[str, Any] | None, str]:
+def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | None, str]:
     """A panel like the paper's on what is above the middle of the way, or else beside it."""
     names = [key for key, (mesh, _) in draft.reflectors.items() for _ in range(len(mesh.faces))]
     triangles = np.concatenate([mesh.vertices[mesh.faces] for mesh, _ in draft.reflectors.values()])
@@ -95,7 +95,7 @@ def propose_panel(draft: RoomDraft, free: Free) -> tuple[dict[str, Any] | None, 
     return None, "no panel: nothing flat is free above or beside the way"
 
 
-def _fits(center: Floats, normal: Floats, right: Floats, host: str, draft: RoomDraft, free: Free) -> bool:
+def _fits(center: Floats, normal: Floats, right: Floats, host: str, draft: RoomDraft, free: FreeSpace) -> bool:
     """Whether the corners of a panel look out from the same host, seen from the middle of the way."""
     mesh, _ = draft.reflectors[host]
     down = np.cross(normal, right)
