@@ -9,7 +9,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.draft import RoomDraft
 from rislam_rt.scene.importing.floor_plan import FloorPlan, Opening
-from rislam_rt.scene.importing.materials import Palette
+from rislam_rt.scene.importing.materials import MaterialAssignment
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.polygons import inside_loop, triangulate
 from rislam_rt.scene.importing.region_groups import numbered, plain_name
@@ -94,7 +94,7 @@ def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft
 
 
 def _named(entries: list[Entry], plan: FloorPlan, options: ImportOptions) -> RoomDraft:
-    palette = Palette(options.materials, options.rest)
+    palette = MaterialAssignment(options.materials, options.rest)
     names = numbered([plain_name(name) or "wall" for name, _, _ in entries])
     reflectors = {}
     for name, (_, mesh, own) in zip(names, entries, strict=True):

@@ -11,7 +11,7 @@ from rislam_rt.scene.importing.account import account
 from rislam_rt.scene.importing.draft import RoomDraft
 from rislam_rt.scene.importing.flat_regions import FlatRegions, find_facets, weld
 from rislam_rt.scene.importing.free_space import find_free, is_seen
-from rislam_rt.scene.importing.materials import Palette, itu_by_word
+from rislam_rt.scene.importing.materials import MaterialAssignment, itu_by_word
 from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.region_groups import RegionGroup, find_pieces, numbered, place_free_name, wall_name
@@ -55,7 +55,7 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
             f"nothing in it is flat and wider than {100 * found.narrow:.2g} cm", "check --units, or lower --detail"
         )
     surfaces, unseen = _seen(found)
-    palette = Palette(options.materials, options.rest)
+    palette = MaterialAssignment(options.materials, options.rest)
     reflectors = _reflectors(surfaces, pieces, parts, palette)
     shades = _shades(found, pieces, list(reflectors))
     if palette.unused():
@@ -81,7 +81,7 @@ def _seen(found: SortedSurfaces) -> tuple[list[Surface], float]:
 
 
 def _reflectors(
-    surfaces: list[Surface], pieces: list[RegionGroup], parts: list[MeshPart], palette: Palette
+    surfaces: list[Surface], pieces: list[RegionGroup], parts: list[MeshPart], palette: MaterialAssignment
 ) -> dict[str, tuple[Mesh, dict[str, Any]]]:
     """Named meshes with their materials: each wall of the shell by itself, each thing as one."""
     shell = sorted((s for s in surfaces if s.piece == 0), key=lambda s: -s.area)
