@@ -7,10 +7,10 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.importing.account import account
 from rislam_rt.scene.importing.draft import RoomDraft
 from rislam_rt.scene.importing.flat_regions import FlatRegions, find_facets, weld
 from rislam_rt.scene.importing.free_space import find_free, is_seen
+from rislam_rt.scene.importing.import_report import account
 from rislam_rt.scene.importing.materials import MaterialAssignment, itu_by_word
 from rislam_rt.scene.importing.mesh_simplification import as_mesh
 from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
