@@ -7,7 +7,6 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.importing.draft import RoomDraft
 from rislam_rt.scene.importing.flat_regions import FlatRegions, find_facets, weld
 from rislam_rt.scene.importing.free_space import find_free, is_seen
 from rislam_rt.scene.importing.import_report import account
@@ -16,6 +15,7 @@ from rislam_rt.scene.importing.mesh_simplification import as_mesh
 from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.region_groups import RegionGroup, find_pieces, numbered, place_free_name, wall_name
+from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.round_surfaces import find_round
 from rislam_rt.scene.importing.scan_room import looks_scanned, sort_scan
 from rislam_rt.scene.importing.size import place_parts

@@ -11,8 +11,8 @@ from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.model import Body, Material, Reflector, RisPanel, Scene, Shade, Trajectory
 from rislam_rt.scene.check import find_errors
 from rislam_rt.scene.findings import Fault, raise_errors
-from rislam_rt.scene.importing.draft import RoomDraft, propose_panel
 from rislam_rt.scene.importing.free_space import FreeSpace
+from rislam_rt.scene.importing.room_draft import RoomDraft, propose_panel
 from rislam_rt.scene.load import SCENE_FILE, build_panel, load_scene
 from rislam_rt.scene.meshes import MAX_FACES, Mesh
 from rislam_rt.scene.motion import straight_motion
