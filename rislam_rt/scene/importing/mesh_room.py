@@ -14,11 +14,11 @@ from rislam_rt.scene.importing.materials import MaterialAssignment, itu_by_word
 from rislam_rt.scene.importing.mesh_simplification import as_mesh
 from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
 from rislam_rt.scene.importing.options import ImportOptions
+from rislam_rt.scene.importing.placement import place_parts
 from rislam_rt.scene.importing.region_groups import RegionGroup, find_pieces, numbered, place_free_name, wall_name
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.round_surfaces import find_round
 from rislam_rt.scene.importing.scan_room import looks_scanned, sort_scan
-from rislam_rt.scene.importing.size import place_parts
 from rislam_rt.scene.importing.surfaces import SortedSurfaces, Surface, sort_regions
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.rooms.shapes import joined

@@ -13,8 +13,8 @@ from rislam_rt.scene.importing.floor_plan import build_plan, parse_corners, pars
 from rislam_rt.scene.importing.mesh_room import import_mesh
 from rislam_rt.scene.importing.mesh_source import read_content
 from rislam_rt.scene.importing.options import ImportOptions
+from rislam_rt.scene.importing.placement import check_size
 from rislam_rt.scene.importing.room_draft import RoomDraft, finish_room
-from rislam_rt.scene.importing.size import check_size
 from rislam_rt.scene.importing.svg import parse_svg
 from rislam_rt.scene.load import check_scene
 from rislam_rt.scene.lying import UNITS
