@@ -13,7 +13,7 @@ from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.free_space import FreeSpace, find_free
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.names import safe_name
-from rislam_rt.scene.rooms.room import BASELINE, CYCLES, Room, panel, reflector
+from rislam_rt.scene.rooms.room import BASELINE, CYCLES, RoomFiles, panel, reflector
 
 FROM_EDGE = 0.1
 """[m] The panel measures 9 cm: so far it keeps off the edges of its host."""
@@ -35,7 +35,7 @@ class RoomDraft:
         return np.concatenate([mesh.vertices[mesh.faces] for mesh in meshes])
 
 
-def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[Room, list[str]]:
+def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, list[str]]:
     """The room with an agent on a free way and a panel above it, and all remarks on it.
 
     Raises
@@ -67,7 +67,7 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[Room, list[st
     if free.enclosed < 1.0:
         remarks.append(f"open: {1.0 - free.enclosed:.0%} of rays from the start leave the room")
     readme = f"{origin} " + " ".join(f"{remark[:1].upper()}{remark[1:]}." for remark in remarks)
-    return Room({key: value for key, value in table.items() if value != []}, meshes, readme), remarks
+    return RoomFiles({key: value for key, value in table.items() if value != []}, meshes, readme), remarks
 
 
 def _reflector(name: str, material: dict[str, Any]) -> dict[str, Any]:
