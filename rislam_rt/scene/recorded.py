@@ -31,7 +31,7 @@ UNITS = {
 """Endings of column names, after `_`, and what they stand for; seconds, radians and metres without one."""
 
 
-class Recording(NamedTuple):
+class RecordedPoses(NamedTuple):
     """K poses."""
 
     time: Floats
@@ -62,7 +62,7 @@ def parse_tum(content: bytes) -> tuple[Floats, Floats, Floats]:
     return time, position, _heading(table[:, 4:])
 
 
-def parse_csv(content: bytes, named: Mapping[str, str]) -> Recording:
+def parse_csv(content: bytes, named: Mapping[str, str]) -> RecordedPoses:
     """Poses of a CSV file with one line of column names; `named` says which columns hold what, where they are not
     called `time`, `x`, `y`, `z`, `heading`, `qx` to `qw` anyway.
 
@@ -86,9 +86,9 @@ def parse_csv(content: bytes, named: Mapping[str, str]) -> Recording:
     table = {what: column * scale for (what, (_, scale)), column in zip(place.items(), np.array(rows).T, strict=True)}
     time, position = _checked(table["time"], np.column_stack([table[axis] for axis in "xyz"]))
     if "heading" in table:
-        return Recording(time, position, table["heading"])
+        return RecordedPoses(time, position, table["heading"])
     turned = all(part in table for part in QUATERNION)
-    return Recording(time, position, _heading(np.column_stack([table[q] for q in QUATERNION])) if turned else None)
+    return RecordedPoses(time, position, _heading(np.column_stack([table[q] for q in QUATERNION])) if turned else None)
 
 
 def _column(what: str, header: Sequence[str], named: Mapping[str, str]) -> tuple[int, float] | None:
