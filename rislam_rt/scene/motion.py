@@ -11,7 +11,7 @@ from rislam_rt.model import Body, Trajectory
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.meshes import read_inside
 from rislam_rt.scene.random_walk import draw_walk
-from rislam_rt.scene.recorded import RecordedPoses, parse_csv, parse_tum
+from rislam_rt.scene.recorded_poses import RecordedPoses, parse_csv, parse_tum
 from rislam_rt.scene.schema import AgentSection
 from rislam_rt.scene.waypoints import Way, round_corners
 

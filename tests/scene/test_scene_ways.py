@@ -13,7 +13,7 @@ from rislam_rt.scene import load_scene
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.motion import along_heading, at_cycles
 from rislam_rt.scene.random_walk import draw_walk
-from rislam_rt.scene.recorded import RecordedPoses, parse_csv
+from rislam_rt.scene.recorded_poses import RecordedPoses, parse_csv
 from rislam_rt.scene.waypoints import round_corners
 
 EPOCH = 1_700_000_000.0
