@@ -41,7 +41,7 @@ ABOVE = 0.3
 _TRIES = 60
 
 
-class Found(NamedTuple):
+class ScattererPlacement(NamedTuple):
     """A scatterer's place, and the screen that hides it, if any."""
 
     position: Floats
@@ -50,7 +50,7 @@ class Found(NamedTuple):
 
 def draw_scatterer(
     place: str, ground: PlacementLimits, pieces: list[FurniturePiece], landmarks: Floats, *, rng: np.random.Generator
-) -> Found | None:
+) -> ScattererPlacement | None:
     """A place of one of `PLACES` for a scatterer; None where the room has none."""
     low, high = ground.outline.min(axis=0), ground.outline.max(axis=0)
     lowest = float(ground.way[:, 2].min())
@@ -66,11 +66,11 @@ def draw_scatterer(
         if not _is_free(point, ground, pieces, landmarks):
             continue
         if place != "hidden":
-            return Found(point)
+            return ScattererPlacement(point)
         screen = _screen_before(point, ground, rng)
         clear = not any(screen.holds(mark, OFF_SURFACES) for mark in [*landmarks, point])
         if clear and fits(screen, ground, pieces) and hidden_share(point, ground.way, [*pieces, screen]) >= MOST:
-            return Found(point, screen)
+            return ScattererPlacement(point, screen)
     return None
 
 
