@@ -20,7 +20,7 @@ from rislam_rt.scene.random_rooms.landmarks import (
     hidden_share,
     make_scatterer,
 )
-from rislam_rt.scene.random_rooms.motion import MOTIONS, draw_course, draw_motion
+from rislam_rt.scene.random_rooms.motion import MOTIONS, draw_motion, draw_motion_profile
 from rislam_rt.scene.random_rooms.plan import SHAPES, area, draw_plan, extent
 from rislam_rt.scene.random_rooms.shell import CEILINGS, build_shell, draw_roof
 
@@ -93,7 +93,7 @@ def draw_room(seed: int) -> RandomRoom:
 def _attempt(seed: int, shape: str, ceiling: str, motion: str, panel: str, *, rng: np.random.Generator) -> RandomRoom:
     outline = draw_plan(shape, rng=rng)
     roof = draw_roof(outline, ceiling, rng=rng)
-    agent = draw_motion(outline, roof, draw_course(motion, rng=rng), rng=rng)
+    agent = draw_motion(outline, roof, draw_motion_profile(motion, rng=rng), rng=rng)
     ground = PlacementLimits(outline, roof, agent.position)
     most = min(MAX_PIECES, int(area(outline) / PER_PIECE))
     pieces = draw_pieces(ground, int(rng.integers(0, most + 1)), rng=rng)
