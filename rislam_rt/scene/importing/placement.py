@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.mesh_source import MeshPart
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.lying import UNITS, place_points
+from rislam_rt.scene.mesh_placement import UNITS, place_points
 
 SMALLEST_ROOM, LARGEST_ROOM = 1.0, 200.0
 """[m] Diagonals outside are taken for a wrong unit, unless the user gave one."""
