@@ -13,8 +13,8 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade, join_panels
 from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
-from rislam_rt.scene.containers import too_many_faces
 from rislam_rt.scene.findings import Fault, Faults, Finding, panel_key, raise_errors
+from rislam_rt.scene.mesh_containers import too_many_faces
 from rislam_rt.scene.mesh_placement import UNITS, place_mesh
 from rislam_rt.scene.meshes import MAX_COORDINATE, MAX_MESH_BYTES, Mesh, MeshReader, read_inside
 from rislam_rt.scene.motion import build_motion

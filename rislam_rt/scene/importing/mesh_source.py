@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.scene.containers import check_glb
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.importing.obj import read_obj
+from rislam_rt.scene.mesh_containers import check_glb
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, read_inside, sound_mesh, unfold
 
 MESH_FORMATS = (".glb", ".gltf", ".obj", ".ply", ".stl")
