@@ -71,7 +71,7 @@ def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
     from rislam_rt.pipeline.studies.spec import study_record
     from rislam_rt.report.fig4a import fig4a_table, verdict
     from rislam_rt.report.study import write_fig4a
-    from rislam_rt.scene.names import safe_name
+    from rislam_rt.scene.file_names import safe_name
 
     opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
     scene = opened.scene

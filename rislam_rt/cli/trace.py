@@ -67,7 +67,7 @@ def command(
     from rislam_rt.pipeline.signals import load_signals_spec, signal_settings
     from rislam_rt.report.deepmimo import deepmimo_files
     from rislam_rt.report.tables import path_table, print_paths
-    from rislam_rt.scene.names import safe_name
+    from rislam_rt.scene.file_names import safe_name
     from rislam_rt.scene.write import write_files
 
     beyond = [word for word in set_ or () if not signals and not word.startswith("radio.")]

@@ -12,7 +12,7 @@ from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import library_versions
 from rislam_rt.pipeline.seal import SCHEMA, checksum
 from rislam_rt.pipeline.spec import PipelineSpec
-from rislam_rt.scene.names import safe_name
+from rislam_rt.scene.file_names import safe_name
 
 SHORT = 8
 """Digits of the hash in a folder's name; the marker inside has all of them."""
