@@ -13,7 +13,7 @@ from rislam_rt.scene.meshes import read_inside
 from rislam_rt.scene.random_walk import draw_walk
 from rislam_rt.scene.recorded_poses import RecordedPoses, parse_csv, parse_tum
 from rislam_rt.scene.schema import AgentSection
-from rislam_rt.scene.waypoints import Way, round_corners
+from rislam_rt.scene.waypoints import RoundedPath, round_corners
 
 MAX_TUM_BYTES = 100_000_000
 MAX_CYCLES = 1_000_000
@@ -66,7 +66,7 @@ def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body
     return Trajectory(time, position, np.tile(speed, (cycles, 1)), np.full(cycles, heading), body)
 
 
-def travel(way: Way, speed: float, cycle_s: float, cycles: int | None, body: Body) -> Trajectory:
+def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, body: Body) -> Trajectory:
     """Along a way at constant speed [m/s], heading along it; to its end, or for so many cycles.
 
     Raises
