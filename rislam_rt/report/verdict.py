@@ -18,7 +18,7 @@ AT_BOUND = float(np.sqrt(-np.log(0.05)))
 whose error along two axes lasts over the run (chi-square with two degrees of freedom), 95 % lie below."""
 
 
-class Verdict(NamedTuple):
+class Conclusions(NamedTuple):
     """Sentences, the most important first."""
 
     headline: str
@@ -29,14 +29,14 @@ class Verdict(NamedTuple):
     """What each did not find, and why."""
 
 
-def judge_run(result: SlamResult, summary: Mapping[str, Any]) -> Verdict:
+def judge_run(result: SlamResult, summary: Mapping[str, Any]) -> Conclusions:
     """The verdict on a run from its scores and from what could be heard in it."""
     found, missing = {}, {}
     for name, scheme in result.schemes.items():
         scores = summary["schemes"][name]
         found[name] = f"{_words(name)}: {_found(result, scheme, scores)}."
         missing[name] = list(_missing(result, scheme, scores))
-    return Verdict(_headline(summary["schemes"]), found, missing)
+    return Conclusions(_headline(summary["schemes"]), found, missing)
 
 
 def _headline(schemes: Mapping[str, Any]) -> str:
