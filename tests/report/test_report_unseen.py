@@ -13,7 +13,7 @@ from rislam_rt.pipeline.studies.unseen.sweep import SNR
 from rislam_rt.pipeline.sweeps import Row
 from rislam_rt.pipeline.sweeps.axes import Cell
 from rislam_rt.report.unseen import write_unseen
-from rislam_rt.report.unseen.cards import by_series, card, class_cards, cycle_times, read_runs
+from rislam_rt.report.unseen.score_cards import by_series, card, class_cards, cycle_times, read_runs
 from rislam_rt.report.unseen.terminal import print_cards
 
 RECORD = {"settings": {"cycles": 200, "depth": 2}, "code": "abc"}

@@ -12,9 +12,9 @@ from rislam_rt.pipeline.sweeps import Row
 from rislam_rt.pipeline.sweeps.record import json_bytes, plain_result
 from rislam_rt.pipeline.sweeps.store import csv_bytes
 from rislam_rt.report.style import to_png
-from rislam_rt.report.unseen.cards import Run, by_series, card, class_cards, cycle_times, read_runs
 from rislam_rt.report.unseen.figure import draw_unseen
 from rislam_rt.report.unseen.page import SHOWN, about_lines, unseen_page
+from rislam_rt.report.unseen.score_cards import Run, by_series, card, class_cards, cycle_times, read_runs
 
 
 def write_unseen(

@@ -16,7 +16,7 @@ from rislam_rt.pipeline.studies.unseen.score import (
 )
 from rislam_rt.pipeline.studies.unseen.spec import TEST, UnseenSpec
 from rislam_rt.report.swept.entries import NOTHING, paragraph, table_lines
-from rislam_rt.report.unseen.cards import Run
+from rislam_rt.report.unseen.score_cards import Run
 
 MILLI = 1e3
 WORST = 12
