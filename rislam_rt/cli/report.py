@@ -35,7 +35,7 @@ def command(
     summary, result = read_any(run)
     if rerun is not None:
         from rislam_rt.pipeline.files import write_atomic
-        from rislam_rt.report.recording import recording_bytes
+        from rislam_rt.report.rerun_recording import recording_bytes
 
         write_atomic(rerun, recording_bytes(result, run.resolve().name))
         typer.echo(f"recording: {rerun}")
