@@ -23,7 +23,7 @@ from rislam_rt.report.swept.entries import (
     trouble,
     what_limits,
 )
-from rislam_rt.report.swept.lines import draw_schemes, explain_lines
+from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines
 
 OURS = "optimized"
 """The scheme that the paper proposes."""

@@ -20,7 +20,7 @@ from rislam_rt.report.swept.entries import (
     table_lines,
     trouble,
 )
-from rislam_rt.report.swept.lines import mark_metres
+from rislam_rt.report.swept.error_curves import mark_metres
 
 WORST = 3
 """Mismatches that are named."""

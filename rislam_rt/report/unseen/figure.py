@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from rislam_rt.arrays import Floats
 from rislam_rt.report.style import TRUTH, styled
-from rislam_rt.report.swept.lines import mark_metres
+from rislam_rt.report.swept.error_curves import mark_metres
 from rislam_rt.report.unseen.score_cards import CLASSES, Run, column
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
