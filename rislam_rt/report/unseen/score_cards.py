@@ -15,7 +15,7 @@ CONSISTENT = (0.7, 2.0)
 """NEES per degree of freedom, over a run, that counts as consistent."""
 
 
-class Run(NamedTuple):
+class SchemeRun(NamedTuple):
     """One scheme in one room."""
 
     series: str
@@ -31,7 +31,7 @@ class Run(NamedTuple):
     """Why; empty if it did not."""
 
 
-def read_runs(rows: Sequence[Row]) -> list[Run]:
+def read_runs(rows: Sequence[Row]) -> list[SchemeRun]:
     """All runs that there are, in the order of the series; cells that have not run are left out."""
     keys = {key: {row.cell.point.get(key) for row in rows} for key in ("variant", SNR)}
     schemes = {name for row in rows for name in row.result.get("schemes", {})}
@@ -46,11 +46,15 @@ def read_runs(rows: Sequence[Row]) -> list[Run]:
                 failed = str(scores.get("failed", ""))
                 traits = row.result["traits"]
                 found.append(
-                    Run(name, row.cell.ident, scheme, int(str(point["room"])), traits, {} if failed else scores, failed)
+                    SchemeRun(
+                        name, row.cell.ident, scheme, int(str(point["room"])), traits, {} if failed else scores, failed
+                    )
                 )
         elif row.failed:
             message = f"{row.state}: {row.message}"
-            found.append(Run(", ".join(parts) or "all", row.cell.ident, "", int(str(point["room"])), {}, {}, message))
+            found.append(
+                SchemeRun(", ".join(parts) or "all", row.cell.ident, "", int(str(point["room"])), {}, {}, message)
+            )
     order = {name: number for number, name in enumerate(dict.fromkeys(run.series for run in found))}
     return sorted(found, key=lambda run: (order[run.series], run.room))
 
@@ -86,7 +90,7 @@ CLASSES: dict[str, Callable[[Mapping[str, Any]], str]] = {
 """Class of a room by name of the division."""
 
 
-def card(runs: Sequence[Run]) -> dict[str, Any]:
+def card(runs: Sequence[SchemeRun]) -> dict[str, Any]:
     """The score card of runs: medians with intervals, 95th percentiles, shares with intervals, means a run."""
     good = [run for run in runs if run.scores]
     entry: dict[str, Any] = {"runs": len(good), "failed": len(runs) - len(good)}
@@ -112,12 +116,12 @@ def card(runs: Sequence[Run]) -> dict[str, Any]:
     return entry
 
 
-def class_cards(runs: Sequence[Run]) -> list[dict[str, Any]]:
+def class_cards(runs: Sequence[SchemeRun]) -> list[dict[str, Any]]:
     """A card for every class of every division."""
     known = [run for run in runs if run.traits]
     cards = []
     for division, of in CLASSES.items():
-        members: dict[str, list[Run]] = {}
+        members: dict[str, list[SchemeRun]] = {}
         for run in known:
             members.setdefault(of(run.traits), []).append(run)
         order = sorted(members, key=lambda name: (not name.startswith("below"), name.startswith("from"), name))
@@ -125,15 +129,17 @@ def class_cards(runs: Sequence[Run]) -> list[dict[str, Any]]:
     return cards
 
 
-def by_series(runs: Sequence[Run]) -> dict[str, list[Run]]:
+def by_series(runs: Sequence[SchemeRun]) -> dict[str, list[SchemeRun]]:
     """Runs of each series, in their order."""
-    found: dict[str, list[Run]] = {}
+    found: dict[str, list[SchemeRun]] = {}
     for run in runs:
         found.setdefault(run.series, []).append(run)
     return found
 
 
-def cycle_times(runs: Mapping[str, Sequence[Run]], timings: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
+def cycle_times(
+    runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Mapping[str, Any]]
+) -> dict[str, float | None]:
     """Median CPU time [ms] of the estimator a cycle, by series; of cells timed more than once the last one counts."""
     told = {entry["ident"]: entry.get("timing", {}) for entry in timings}
     found: dict[str, float | None] = {}
@@ -144,13 +150,13 @@ def cycle_times(runs: Mapping[str, Sequence[Run]], timings: Sequence[Mapping[str
     return found
 
 
-def column(runs: Sequence[Run], name: str) -> Floats:
+def column(runs: Sequence[SchemeRun], name: str) -> Floats:
     """(R,) a score; NaN where there is none."""
     found = [run.scores.get(name) for run in runs]
     return np.array([np.nan if value is None else value for value in found], dtype=np.float64)
 
 
-def _count(runs: Sequence[Run], name: str) -> int:
+def _count(runs: Sequence[SchemeRun], name: str) -> int:
     return int(np.nansum(column(runs, name)))
 
 
