@@ -18,7 +18,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.geometry.angles import unit
-from rislam_rt.information import LinearMeasurements, MotionPrior, build_landmark_model, posterior_crlb
+from rislam_rt.information import LinearMeasurements, MotionPrior, build_landmark_model, posterior_bound
 from rislam_rt.information.landmark_model import LandmarkModel, mirror_chain
 from rislam_rt.information.position import range_information
 from rislam_rt.measurement import build_sensor

@@ -24,8 +24,8 @@ from rislam_rt.design import (
     DesignConfig,
     DesignProblem,
     build_objective,
-    convex_dual,
     direct_only,
+    dual_bound,
     problem_from_belief,
     problem_from_paths,
 )

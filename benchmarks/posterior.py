@@ -13,7 +13,7 @@ import numpy as np
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.design import design_along
-from rislam_rt.information import MotionPrior, build_landmark_model, posterior_crlb
+from rislam_rt.information import MotionPrior, build_landmark_model, posterior_bound
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene

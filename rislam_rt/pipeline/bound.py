@@ -15,7 +15,7 @@ from rislam_rt.information import (
     WallSpread,
     build_landmark_model,
     plane_tangents,
-    posterior_crlb,
+    posterior_bound,
 )
 from rislam_rt.measurement import build_sensor, expected_distortion
 from rislam_rt.measurement.received import HORIZON_MARGIN

@@ -7,7 +7,7 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.information import (
     Outcome,
     amplitude_std,
-    equivalent_fim,
+    equivalent_information,
     measurement_std,
     position_bound,
     position_information,

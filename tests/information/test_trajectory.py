@@ -15,7 +15,7 @@ from rislam_rt.information import (
     build_landmark_model,
     mirror_chain,
     plane_tangents,
-    posterior_crlb,
+    posterior_bound,
 )
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.scene import load_scene

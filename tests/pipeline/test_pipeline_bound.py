@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import ncx2
 
 from rislam_rt.channel.walls import build_walls
-from rislam_rt.information import MotionPrior, build_landmark_model, plane_tangents, posterior_crlb
+from rislam_rt.information import MotionPrior, build_landmark_model, plane_tangents, posterior_bound
 from rislam_rt.information.landmark_model import LinearMeasurements
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec

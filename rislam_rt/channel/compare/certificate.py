@@ -110,9 +110,9 @@ class DifferenceExplainer:
         """The proof for a path that only `side` has.
 
         A path exists where all its conditions hold. It is proved absent by an object that stands clearly in the way
-        of reflections in order, undecidable where a margin is below what float32 leaves open there (`UnfoldedLeg.shift`) and no
-        other condition clearly fails, and cut by the tracer where it exists with too short a segment. All else is no
-        proof.
+        of reflections in order, undecidable where a margin is below what float32 leaves open there
+        (`UnfoldedLeg.shift`) and no other condition clearly fails, and cut by the tracer where it exists with too short
+        a segment. All else is no proof.
         """
         bounces = len(identity[2]) + len(identity[3])
         if bounces > self.depth:
