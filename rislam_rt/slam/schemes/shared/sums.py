@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.schemes.bp_slam.course import Course, Step
-from rislam_rt.slam.schemes.bp_slam.ranges import Bistatic, length_of
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.schemes.shared.course import Course, Step
+from rislam_rt.slam.schemes.shared.ranges import Bistatic, length_of
 
 POINT, PLANE, DRIFT = 0, 1, 2
 """What a Gaussian holds its feature for: a point that stays, a wall (the image of the Tx moves), or a point that
@@ -25,6 +25,21 @@ LEAST_ACROSS = 1e-4
 """Smallest squared sine, for cosines that a Gaussian has beyond one."""
 UPRIGHT, UPRIGHT_STD = (0.0, 0.5 * np.pi, np.pi), 0.02
 """Turns of walls and of the ceiling about a level walk, and how far off they may be [rad]."""
+
+
+STRONG_KINDS = np.array([0.2, 0.5, 0.3])
+"""Probabilities of point, wall and wanderer for a path as strong as a wall return; a corner of two walls returns like a
+point."""
+
+
+def kinds_of(strong: Booleans, wanderers: float) -> Floats:
+    """(M, 3) probabilities of point, wall and wanderer for new features of strong and of weak paths."""
+    return np.where(strong[:, None], STRONG_KINDS, np.array([1.0 - wanderers, 0.0, wanderers]))
+
+
+def axes_filtered(height: str) -> Floats:
+    """(3,) ones for the axes that a filter filters, with a height that is `known` or `estimated`."""
+    return np.array([1.0, 1.0, 1.0 if height == "estimated" else 0.0])
 
 
 class Sums(NamedTuple):

@@ -4,7 +4,6 @@ Same functions, inputs and outputs as the package's own filter, so that a run ca
 mean nothing to it, and angles of arrival are not used.
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,17 +15,19 @@ from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, 
 from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los
 from rislam_rt.slam.inputs import check_step
-from rislam_rt.slam.schemes.bp_slam.association import Association
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
-from rislam_rt.slam.schemes.bp_slam.correct import absorb, claims, is_strong, newborn
-from rislam_rt.slam.schemes.bp_slam.course import Course, advance, begin
-from rislam_rt.slam.schemes.bp_slam.features import Scan, birth_ratio
-from rislam_rt.slam.schemes.bp_slam.ranges import Bistatic
-from rislam_rt.slam.schemes.bp_slam.report import ahead_of, known_points, lift, reported
-from rislam_rt.slam.schemes.bp_slam.sums import Sight, Sums, born, carry, join, look, no_sums, prune, spread_of
+from rislam_rt.slam.schemes.shared.association import Association
+from rislam_rt.slam.schemes.shared.correct import absorb, claims, is_strong, newborn
+from rislam_rt.slam.schemes.shared.course import Course, advance, begin
+from rislam_rt.slam.schemes.shared.ranges import Bistatic
+from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, reported
+from rislam_rt.slam.schemes.shared.scan import Odds, Scan, birth_ratio
+from rislam_rt.slam.schemes.shared.sums import Sight, Sums, born, carry, join, kinds_of, look, no_sums, prune, spread_of
 
 FEWEST_FALSE = 1e-3
 """Mean number of false ranges a scan that is reckoned with at least, so that no range is ever held for certain."""
+FIRST_DETECTION = 0.95
+"""That a feature which stands in view for the first time is measured, as published."""
 NIS_LIMIT = 3.0
 """Running mean of the NIS per degree of freedom above which the filter says that it has diverged."""
 STRAIN_RATE = 0.05
@@ -70,10 +71,10 @@ def init(
     return BpSlamState(course, sums, config.initial_features, 0, 0, height, float(start.heading), 1.0, body, sensor)
 
 
-def told(config: BpSlamConfig, sensor: SensorModel) -> BpSlamConfig:
-    """The settings with the false ranges that the agent is told of its receiver."""
+def told(config: BpSlamConfig, sensor: SensorModel) -> Odds:
+    """What a range is weighed against, with the false ranges that the agent is told of its receiver."""
     rate = max(sensor.false_alarms, FEWEST_FALSE)
-    return replace(config, clutter_mean=rate, max_range=SPEED_OF_LIGHT * sensor.window[1])
+    return Odds(config.detection_probability, rate, SPEED_OF_LIGHT * sensor.window[1])
 
 
 def predict(state: BpSlamState, dt: float, config: BpSlamConfig) -> SlamEstimate:
@@ -91,7 +92,7 @@ def _move(state: BpSlamState, dt: float, accelerate: Floats, config: BpSlamConfi
     sums = carry(state.sums, step, wander)
     sums = sums._replace(existence=config.survival_probability * sums.existence)
     height = state.height + np.array([dt * state.height[1], 0.0])
-    unseen = config.survival_probability * (1.0 - config.moving_detection) * state.undetected
+    unseen = config.survival_probability * (1.0 - config.detection_probability) * state.undetected
     return state._replace(
         course=course, sums=sums, height=height, undetected=unseen + config.birth_mean, cycle=state.cycle + 1
     )
@@ -109,7 +110,7 @@ def step(
         Time step or heading is no number.
     """
     check_step(dt, heading)
-    config = told(config, state.sensor)
+    odds = told(config, state.sensor)
     state = _move(state, dt, np.full(state.course.axes, config.sigma_a), config)._replace(heading=float(heading))
     glance = glance_of(measurement, state.sensor.radio)
     free = ~is_los(glance, state.body)
@@ -121,13 +122,13 @@ def step(
     model = Bistatic(
         turn @ state.body.tx_offset, turn @ state.body.rx_offset, state.sensor.radio.array.pattern == "upper"
     )
-    fresh = 1.0 + birth_ratio(scan, state.undetected, model, 3, config)
+    fresh = 1.0 + birth_ratio(scan, state.undetected, model, 3, odds._replace(detection_probability=FIRST_DETECTION))
     sight = look(state.sums, state.course, state.pose[0], model)
-    found = claims(state.sums, sight, state.course, scan, fresh, config)
+    found = claims(state.sums, sight, state.course, scan, fresh, odds)
     landmark = np.full(len(measurement), REMOVED)
     landmark[rows], nis = _claimed(state, sight, scan, found, config)
     dof = int((landmark >= 0).sum())
-    sums, course = absorb(state.sums, sight, state.course, scan, found, config)
+    sums, course = absorb(state.sums, sight, state.course, scan, found, odds)
     state = state._replace(sums=sums, course=course)
     state = _give_birth(state, scan, is_strong(glance.ratio[rows], config.specular_ratio), found, fresh, config)
     strain = state.strain + (STRAIN_RATE * (nis / dof - state.strain) if dof else 0.0)
@@ -139,16 +140,16 @@ def step(
 def _give_birth(
     state: BpSlamState, scan: Scan, strong: Booleans, found: Association, fresh: Floats, config: BpSlamConfig
 ) -> BpSlamState:
-    rows, existence = newborn(found, fresh, config)
+    rows, existence = newborn(found, fresh, config.birth_threshold)
     sums = state.sums
     if len(rows):
-        kinds = np.where(strong[rows, None], config.strong_kinds, config.weak_kinds)
+        kinds = kinds_of(strong[rows], config.wanderers)
         new = born(
             scan.length[rows], scan.std[rows], kinds, existence, state.course, state.pose[0],
             config.birth_turns, state.next_ident,
         )  # fmt: skip
         sums = join(sums, new)
-    sums = prune(sums, config.pruning_threshold, config.share_threshold, config.moving_features)
+    sums = prune(sums, config.pruning_threshold, config.share_threshold, config.max_features)
     return state._replace(sums=sums, next_ident=state.next_ident + len(rows))
 
 

@@ -5,9 +5,16 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
-from rislam_rt.slam.schemes.bp_slam.ranges import RangeModel, random_directions
-from rislam_rt.slam.schemes.resampling import cell_levels, cell_order, effective_fraction, normalised_rows, thin_out
+from rislam_rt.slam.schemes.bp_slam_static.config import BpSlamStaticConfig
+from rislam_rt.slam.schemes.shared.ranges import RangeModel, random_directions
+from rislam_rt.slam.schemes.shared.resampling import (
+    cell_levels,
+    cell_order,
+    effective_fraction,
+    normalised_rows,
+    thin_out,
+)
+from rislam_rt.slam.schemes.shared.scan import Scan
 
 RESAMPLE_BELOW = 0.25
 """Effective fraction of a feature's particles below which it is resampled."""
@@ -15,19 +22,6 @@ SHARE = 0.7
 """Power of the weights by which resampling draws; the rest stays with the particles."""
 KNOWN_FLOOR = 0.05
 """An anchor that is hidden for long is still looked for with this probability."""
-
-
-class Scan(NamedTuple):
-    """What one anchor (or the agent's own receiver) measured in a step."""
-
-    length: Floats
-    """(M,) ranges [m], in no particular order."""
-    std: Floats
-    """(M,) standard deviations [m]."""
-
-    def take(self, rows: Integers) -> "Scan":
-        """Some of the ranges."""
-        return Scan(self.length[rows], self.std[rows])
 
 
 class Features(NamedTuple):
@@ -90,7 +84,7 @@ def known_anchors(anchors: Floats, std: float, num_particles: int, *, rng: np.ra
     return make_features(cloud, np.ones(count), number, number, known=True)
 
 
-def predict_features(features: Features, config: BpSlamConfig, *, rng: np.random.Generator) -> Features:
+def predict_features(features: Features, config: BpSlamStaticConfig, *, rng: np.random.Generator) -> Features:
     """Survival, and a small random walk."""
     walk = config.feature_std * rng.standard_normal(features.cloud.shape)
     existence = config.survival_probability * features.existence
@@ -100,21 +94,9 @@ def predict_features(features: Features, config: BpSlamConfig, *, rng: np.random
     )
 
 
-def birth_ratio(scan: Scan, undetected: float, model: RangeModel, dims: int, config: BpSlamConfig) -> Floats:
-    """(M,) expected density of first detections over that of clutter.
-
-    `undetected` features are uniform over the region, whose measure is the integral of the model's shell.
-    """
-    inside = (scan.length > 0.0) & (scan.length <= config.max_range)
-    length = np.where(inside, scan.length, 0.5 * config.max_range)
-    region = model.shell(np.array(config.max_range), dims) * config.max_range / dims
-    density = undetected * config.detection_probability * model.shell(length, dims) / region
-    return np.where(inside, density, 0.0) / config.clutter_density
-
-
 def born(
     scan: Scan, anchor: int, position: Floats, existence: Floats, model: RangeModel, first: int,
-    config: BpSlamConfig, *, rng: np.random.Generator,
+    config: BpSlamStaticConfig, *, rng: np.random.Generator,
 ) -> Features:  # fmt: skip
     """One new feature a measurement, numbered from `first`, spread over all directions from agents (N, D).
 
@@ -152,7 +134,7 @@ def select(features: Features, rows: Booleans | Integers) -> Features:
     return Features._make(column[rows] for column in features)
 
 
-def prune(features: Features, config: BpSlamConfig) -> Features:
+def prune(features: Features, config: BpSlamStaticConfig) -> Features:
     """Without the improbable ones, and without the least probable beyond the number allowed per anchor."""
     order = np.lexsort([-features.existence, ~features.known, features.anchor])
     anchor = features.anchor[order]

@@ -8,10 +8,11 @@ from numpy.typing import ArrayLike
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.errors import ConfigError
-from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
-from rislam_rt.slam.schemes.bp_slam.features import Features, Scan, known_anchors, select
-from rislam_rt.slam.schemes.bp_slam.ranges import Direct
-from rislam_rt.slam.schemes.bp_slam.update import Belief, predict_belief, update_belief
+from rislam_rt.slam.schemes.bp_slam_static.config import BpSlamStaticConfig
+from rislam_rt.slam.schemes.bp_slam_static.features import Features, known_anchors, select
+from rislam_rt.slam.schemes.bp_slam_static.update import Belief, predict_belief, update_belief
+from rislam_rt.slam.schemes.shared.ranges import Direct
+from rislam_rt.slam.schemes.shared.scan import Scan
 
 
 class FeatureTable(NamedTuple):
@@ -51,7 +52,7 @@ class StaticResult(NamedTuple):
 
 def run_static(
     anchors: ArrayLike, ranges: Sequence[Sequence[ArrayLike]], start: ArrayLike, start_std: ArrayLike,
-    config: BpSlamConfig | None = None, *, dt: float = 1.0, anchor_std: float = 0.001, rng: np.random.Generator,
+    config: BpSlamStaticConfig | None = None, *, dt: float = 1.0, anchor_std: float = 0.001, rng: np.random.Generator,
 ) -> StaticResult:  # fmt: skip
     """Agent and features from ranges alone.
 
@@ -73,7 +74,7 @@ def run_static(
     ConfigError
         A shape does not fit, or a range is not a finite number.
     """
-    config = config or BpSlamConfig()
+    config = config or BpSlamStaticConfig()
     points, mean, std, scans = _checked(anchors, ranges, start, start_std, config)
     dims, count = points.shape[1], config.num_particles
     cloud = mean + std * rng.standard_normal((count, 2 * dims))
@@ -98,7 +99,7 @@ def run_static(
     return StaticResult(pose[:, :dims], pose[:, dims:], np.array(moments), table, np.array(effective))
 
 
-def _detected(features: Features, agent: Floats, step: int, config: BpSlamConfig) -> FeatureTable:
+def _detected(features: Features, agent: Floats, step: int, config: BpSlamStaticConfig) -> FeatureTable:
     found = select(features, features.existence > config.detection_threshold)
     mean, covariance = found.moments(agent)
     spread = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / mean.shape[1])
@@ -107,7 +108,7 @@ def _detected(features: Features, agent: Floats, step: int, config: BpSlamConfig
 
 def _checked(
     anchors: ArrayLike, ranges: Sequence[Sequence[ArrayLike]], start: ArrayLike, start_std: ArrayLike,
-    config: BpSlamConfig,
+    config: BpSlamStaticConfig,
 ) -> tuple[Floats, Floats, Floats, list[tuple[Scan, ...]]]:  # fmt: skip
     """The arguments as arrays."""
     points = np.asarray(anchors, dtype=np.float64)

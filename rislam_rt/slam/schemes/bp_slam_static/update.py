@@ -12,13 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.schemes.bp_slam.association import Association, associate
-from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
-from rislam_rt.slam.schemes.bp_slam.coupling import carry, correct_slopes
-from rislam_rt.slam.schemes.bp_slam.features import (
+from rislam_rt.slam.schemes.bp_slam_static.config import BpSlamStaticConfig
+from rislam_rt.slam.schemes.bp_slam_static.coupling import carry, correct_slopes
+from rislam_rt.slam.schemes.bp_slam_static.features import (
     Features,
-    Scan,
-    birth_ratio,
     born,
     join,
     predict_features,
@@ -26,8 +23,9 @@ from rislam_rt.slam.schemes.bp_slam.features import (
     refresh,
     select,
 )
-from rislam_rt.slam.schemes.bp_slam.ranges import RangeModel
-from rislam_rt.slam.schemes.resampling import (
+from rislam_rt.slam.schemes.shared.association import Association, associate
+from rislam_rt.slam.schemes.shared.ranges import RangeModel
+from rislam_rt.slam.schemes.shared.resampling import (
     cell_levels,
     cell_order,
     effective_fraction,
@@ -36,6 +34,7 @@ from rislam_rt.slam.schemes.resampling import (
     smooth,
     systematic_rows,
 )
+from rislam_rt.slam.schemes.shared.scan import Scan, birth_ratio
 
 GATE = 5.0
 """Standard deviations beyond which the likelihood of a range counts as zero (4e-6 of its peak)."""
@@ -86,7 +85,7 @@ class _Evaluation(NamedTuple):
 
 
 def predict_belief(
-    belief: Belief, dt: float, accelerate: Floats, config: BpSlamConfig, *, rng: np.random.Generator
+    belief: Belief, dt: float, accelerate: Floats, config: BpSlamStaticConfig, *, rng: np.random.Generator
 ) -> Belief:
     """Discrete white-noise acceleration of standard deviations `accelerate` (D,) [m/s^2]; features survive or not."""
     before = rng.permutation(belief.state)
@@ -103,7 +102,7 @@ def predict_belief(
 
 
 def update_belief(
-    belief: Belief, scans: tuple[Scan, ...], model: RangeModel, config: BpSlamConfig, *, rng: np.random.Generator
+    belief: Belief, scans: tuple[Scan, ...], model: RangeModel, config: BpSlamStaticConfig, *, rng: np.random.Generator
 ) -> tuple[Belief, UpdateInfo]:
     """One scan of every anchor into the belief; the agent's message to features is its prediction, as published."""
     state, features = rng.permutation(belief.state), belief.features
@@ -117,7 +116,7 @@ def update_belief(
     for anchor, scan in enumerate(scans):
         rows = np.flatnonzero(features.anchor == anchor)
         seen = [_evaluate(reach[row], scan, config) for row in rows]
-        fresh = 1.0 + birth_ratio(scan, float(belief.undetected[anchor]), model, dims, config)
+        fresh = 1.0 + birth_ratio(scan, float(belief.undetected[anchor]), model, dims, config.odds)
         result = _associate(seen, weight[rows], features.existence[rows], fresh, config)
         for number, row in enumerate(rows):
             gains[row] = _message(seen[number], result.to_feature[number], config)
@@ -186,7 +185,7 @@ def _moved(newborn: Features, before: Floats, after: Floats) -> Features:
     return newborn._replace(cloud=newborn.cloud + shift[:, None])
 
 
-def _evaluate(reach: Floats, scan: Scan, config: BpSlamConfig) -> _Evaluation:
+def _evaluate(reach: Floats, scan: Scan, config: BpSlamStaticConfig) -> _Evaluation:
     """Likelihood ratios of one feature, from the ranges (S, N) of its pairs."""
     low, high = reach.min(), reach.max()
     near = np.flatnonzero((scan.length > low - GATE * scan.std) & (scan.length < high + GATE * scan.std))
@@ -198,7 +197,7 @@ def _evaluate(reach: Floats, scan: Scan, config: BpSlamConfig) -> _Evaluation:
 
 
 def _associate(
-    seen: list[_Evaluation], weight: Floats, existence: Floats, fresh: Floats, config: BpSlamConfig
+    seen: list[_Evaluation], weight: Floats, existence: Floats, fresh: Floats, config: BpSlamStaticConfig
 ) -> Association:
     """Loopy association of one anchor's features (K,) and measurements (M,)."""
     pair = np.zeros((len(seen), len(fresh)))
@@ -208,7 +207,7 @@ def _associate(
     return associate(missed, pair, fresh, config.iterations, config.tolerance)
 
 
-def _message(seen: _Evaluation, to_feature: Floats, config: BpSlamConfig) -> Floats:
+def _message(seen: _Evaluation, to_feature: Floats, config: BpSlamStaticConfig) -> Floats:
     """(S, N) factor of every pair: missed, or made one of the measurements; never zero."""
     weight = to_feature[seen.measurement]
     return (1.0 - config.detection_probability) + np.einsum("g,gsn->sn", weight, seen.ratio)
@@ -245,7 +244,7 @@ def _patience(features: Features, state: Floats, noise: float) -> Floats:
 
 def _update_features(
     features: Features, gains: Floats, state: Floats, shifts: Integers, mean_after: Floats, thickness: float,
-    config: BpSlamConfig, *, rng: np.random.Generator,
+    config: BpSlamStaticConfig, *, rng: np.random.Generator,
 ) -> Features:  # fmt: skip
     """Weights by the mean factor of every particle; line through the agent's states by one pair a particle."""
     kept = features.known | (features.existence >= config.pruning_threshold)

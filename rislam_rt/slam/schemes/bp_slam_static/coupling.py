@@ -10,8 +10,8 @@ zero this is the published form.
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.schemes.bp_slam.features import Features
-from rislam_rt.slam.schemes.resampling import cell_levels
+from rislam_rt.slam.schemes.bp_slam_static.features import Features
+from rislam_rt.slam.schemes.shared.resampling import cell_levels
 
 FLOOR_STD = 1e-3
 """Thinnest a cell is taken for [m]."""

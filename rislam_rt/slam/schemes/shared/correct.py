@@ -5,16 +5,15 @@ is a mixture over its Gaussians, over the ranges that it may have made, over "mi
 multiplied in and the product brought back to one Gaussian of the same mean and covariance.
 """
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.schemes.bp_slam.association import Association, associate
-from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
-from rislam_rt.slam.schemes.bp_slam.course import Course
-from rislam_rt.slam.schemes.bp_slam.features import Scan
-from rislam_rt.slam.schemes.bp_slam.sums import Sight, Sums, spread_of
+from rislam_rt.slam.schemes.shared.association import Association, associate
+from rislam_rt.slam.schemes.shared.course import Course
+from rislam_rt.slam.schemes.shared.scan import Odds, Scan
+from rislam_rt.slam.schemes.shared.sums import Sight, Sums, spread_of
 
 NO_VARIANCE = 1e12
 """Variance [m^2] of a range that tells nothing."""
@@ -22,20 +21,6 @@ NO_VARIANCE = 1e12
 
 ROUNDS, TOLERANCE = 30, 1e-3
 """Loopy association ends at this many rounds, or as messages change by less: finer than the sums that it weighs."""
-
-
-class Odds(Protocol):
-    """What a range is weighed against."""
-
-    @property
-    def moving_detection(self) -> float:
-        """Probability that a feature makes a range."""
-        ...
-
-    @property
-    def clutter_density(self) -> float:
-        """Expected false ranges per metre."""
-        ...
 
 
 class Pull(NamedTuple):
@@ -49,11 +34,11 @@ class Pull(NamedTuple):
     """(C,) logarithm of the factor on the Gaussian's share."""
 
 
-def claims(sums: Sums, sight: Sight, course: Course, scan: Scan, fresh: Floats, config: BpSlamConfig) -> Association:
+def claims(sums: Sums, sight: Sight, course: Course, scan: Scan, fresh: Floats, odds: Odds) -> Association:
     """Marginals of the association of K features and M ranges."""
     pair = np.zeros((len(sums.ident), len(scan.length)))
-    np.add.at(pair, sums.owner, sums.share[:, None] * _ratios(sight.length, spread_of(sight, course), scan, config))
-    missed = 1.0 - sums.existence * config.moving_detection
+    np.add.at(pair, sums.owner, sums.share[:, None] * _ratios(sight.length, spread_of(sight, course), scan, odds))
+    missed = 1.0 - sums.existence * odds.detection_probability
     return associate(missed, sums.existence[:, None] * pair, fresh, ROUNDS, TOLERANCE)
 
 
@@ -61,7 +46,7 @@ def _ratios(length: Floats, spread: Floats, scan: Scan, odds: Odds) -> Floats:
     """Likelihood ratios (C, M) `p_d f(z) / clutter`."""
     variance = spread[:, None] + scan.std**2
     square = (scan.length - length[:, None]) ** 2 / variance
-    peak = odds.moving_detection / (odds.clutter_density * np.sqrt(2.0 * np.pi * variance))
+    peak = odds.detection_probability / (odds.clutter_density * np.sqrt(2.0 * np.pi * variance))
     return np.where(square < 60.0, np.exp(-0.5 * square), 0.0) * peak
 
 
@@ -105,7 +90,7 @@ def absorb(sums: Sums, sight: Sight, course: Course, scan: Scan, found: Associat
 def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds) -> Pull:
     """What C Gaussians of one feature learn: moments over the ranges and "missed", as one range."""
     ratio = _ratios(seen, spread, scan, odds) * message
-    none = 1.0 - odds.moving_detection
+    none = 1.0 - odds.detection_probability
     total = none + ratio.sum(axis=1)
     belief = ratio / total[:, None]
     shrink = spread[:, None] / (spread[:, None] + scan.std**2)
@@ -132,10 +117,10 @@ def _mix(course: Course, gain: Floats, variance: Floats, miss: Floats, weight: F
     return course._replace(mean=course.mean + mean, covariance=course.covariance + (parts.T * scale) @ parts)
 
 
-def newborn(found: Association, fresh: Floats, config: BpSlamConfig) -> tuple[Integers, Floats]:
+def newborn(found: Association, fresh: Floats, birth_threshold: float) -> tuple[Integers, Floats]:
     """Rows of the ranges that start a feature, and its probability of existing."""
     alive = found.unclaimed * (fresh - 1.0) / fresh
-    rows = np.flatnonzero(alive >= config.birth_threshold)
+    rows = np.flatnonzero(alive >= birth_threshold)
     return rows, alive[rows]
 
 
