@@ -9,8 +9,8 @@ from rislam_rt.cli.config import command
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.settings import Setting, explain, list_settings
 from rislam_rt.pipeline.spec import PipelineSpec
-from rislam_rt.pipeline.studies import load_any
 from rislam_rt.shipped import shipped_pipelines
+from rislam_rt.studies import load_any
 
 SETTINGS = {one.key: one for one in list_settings(PipelineSpec)}
 

@@ -5,7 +5,7 @@ there, labels are taken as known, there is no model of detection, and a path tha
 with it. Unlike there, no transmitter stands in the room: both ends move with the agent, so that a virtual transmitter
 is a point `a` at range `|p_T - a| + |a - p_R|`. Gaussian sums stand in for the particles of a virtual transmitter
 (Ulmschneider, Gentner, Jost and Dammann, 2018), and a Gaussian over the course for those of the agent: a hundred
-particles, resampled, keep one course and forget what delays never told (see `bp_slam.gauge`).
+particles, resampled, keep one course and forget what delays never told (see `shared.gauge`).
 """
 
 from typing import NamedTuple
