@@ -115,16 +115,16 @@ MUTANTS = (
         "into_disc(blind_axes(found.points[:, 1:] * [1.0, -1.0], radio))",
     ),
     Mutant(
-        "a sweep's seed hangs on its order", "pipeline/sweeps/axes.py",
+        "a sweep's seed hangs on its order", "sweeps/axes.py",
         "            seed = int.from_bytes(_digest([drawn, repetition, sweep.seed])[:8]) >> 1",
         "            seed = int.from_bytes(_digest([len(cells), sweep.seed])[:8]) >> 1",
     ),
     Mutant(
-        "a sweep takes any cell for its own", "pipeline/sweeps/store.py",
+        "a sweep takes any cell for its own", "sweeps/store.py",
         '        if found["ident"] == cell.ident:', "        if found:",
     ),
     Mutant(
-        "a damaged file passes", "pipeline/seal.py",
+        "a damaged file passes", "storage/seal.py",
         '    if content["checksum"] != checksum({key: value for key, value in content.items() if key != "checksum"}):',
         '    if not content["checksum"]:',
     ),

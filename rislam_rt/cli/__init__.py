@@ -1,4 +1,4 @@
-"""Floor 8: the command line, one file a command. Nothing heavy is imported before a command runs."""
+"""Floor 9: the command line, one file a command. Nothing heavy is imported before a command runs."""
 
 import os
 import sys

@@ -9,7 +9,7 @@ from rislam_rt.cli.verbosity import verbosity
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
-    from rislam_rt.pipeline.sweeps import Cost, Told
+    from rislam_rt.sweeps import Cost, Told
 
 
 class ProgressReport(Protocol):

@@ -41,7 +41,7 @@ def command(
     Example: rislam-rt run trace_then_slam --scene office --set seed=1 --set 'schemes=["optimized", "no_ris"]'
     """
     from rislam_rt.cli.study import run_claims, run_compare_channels, run_gain_curves, run_swept
-    from rislam_rt.pipeline.studies import (
+    from rislam_rt.studies import (
         ClaimsSpec,
         ClassifierSpec,
         CompareSpec,

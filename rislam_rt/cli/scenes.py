@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rislam_rt.model import RadioConfig, Scene
     from rislam_rt.pipeline import PipelineSpec
     from rislam_rt.pipeline.spec import Settings
-    from rislam_rt.pipeline.studies import Fig4aSpec
+    from rislam_rt.studies import Fig4aSpec
 
 
 class OpenedScene(NamedTuple):

@@ -12,8 +12,8 @@ from rislam_rt.cli.study import StudyOptions, output_folder
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rislam_rt.pipeline.studies import UnseenSpec
-    from rislam_rt.pipeline.sweeps import Row
+    from rislam_rt.studies import UnseenSpec
+    from rislam_rt.sweeps import Row
 
 
 def run_unseen(spec: "UnseenSpec", given: StudyOptions) -> None:
@@ -22,12 +22,12 @@ def run_unseen(spec: "UnseenSpec", given: StudyOptions) -> None:
     from rislam_rt.cli.progress import show_sweep
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.studies.unseen import build_unseen, count_tests
-    from rislam_rt.pipeline.studies.unseen.record import unseen_record
-    from rislam_rt.pipeline.sweeps import Effort, build_cells, run_sweep
-    from rislam_rt.pipeline.sweeps.store import check_folder, read_timings
     from rislam_rt.report.unseen import write_unseen
     from rislam_rt.report.unseen.terminal import print_cards
+    from rislam_rt.studies.unseen import build_unseen, count_tests
+    from rislam_rt.studies.unseen.record import unseen_record
+    from rislam_rt.sweeps import Effort, build_cells, run_sweep
+    from rislam_rt.sweeps.store import check_folder, read_timings
 
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'unseen' draws its rooms; leave it out")

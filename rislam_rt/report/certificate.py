@@ -10,10 +10,10 @@ from matplotlib.lines import Line2D
 from rislam_rt.channel.compare import OneSidedPath
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import PathKind, Paths
-from rislam_rt.pipeline.studies.compare import Certificate
 from rislam_rt.report.geometry import outline_edges
 from rislam_rt.report.room import path_points
 from rislam_rt.report.style import KIND, TRUTH, WALL, styled
+from rislam_rt.studies.compare import Certificate
 
 ALONE = "#CC79A7"
 """Colour of a path that only one side has."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import SlamResult
-from rislam_rt.pipeline.files import write_atomic
 from rislam_rt.pipeline.spec import PipelineSpec, build_settings
 from rislam_rt.report.code_pictures import draw_run_codes
 from rislam_rt.report.conclusions import judge_run
@@ -21,6 +20,7 @@ from rislam_rt.report.time_curves import draw_agent_error, draw_landmark_errors,
 from rislam_rt.report.timing import draw_timing
 from rislam_rt.report.view.page import view_fragment, view_script, view_style
 from rislam_rt.report.view.run_data import run_data
+from rislam_rt.storage.files import write_atomic
 
 PAGE = "report.html"
 

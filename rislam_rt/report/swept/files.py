@@ -6,8 +6,16 @@ from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 
-from rislam_rt.pipeline.files import write_atomic
-from rislam_rt.pipeline.studies.swept import (
+from rislam_rt.report.style import to_png
+from rislam_rt.report.swept.ablations import ablations_content, ablations_page, draw_ablations
+from rislam_rt.report.swept.entries import csv_text, paragraph
+from rislam_rt.report.swept.fig4b import draw_fig4b, fig4b_content, fig4b_page
+from rislam_rt.report.swept.fig4c import draw_fig4c, fig4c_content, fig4c_page
+from rislam_rt.report.swept.hardware import draw_hardware, hardware_content, hardware_page
+from rislam_rt.report.swept.robustness import draw_robustness, robustness_content, robustness_page
+from rislam_rt.report.swept.rooms import draw_rooms, rooms_content, rooms_page
+from rislam_rt.storage.files import write_atomic
+from rislam_rt.studies.swept import (
     AblationsSpec,
     Fig4bSpec,
     Fig4cSpec,
@@ -18,16 +26,8 @@ from rislam_rt.pipeline.studies.swept import (
     SweptSpec,
     group_rows,
 )
-from rislam_rt.pipeline.sweeps import Row
-from rislam_rt.pipeline.sweeps.record import json_bytes, plain_result
-from rislam_rt.report.style import to_png
-from rislam_rt.report.swept.ablations import ablations_content, ablations_page, draw_ablations
-from rislam_rt.report.swept.entries import csv_text, paragraph
-from rislam_rt.report.swept.fig4b import draw_fig4b, fig4b_content, fig4b_page
-from rislam_rt.report.swept.fig4c import draw_fig4c, fig4c_content, fig4c_page
-from rislam_rt.report.swept.hardware import draw_hardware, hardware_content, hardware_page
-from rislam_rt.report.swept.robustness import draw_robustness, robustness_content, robustness_page
-from rislam_rt.report.swept.rooms import draw_rooms, rooms_content, rooms_page
+from rislam_rt.sweeps import Row
+from rislam_rt.sweeps.record import json_bytes, plain_result
 
 
 class StudyLayout(NamedTuple):

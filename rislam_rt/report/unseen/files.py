@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.pipeline.files import write_atomic
-from rislam_rt.pipeline.studies.unseen.spec import UnseenSpec
-from rislam_rt.pipeline.sweeps import Row
-from rislam_rt.pipeline.sweeps.record import json_bytes, plain_result
-from rislam_rt.pipeline.sweeps.store import csv_bytes
 from rislam_rt.report.style import to_png
 from rislam_rt.report.unseen.figure import draw_unseen
 from rislam_rt.report.unseen.page import SHOWN, about_lines, unseen_page
 from rislam_rt.report.unseen.score_cards import SchemeRun, by_series, card, class_cards, cycle_times, read_runs
+from rislam_rt.storage.files import write_atomic
+from rislam_rt.studies.unseen.spec import UnseenSpec
+from rislam_rt.sweeps import Row
+from rislam_rt.sweeps.record import json_bytes, plain_result
+from rislam_rt.sweeps.store import csv_bytes
 
 
 def write_unseen(

@@ -3,7 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rislam_rt.pipeline.studies.unseen.score import (
+from rislam_rt.report.swept.entries import NOTHING, paragraph, table_lines
+from rislam_rt.report.unseen.score_cards import SchemeRun
+from rislam_rt.studies.unseen.score import (
     FAR_OVER,
     GOOD_ANGLE,
     GOOD_OFFSET,
@@ -14,9 +16,7 @@ from rislam_rt.pipeline.studies.unseen.score import (
     NEAR_WALL,
     SETTLED,
 )
-from rislam_rt.pipeline.studies.unseen.spec import TEST, UnseenSpec
-from rislam_rt.report.swept.entries import NOTHING, paragraph, table_lines
-from rislam_rt.report.unseen.score_cards import SchemeRun
+from rislam_rt.studies.unseen.spec import TEST, UnseenSpec
 
 MILLI = 1e3
 WORST = 12

@@ -7,9 +7,9 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import Interval, bootstrap, median_over_runs, share_interval
-from rislam_rt.pipeline.studies.unseen.sweep import SNR
-from rislam_rt.pipeline.sweeps import Row
-from rislam_rt.pipeline.sweeps.store import DONE
+from rislam_rt.studies.unseen.sweep import SNR
+from rislam_rt.sweeps import Row
+from rislam_rt.sweeps.store import DONE
 
 CONSISTENT = (0.7, 2.0)
 """NEES per degree of freedom, over a run, that counts as consistent."""
