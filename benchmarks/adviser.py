@@ -29,7 +29,7 @@ from rislam_rt.pipeline.advise.remedies import HEARD, SELDOM
 from rislam_rt.pipeline.radio import build_radio
 from rislam_rt.pipeline.run import build_channel
 from rislam_rt.pipeline.spec import build_settings
-from rislam_rt.report.verdict import panel_found_at
+from rislam_rt.report.conclusions import panel_found_at
 from rislam_rt.scene.random_rooms import draw_room
 
 CYCLES, SEED = 100, 1

@@ -53,22 +53,22 @@ _HOMES = {
         "run_slam",
     ),
     "rislam_rt.pipeline.spec": ("build_radio",),
-    "rislam_rt.pipeline.inputs": (
+    "rislam_rt.pipeline.recordings.inputs": (
         "Inputs",
         "dataset_to_inputs",
     ),
-    "rislam_rt.pipeline.own": (
+    "rislam_rt.pipeline.recordings.own_measurements": (
         "localise",
         "read_inputs",
         "inputs_of",
     ),
-    "rislam_rt.pipeline.studies.unseen": (
+    "rislam_rt.studies.unseen": (
         "read_recording",
         "replay",
         "answers_from_arrays",
         "score_run",
     ),
-    "rislam_rt.pipeline.sweeps": (
+    "rislam_rt.sweeps": (
         "Axis",
         "Sweep",
         "Effort",

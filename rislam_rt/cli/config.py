@@ -26,7 +26,7 @@ def command(
     """
     from rislam_rt.pipeline.settings import explain as find
     from rislam_rt.pipeline.settings import list_settings
-    from rislam_rt.pipeline.studies import load_any
+    from rislam_rt.studies import load_any
 
     spec = load_any(pipeline, set_ or ())
     settings = list_settings(type(spec))

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import library_versions
-from rislam_rt.pipeline.seal import SCHEMA, checksum
 from rislam_rt.pipeline.spec import PipelineSpec
-from rislam_rt.scene.names import safe_name
+from rislam_rt.scene.file_names import safe_name
+from rislam_rt.storage.seal import SCHEMA, checksum
 
 SHORT = 8
 """Digits of the hash in a folder's name; the marker inside has all of them."""

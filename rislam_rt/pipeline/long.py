@@ -11,7 +11,6 @@ import numpy as np
 from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.model import Scene, SlamResult
 from rislam_rt.pipeline import slices
-from rislam_rt.pipeline.files import write_pieces
 from rislam_rt.pipeline.run import Progress, library_versions, panel_warnings, set_scene
 from rislam_rt.pipeline.slices import (
     FOLDER,
@@ -29,6 +28,7 @@ from rislam_rt.pipeline.tally import Tally
 from rislam_rt.pipeline.workers import run_side_by_side
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.write import tum_bytes
+from rislam_rt.storage.files import write_pieces
 
 
 class LongRun(NamedTuple):

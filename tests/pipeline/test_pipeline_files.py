@@ -9,9 +9,9 @@ import xarray as xr
 from rislam_rt.model import RisCode, RisSpec
 from rislam_rt.model.ris import RisSpecs
 from rislam_rt.pipeline.identity import run_identity
-from rislam_rt.pipeline.inputs import dataset_to_inputs, inputs_to_dataset
-from rislam_rt.pipeline.own import localise, read_inputs, run_rng
 from rislam_rt.pipeline.radio import build_radio
+from rislam_rt.pipeline.recordings.inputs import dataset_to_inputs, inputs_to_dataset
+from rislam_rt.pipeline.recordings.own_measurements import localise, read_inputs, run_rng
 from rislam_rt.pipeline.store import open_run
 from rislam_rt.pipeline.summary import summarise
 

@@ -11,13 +11,13 @@ from rislam_rt.cli.slam import _new_folder, command
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
-from rislam_rt.pipeline.own import inputs_of, localise, read_inputs
 from rislam_rt.pipeline.radio import build_radio
+from rislam_rt.pipeline.recordings.own_measurements import inputs_of, localise, read_inputs
 from rislam_rt.pipeline.spec import PipelineSpec
-from rislam_rt.pipeline.studies.unseen import Inputs, Recorder
 from rislam_rt.scene.write import tum_bytes
 from rislam_rt.shipped import find_pipeline
 from rislam_rt.slam import StartPrior
+from rislam_rt.studies.unseen import Inputs, Recorder
 
 CYCLES = 40
 CHANGES = [f"cycles={CYCLES}", "channel=image_source", "depth=1", "schemes=['no_ris']", "slam.use_vt=true"]

@@ -9,8 +9,8 @@ from rislam_rt.cli.config import command
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.settings import Setting, explain, list_settings
 from rislam_rt.pipeline.spec import PipelineSpec
-from rislam_rt.pipeline.studies import load_any
 from rislam_rt.shipped import shipped_pipelines
+from rislam_rt.studies import load_any
 
 SETTINGS = {one.key: one for one in list_settings(PipelineSpec)}
 
@@ -47,7 +47,7 @@ def test_no_setting_is_left_out() -> None:
         ("design.elite", 10, "at least 0, at most 48", ""),
         ("design.mutation", 0.02, "at least 0, at most 1", ""),
         ("slam.height", "known", "one of known, estimated", ""),
-        ("bp_slam.moving_detection", 0.7, "above 0, below 1", ""),
+        ("bp_slam.detection_probability", 0.7, "above 0, below 1", ""),
     ],
 )
 def test_default_range_and_unit(key: str, default: object, allowed: str, unit: str) -> None:

@@ -12,10 +12,10 @@ from rislam_rt.model import SlamResult
 from rislam_rt.pipeline import load_spec, slices
 from rislam_rt.pipeline.dataset import read_dataset
 from rislam_rt.pipeline.identity import run_identity
-from rislam_rt.pipeline.inputs import PADDING, dataset_to_inputs
 from rislam_rt.pipeline.join import join_paths, join_schemes
 from rislam_rt.pipeline.long import is_long, read_any, run_long
-from rislam_rt.pipeline.own import localise, run_rng
+from rislam_rt.pipeline.recordings.inputs import PADDING, dataset_to_inputs
+from rislam_rt.pipeline.recordings.own_measurements import localise, run_rng
 from rislam_rt.pipeline.store import open_run
 from rislam_rt.pipeline.summary import summarise_scheme
 

@@ -25,13 +25,13 @@ from rislam_rt.pipeline.dataset import (
     seal_dataset,
     write_dataset,
 )
-from rislam_rt.pipeline.files import write_atomic, write_pieces
 from rislam_rt.pipeline.identity import code_digest, run_identity
-from rislam_rt.pipeline.lock import hold
-from rislam_rt.pipeline.seal import file_digest, seal
 from rislam_rt.pipeline.store import find_run, open_run, read_run, read_summary, scheme_file
 from rislam_rt.pipeline.summary import summarise
 from rislam_rt.scene import load_scene
+from rislam_rt.storage.files import write_atomic, write_pieces
+from rislam_rt.storage.lock import hold
+from rislam_rt.storage.seal import file_digest, seal
 
 
 @pytest.fixture(scope="module")
@@ -278,7 +278,7 @@ def test_two_runs_do_not_share_a_folder(tmp_path, identity):
 
 
 def test_the_lock_of_a_dead_process_is_taken_over(tmp_path):
-    code = "import os, sys\nfrom pathlib import Path\nfrom rislam_rt.pipeline.lock import hold\n"
+    code = "import os, sys\nfrom pathlib import Path\nfrom rislam_rt.storage.lock import hold\n"
     code += "with hold(Path(sys.argv[1]), 'run'):\n    print('held', flush=True)\n    sys.stdin.read()\n"
     words = [sys.executable, "-c", code, str(tmp_path)]
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:

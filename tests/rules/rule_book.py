@@ -12,15 +12,16 @@ PACKAGE = "rislam_rt"
 
 FLOORS = {
     0: ("errors", "constants", "arrays", "backend", "shipped", "toml"),
-    1: ("geometry",),
+    1: ("geometry", "storage"),
     2: ("model",),
     3: ("scene", "ris", "waveform"),
     4: ("channel", "information"),
     5: ("measurement", "design", "slam", "evaluate"),
-    6: ("pipeline",),
-    7: ("report",),
-    8: ("cli",),
-    9: ("__main__",),
+    6: ("pipeline", "sweeps"),
+    7: ("studies",),
+    8: ("report",),
+    9: ("cli",),
+    10: ("__main__",),
 }
 FLOOR_OF = {folder: floor for floor, folders in FLOORS.items() for folder in folders}
 
@@ -40,7 +41,7 @@ ONLY_IN = {
     "random": (),
     "evo": (),
     "deepmimo": (),
-    "rerun": ("report/recording.py",),
+    "rerun": ("report/rerun_recording.py",),
 }
 """Where a foreign package may be imported inside the package: the tracer in one folder, evo (GPL) nowhere."""
 
