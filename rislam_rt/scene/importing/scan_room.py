@@ -7,7 +7,7 @@ from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.flat_regions import FlatRegions, Welded
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.scan import WIDTHS, ScanPlane, find_planes, thin_cloud
+from rislam_rt.scene.importing.scan import WIDTHS, ScanPlane, downsample_mesh, find_planes
 from rislam_rt.scene.importing.scan_outline import BRIDGE, CELL, Outline, outline_planes
 from rislam_rt.scene.importing.surfaces import ClutterMesh, SortedSurfaces, Surface, in_cells, off_planes, surface_area
 
@@ -31,7 +31,7 @@ def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[SortedSurfaces, lis
     Fault
         No plane is found.
     """
-    cloud = thin_cloud(mesh)
+    cloud = downsample_mesh(mesh)
     planes = find_planes(cloud)
     outlines = outline_planes(planes, cloud, options.fill)
     kept = [(plane, outline) for plane, outline in zip(planes, outlines, strict=True) if outline is not None]
