@@ -17,7 +17,7 @@ from rislam_rt.model.ris import (
     join_panels,
     join_sheets,
 )
-from rislam_rt.model.scene import Material, Reflector, Scatterer, Scene, Shade
+from rislam_rt.model.scene import Material, Occluder, Reflector, Scatterer, Scene
 from rislam_rt.model.sensor import SensorModel, detection_probability, merged_pull
 from rislam_rt.model.trajectory import Body, Trajectory
 
@@ -30,6 +30,7 @@ __all__ = [
     "MapEstimate",
     "Material",
     "Measurement",
+    "Occluder",
     "PathKind",
     "PathTruth",
     "Paths",
@@ -46,7 +47,6 @@ __all__ = [
     "Scene",
     "SchemeResult",
     "SensorModel",
-    "Shade",
     "SlamEstimate",
     "SlamResult",
     "Suspect",

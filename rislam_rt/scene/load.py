@@ -10,7 +10,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade, join_panels
+from rislam_rt.model import Material, Occluder, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, join_panels
 from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
 from rislam_rt.scene.findings import Fault, Faults, Finding, panel_key, raise_errors
@@ -132,7 +132,7 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     for number, shade in enumerate(spec.shade):
         try:
             mesh = shelf.mesh(shade.mesh, shade)
-            shades.append(Shade(mesh.vertices, mesh.faces, shade.name))
+            shades.append(Occluder(mesh.vertices, mesh.faces, shade.name))
         except Fault as fault:
             findings.append(fault.at(str(file), f"shade[{number}].mesh ({shade.name})"))
     panels = _panels(spec.ris, str(file), findings)
@@ -152,7 +152,7 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     return SceneDraft(str(file), scene, [], bounds)
 
 
-def _surfaces(reflectors: Sequence[Reflector], shades: Sequence[Shade]) -> Floats:
+def _surfaces(reflectors: Sequence[Reflector], shades: Sequence[Occluder]) -> Floats:
     """(T, 3, 3) [m] of all that stands in an agent's way."""
     return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in shades)])
 
@@ -218,7 +218,7 @@ def _scatterer(section: ScattererSection, shelf: MeshFiles) -> Scatterer:
         mesh = shelf.mesh(section.mesh, section)
     elif section.shadow:
         mesh = solid_mesh(position, radius or 0.0, height, axis)
-    shade = None if mesh is None else Shade(mesh.vertices, mesh.faces)
+    shade = None if mesh is None else Occluder(mesh.vertices, mesh.faces)
     return Scatterer(section.name, position, rcs, radius, law, height, axis, shade)
 
 

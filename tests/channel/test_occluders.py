@@ -10,15 +10,15 @@ from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.occluders import build_occluders
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import triangle_planes
-from rislam_rt.model import PathKind, RadioConfig, Scatterer, Shade
+from rislam_rt.model import Occluder, PathKind, RadioConfig, Scatterer
 from rislam_rt.scene.solids import cylinder_mesh, sphere_mesh
 
 RADIO = RadioConfig()
 CENTER = np.array([2.0, 1.0, 1.0])
-BALL = Scatterer("ball", CENTER, 0.3, 0.3, shade=Shade(*sphere_mesh(CENTER, 0.3)))
+BALL = Scatterer("ball", CENTER, 0.3, 0.3, shade=Occluder(*sphere_mesh(CENTER, 0.3)))
 POST = Scatterer(
     "post", np.array([4.0, 3.2, 1.5]), 0.1, 0.25, "constant", 2.9, np.array([0.0, 0.0, 1.0]),
-    Shade(*cylinder_mesh(np.array([4.0, 3.2, 1.5]), 0.25, 2.9, np.array([0.0, 0.0, 1.0]))),
+    Occluder(*cylinder_mesh(np.array([4.0, 3.2, 1.5]), 0.25, 2.9, np.array([0.0, 0.0, 1.0]))),
 )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
-from rislam_rt.model import RadioConfig, Shade
+from rislam_rt.model import Occluder, RadioConfig
 from rislam_rt.scene.check.mesh_queries import crossings, winding
 from rislam_rt.scene.check.triangle_array import TriangleArray, without_area
 from rislam_rt.scene.findings import Finding
@@ -56,7 +56,7 @@ def cylinder_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Findi
             )
 
 
-def _shades(room: TriangleArray) -> Iterator[tuple[str, int | None, Shade]]:
+def _shades(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:
     """Field and shade of every scatterer that has one, with its number, and of those that stand alone."""
     for number, scatterer in enumerate(room.scene.scatterers):
         if scatterer.shade is not None:
@@ -65,12 +65,12 @@ def _shades(room: TriangleArray) -> Iterator[tuple[str, int | None, Shade]]:
         yield f"shade[{number}].mesh ({shade.name})", None, shade
 
 
-def _inside(points: Floats, shade: Shade) -> Booleans:
+def _inside(points: Floats, shade: Occluder) -> Booleans:
     """Which points (N, 3) a shade encloses."""
     return np.array([abs(winding(point, shade.triangles)) > 0.5 for point in points], dtype=np.bool_)
 
 
-def _enters(points: Floats, shade: Shade) -> int | None:
+def _enters(points: Floats, shade: Occluder) -> int | None:
     """The first cycle of a track (K, 3) that begins inside, or after which the track crosses the mesh."""
     if _inside(points[:1], shade)[0]:
         return 0

@@ -8,7 +8,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError, SceneError
-from rislam_rt.model import Body, Material, Reflector, RisPanel, Scene, Shade, Trajectory
+from rislam_rt.model import Body, Material, Occluder, Reflector, RisPanel, Scene, Trajectory
 from rislam_rt.scene.check import find_errors
 from rislam_rt.scene.findings import Fault, raise_errors
 from rislam_rt.scene.importing.free_space import FreeSpace
@@ -76,7 +76,7 @@ def scene_of_xml(path: Path, name: str, within: Sequence[float] = ()) -> tuple[S
         raise SceneError(f"{path}: nothing in it reflects; give a scene with radio materials")
     own = {SHADE_OF + s.name for s in whole.scatterers} if whole else set()
     shades = tuple(
-        Shade(p.mesh.vertices, p.mesh.faces, p.name) for p in found.parts if p.material is None and p.name not in own
+        Occluder(p.mesh.vertices, p.mesh.faces, p.name) for p in found.parts if p.material is None and p.name not in own
     )
     if whole is not None:
         notes.append(f"agent, panel and {len(whole.scatterers)} scatterers are those of the {SCENE_FILE} beside it")
@@ -105,7 +105,9 @@ def _exact(read: Material, exact: Material | None) -> Material:
     return read
 
 
-def _panel(reflectors: Sequence[Reflector], shades: Sequence[Shade], agent: Trajectory) -> tuple[RisPanel | None, str]:
+def _panel(
+    reflectors: Sequence[Reflector], shades: Sequence[Occluder], agent: Trajectory
+) -> tuple[RisPanel | None, str]:
     """A panel like the paper's above or beside the way, where there is a place for one, and words on it."""
     draft = RoomDraft(
         {r.name: (Mesh(r.vertices, r.faces), {}) for r in reflectors},
@@ -116,7 +118,7 @@ def _panel(reflectors: Sequence[Reflector], shades: Sequence[Shade], agent: Traj
     return (build_panel(RisSection(**table)) if table else None), about
 
 
-def _motion(path: Path, reflectors: Sequence[Reflector], shades: Sequence[Shade]) -> Trajectory:
+def _motion(path: Path, reflectors: Sequence[Reflector], shades: Sequence[Occluder]) -> Trajectory:
     try:
         table = suggest_agent(np.concatenate([r.triangles for r in reflectors] + [s.triangles for s in shades]))
     except Fault as fault:
