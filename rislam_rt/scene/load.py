@@ -23,11 +23,11 @@ from rislam_rt.scene.schema import (
     LimitsSection,
     MaterialSection,
     MeshesSection,
+    OccluderSection,
     ReflectorSection,
     RisSection,
     ScattererSection,
     SceneSpec,
-    ShadeSection,
     read_spec,
 )
 from rislam_rt.scene.solids import solid_mesh
@@ -166,7 +166,7 @@ class MeshFiles:
         self.reader = MeshReader()
         self.faces = 0
 
-    def mesh(self, place: str, section: ReflectorSection | ScattererSection | ShadeSection) -> Mesh:
+    def mesh(self, place: str, section: ReflectorSection | ScattererSection | OccluderSection) -> Mesh:
         """The mesh `file` or `file#node`, placed as its section says, or else all meshes of the scene."""
         name, _, node = place.partition("#")
         if name not in self.contents:
