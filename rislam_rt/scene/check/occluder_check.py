@@ -11,7 +11,7 @@ from rislam_rt.scene.check.triangle_array import TriangleArray, without_area
 from rislam_rt.scene.findings import Finding
 
 
-def shade_face_errors(room: TriangleArray) -> Iterator[Finding]:
+def occluder_face_errors(room: TriangleArray) -> Iterator[Finding]:
     """Faces without area."""
     for field, _, shade in _shades(room):
         bad = without_area(shade.triangles)
@@ -20,7 +20,7 @@ def shade_face_errors(room: TriangleArray) -> Iterator[Finding]:
             yield room.error(field, message, "remove degenerate faces from the mesh")
 
 
-def shade_errors(room: TriangleArray) -> Iterator[Finding]:
+def occluder_errors(room: TriangleArray) -> Iterator[Finding]:
     """A mesh that is not about its own scatterer, that encloses another landmark, or that the agent runs into."""
     marks, motion = room.scene.landmark_positions, room.scene.agent
     for field, number, shade in _shades(room):
