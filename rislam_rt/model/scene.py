@@ -193,7 +193,7 @@ class Scene:
     agent: Trajectory
     digest: str = ""
     """SHA-256 over the scene file and its meshes; empty for a scene built in memory."""
-    shades: tuple[Occluder, ...] = ()
+    occluders: tuple[Occluder, ...] = ()
     """What hides and is neither wall nor landmark: clutter too small or too round to reflect like a plane."""
 
     def __repr__(self) -> str:

@@ -128,17 +128,17 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
             scatterers.append(_scatterer(scatterer, shelf))
         except Fault as fault:
             findings.append(fault.at(str(file), f"scatterer[{number}].mesh ({scatterer.name})"))
-    shades = []
+    occluders = []
     for number, shade in enumerate(spec.shade):
         try:
             mesh = shelf.mesh(shade.mesh, shade)
-            shades.append(Occluder(mesh.vertices, mesh.faces, shade.name))
+            occluders.append(Occluder(mesh.vertices, mesh.faces, shade.name))
         except Fault as fault:
             findings.append(fault.at(str(file), f"shade[{number}].mesh ({shade.name})"))
     panels = _panels(spec.ris, str(file), findings)
     try:
         if not (findings and spec.agent.random_walk):  # which needs the whole room
-            surfaces = _surfaces(reflectors, [*shades, *(s.shade for s in scatterers if s.shade)])
+            surfaces = _surfaces(reflectors, [*occluders, *(s.shade for s in scatterers if s.shade)])
             agent, shelf.contents["trajectory"] = build_motion(spec.agent, file.parent, surfaces)
     except Fault as fault:
         findings.append(fault.at(str(file), "agent"))
@@ -148,13 +148,13 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
         return SceneDraft(str(file), None, findings, bounds)
     ris = join_panels(panels)
     digest = _digest(content, shelf.contents)
-    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(shades))
+    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(occluders))
     return SceneDraft(str(file), scene, [], bounds)
 
 
-def _surfaces(reflectors: Sequence[Reflector], shades: Sequence[Occluder]) -> Floats:
+def _surfaces(reflectors: Sequence[Reflector], occluders: Sequence[Occluder]) -> Floats:
     """(T, 3, 3) [m] of all that stands in an agent's way."""
-    return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in shades)])
+    return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in occluders)])
 
 
 class MeshFiles:

@@ -224,11 +224,11 @@ def test_records_refuse_what_makes_no_sense() -> None:
 def test_shades_alone_are_written_read_and_checked(room: Path, tmp_path: Path) -> None:
     scene = load_scene(room)
     heap = Occluder(*block([2.9, 2.9, 0.2], [3.1, 3.1, 0.4]), name="heap")
-    again = load_scene(write_scene(replace(scene, shades=(heap,)), tmp_path / "again"))
-    assert [shade.name for shade in again.shades] == ["heap"]
-    assert np.array_equal(again.shades[0].triangles, heap.triangles)
+    again = load_scene(write_scene(replace(scene, occluders=(heap,)), tmp_path / "again"))
+    assert [shade.name for shade in again.occluders] == ["heap"]
+    assert np.array_equal(again.occluders[0].triangles, heap.triangles)
     around = Occluder(*block([0.2, 0.2, 0.1], [1.0, 1.0, 0.9]), name="heap")
-    inside = [f.line for f in check_scene(replace(scene, shades=(around,)))]
+    inside = [f.line for f in check_scene(replace(scene, occluders=(around,)))]
     assert any("the agent is inside it at or after cycle 0" in line and "shade[0]" in line for line in inside)
-    twice = [f.line for f in check_scene(replace(scene, shades=(replace(heap, name="floor"),)))]
+    twice = [f.line for f in check_scene(replace(scene, occluders=(replace(heap, name="floor"),)))]
     assert any("called 'floor'" in line for line in twice)

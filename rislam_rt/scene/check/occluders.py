@@ -13,7 +13,7 @@ from rislam_rt.scene.findings import Finding
 
 def occluder_face_errors(room: TriangleArray) -> Iterator[Finding]:
     """Faces without area."""
-    for field, _, shade in _shades(room):
+    for field, _, shade in _occluders(room):
         bad = without_area(shade.triangles)
         if bad.any():
             message = f"{int(bad.sum())} faces without area, the first is face {int(np.argmax(bad))}"
@@ -23,7 +23,7 @@ def occluder_face_errors(room: TriangleArray) -> Iterator[Finding]:
 def occluder_errors(room: TriangleArray) -> Iterator[Finding]:
     """A mesh that is not about its own scatterer, that encloses another landmark, or that the agent runs into."""
     marks, motion = room.scene.landmark_positions, room.scene.agent
-    for field, number, shade in _shades(room):
+    for field, number, shade in _occluders(room):
         inside = _inside(marks, shade)
         if number is not None and not inside[number]:
             message = f"it does not enclose the scatterer's position {marks[number].tolist()}"
@@ -56,12 +56,12 @@ def cylinder_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Findi
             )
 
 
-def _shades(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:
+def _occluders(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:
     """Field and shade of every scatterer that has one, with its number, and of those that stand alone."""
     for number, scatterer in enumerate(room.scene.scatterers):
         if scatterer.shade is not None:
             yield f"scatterer[{number}].mesh ({scatterer.name})", number, scatterer.shade
-    for number, shade in enumerate(room.scene.shades):
+    for number, shade in enumerate(room.scene.occluders):
         yield f"shade[{number}].mesh ({shade.name})", None, shade
 
 

@@ -110,7 +110,7 @@ def test_what_hides_and_reflects_nothing_is_named(paper: Scene) -> None:
     box = np.array([[x, y, z] for x in (1.7, 2.3) for y in (0.7, 1.3) for z in (0.7, 1.3)])
     quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
     faces = np.array([face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))])
-    _, links = look(replace(paper, shades=(Occluder(box, faces, "crate"),)))
+    _, links = look(replace(paper, occluders=(Occluder(box, faces, "crate"),)))
     assert set(links["sphere", ""].reason) == {"shaded by 'crate'"}
 
 
