@@ -10,7 +10,7 @@ import numpy as np
 
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import SlamResult
-from rislam_rt.pipeline.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.report.code import draw_run_codes
 from rislam_rt.report.curves import draw_agent_error, draw_landmark_errors, draw_levels
 from rislam_rt.report.room import draw_above, draw_paths
