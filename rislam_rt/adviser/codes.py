@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Integers
 from rislam_rt.design import exact_code
-from rislam_rt.design.search import sweep_codes
+from rislam_rt.design.beam_sweep import sweep_codes
 from rislam_rt.measurement.received import HORIZON_MARGIN
 from rislam_rt.model import Paths, RadioConfig, RisCode
 from rislam_rt.model.ris import DataSheet, join_codes

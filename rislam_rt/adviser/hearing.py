@@ -7,8 +7,8 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.measurement import Received, receive
 from rislam_rt.measurement.bound import NEGLIGIBLE
-from rislam_rt.measurement.parts import Parts, audible, merge, single
-from rislam_rt.measurement.slot import split
+from rislam_rt.measurement.components import NoiselessComponents, audible, merge, single
+from rislam_rt.measurement.slot_motion import split
 from rislam_rt.model import Paths, SensorModel
 from rislam_rt.pipeline.specification.spec import Settings
 
@@ -51,7 +51,7 @@ def hear(paths: Paths, cycle: int, heading: float, settings: Settings) -> Heard:
     return Heard(1.0 - missed, strongest, covered)
 
 
-def _cover(loud: Received, path: int, parts: Parts, sensor: SensorModel) -> int:
+def _cover(loud: Received, path: int, parts: NoiselessComponents, sensor: SensorModel) -> int:
     """The strongest path that a path is joined to and that leads its component; -1 if it leads one, or is not loud."""
     row = np.flatnonzero(loud.path == path)
     if path in parts.path or not len(row):

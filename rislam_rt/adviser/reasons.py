@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.measurement.received import HORIZON_MARGIN
 from rislam_rt.model import Paths, Scene
 from rislam_rt.pipeline.specification.spec import Settings
-from rislam_rt.scene.check.probe import crossings
+from rislam_rt.scene.check.mesh_queries import crossings
 
 WEAK = "too weak"
 CLEARANCE = 1e-6

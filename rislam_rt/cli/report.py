@@ -34,7 +34,7 @@ def command(
         raise ConfigError(f"--gif: '{gif}' received; give a name that ends in .gif")
     summary, result = read_any(run)
     if rerun is not None:
-        from rislam_rt.report.recording import recording_bytes
+        from rislam_rt.report.rerun_recording import recording_bytes
         from rislam_rt.storage.files import write_atomic
 
         write_atomic(rerun, recording_bytes(result, run.resolve().name))

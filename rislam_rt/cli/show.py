@@ -35,7 +35,7 @@ def command(
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene, settings_of
     from rislam_rt.report.tables import print_scene
-    from rislam_rt.scene.names import safe_name
+    from rislam_rt.scene.file_names import safe_name
 
     settings = settings_of(pipeline, set_ or ()) if html is not None else None
     if out is not None:

@@ -115,7 +115,7 @@ def _triple(option: str, text: str) -> "Floats":
 def _true_positions(file: Path, cycles: int) -> "Floats":
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene.findings import Fault
-    from rislam_rt.scene.recorded import parse_tum
+    from rislam_rt.scene.recorded_poses import parse_tum
 
     try:
         _, position, _ = parse_tum(file.read_bytes())

@@ -10,14 +10,14 @@ import typer
 from rislam_rt.cli.options import write_json
 
 if TYPE_CHECKING:
-    from rislam_rt.cli.study import Given
+    from rislam_rt.cli.study import StudyOptions
     from rislam_rt.studies.classifier.spec import ClassifierSpec
 
 PAGE, SCORES, IMPORTANCE = "classifier", "figures/classifier_scores.png", "figures/classifier_features.png"
 PANEL = "figures/classifier_panel.png"
 
 
-def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
+def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
     """Train the classifier of components and score it; weights, page, data and figures."""
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene

@@ -14,9 +14,9 @@ from rislam_rt.pipeline.design_at import design_at, design_table
 from rislam_rt.pipeline.long.join import join_schemes, thinned_scheme
 from rislam_rt.pipeline.recordings.inputs import dataset_to_inputs, inputs_to_dataset
 from rislam_rt.pipeline.scores.summary import landmark_scores, landmark_track
-from rislam_rt.report.code import draw_run_codes
+from rislam_rt.report.code_pictures import draw_run_codes
+from rislam_rt.report.conclusions import panel_found_at
 from rislam_rt.report.room import draw_above
-from rislam_rt.report.verdict import panel_found_at
 from rislam_rt.shipped import find_pipeline, find_room
 
 SET = [

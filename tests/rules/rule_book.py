@@ -41,7 +41,7 @@ ONLY_IN = {
     "random": (),
     "evo": (),
     "deepmimo": (),
-    "rerun": ("report/recording.py",),
+    "rerun": ("report/rerun_recording.py",),
 }
 """Where a foreign package may be imported inside the package: the tracer in one folder, evo (GPL) nowhere."""
 

@@ -33,14 +33,14 @@ def trace_clutter(scene: Scene, radio: RadioConfig, motion: Trajectory, section:
     """
     if not section.wanted:
         return None
-    from rislam_rt.channel.traced.cells import as_paths
-    from rislam_rt.channel.traced.extras import ExtraConfig, trace_extras
+    from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, trace_diffuse_paths
+    from rislam_rt.channel.traced.resolution_cells import as_paths
 
     if not section.diffuse:
         smooth = [replace(r, material=replace(r.material, scattering=0.0)) for r in scene.reflectors]
         scene = replace(scene, reflectors=tuple(smooth))
-    config = ExtraConfig(diffraction=section.diffraction, depth=section.depth, samples=section.samples)
-    return as_paths(trace_extras(scene, radio, motion, config), motion, radio)
+    config = DiffuseConfig(diffraction=section.diffraction, depth=section.depth, samples=section.samples)
+    return as_paths(trace_diffuse_paths(scene, radio, motion, config), motion, radio)
 
 
 def heard_clutter(paths: Paths, motion: Trajectory, radio: RadioConfig) -> Clutter:

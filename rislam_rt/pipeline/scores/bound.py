@@ -10,8 +10,8 @@ from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.information import (
     LandmarkModel,
+    LinearMeasurements,
     MotionPrior,
-    Rows,
     WallSpread,
     build_landmark_model,
     plane_tangents,
@@ -26,7 +26,7 @@ from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings, build_
 
 SILENT = 1e-4
 """Information over that at the detection threshold below which a path counts as not heard."""
-NO_ROWS = Rows(np.zeros((0, 3)), np.zeros((0, 0)), np.zeros(0))
+NO_ROWS = LinearMeasurements(np.zeros((0, 3)), np.zeros((0, 0)), np.zeros(0))
 """A cycle in which nothing is heard."""
 FLOOR_TILT, UPRIGHT_TILT = 0.05, 0.01
 """Standard deviations [rad] that the project's filter takes for granted: of the floor from level, and, with wall
@@ -49,7 +49,7 @@ class SchemeBound(NamedTuple):
 class BoundProblem(NamedTuple):
     """What the recursion of a bound goes through: it can be run under several assumptions about motion and start."""
 
-    rows: Sequence[Rows]
+    rows: Sequence[LinearMeasurements]
     """(K,) measurements of each cycle."""
     model: LandmarkModel | None
     """None where nothing is heard."""
@@ -157,13 +157,13 @@ def position_rms(agent: Floats, axes: int) -> Floats:
     return np.asarray(np.sqrt(np.einsum("kii->k", agent[:, :axes, :axes])))
 
 
-def fewer_rows(rows: Rows) -> Rows:
+def fewer_rows(rows: LinearMeasurements) -> LinearMeasurements:
     """At most as many measurements as there are unknowns, with the same information: the factor R of a QR."""
     weighted = np.sqrt(rows.information)[:, None] * np.concatenate([rows.agent, rows.unknown], axis=1)
     if len(weighted) <= weighted.shape[1]:
         return rows
     factor = np.asarray(np.linalg.qr(weighted, mode="r"))
-    return Rows(factor[:, :3], factor[:, 3:], np.ones(len(factor)))
+    return LinearMeasurements(factor[:, :3], factor[:, 3:], np.ones(len(factor)))
 
 
 def heard_paths(paths: Paths, sensor: SensorModel, *, use_vt: bool) -> Paths:

@@ -11,7 +11,7 @@ from rislam_rt.model import Scene
 from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import library_versions
 from rislam_rt.pipeline.specification.spec import PipelineSpec
-from rislam_rt.scene.names import safe_name
+from rislam_rt.scene.file_names import safe_name
 from rislam_rt.storage.seal import SCHEMA, checksum
 
 SHORT = 8

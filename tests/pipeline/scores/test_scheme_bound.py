@@ -8,7 +8,7 @@ from scipy.stats import ncx2
 
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.information import MotionPrior, build_landmark_model, plane_tangents, posterior_bound
-from rislam_rt.information.landmarks import Rows
+from rislam_rt.information.landmark_model import LinearMeasurements
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import set_stage
@@ -151,7 +151,7 @@ def test_landmarks_and_walls_have_bounds_where_they_are_heard(stage):
 
 def test_fewer_rows_hold_the_same_information():
     rng = np.random.default_rng(2)
-    rows = Rows(rng.standard_normal((50, 3)), rng.standard_normal((50, 4)), rng.uniform(0.1, 2.0, 50))
+    rows = LinearMeasurements(rng.standard_normal((50, 3)), rng.standard_normal((50, 4)), rng.uniform(0.1, 2.0, 50))
     short = fewer_rows(rows)
     assert len(short.information) == 7
     for first, second in ((rows, short), (rows, fewer_rows(short))):

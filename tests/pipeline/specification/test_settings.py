@@ -47,7 +47,7 @@ def test_no_setting_is_left_out() -> None:
         ("design.elite", 10, "at least 0, at most 48", ""),
         ("design.mutation", 0.02, "at least 0, at most 1", ""),
         ("slam.height", "known", "one of known, estimated", ""),
-        ("bp_slam.moving_detection", 0.7, "above 0, below 1", ""),
+        ("bp_slam.detection_probability", 0.7, "above 0, below 1", ""),
     ],
 )
 def test_default_range_and_unit(key: str, default: object, allowed: str, unit: str) -> None:
