@@ -30,7 +30,6 @@ from rislam_rt.pipeline.workers import run_side_by_side
 from rislam_rt.ris import delay_spread_warnings
 from rislam_rt.scene.check import material_errors
 from rislam_rt.scene.findings import raise_errors
-from rislam_rt.slam.inputs import lone_panel
 
 Progress = Callable[[str, int, int], None]
 """Told the stage (`trace` or a scheme), how much of it is done, and how much there is."""
@@ -210,8 +209,6 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
             raise ConfigError(f"schemes: '{need[0]}' needs a panel and scene '{scene.name}' has none; give 'no_ris'")
         return
     check_control(scene.ris.spec, spec.control, spec.panel.bit_flip)
-    if spec.slam.filter == "window" and any(SCHEMES[n].panel and SCHEMES[n].estimator == "slam" for n in spec.schemes):
-        lone_panel(scene.ris.spec)
 
 
 def prepare_channel(kind: str) -> None:

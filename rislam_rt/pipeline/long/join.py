@@ -56,6 +56,7 @@ def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> Schem
         parent=parent,
         info={name: np.concatenate([part.info[name] for part in parts]) for name in parts[0].info},
         outcome=tuple(outcome for part in parts for outcome in part.outcome),
+        smoothed=None,  # a part looks no further back than its own beginning
         given=None,
     )
 
