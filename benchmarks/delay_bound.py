@@ -24,9 +24,9 @@ from rislam_rt.information.position import range_information
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import PathKind, SlamResult
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.bound import SILENT, fewer_rows, heard_paths
 from rislam_rt.pipeline.run import run_slam
-from rislam_rt.pipeline.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.scores.bound import SILENT, fewer_rows, heard_paths
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[1]

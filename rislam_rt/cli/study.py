@@ -31,8 +31,8 @@ def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.study import write_comparison
     from rislam_rt.report.tables import print_validation
     from rislam_rt.studies.compare import comparison_table, run_comparison
@@ -65,9 +65,9 @@ def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
 
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene, scene_of
-    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.report.fig4a import fig4a_table, findings_of
+    from rislam_rt.pipeline.specification.radio import build_radio
+    from rislam_rt.report.fig4a import fig4a_table, findings_of, verdict
     from rislam_rt.report.study import write_fig4a
     from rislam_rt.scene.file_names import safe_name
     from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
@@ -157,7 +157,7 @@ def output_folder(out: Path | None, name: str, record: "Mapping[str, Any]") -> P
         There is a file of that name.
     """
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.identity import short_name
+    from rislam_rt.pipeline.store.identity import short_name
     from rislam_rt.storage.seal import checksum
 
     folder = out or Path("runs") / short_name(name, checksum(record))

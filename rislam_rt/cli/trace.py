@@ -62,9 +62,9 @@ def command(
     """
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.read import load_radio
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.signals import load_signals_spec, signal_settings
+    from rislam_rt.pipeline.specification.read import load_radio
     from rislam_rt.report.deepmimo import deepmimo_files
     from rislam_rt.report.tables import path_table, print_paths
     from rislam_rt.scene.file_names import safe_name

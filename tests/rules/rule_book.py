@@ -18,7 +18,7 @@ FLOORS = {
     4: ("channel", "information"),
     5: ("measurement", "design", "slam", "evaluate"),
     6: ("pipeline", "sweeps"),
-    7: ("studies",),
+    7: ("studies", "adviser"),
     8: ("report",),
     9: ("cli",),
     10: ("__main__",),
