@@ -21,7 +21,7 @@ from rislam_rt.pipeline.told import Told, tell_measurement
 from rislam_rt.ris import PanelErrors, rephase
 
 
-class Rng(NamedTuple):
+class CycleGenerators(NamedTuple):
     """Generators of one cycle."""
 
     design: np.random.Generator
@@ -30,7 +30,7 @@ class Rng(NamedTuple):
     filter: np.random.Generator
 
 
-class Room(NamedTuple):
+class GroundTruth(NamedTuple):
     """The true side of a run."""
 
     paths: Paths
@@ -67,11 +67,11 @@ class Agent(NamedTuple):
     """What the receiver found in the cycle before."""
 
 
-class Means(NamedTuple):
+class RunContext(NamedTuple):
     """What leads a scheme through its cycles, the same in all of them."""
 
     panel: DataSheet | None
-    designer: "Designer | None"
+    designer: "CodePolicy | None"
     estimator: Estimator
     spec: PipelineSpec
     settings: Settings
@@ -96,17 +96,19 @@ class Cycle(NamedTuple):
     """What the agent holds to be applied."""
 
 
-class Designer(Protocol):
+class CodePolicy(Protocol):
     """Chooses a code from the predicted belief."""
 
     def __call__(
-        self, belief: Callable[[], SlamEstimate], cycle: int, room: Room, *, rng: np.random.Generator
+        self, belief: Callable[[], SlamEstimate], cycle: int, room: GroundTruth, *, rng: np.random.Generator
     ) -> RisCode:
         """`belief` is worked out on being called, for not all need it; `room` is for the one that knows the truth."""
         ...
 
 
-def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -> tuple[Agent, Cycle]:
+def run_cycle(
+    agent: Agent, room: GroundTruth, cycle: int, means: RunContext, *, rng: CycleGenerators
+) -> tuple[Agent, Cycle]:
     """One cycle of one scheme."""
     control, estimator, told = means.spec.control, means.estimator, means.told
     config = estimator.config(told.settings)

@@ -11,7 +11,7 @@ from rislam_rt.measurement import FrontEnd
 from rislam_rt.model import Body, PathKind, Paths, Scene, SchemeResult
 from rislam_rt.pipeline.code_policies import build_designer
 from rislam_rt.pipeline.control import open_link
-from rislam_rt.pipeline.cycle import Agent, Cycle, Means, Rng, Room, run_cycle
+from rislam_rt.pipeline.cycle import Agent, Cycle, CycleGenerators, GroundTruth, RunContext, run_cycle
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.record import gather, given_of
 from rislam_rt.pipeline.room.extras import heard_clutter
@@ -47,7 +47,7 @@ class Walk:
             self.faults = draw_panel(panel, spec.panel.tolerance, rng=np.random.default_rng(seeds.panel))
             designer = build_designer(self.scheme, panel, spec, settings, told)
         estimator = estimator or ESTIMATORS[self.scheme.estimator]
-        self.means = Means(panel, designer, estimator, spec, settings, told)
+        self.means = RunContext(panel, designer, estimator, spec, settings, told)
         self.filter_rng, self.design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
         config = estimator.config(told.settings)
         state = estimator.init(
@@ -76,12 +76,12 @@ class Walk:
         if first == 0:
             build = np.random.default_rng(self.seeds.hardware)
             self.front_end = prepare_front_end(heard, motion, self.body, self.means.settings, rng=build)
-        room = Room(heard, self.motion, shift, self.faults, first, self.front_end, clutter)
+        room = GroundTruth(heard, self.motion, shift, self.faults, first, self.front_end, clutter)
         cycles: list[Cycle] = []
         tell(self.name, first, len(self.motion))
         for cycle in range(first, last):
             control, noise = (child(seed, cycle) for seed in (self.seeds.control, self.seeds.noise))
-            rng = Rng(self.design_rng, control, noise, self.filter_rng)
+            rng = CycleGenerators(self.design_rng, control, noise, self.filter_rng)
             self.agent, outcome = run_cycle(self.agent, room, cycle, self.means, rng=rng)
             cycles.append(outcome)
             tell(self.name, cycle + 1, len(self.motion))
