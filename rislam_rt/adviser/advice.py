@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.adviser.budget import NOTHING_DB, Link, link_budget, survey
+from rislam_rt.adviser.budget import NOTHING_DB, LandmarkLink, link_budget, survey
 from rislam_rt.adviser.cost import Cost, trace_cost
 from rislam_rt.adviser.remedies import remedies, verdict
 from rislam_rt.model import Scene
@@ -14,7 +14,7 @@ from rislam_rt.pipeline.specification.spec import Settings
 class Advice(NamedTuple):
     """What is to be expected of a run in a room, with the radio and receiver of `settings`."""
 
-    links: list[Link]
+    links: list[LandmarkLink]
     remedies: list[str]
     costs: list[Cost]
     threshold_db: float

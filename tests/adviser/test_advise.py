@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.adviser.advice import advise
-from rislam_rt.adviser.budget import Link, Survey, at_rows, link_budget, survey
+from rislam_rt.adviser.budget import LandmarkLink, Survey, at_rows, link_budget, survey
 from rislam_rt.adviser.codes import aimed_codes, under
 from rislam_rt.adviser.cost import COUNTED, cost_words, trace_cost
 from rislam_rt.adviser.coverage import panel_coverage
@@ -28,7 +28,7 @@ def settings(*changed: str) -> Settings:
     return build_settings(load_spec(ROOT / "pipelines" / "trace_then_slam.toml", changed))
 
 
-def look(scene: Scene, *changed: str, places: int = 5) -> tuple[Survey, dict[tuple[str, str], Link]]:
+def look(scene: Scene, *changed: str, places: int = 5) -> tuple[Survey, dict[tuple[str, str], LandmarkLink]]:
     looked = survey(scene, settings(*changed), places)
     return looked, {(link.landmark, link.code): link for link in link_budget(looked, rng=np.random.default_rng(1))}
 

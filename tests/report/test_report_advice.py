@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.adviser.advice import Advice
-from rislam_rt.adviser.budget import NOTHING_DB, Link
+from rislam_rt.adviser.budget import NOTHING_DB, LandmarkLink
 from rislam_rt.adviser.cost import Cost
 from rislam_rt.adviser.coverage import Coverage
 from rislam_rt.report.advice import draw_coverage, print_advice
@@ -20,7 +20,10 @@ def test_a_margin_in_brackets_is_not_heard_and_the_commonest_reason_is_given(
 ) -> None:
     margins, chances = np.array([3.2, -4.0, NOTHING_DB]), np.array([0.9, 0.0, 0.0])
     reasons = ("", "too weak", "shaded by 'crate'")
-    links = [Link("lamp", "", margins, chances, reasons), Link("ris", "aimed", margins + 9, np.ones(3), ("", "", ""))]
+    links = [
+        LandmarkLink("lamp", "", margins, chances, reasons),
+        LandmarkLink("ris", "aimed", margins + 9, np.ones(3), ("", "", "")),
+    ]
     costs = [Cost(1, 6, 33, 31, 0.2), Cost(2, 6, 10**9, None, None)]
     print_advice(Advice(links, ["lamp: heard at times: [too] weak"], costs, 10.0))
     text = capsys.readouterr().out
