@@ -14,7 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.measurement import Clutter, FrontEnd, measure
 from rislam_rt.model import DataSheet, Measurement, Paths, PathTruth, RisCode, SlamEstimate, Trajectory
-from rislam_rt.pipeline.control import Link, message_seconds, send_code
+from rislam_rt.pipeline.control import ControlLink, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings
 from rislam_rt.pipeline.told import Told, tell_measurement
@@ -61,7 +61,7 @@ class Agent(NamedTuple):
     """What the agent carries from cycle to cycle, with its control channel."""
 
     state: Any
-    link: Link | None
+    link: ControlLink | None
     """None without a panel."""
     heard: Measurement | None = None
     """What the receiver found in the cycle before."""
