@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.adviser.budget import NOTHING_DB, LandmarkLink, link_budget, survey
-from rislam_rt.adviser.cost import Cost, trace_cost
+from rislam_rt.adviser.cost import TraceCost, trace_cost
 from rislam_rt.adviser.remedies import remedies, verdict
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.specification.spec import Settings
@@ -16,7 +16,7 @@ class Advice(NamedTuple):
 
     links: list[LandmarkLink]
     remedies: list[str]
-    costs: list[Cost]
+    costs: list[TraceCost]
     threshold_db: float
     """Of detection: SNR over all antennas."""
 
