@@ -9,7 +9,7 @@ from rislam_rt.cli.verbosity import verbosity
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
-    from rislam_rt.sweeps import Cost, Told
+    from rislam_rt.sweeps import SweepCost, Told
 
 
 class ProgressReport(Protocol):
@@ -85,7 +85,7 @@ def describe_cost(told: "Told") -> str:
     return f"{there}; {told.cost.cells} left at about {told.cost.cell_seconds or 0.0:.3g} s each: {clock(told.cost)}"
 
 
-def clock(cost: "Cost") -> str:
+def clock(cost: "SweepCost") -> str:
     """The time that is left as `h:mm:ss`."""
     if cost.seconds is None:
         return "unknown time"

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.sweeps.axes import Cell, Sweep, build_cells
-from rislam_rt.sweeps.cost import Cost, estimate_cost
+from rislam_rt.sweeps.cost import SweepCost, estimate_cost
 from rislam_rt.sweeps.store import (
     DONE,
     MISSING,
@@ -60,7 +60,7 @@ class Told(NamedTuple):
     """Cells that ended well, in this run or before."""
     failed: int
     total: int
-    cost: Cost
+    cost: SweepCost
     """Of what is left."""
     last: Row | None
     """The cell that just ended."""
@@ -71,7 +71,7 @@ class Report:
     """All cells in their order."""
 
     rows: tuple[Row, ...]
-    cost: Cost
+    cost: SweepCost
     """Of what is left, if the sweep was to stop at the estimate."""
 
     @property
@@ -172,7 +172,7 @@ class _Board:
         self.width = effort.jobs
         self.timings = read_timings(folder)
         self.due = 0.0
-        self.known: tuple[float, Cost] | None = None
+        self.known: tuple[float, SweepCost] | None = None
 
     def take(self, ident: str, outcome: Outcome) -> None:
         """A cell has ended."""
@@ -185,7 +185,7 @@ class _Board:
             self.write()
         self.show(row)
 
-    def cost(self) -> Cost:
+    def cost(self) -> SweepCost:
         """Of what is left, worked out anew at most once in `TABLE_SECONDS`."""
         if self.known is None or self.known[1].seconds is None or not self.left or monotonic() >= self.known[0]:
             left = [self.rows[ident].cell for ident in self.left]
