@@ -22,7 +22,7 @@ from rislam_rt.sweeps.store import (
     write_cell,
     write_table,
 )
-from rislam_rt.sweeps.work import LOST, Outcome, Task, find_function
+from rislam_rt.sweeps.work import LOST, CellOutcome, Task, find_function
 from rislam_rt.sweeps.worker_pool import Run, crew_here
 
 TABLE_SECONDS = 1.0
@@ -174,7 +174,7 @@ class _Board:
         self.due = 0.0
         self.known: tuple[float, SweepCost] | None = None
 
-    def take(self, ident: str, outcome: Outcome) -> None:
+    def take(self, ident: str, outcome: CellOutcome) -> None:
         """A cell has ended."""
         cell = self.rows[ident].cell
         self.rows[ident] = row = write_cell(self.folder, cell, self.sweep.label, outcome)

@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from itertools import islice
 from time import monotonic
 
-from rislam_rt.sweeps.work import DIED, HUNG, LOST, Outcome, Task
+from rislam_rt.sweeps.work import DIED, HUNG, LOST, CellOutcome, Task
 
-Run = Callable[[Iterable[tuple[str, Task]]], Iterator[tuple[str, Outcome]]]
+Run = Callable[[Iterable[tuple[str, Task]]], Iterator[tuple[str, CellOutcome]]]
 """Does tasks and gives their outcomes as they come, each with its name."""
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "RISLAM_RT_THREADS")
@@ -42,7 +42,7 @@ class Worker:
         )
         self.fresh = True
 
-    def do(self, task: Task, limit: float | None) -> Outcome:
+    def do(self, task: Task, limit: float | None) -> CellOutcome:
         """One cell, stopped after `limit` [s]; the start of the interpreter does not count."""
         if self.fresh and self._hear(None) is None:
             return self._dead(0.0)
@@ -56,10 +56,10 @@ class Worker:
             line = self._hear(limit)
         except TimeoutError:
             self.stop()
-            return Outcome(
+            return CellOutcome(
                 cause=HUNG, message=f"not done after {limit:g} s, its time limit", seconds=monotonic() - begin
             )
-        return self._dead(monotonic() - begin) if line is None else Outcome(*json.loads(line))
+        return self._dead(monotonic() - begin) if line is None else CellOutcome(*json.loads(line))
 
     def _say(self, line: bytes) -> None:
         assert self.process.stdin is not None
@@ -87,14 +87,14 @@ class Worker:
             line += part
         return line
 
-    def _dead(self, seconds: float) -> Outcome:
+    def _dead(self, seconds: float) -> CellOutcome:
         code = self.process.wait()
         self.stop()
         if code >= 0:
-            return Outcome(cause=DIED, message=f"its process ended with exit code {code}", seconds=seconds)
+            return CellOutcome(cause=DIED, message=f"its process ended with exit code {code}", seconds=seconds)
         name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
         cause = LOST if -code in FROM_OUTSIDE else DIED
-        return Outcome(cause=cause, message=f"its process was killed by {name}", seconds=seconds)
+        return CellOutcome(cause=cause, message=f"its process was killed by {name}", seconds=seconds)
 
     def stop(self) -> None:
         """End it at once."""
@@ -118,7 +118,7 @@ class Crew:
         self.busy: list[Worker] = []
         self.over = False
 
-    def do(self, task: Task, limit: float | None) -> Outcome:
+    def do(self, task: Task, limit: float | None) -> CellOutcome:
         """One cell, by an idle worker or a new one."""
         worker = self.idle.pop() if self.idle else Worker()
         if not worker.alive:
@@ -152,8 +152,8 @@ def crew_here(jobs: int, limit: float | None) -> Iterator[Run]:
     crew = Crew()
     pool = ThreadPoolExecutor(jobs, initializer=_leave_interrupts)
 
-    def run(tasks: Iterable[tuple[str, Task]]) -> Iterator[tuple[str, Outcome]]:
-        waiting, running = iter(tasks), dict[Future[Outcome], str]()
+    def run(tasks: Iterable[tuple[str, Task]]) -> Iterator[tuple[str, CellOutcome]]:
+        waiting, running = iter(tasks), dict[Future[CellOutcome], str]()
         while True:
             for name, task in islice(waiting, jobs - len(running)):
                 running[pool.submit(crew.do, task, limit)] = name
