@@ -28,7 +28,7 @@ class Answers(NamedTuple):
     """CPU time [s] of a cycle, step and estimate."""
 
 
-class Report(NamedTuple):
+class ReplayDiagnostics(NamedTuple):
     """What is read of an estimator's diagnostics."""
 
     landmark: Integers
@@ -71,7 +71,10 @@ def answers_from_arrays(
     ]
     none = [np.full(len(m), -1) for m in inputs.measurements]
     said = np.zeros(cycles, dtype=np.bool_) if lost is None else lost
-    infos = [Report(np.asarray(own), "diverged" if s else "ok") for own, s in zip(landmark or none, said, strict=True)]
+    infos = [
+        ReplayDiagnostics(np.asarray(own), "diverged" if s else "ok")
+        for own, s in zip(landmark or none, said, strict=True)
+    ]
     return Answers(tuple(estimates), tuple(infos), 0.0)
 
 
