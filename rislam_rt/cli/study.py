@@ -97,7 +97,7 @@ def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
     from rislam_rt.report.swept import write_swept
     from rislam_rt.studies.swept import build_sweep
     from rislam_rt.studies.swept.record import swept_record
-    from rislam_rt.sweeps import Effort, build_cells, run_sweep
+    from rislam_rt.sweeps import SweepOptions, build_cells, run_sweep
     from rislam_rt.sweeps.store import check_folder
 
     sweep = build_sweep(spec, given.pipeline, given.scene)
@@ -111,7 +111,7 @@ def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
     def grow(rows: "Sequence[Row]") -> None:
         write_swept(rows, spec, record, folder, figures=given.page)
 
-    effort = Effort(given.jobs or os.cpu_count() or 1, None, spec.time_limit_s)
+    effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, spec.time_limit_s)
     try:
         with show_sweep() as tell:
             report = run_sweep(sweep, cells, effort, tell=tell, grow=grow)

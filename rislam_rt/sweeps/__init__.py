@@ -2,18 +2,18 @@
 
 from rislam_rt.sweeps.axes import Axis, Cell, Sweep, build_cells, parse_axis
 from rislam_rt.sweeps.cost import SweepCost, estimate_cost
-from rislam_rt.sweeps.run import Effort, Report, Told, run_sweep
+from rislam_rt.sweeps.run import SweepOptions, SweepProgress, SweepReport, run_sweep
 from rislam_rt.sweeps.store import Row
 
 __all__ = [
     "Axis",
     "Cell",
-    "Effort",
-    "Report",
     "Row",
     "Sweep",
     "SweepCost",
-    "Told",
+    "SweepOptions",
+    "SweepProgress",
+    "SweepReport",
     "build_cells",
     "estimate_cost",
     "parse_axis",

@@ -32,7 +32,7 @@ TABLE_SHARE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Effort:
+class SweepOptions:
     """How to run, which never changes what comes out."""
 
     jobs: int = 1
@@ -53,7 +53,7 @@ class Effort:
             raise ConfigError(f"--time-limit: {self.time_limit:g} received; give a positive number of seconds")
 
 
-class Told(NamedTuple):
+class SweepProgress(NamedTuple):
     """Where a sweep stands: given when its cost is known, and after every cell."""
 
     done: int
@@ -67,7 +67,7 @@ class Told(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class SweepReport:
     """All cells in their order."""
 
     rows: tuple[Row, ...]
@@ -83,11 +83,11 @@ class Report:
 def run_sweep(
     sweep: Sweep,
     folder: Path,
-    effort: Effort | None = None,
+    effort: SweepOptions | None = None,
     *,
-    tell: Callable[[Told], None] | None = None,
+    tell: Callable[[SweepProgress], None] | None = None,
     grow: Callable[[Sequence[Row]], None] | None = None,
-) -> Report:
+) -> SweepReport:
     """Do all cells that are not there yet and leave one file for each in `folder`.
 
     Whenever it is stopped, and however, another call goes on from the cells that are there; the files are the same,
@@ -109,7 +109,7 @@ def run_sweep(
     SetupError
         Dask is asked for and not there.
     """
-    effort = effort or Effort()
+    effort = effort or SweepOptions()
     find_function(sweep.function)
     cells = build_cells(sweep)
     with ExitStack() as stack:
@@ -127,10 +127,10 @@ def run_sweep(
                     board.take(ident, outcome)
         else:
             board.show(None)
-    return Report(tuple(board.rows.values()), board.cost())
+    return SweepReport(tuple(board.rows.values()), board.cost())
 
 
-def _hire(stack: ExitStack, effort: Effort) -> tuple[Run, int]:
+def _hire(stack: ExitStack, effort: SweepOptions) -> tuple[Run, int]:
     """Who does the cells, and how many at a time."""
     if effort.dask is None:
         return stack.enter_context(crew_here(effort.jobs, effort.time_limit)), effort.jobs
@@ -157,9 +157,9 @@ class _Board:
         self,
         sweep: Sweep,
         folder: Path,
-        effort: Effort,
+        effort: SweepOptions,
         cells: Sequence[Cell],
-        tell: Callable[[Told], None] | None,
+        tell: Callable[[SweepProgress], None] | None,
         grow: Callable[[Sequence[Row]], None] | None,
     ) -> None:
         self.sweep, self.folder, self.effort, self.tell, self.grow = sweep, folder, effort, tell, grow
@@ -198,7 +198,7 @@ class _Board:
             states = [row.state for row in self.rows.values()]
             done = states.count(DONE)
             failed = len(states) - done - sum(row.cell.ident in self.left for row in self.rows.values())
-            self.tell(Told(done, failed, len(states), self.cost(), last))
+            self.tell(SweepProgress(done, failed, len(states), self.cost(), last))
 
     def write(self) -> None:
         """Bring the table up to date."""
