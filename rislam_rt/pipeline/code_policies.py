@@ -12,16 +12,18 @@ from rislam_rt.pipeline.cycle import CodePolicy, GroundTruth
 from rislam_rt.pipeline.own_methods import is_own, own_code
 from rislam_rt.pipeline.schemes import Scheme
 from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings
-from rislam_rt.pipeline.told import Told
+from rislam_rt.pipeline.told import AssumedModel
 
 
-def build_designer(scheme: Scheme, panel: DataSheet, spec: PipelineSpec, settings: Settings, told: Told) -> CodePolicy:
+def build_designer(
+    scheme: Scheme, panel: DataSheet, spec: PipelineSpec, settings: Settings, told: AssumedModel
+) -> CodePolicy:
     """The designer of a scheme that has a panel: true panel and settings serve the one that knows the truth."""
     method = spec.design.method if scheme.method == "spec" else str(scheme.method)
     return _on_truth(method, panel, spec, settings) if scheme.on_truth else _on_belief(method, spec, told)
 
 
-def _on_belief(method: str, spec: PipelineSpec, told: Told) -> CodePolicy:
+def _on_belief(method: str, spec: PipelineSpec, told: AssumedModel) -> CodePolicy:
     section, panel, settings = spec.design, told.panel, told.settings
     assert panel is not None
     last: RisCode | None = None

@@ -17,7 +17,7 @@ from rislam_rt.model import DataSheet, Measurement, Paths, PathTruth, RisCode, S
 from rislam_rt.pipeline.control import ControlLink, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings
-from rislam_rt.pipeline.told import Told, tell_measurement
+from rislam_rt.pipeline.told import AssumedModel, tell_measurement
 from rislam_rt.ris import PanelErrors, rephase
 
 
@@ -76,7 +76,7 @@ class RunContext(NamedTuple):
     spec: PipelineSpec
     settings: Settings
     """True ones: what the room and the receiver go by."""
-    told: Told
+    told: AssumedModel
     """What filter and design go by."""
 
 

@@ -9,7 +9,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import NOTHING, RisCode, SchemeResult
 from rislam_rt.pipeline.cycle import Cycle
 from rislam_rt.pipeline.recordings.inputs import Inputs, inputs_to_dataset, seed_marks
-from rislam_rt.pipeline.told import Told
+from rislam_rt.pipeline.told import AssumedModel
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,7 +68,7 @@ def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, give
     )
 
 
-def given_of(told: Told, first: int, cycles: Sequence[Cycle], seed: np.random.SeedSequence) -> Given:
+def given_of(told: AssumedModel, first: int, cycles: Sequence[Cycle], seed: np.random.SeedSequence) -> Given:
     """What the estimator was given from cycle `first` on."""
     span = slice(first, first + len(cycles))
     time, heading = told.time[span] - told.time[0], told.heading[span]

@@ -17,7 +17,7 @@ from rislam_rt.pipeline.specification.spec import ESTIMATOR_SECTIONS, PipelineSp
 from rislam_rt.slam import StartPrior
 
 
-class Told(NamedTuple):
+class AssumedModel(NamedTuple):
     """All that estimators and designs get beside measurements and the code in force."""
 
     start: StartPrior
@@ -36,7 +36,7 @@ class Told(NamedTuple):
 def tell_belief(
     motion: Trajectory, body: Body, panel: DataSheet | None, spec: PipelineSpec, settings: Settings,
     *, start: np.random.Generator, compass: np.random.Generator,
-) -> Told:  # fmt: skip
+) -> AssumedModel:  # fmt: skip
     """What a run's belief is told of the truth.
 
     Parameters
@@ -53,7 +53,7 @@ def tell_belief(
     told = spec.told
     noise = np.radians(told.compass_noise_deg) * compass.standard_normal(len(motion))
     heading = motion.heading + np.radians(told.compass_bias_deg) + noise
-    return Told(
+    return AssumedModel(
         tell_start(motion, float(heading[0]), spec.start, told, settings, rng=start),
         replace(body, tx_offset=body.tx_offset + told.baseline_m * _outwards(body)),
         None if panel is None else tell_panel(panel, told),
