@@ -8,11 +8,11 @@ from rislam_rt.design import design_code, designer, problem_from_paths
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import prior_from_covariance
 from rislam_rt.model import DataSheet, RisCode, SlamEstimate
+from rislam_rt.pipeline.assumed_model import AssumedModel
 from rislam_rt.pipeline.cycle import CodePolicy, GroundTruth
 from rislam_rt.pipeline.own_methods import is_own, own_code
 from rislam_rt.pipeline.schemes import Scheme
 from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings
-from rislam_rt.pipeline.told import AssumedModel
 
 
 def build_designer(

@@ -7,9 +7,9 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import NOTHING, RisCode, SchemeResult
+from rislam_rt.pipeline.assumed_model import AssumedModel
 from rislam_rt.pipeline.cycle import Cycle
 from rislam_rt.pipeline.recordings.inputs import Inputs, inputs_to_dataset, seed_marks
-from rislam_rt.pipeline.told import AssumedModel
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,6 +13,7 @@ from rislam_rt.backend import prepare_backend
 from rislam_rt.channel.protocol import Channel
 from rislam_rt.errors import ConfigError, RislamError, expect
 from rislam_rt.model import Body, Paths, RadioConfig, Scene, SchemeResult, SlamResult
+from rislam_rt.pipeline.assumed_model import lean
 from rislam_rt.pipeline.control import check_control
 from rislam_rt.pipeline.cycle import usual_step
 from rislam_rt.pipeline.estimators import Estimator
@@ -24,7 +25,6 @@ from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.specification.spec import PipelineSpec
-from rislam_rt.pipeline.told import lean
 from rislam_rt.pipeline.walk import Walk
 from rislam_rt.pipeline.workers import run_side_by_side
 from rislam_rt.ris import delay_spread_warnings

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from rislam_rt import slam
 from rislam_rt.model import PathKind
-from rislam_rt.pipeline import load_spec, told
+from rislam_rt.pipeline import assumed_model, load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.run import set_stage
 from rislam_rt.pipeline.specification.mistold import ToldSection

@@ -8,11 +8,11 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SlamEstimate, empty_map
+from rislam_rt.pipeline.assumed_model import tell_settings
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
-from rislam_rt.pipeline.told import tell_settings
 from rislam_rt.slam import StartPrior
 from rislam_rt.toml import put_dotted
 
