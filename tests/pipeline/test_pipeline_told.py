@@ -14,7 +14,7 @@ from rislam_rt.model import PathKind
 from rislam_rt.pipeline import assumed_model, load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.run import set_stage
-from rislam_rt.pipeline.specification.mistold import AssumedSection
+from rislam_rt.pipeline.specification.mismatch import AssumedSection
 from rislam_rt.pipeline.specification.spec import build_settings
 
 ROOT = Path(__file__).parents[2]
