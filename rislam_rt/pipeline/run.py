@@ -46,7 +46,7 @@ CYCLE_BYTES = 100_000
 """Of a cycle while it is traced, in the paper's room with two bounces."""
 
 
-class Stage(NamedTuple):
+class RunSetup(NamedTuple):
     """What all schemes of a run share."""
 
     scene: Scene
@@ -77,7 +77,7 @@ def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
     return replace(scene, agent=lean(motion, spec.told)), motion.body, seeds
 
 
-def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> Stage:
+def prepare_setup(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> RunSetup:
     """Draw the true motion and find all paths along it. None of it depends on the noise, so that one stage serves many.
 
     Raises
@@ -93,7 +93,7 @@ def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
     radio = build_radio(spec.radio)
     paths = build_channel(spec.channel, scene, radio, spec.depth).paths(scene.agent)
     extras = trace_clutter(scene, radio, scene.agent, spec.extras)
-    return Stage(scene, paths, body, seeds, perf_counter() - begin, extras)
+    return RunSetup(scene, paths, body, seeds, perf_counter() - begin, extras)
 
 
 def check_one_piece(cycles: int, way_out: str) -> None:
@@ -146,7 +146,7 @@ def run_slam(
     done = {} if done is None else done
     tell = progress or (lambda stage, at, total: None)
     tell("trace", 0, 1)
-    stage = set_stage(scene, spec, rng=rng)
+    stage = prepare_setup(scene, spec, rng=rng)
     tell("trace", 1, 1)
     todo = [name for name in spec.schemes if name not in done]
     for name, scheme in run_side_by_side(run_scheme, todo, (stage, spec), jobs, tell):
@@ -156,7 +156,9 @@ def run_slam(
     return result_of(stage, spec, {name: done[name] for name in spec.schemes}, seed=_seed_of(rng))
 
 
-def result_of(stage: Stage, spec: PipelineSpec, schemes: Mapping[str, SchemeResult], *, seed: int | None) -> SlamResult:
+def result_of(
+    stage: RunSetup, spec: PipelineSpec, schemes: Mapping[str, SchemeResult], *, seed: int | None
+) -> SlamResult:
     """Schemes that ran on one stage, as a run."""
     return SlamResult(
         name=spec.name,
@@ -172,7 +174,7 @@ def result_of(stage: Stage, spec: PipelineSpec, schemes: Mapping[str, SchemeResu
 
 
 def run_scheme(
-    name: str, stage: Stage, spec: PipelineSpec, tell: Progress, estimator: Estimator | None = None
+    name: str, stage: RunSetup, spec: PipelineSpec, tell: Progress, estimator: Estimator | None = None
 ) -> SchemeResult:
     """One scheme over all cycles, with its own estimator unless another is given."""
     walk = Walk(name, stage.scene, stage.body, spec, stage.seeds, estimator)

@@ -13,7 +13,7 @@ from rislam_rt import slam
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import assumed_model, load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
-from rislam_rt.pipeline.run import set_stage
+from rislam_rt.pipeline.run import prepare_setup
 from rislam_rt.pipeline.specification.mismatch import AssumedSection
 from rislam_rt.pipeline.specification.spec import build_settings
 
@@ -157,7 +157,7 @@ def test_a_panel_told_tilted_stays_a_panel(room):
 def test_a_leaning_body_hears_from_where_its_array_looks(room):
     """Arrivals from the vertices of the paths, turned by scipy's rotations into the array's own frame."""
     spec = load_spec(PIPELINE, ["channel=image_source", "cycles=3", "told.tilt_deg=4.0"])
-    stage = set_stage(room, spec, rng=np.random.default_rng(1))
+    stage = prepare_setup(room, spec, rng=np.random.default_rng(1))
     motion = stage.scene.agent
     heard = told.deceive(stage.paths, motion, spec.told, rng=np.random.default_rng(2))
     level = stage.paths.arrival
@@ -178,7 +178,7 @@ def test_a_clock_of_its_own_shifts_and_drifts(room):
     spec = load_spec(
         PIPELINE, ["channel=image_source", "cycles=5", "told.clock_offset_ns=2.0", "told.clock_drift_ns_s=3.0"]
     )
-    stage = set_stage(room, spec, rng=np.random.default_rng(1))
+    stage = prepare_setup(room, spec, rng=np.random.default_rng(1))
     late = told.deceive(stage.paths, stage.scene.agent, spec.told, rng=np.random.default_rng(2)).tau - stage.paths.tau
     expected = 1e-9 * (2.0 + 3.0 * 0.1 * np.arange(5))[:, None] * stage.paths.valid
     np.testing.assert_allclose(late, expected, rtol=0.0, atol=1e-22)  # float64 of delays below 1e-7 s

@@ -11,7 +11,7 @@ import numpy as np
 
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.recordings.replay import Recorder
-from rislam_rt.pipeline.run import Stage, prepare_channel, run_scheme, set_stage
+from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, run_scheme
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.scene.random_rooms import RandomRoom, draw_room
@@ -59,7 +59,7 @@ class Keep(NamedTuple):
 
 
 def _run(
-    name: str, stage: Stage, spec: PipelineSpec, traits: Mapping[str, Any], keep: Keep
+    name: str, stage: RunSetup, spec: PipelineSpec, traits: Mapping[str, Any], keep: Keep
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Scores and times of one scheme."""
     recorder = Recorder(ESTIMATORS[SCHEMES[name].estimator])
@@ -99,11 +99,11 @@ def trace_key(spec: PipelineSpec) -> str:
 
 
 @lru_cache(maxsize=2)
-def find_stage(seed: int, key: str) -> tuple[RandomRoom, Stage]:
+def find_stage(seed: int, key: str) -> tuple[RandomRoom, RunSetup]:
     """A room, its true motion and its paths; the last ones are kept, as cells of one room follow each other."""
     spec = PipelineSpec.model_validate({**json.loads(key), "name": "trace", "schemes": ["no_ris"]})
     room = draw_room(seed)
-    return room, set_stage(room.scene, spec, rng=np.random.default_rng(seed))
+    return room, prepare_setup(room.scene, spec, rng=np.random.default_rng(seed))
 
 
 def room_traits(room: RandomRoom) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from rislam_rt.information import MotionPrior, build_landmark_model, plane_tange
 from rislam_rt.information.landmark_model import LinearMeasurements
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.run import set_stage
+from rislam_rt.pipeline.run import prepare_setup
 from rislam_rt.pipeline.scores.bound import (
     FLOOR_TILT,
     UPRIGHT_TILT,
@@ -33,7 +33,7 @@ SEEN = "radio.reference_snr_db=60.0"
 
 @pytest.fixture(scope="module")
 def stage(room):
-    return set_stage(room, load_spec(PIPELINE, SHORT), rng=np.random.default_rng(1))
+    return prepare_setup(room, load_spec(PIPELINE, SHORT), rng=np.random.default_rng(1))
 
 
 def bound(stage, scheme, *settings, gain=None):
