@@ -25,7 +25,7 @@ from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.specification.spec import PipelineSpec
-from rislam_rt.pipeline.walk import Walk
+from rislam_rt.pipeline.walk import SchemeSimulation
 from rislam_rt.pipeline.workers import run_side_by_side
 from rislam_rt.ris import delay_spread_warnings
 from rislam_rt.scene.check import material_errors
@@ -177,7 +177,7 @@ def run_scheme(
     name: str, stage: RunSetup, spec: PipelineSpec, tell: Progress, estimator: Estimator | None = None
 ) -> SchemeResult:
     """One scheme over all cycles, with its own estimator unless another is given."""
-    walk = Walk(name, stage.scene, stage.body, spec, stage.seeds, estimator)
+    walk = SchemeSimulation(name, stage.scene, stage.body, spec, stage.seeds, estimator)
     return walk.lead(stage.paths, 0, len(stage.scene.agent), tell, stage.extras)
 
 

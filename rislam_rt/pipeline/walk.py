@@ -25,7 +25,7 @@ from rislam_rt.ris import draw_panel
 Tell = Callable[[str, int, int], None]
 
 
-class Walk:
+class SchemeSimulation:
     """Agent, generators and panel of one scheme between two slices; nothing in it grows with the cycles done.
 
     Cycle k draws from generators of its own, so that the numbers are the same however the run is cut.

@@ -32,7 +32,7 @@ from rislam_rt.pipeline.run import Progress, build_channel
 from rislam_rt.pipeline.seeds import Seeds
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.specification.spec import PipelineSpec
-from rislam_rt.pipeline.walk import Walk
+from rislam_rt.pipeline.walk import SchemeSimulation
 
 SLICE = 1000
 """Cycles of a slice. With the paper's room a cycle holds 0.1 MB while it is traced: 0.1 GB a slice."""
@@ -82,7 +82,7 @@ def run_slices(
     """
     radio = build_radio(spec.radio)
     channel = build_channel(spec.channel, scene, radio, spec.depth)
-    walk, seconds, cycles = Walk(name, scene, body, spec, seeds), 0.0, len(scene.agent)
+    walk, seconds, cycles = SchemeSimulation(name, scene, body, spec, seeds), 0.0, len(scene.agent)
     for number, (first, last) in enumerate(slice_bounds(cycles)):
         begin = perf_counter()
         paths = channel.paths(scene.agent[first : min(last + walk.foresight, cycles)])
