@@ -21,11 +21,11 @@ from rislam_rt.pipeline.own_methods import OwnChannel
 from rislam_rt.pipeline.room.extras import check_extras, trace_clutter
 from rislam_rt.pipeline.room.motion import draw_motion
 from rislam_rt.pipeline.room.scene_overrides import change_room
+from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.specification.spec import PipelineSpec
-from rislam_rt.pipeline.walk import SchemeSimulation
 from rislam_rt.pipeline.workers import run_side_by_side
 from rislam_rt.ris import delay_spread_warnings
 from rislam_rt.scene.check import material_errors

@@ -29,10 +29,10 @@ from rislam_rt.pipeline.long.join import join_paths, join_schemes, thinned_paths
 from rislam_rt.pipeline.record import given_to_dataset
 from rislam_rt.pipeline.room.extras import trace_clutter
 from rislam_rt.pipeline.run import Progress, build_channel
+from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.seeds import Seeds
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.specification.spec import PipelineSpec
-from rislam_rt.pipeline.walk import SchemeSimulation
 
 SLICE = 1000
 """Cycles of a slice. With the paper's room a cycle holds 0.1 MB while it is traced: 0.1 GB a slice."""

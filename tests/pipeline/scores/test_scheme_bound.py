@@ -12,6 +12,7 @@ from rislam_rt.information.landmark_model import LinearMeasurements
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import prepare_setup
+from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.pipeline.scores.bound import (
     FLOOR_TILT,
     UPRIGHT_TILT,
@@ -23,7 +24,6 @@ from rislam_rt.pipeline.scores.bound import (
 )
 from rislam_rt.pipeline.scores.summary import map_score, summarise
 from rislam_rt.pipeline.specification.spec import build_settings
-from rislam_rt.pipeline.walk import without_panel
 
 PIPELINE = Path(__file__).parents[3] / "pipelines" / "trace_then_slam.toml"
 SHORT = ["channel=image_source", "cycles=40", "depth=1"]
