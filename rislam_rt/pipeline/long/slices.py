@@ -41,7 +41,7 @@ SHOWN = 2000
 FOLDER, PATHS_FILE = "slices", "paths.nc"
 
 
-class Part(NamedTuple):
+class SlicePart(NamedTuple):
     """One slice of one scheme, as it was written."""
 
     motion: Trajectory
@@ -109,7 +109,7 @@ def slice_files(name: str, cycles: int) -> list[str]:
     ]
 
 
-def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Part]:
+def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[SlicePart]:
     """The slices of a scheme in the order of time, one at a time.
 
     Raises
@@ -129,10 +129,10 @@ def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Part
         scheme = dataset_to_scheme(found[1])
         if scheme.scheme != name:
             raise ResultError(f"{file}: holds scheme '{scheme.scheme[:40]}'; run again with another --out")
-        yield Part(scene.agent[first:last], dataset_to_paths(found[0]), scheme)
+        yield SlicePart(scene.agent[first:last], dataset_to_paths(found[0]), scheme)
 
 
-def thin_scheme(folder: Path, name: str, scene: Scene, run: str) -> tuple[Trajectory, Paths, SchemeResult]:
+def subsample_scheme(folder: Path, name: str, scene: Scene, run: str) -> tuple[Trajectory, Paths, SchemeResult]:
     """Every n-th cycle of a scheme, at most `SHOWN` in all, for figures."""
     stride = -(-len(scene.agent) // SHOWN)
     paths, schemes, at = [], [], 0
