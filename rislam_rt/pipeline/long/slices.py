@@ -25,7 +25,7 @@ from rislam_rt.pipeline.dataset import (
     seal_dataset,
     write_dataset,
 )
-from rislam_rt.pipeline.long.join import join_paths, join_schemes, thinned_paths, thinned_scheme
+from rislam_rt.pipeline.long.join import join_paths, join_schemes, subsampled_paths, subsampled_scheme
 from rislam_rt.pipeline.record import given_to_dataset
 from rislam_rt.pipeline.room.extras import trace_clutter
 from rislam_rt.pipeline.run import Progress, build_channel
@@ -89,7 +89,7 @@ def run_slices(
         extras = trace_clutter(scene, radio, scene.agent[first : min(last + walk.foresight, cycles)], spec.extras)
         seconds += perf_counter() - begin
         part = walk.lead(paths, first, last, tell, extras)
-        own = paths if walk.foresight == 0 else thinned_paths(paths, np.arange(last - first))
+        own = paths if walk.foresight == 0 else subsampled_paths(paths, np.arange(last - first))
         for file, data in (
             (slice_file(folder, number, PATHS_FILE), paths_to_dataset(own, scene.agent[first:last])),
             (slice_file(folder, number, f"scheme_{name}.nc"), scheme_to_dataset(part)),
@@ -140,8 +140,8 @@ def subsample_scheme(folder: Path, name: str, scene: Scene, run: str) -> tuple[T
         rows = np.arange((-at) % stride, len(part.motion), stride)
         at += len(part.motion)
         if len(rows):
-            paths.append(thinned_paths(part.paths, rows))
-            schemes.append(thinned_scheme(part.scheme, rows))
+            paths.append(subsampled_paths(part.paths, rows))
+            schemes.append(subsampled_scheme(part.scheme, rows))
         last_map = part.scheme.map
     joined = replace(join_schemes(schemes, paths), map=last_map)
     return scene.agent[::stride], join_paths(paths), joined
