@@ -12,7 +12,7 @@ from rislam_rt.measurement import HardwareConfig, ReceiverConfig, build_sensor
 from rislam_rt.model import RadioConfig, SensorModel
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
-from rislam_rt.pipeline.specification.extras import DiffuseSection
+from rislam_rt.pipeline.specification.diffuse import DiffuseSection
 from rislam_rt.pipeline.specification.mismatch import AssumedSection
 from rislam_rt.pipeline.specification.radio import RadioSection, build_radio, linear
 from rislam_rt.pipeline.specification.section import (
