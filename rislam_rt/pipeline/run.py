@@ -18,7 +18,7 @@ from rislam_rt.pipeline.control import check_control
 from rislam_rt.pipeline.cycle import usual_step
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.own_methods import OwnChannel
-from rislam_rt.pipeline.room.extras import check_extras, trace_clutter
+from rislam_rt.pipeline.room.extras import check_diffuse, trace_clutter
 from rislam_rt.pipeline.room.motion import draw_motion
 from rislam_rt.pipeline.room.scene_overrides import change_room
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
@@ -194,7 +194,7 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     """
     raise_errors(list(material_errors(scene, f"scene '{scene.name}'", build_radio(spec.radio))))
     scene = change_room(scene, spec.room, rng=np.random.default_rng(0))
-    check_extras(scene, spec.extras, spec.channel)
+    check_diffuse(scene, spec.extras, spec.channel)
     motion, budget = scene.agent, spec.budget
     if spec.cycles is not None and spec.cycles > len(motion):
         raise ConfigError(f"cycles: {spec.cycles} received; the scene has {len(motion)}, give no more")

@@ -9,7 +9,7 @@ from rislam_rt.model import Paths, RadioConfig, Scene, Trajectory
 from rislam_rt.pipeline.specification.diffuse import DiffuseSection
 
 
-def check_extras(scene: Scene, section: DiffuseSection, channel: str) -> None:
+def check_diffuse(scene: Scene, section: DiffuseSection, channel: str) -> None:
     """Refuse what nobody could trace.
 
     Raises
