@@ -18,7 +18,7 @@ from rislam_rt.pipeline.control import check_control
 from rislam_rt.pipeline.cycle import usual_step
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.own_methods import OwnChannel
-from rislam_rt.pipeline.room.extras import check_diffuse, trace_clutter
+from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_clutter
 from rislam_rt.pipeline.room.motion import draw_motion
 from rislam_rt.pipeline.room.scene_overrides import change_room
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation

@@ -15,7 +15,7 @@ from rislam_rt.pipeline.control import open_link
 from rislam_rt.pipeline.cycle import Agent, Cycle, CycleGenerators, GroundTruth, RunContext, run_cycle
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.record import gather, given_of
-from rislam_rt.pipeline.room.extras import heard_clutter
+from rislam_rt.pipeline.room.diffuse_clutter import heard_clutter
 from rislam_rt.pipeline.room.front_end import prepare_front_end
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, child
