@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.adviser.codes import codes_of, under
-from rislam_rt.adviser.hearing import Heard, hear
+from rislam_rt.adviser.hearing import DetectionForecast, forecast_detection
 from rislam_rt.adviser.reasons import Reasons, build_reasons
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source import ImageSourceChannel
@@ -93,12 +93,14 @@ def at_rows(motion: Trajectory, rows: Integers) -> Trajectory:
     )
 
 
-def _all_places(paths: Paths, looked: Survey) -> list[Heard]:
+def _all_places(paths: Paths, looked: Survey) -> list[DetectionForecast]:
     heading = looked.scene.agent.heading
-    return [hear(paths, place, float(heading[place]), looked.settings) for place in range(paths.num_cycles)]
+    return [
+        forecast_detection(paths, place, float(heading[place]), looked.settings) for place in range(paths.num_cycles)
+    ]
 
 
-def _link(name: str, code: str, heard: list[list[Heard]], reasons: Reasons, number: int) -> LandmarkLink:
+def _link(name: str, code: str, heard: list[list[DetectionForecast]], reasons: Reasons, number: int) -> LandmarkLink:
     """Over C codes: the mean of the chance, and of the power, but of swept codes the best beam's."""
     snr = np.array([[place.snr[number] for place in places] for places in heard])
     chance = np.array([[place.probability[number] for place in places] for places in heard]).mean(axis=0)

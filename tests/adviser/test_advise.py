@@ -11,7 +11,7 @@ from rislam_rt.adviser.budget import LandmarkLink, Survey, at_rows, link_budget,
 from rislam_rt.adviser.codes import aimed_codes, under
 from rislam_rt.adviser.cost import COUNTED, cost_words, trace_cost
 from rislam_rt.adviser.coverage import panel_coverage
-from rislam_rt.adviser.hearing import hear
+from rislam_rt.adviser.hearing import forecast_detection
 from rislam_rt.adviser.remedies import HEARD, enough_elements, lack_db, remedies, verdict, weak_places
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import measure
@@ -51,7 +51,7 @@ def test_the_chance_of_being_heard_is_the_share_of_the_receivers_own_draws(paper
     paths = under(looked.paths, paper.ris.spec, aimed_codes(looked.paths, paper.ris.spec, looked.settings.radio))
     for place in range(3):
         heading = float(looked.scene.agent.heading[place])
-        said, count = hear(paths, place, heading, looked.settings).probability, np.zeros(2)
+        said, count = forecast_detection(paths, place, heading, looked.settings).probability, np.zeros(2)
         for _ in range(draws):
             _, truth = measure(paths, place, heading, looked.settings.radio, looked.settings.receiver, rng=rng)
             owner = paths.landmark[truth.path[truth.path >= 0]]
