@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.adviser.codes import codes_of, under
-from rislam_rt.adviser.hearing import DetectionForecast, forecast_detection
+from rislam_rt.adviser.detection import DetectionForecast, forecast_detection
 from rislam_rt.adviser.reasons import Reasons, build_reasons
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source import ImageSourceChannel

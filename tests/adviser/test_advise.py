@@ -11,7 +11,7 @@ from rislam_rt.adviser.budget import LandmarkLink, Survey, at_rows, link_budget,
 from rislam_rt.adviser.codes import aimed_codes, under
 from rislam_rt.adviser.cost import COUNTED, cost_words, trace_cost
 from rislam_rt.adviser.coverage import panel_coverage
-from rislam_rt.adviser.hearing import forecast_detection
+from rislam_rt.adviser.detection import forecast_detection
 from rislam_rt.adviser.remedies import HEARD, enough_elements, lack_db, remedies, verdict, weak_places
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import measure
