@@ -67,7 +67,7 @@ def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
     from rislam_rt.cli.scenes import open_scene, scene_of
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
-    from rislam_rt.report.fig4a import fig4a_table, findings_of, verdict
+    from rislam_rt.report.fig4a import fig4a_table, findings_of
     from rislam_rt.report.study import write_fig4a
     from rislam_rt.scene.file_names import safe_name
     from rislam_rt.studies.fig4a import check_fig4a, run_fig4a

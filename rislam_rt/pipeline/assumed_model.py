@@ -1,7 +1,7 @@
 """What the belief is told: the one place where anything crosses from the truth to filter, association and design.
 
-`tell_belief` makes the filter's and the design's inputs from the truth and the errors of `[told]`; `deceive` turns the
-true signals as an undeclared tilt or clock does. The quantities stand one by one in `docs/told.md`.
+`tell_belief` makes the filter's and the design's inputs from the truth and the errors of `[told]`; `perceived_paths`
+turns the true signals as an undeclared tilt or clock does. The quantities stand one by one in `docs/told.md`.
 """
 
 from dataclasses import fields, replace
@@ -142,7 +142,7 @@ def tell_measurement(measurement: Measurement, told: AssumedSection) -> Measurem
     )
 
 
-def lean(motion: Trajectory, told: AssumedSection) -> Trajectory:
+def tilted_motion(motion: Trajectory, told: AssumedSection) -> Trajectory:
     """The motion of a body that leans as `tilt_deg` says: its ends lie where they truly are."""
     if told.tilt_deg == 0.0:
         return motion
@@ -150,7 +150,7 @@ def lean(motion: Trajectory, told: AssumedSection) -> Trajectory:
     return replace(motion, body=replace(body, tx_offset=tilt @ body.tx_offset, rx_offset=tilt @ body.rx_offset))
 
 
-def deceive(
+def perceived_paths(
     paths: Paths, motion: Trajectory, told: AssumedSection, *, rng: np.random.Generator, since: float | None = None
 ) -> Paths:
     """The paths as a leaning, swaying array with a clock of its own hears them.

@@ -34,7 +34,7 @@ class GroundTruth(NamedTuple):
     """The true side of a run."""
 
     paths: Paths
-    """As the array hears them (`told.deceive`)."""
+    """As the array hears them (`assumed_model.perceived_paths`)."""
     trajectory: Trajectory
     doppler: Floats
     """(K, P) shifts [Hz]: what paths turn by within the measurement slot."""

@@ -13,12 +13,12 @@ from rislam_rt.backend import prepare_backend
 from rislam_rt.channel.protocol import Channel
 from rislam_rt.errors import ConfigError, RislamError, expect
 from rislam_rt.model import Body, Paths, RadioConfig, Scene, SchemeResult, SlamResult
-from rislam_rt.pipeline.assumed_model import lean
+from rislam_rt.pipeline.assumed_model import tilted_motion
 from rislam_rt.pipeline.control import check_control
 from rislam_rt.pipeline.cycle import usual_step
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.own_methods import OwnChannel
-from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_clutter
+from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_diffuse_clutter
 from rislam_rt.pipeline.room.motion import draw_motion
 from rislam_rt.pipeline.room.scene_overrides import change_room
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
@@ -74,7 +74,7 @@ def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
     seeds = spawn_seeds(rng=rng)
     scene = change_room(cut_scene(scene, spec.cycles), spec.room, rng=np.random.default_rng(seeds.room))
     motion = draw_motion(scene, spec.motion.sigma_a_m_s2, rng=np.random.default_rng(seeds.motion))
-    return replace(scene, agent=lean(motion, spec.told)), motion.body, seeds
+    return replace(scene, agent=tilted_motion(motion, spec.told)), motion.body, seeds
 
 
 def prepare_setup(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> RunSetup:
@@ -92,7 +92,7 @@ def prepare_setup(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator)
     begin = perf_counter()
     radio = build_radio(spec.radio)
     paths = build_channel(spec.channel, scene, radio, spec.depth).paths(scene.agent)
-    extras = trace_clutter(scene, radio, scene.agent, spec.extras)
+    extras = trace_diffuse_clutter(scene, radio, scene.agent, spec.extras)
     return RunSetup(scene, paths, body, seeds, perf_counter() - begin, extras)
 
 

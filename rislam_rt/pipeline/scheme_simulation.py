@@ -9,13 +9,13 @@ import numpy as np
 from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.measurement import FrontEnd
 from rislam_rt.model import Body, PathKind, Paths, Scene, SchemeResult
-from rislam_rt.pipeline.assumed_model import deceive, tell_belief
+from rislam_rt.pipeline.assumed_model import perceived_paths, tell_belief
 from rislam_rt.pipeline.code_policies import build_designer
 from rislam_rt.pipeline.control import open_link
 from rislam_rt.pipeline.cycle import Agent, Cycle, CycleGenerators, GroundTruth, RunContext, run_cycle
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.record import gather, given_of
-from rislam_rt.pipeline.room.diffuse_clutter import heard_clutter
+from rislam_rt.pipeline.room.diffuse_clutter import received_clutter
 from rislam_rt.pipeline.room.front_end import prepare_front_end
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, child
@@ -70,9 +70,9 @@ class SchemeSimulation:
         shift = doppler_shift(paths, motion, self.means.settings.radio.wavelength)
         clutter, twin = None, deepcopy(self.sway)  # one array hears both
         if extras is not None:
-            extras = deceive(extras, motion, spec.told, rng=twin, since=float(self.motion.time[0]))
-            clutter = heard_clutter(extras, motion, self.means.settings.radio)
-        heard = deceive(paths, motion, spec.told, rng=self.sway, since=float(self.motion.time[0]))
+            extras = perceived_paths(extras, motion, spec.told, rng=twin, since=float(self.motion.time[0]))
+            clutter = received_clutter(extras, motion, self.means.settings.radio)
+        heard = perceived_paths(paths, motion, spec.told, rng=self.sway, since=float(self.motion.time[0]))
         if first == 0:
             build = np.random.default_rng(self.seeds.hardware)
             self.front_end = prepare_front_end(heard, motion, self.body, self.means.settings, rng=build)

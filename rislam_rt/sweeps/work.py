@@ -1,6 +1,6 @@
 """The life of a worker: an interpreter that does one cell after another, told and telling in lines of JSON.
 
-`main` takes a `Task` a line on its standard input and gives an `CellOutcome` a line on its standard output. It ends with
+`main` takes a `Task` a line on its standard input and gives a `CellOutcome` a line on its standard output. It ends with
 its input, in the middle of a cell if need be: nobody is left to hear the result.
 """
 

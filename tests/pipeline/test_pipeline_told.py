@@ -136,7 +136,7 @@ def test_a_start_that_errs_more_than_is_told(room):
     settings = SimpleNamespace(slam=SimpleNamespace(height="estimated", heading="estimated"))
     start = load_spec(PIPELINE, ["start.heading_std_deg=1.0", "start.position_std_m=0.02"]).start
     section, rng = AssumedSection(start_scale=3.0), np.random.default_rng(1)
-    draws = [told.tell_start(room.agent, 0.0, start, section, settings, rng=rng) for _ in range(200)]
+    draws = [assumed_model.tell_start(room.agent, 0.0, start, section, settings, rng=rng) for _ in range(200)]
     assert {(prior.position_std, prior.heading_std) for prior in draws} == {(0.02, float(np.radians(1.0)))}
     shift = np.array([prior.position - room.agent.position[0] for prior in draws]) / 0.02
     assert np.std(shift) == pytest.approx(3.0, abs=5.0 * 3.0 / np.sqrt(2 * 600))
@@ -146,11 +146,11 @@ def test_a_start_that_errs_more_than_is_told(room):
 
 def test_a_panel_told_tilted_stays_a_panel(room):
     spec = room.ris.spec
-    wrong = told.tell_panel(spec, AssumedSection(panel_tilt_deg=7.0, panel_turn_deg=11.0))
+    wrong = assumed_model.tell_panel(spec, AssumedSection(panel_tilt_deg=7.0, panel_turn_deg=11.0))
     assert np.degrees(np.arccos(wrong.normal @ spec.normal)) == pytest.approx(7.0, abs=1e-9)
     frame = np.stack([wrong.right, wrong.up, wrong.normal])
     np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
-    turned = told.tell_panel(spec, AssumedSection(panel_turn_deg=11.0))
+    turned = assumed_model.tell_panel(spec, AssumedSection(panel_turn_deg=11.0))
     assert np.degrees(np.arccos(turned.up @ spec.up)) == pytest.approx(11.0, abs=1e-9)
 
 
@@ -159,7 +159,7 @@ def test_a_leaning_body_hears_from_where_its_array_looks(room):
     spec = load_spec(PIPELINE, ["channel=image_source", "cycles=3", "told.tilt_deg=4.0"])
     stage = prepare_setup(room, spec, rng=np.random.default_rng(1))
     motion = stage.scene.agent
-    heard = told.deceive(stage.paths, motion, spec.told, rng=np.random.default_rng(2))
+    heard = assumed_model.perceived_paths(stage.paths, motion, spec.told, rng=np.random.default_rng(2))
     level = stage.paths.arrival
     for cycle in range(3):
         # the front rises by 4 degrees: about y in the right-handed sense it would sink
@@ -179,6 +179,9 @@ def test_a_clock_of_its_own_shifts_and_drifts(room):
         PIPELINE, ["channel=image_source", "cycles=5", "told.clock_offset_ns=2.0", "told.clock_drift_ns_s=3.0"]
     )
     stage = prepare_setup(room, spec, rng=np.random.default_rng(1))
-    late = told.deceive(stage.paths, stage.scene.agent, spec.told, rng=np.random.default_rng(2)).tau - stage.paths.tau
+    late = (
+        assumed_model.perceived_paths(stage.paths, stage.scene.agent, spec.told, rng=np.random.default_rng(2)).tau
+        - stage.paths.tau
+    )
     expected = 1e-9 * (2.0 + 3.0 * 0.1 * np.arange(5))[:, None] * stage.paths.valid
     np.testing.assert_allclose(late, expected, rtol=0.0, atol=1e-22)  # float64 of delays below 1e-7 s

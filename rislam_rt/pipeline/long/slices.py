@@ -27,7 +27,7 @@ from rislam_rt.pipeline.dataset import (
 )
 from rislam_rt.pipeline.long.join import join_paths, join_schemes, subsampled_paths, subsampled_scheme
 from rislam_rt.pipeline.record import given_to_dataset
-from rislam_rt.pipeline.room.diffuse_clutter import trace_clutter
+from rislam_rt.pipeline.room.diffuse_clutter import trace_diffuse_clutter
 from rislam_rt.pipeline.run import Progress, build_channel
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.seeds import Seeds
@@ -86,7 +86,9 @@ def run_slices(
     for number, (first, last) in enumerate(slice_bounds(cycles)):
         begin = perf_counter()
         paths = channel.paths(scene.agent[first : min(last + walk.foresight, cycles)])
-        extras = trace_clutter(scene, radio, scene.agent[first : min(last + walk.foresight, cycles)], spec.extras)
+        extras = trace_diffuse_clutter(
+            scene, radio, scene.agent[first : min(last + walk.foresight, cycles)], spec.extras
+        )
         seconds += perf_counter() - begin
         part = walk.lead(paths, first, last, tell, extras)
         own = paths if walk.foresight == 0 else subsampled_paths(paths, np.arange(last - first))
