@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.adviser.budget import NOTHING_DB, LandmarkLink, link_budget, survey
 from rislam_rt.adviser.cost import TraceCost, trace_cost
-from rislam_rt.adviser.remedies import remedies, verdict
+from rislam_rt.adviser.remedies import detection_label, remedies
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.specification.spec import Settings
 
@@ -28,7 +28,12 @@ class Advice(NamedTuple):
                 {"margin_db": _finite(link.margin_db[at]), "probability": float(link.probability[at]),
                  "reason": link.reason[at]} for at in link.three
             ]  # fmt: skip
-            words = {"landmark": link.landmark, "code": link.code, "share": link.share, "verdict": verdict(link)}
+            words = {
+                "landmark": link.landmark,
+                "code": link.code,
+                "share": link.share,
+                "verdict": detection_label(link),
+            }
             links.append(words | dict(zip(("start", "middle", "end"), places, strict=True)))
         costs = [cost._asdict() for cost in self.costs]
         return {"threshold_db": self.threshold_db, "links": links, "remedies": self.remedies, "costs": costs}

@@ -23,7 +23,7 @@ GROWTH = 1.05
 """From one size tried to the next, once the law for a continuous phase has said where to begin."""
 
 
-def verdict(link: LandmarkLink) -> str:
+def detection_label(link: LandmarkLink) -> str:
     """`heard`, `heard at times` or `not heard`."""
     return "heard" if link.share >= HEARD else "heard at times" if link.share >= SELDOM else "not heard"
 

@@ -129,7 +129,7 @@ def run_cycle(
 
     paths, applied = room.at(cycle), None
     if link is not None:
-        applied = link.applied if room.faults is None else room.faults.settle(link.applied)
+        applied = link.applied if room.faults is None else room.faults.applied(link.applied)
         paths = rephase(paths, applied, 1.0 if room.faults is None else room.faults.weight)
     measurement, truth = measure(
         paths, 0, float(room.trajectory.heading[cycle]), means.settings.radio, means.settings.receiver, agent.heard,

@@ -14,7 +14,7 @@ from rislam_rt.adviser.advice import Advice
 from rislam_rt.adviser.budget import NOTHING_DB, LandmarkLink
 from rislam_rt.adviser.cost import cost_words
 from rislam_rt.adviser.coverage import Coverage
-from rislam_rt.adviser.remedies import verdict
+from rislam_rt.adviser.remedies import detection_label
 from rislam_rt.model import Scene
 from rislam_rt.report.room import draw_plan
 from rislam_rt.report.style import save_figure, styled
@@ -84,4 +84,4 @@ def _cell(link: LandmarkLink, at: int) -> str:
 
 def _why(link: LandmarkLink) -> str:
     said = [reason for reason in link.reason if reason]
-    return "" if verdict(link) == "heard" or not said else max(said, key=said.count)
+    return "" if detection_label(link) == "heard" or not said else max(said, key=said.count)

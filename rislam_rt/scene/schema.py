@@ -258,7 +258,7 @@ class SceneSpec(SceneSection):
         return self
 
     @model_validator(mode="after")
-    def _panels_told_apart(self) -> "SceneSpec":
+    def _panels_distinct(self) -> "SceneSpec":
         names = [panel.name for panel in self.ris]
         if len(set(names)) < len(names):
             raise ValueError(f"ris.name: {', '.join(names)} received; give every panel a name of its own")

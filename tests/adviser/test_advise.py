@@ -12,7 +12,7 @@ from rislam_rt.adviser.codes import aimed_codes, under
 from rislam_rt.adviser.cost import COUNTED, cost_words, trace_cost
 from rislam_rt.adviser.coverage import panel_coverage
 from rislam_rt.adviser.detection import forecast_detection
-from rislam_rt.adviser.remedies import HEARD, enough_elements, lack_db, remedies, verdict, weak_places
+from rislam_rt.adviser.remedies import HEARD, detection_label, enough_elements, lack_db, remedies, weak_places
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import measure
 from rislam_rt.model import Occluder, PathKind, RisPanel, Scene
@@ -125,7 +125,7 @@ def test_what_lacks_is_what_would_do(paper: Scene) -> None:
     faint, links = look(paper, "radio.reference_snr_db=-12")
     link = links["ris", "aimed"]
     lack = lack_db(link)
-    assert verdict(link) != "heard"
+    assert detection_label(link) != "heard"
     assert lack > 0.0
     weak = weak_places(link)
     _, less = look(paper, f"radio.reference_snr_db={-12 + lack + 0.1}")

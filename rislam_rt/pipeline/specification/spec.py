@@ -241,7 +241,7 @@ class PipelineSpec(Section):
         return self
 
     @model_validator(mode="after")
-    def _antennas_told(self) -> "PipelineSpec":
+    def _antennas_assumed(self) -> "PipelineSpec":
         if not self.radio.antennas.plain and not self.told.antennas:
             raise ValueError(
                 "radio.tx_pattern, rx_pattern, *_polarization: others than isotropic and vertical ones received, which "
