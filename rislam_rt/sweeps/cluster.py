@@ -7,12 +7,12 @@ from typing import Any
 
 from rislam_rt.errors import ConfigError, SetupError
 from rislam_rt.sweeps.work import LOST, CellOutcome, Task
-from rislam_rt.sweeps.worker_pool import Crew, Run
+from rislam_rt.sweeps.worker_pool import Run, WorkerPool
 
 CONNECT_SECONDS = 3
 """How long to wait for the scheduler, which is there already: it only has to answer."""
 
-_CREW = Crew()
+_CREW = WorkerPool()
 """Of the Dask worker that this module is imported in."""
 
 

@@ -23,7 +23,7 @@ from rislam_rt.sweeps.store import (
     write_table,
 )
 from rislam_rt.sweeps.work import LOST, CellOutcome, Task, find_function
-from rislam_rt.sweeps.worker_pool import Run, crew_here
+from rislam_rt.sweeps.worker_pool import Run, local_pool
 
 TABLE_SECONDS = 1.0
 """Least time between two writings of the growing table."""
@@ -133,7 +133,7 @@ def run_sweep(
 def _hire(stack: ExitStack, effort: SweepOptions) -> tuple[Run, int]:
     """Who does the cells, and how many at a time."""
     if effort.dask is None:
-        return stack.enter_context(crew_here(effort.jobs, effort.time_limit)), effort.jobs
+        return stack.enter_context(local_pool(effort.jobs, effort.time_limit)), effort.jobs
     from rislam_rt.sweeps.cluster import crew_there
 
     return stack.enter_context(crew_there(effort.dask, effort.time_limit))

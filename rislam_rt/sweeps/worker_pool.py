@@ -28,7 +28,7 @@ LOOK_SECONDS = 1.0
 """Longest time between two looks at whether a worker lives."""
 
 
-class Worker:
+class CellWorker:
     """One interpreter, started fresh (never a fork: numerical libraries keep threads); it does cells one by one."""
 
     def __init__(self) -> None:
@@ -110,20 +110,20 @@ class Worker:
         return self.process.poll() is None
 
 
-class Crew:
+class WorkerPool:
     """Workers of this process; as many as cells are done at a time."""
 
     def __init__(self) -> None:
-        self.idle: list[Worker] = []
-        self.busy: list[Worker] = []
+        self.idle: list[CellWorker] = []
+        self.busy: list[CellWorker] = []
         self.over = False
 
     def do(self, task: Task, limit: float | None) -> CellOutcome:
         """One cell, by an idle worker or a new one."""
-        worker = self.idle.pop() if self.idle else Worker()
+        worker = self.idle.pop() if self.idle else CellWorker()
         if not worker.alive:
             worker.stop()
-            worker = Worker()
+            worker = CellWorker()
         self.busy.append(worker)
         if self.over:
             worker.process.kill()
@@ -147,9 +147,9 @@ class Crew:
 
 
 @contextmanager
-def crew_here(jobs: int, limit: float | None) -> Iterator[Run]:
+def local_pool(jobs: int, limit: float | None) -> Iterator[Run]:
     """Workers on this machine, `jobs` at a time. Leaving ends them, in the middle of their cells if need be."""
-    crew = Crew()
+    crew = WorkerPool()
     pool = ThreadPoolExecutor(jobs, initializer=_leave_interrupts)
 
     def run(tasks: Iterable[tuple[str, Task]]) -> Iterator[tuple[str, CellOutcome]]:
