@@ -17,7 +17,7 @@ _CREW = WorkerPool()
 
 
 @contextmanager
-def crew_there(address: str, limit: float | None) -> Iterator[tuple[Run, int]]:
+def cluster_pool(address: str, limit: float | None) -> Iterator[tuple[Run, int]]:
     """Workers of the cluster at `address`, as many at a time as it has threads, and that number.
 
     Its machines need this package and the cell's function, importable, and the folders that the settings name.

@@ -134,9 +134,9 @@ def _hire(stack: ExitStack, effort: SweepOptions) -> tuple[Run, int]:
     """Who does the cells, and how many at a time."""
     if effort.dask is None:
         return stack.enter_context(local_pool(effort.jobs, effort.time_limit)), effort.jobs
-    from rislam_rt.sweeps.cluster import crew_there
+    from rislam_rt.sweeps.cluster import cluster_pool
 
-    return stack.enter_context(crew_there(effort.dask, effort.time_limit))
+    return stack.enter_context(cluster_pool(effort.dask, effort.time_limit))
 
 
 def _shares(board: "_Board") -> Iterator[list[tuple[str, Task]]]:
