@@ -34,7 +34,7 @@ def remedies(looked: Survey, links: Sequence[LandmarkLink]) -> list[str]:
     for link in links:
         if link.code in ("", "aimed") and link.share < HEARD:
             lines.append(
-                f"{link.landmark}: {verdict(link)} (on {link.share:.0%} of the way): {_what_helps(looked, link)}"
+                f"{link.landmark}: {detection_label(link)} (on {link.share:.0%} of the way): {_what_helps(looked, link)}"
             )
     lines += [line for link in links if link.code == "swept" for line in _on_search(link, links)]
     return lines

@@ -149,14 +149,14 @@ class WorkerPool:
 @contextmanager
 def local_pool(jobs: int, limit: float | None) -> Iterator[Run]:
     """Workers on this machine, `jobs` at a time. Leaving ends them, in the middle of their cells if need be."""
-    crew = WorkerPool()
+    workers = WorkerPool()
     pool = ThreadPoolExecutor(jobs, initializer=_leave_interrupts)
 
     def run(tasks: Iterable[tuple[str, Task]]) -> Iterator[tuple[str, CellOutcome]]:
         waiting, running = iter(tasks), dict[Future[CellOutcome], str]()
         while True:
             for name, task in islice(waiting, jobs - len(running)):
-                running[pool.submit(crew.do, task, limit)] = name
+                running[pool.submit(workers.do, task, limit)] = name
             if not running:
                 return
             for future in wait(running, return_when=FIRST_COMPLETED).done:
@@ -165,9 +165,9 @@ def local_pool(jobs: int, limit: float | None) -> Iterator[Run]:
     try:
         yield run
     finally:
-        crew.break_off()
+        workers.break_off()
         pool.shutdown(cancel_futures=True)
-        crew.dismiss()
+        workers.dismiss()
 
 
 def _leave_interrupts() -> None:
