@@ -1,7 +1,7 @@
 """Floor 2: frozen data, checked once on construction. No behaviour beyond what a field's name promises."""
 
 from rislam_rt.model.antennas import Antennas
-from rislam_rt.model.estimate import MapEstimate, SlamEstimate, Suspect, empty_map, pose_estimate
+from rislam_rt.model.estimate import MapEstimate, PanelCandidate, SlamEstimate, empty_map, pose_estimate
 from rislam_rt.model.measurement import Measurement, PathTruth
 from rislam_rt.model.paths import PathKind, Paths, RisLegs
 from rislam_rt.model.radio import RadioConfig, RxArray
@@ -31,6 +31,7 @@ __all__ = [
     "Material",
     "Measurement",
     "Occluder",
+    "PanelCandidate",
     "PathKind",
     "PathTruth",
     "Paths",
@@ -49,7 +50,6 @@ __all__ = [
     "SensorModel",
     "SlamEstimate",
     "SlamResult",
-    "Suspect",
     "Trajectory",
     "detection_probability",
     "empty_map",
