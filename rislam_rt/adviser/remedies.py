@@ -33,9 +33,8 @@ def remedies(looked: Survey, links: Sequence[LandmarkLink]) -> list[str]:
     lines = []
     for link in links:
         if link.code in ("", "aimed") and link.share < HEARD:
-            lines.append(
-                f"{link.landmark}: {detection_label(link)} (on {link.share:.0%} of the way): {_what_helps(looked, link)}"
-            )
+            heard = f"{detection_label(link)} (on {link.share:.0%} of the way)"
+            lines.append(f"{link.landmark}: {heard}: {_what_helps(looked, link)}")
     lines += [line for link in links if link.code == "swept" for line in _on_search(link, links)]
     return lines
 
