@@ -45,6 +45,14 @@ class Walls:
         """(W,) which walls share a wall's plane by lying on each other; none for -1."""
         return (self.plane == self.plane[wall]) if wall >= 0 else np.zeros(len(self), dtype=np.bool_)
 
+    def surface(self, wall: int) -> tuple[Floats, Floats]:
+        """Centroid (3,) of a wall and the share (T,) of each of its triangles in its area."""
+        triangles = self.triangles[self.wall_of_triangle == wall]
+        edges = triangles[:, 1:] - triangles[:, :1]
+        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
+        weight = area / area.sum()
+        return weight @ triangles.mean(axis=1), weight
+
 
 def build_walls(scene: Scene) -> Walls:
     """Number the walls of a scene, each the plane that fits all its corners.

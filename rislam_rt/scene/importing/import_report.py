@@ -5,9 +5,9 @@ from typing import Any
 
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.plane_segmentation import planar_regions
-from rislam_rt.scene.importing.flat_regions import FlatRegions
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.surfaces import SortedSurfaces, Surface
+from rislam_rt.scene.importing.regions.flat_regions import FlatRegions
+from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface
 from rislam_rt.scene.meshes import Mesh
 
 

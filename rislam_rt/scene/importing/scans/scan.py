@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
-from rislam_rt.scene.importing.flat_regions import Welded, connected
+from rislam_rt.scene.importing.regions.flat_regions import Welded, connected
 
 SPACING = 0.04
 """[m] One point of the mesh is looked at in every cube of this size."""

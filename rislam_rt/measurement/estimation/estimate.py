@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats
-from rislam_rt.measurement.detect import MatchedFilterGrid, into_range, pick_peaks
-from rislam_rt.measurement.refine import (
+from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, into_range, pick_peaks
+from rislam_rt.measurement.estimation.refine import (
     Accuracy,
     LeastSquaresFit,
     accuracy,
@@ -24,7 +24,7 @@ from rislam_rt.measurement.refine import (
     residual,
     without_idle,
 )
-from rislam_rt.measurement.sounding import Sounding
+from rislam_rt.measurement.estimation.sounding import Sounding
 
 BATCH = 16
 """Most paths that are added between two refinements."""

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
-from rislam_rt.measurement.inner_products import InnerProducts, PathSignals, inner_of, waves_at
-from rislam_rt.measurement.positive_definite import RIDGE, inverse, solve
-from rislam_rt.measurement.sounding import Sounding
-from rislam_rt.measurement.spherical_waves import correlate_waves, wave_signals
+from rislam_rt.measurement.estimation.inner_products import InnerProducts, PathSignals, inner_of, waves_at
+from rislam_rt.measurement.estimation.positive_definite import RIDGE, inverse, solve
+from rislam_rt.measurement.estimation.sounding import Sounding
+from rislam_rt.measurement.estimation.spherical_waves import correlate_waves, wave_signals
 
 PRIOR = np.array([0.0, 2.0, 2.0])
 """Half the information that lying in the unit disc gives on a cosine (standard deviation 0.5): it matters only along an

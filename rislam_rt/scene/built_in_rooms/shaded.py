@@ -1,8 +1,8 @@
 """A room with round objects that hide things."""
 
-from rislam_rt.scene.rooms.paths import curved_agent
-from rislam_rt.scene.rooms.room import RoomFiles, panel, reflector, sphere
-from rislam_rt.scene.rooms.shapes import box_walls
+from rislam_rt.scene.built_in_rooms.paths import curved_agent
+from rislam_rt.scene.built_in_rooms.room import RoomFiles, panel, reflector, sphere
+from rislam_rt.scene.built_in_rooms.shapes import box_walls
 
 
 def shaded_room() -> RoomFiles:

@@ -6,10 +6,10 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.scene.built_in_rooms.paths import curved_agent
+from rislam_rt.scene.built_in_rooms.room import RoomFiles, panel, reflector, sphere
+from rislam_rt.scene.built_in_rooms.shapes import block, box_walls, joined, quad
 from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.rooms.paths import curved_agent
-from rislam_rt.scene.rooms.room import RoomFiles, panel, reflector, sphere
-from rislam_rt.scene.rooms.shapes import block, box_walls, joined, quad
 
 GLB_FILE = "room.glb"
 

@@ -7,11 +7,11 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
 from rislam_rt.geometry.triangles import distance_to_triangles
-from rislam_rt.scene.importing.flat_regions import FLAT_ANGLE, FlatRegions
-from rislam_rt.scene.importing.mesh_simplification import clustered, corners_kept, has_area, region_mesh
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.region_groups import RegionGroup
-from rislam_rt.scene.importing.round_surfaces import RoundPatch, prism
+from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions
+from rislam_rt.scene.importing.regions.mesh_simplification import clustered, corners_kept, has_area, region_mesh
+from rislam_rt.scene.importing.regions.region_groups import RegionGroup
+from rislam_rt.scene.importing.regions.round_surfaces import RoundPatch, prism
 from rislam_rt.scene.meshes import Mesh
 
 RESTING = 5e-3

@@ -4,9 +4,9 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.triangles import distance_to_edges
-from rislam_rt.scene.importing.flat_regions import FlatRegions
 from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
-from rislam_rt.scene.importing.round_surfaces import across
+from rislam_rt.scene.importing.regions.flat_regions import FlatRegions
+from rislam_rt.scene.importing.regions.round_surfaces import across
 from rislam_rt.scene.meshes import Mesh
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
-from rislam_rt.measurement.sounding import Sounding, tone_response
+from rislam_rt.measurement.estimation.sounding import Sounding, tone_response
 
 
 class PathSignals(NamedTuple):

@@ -9,7 +9,7 @@ taken as the whole path, true of leakage and wall returns, the only ones strong 
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats
-from rislam_rt.measurement.sounding import Sounding, tone_response
+from rislam_rt.measurement.estimation.sounding import Sounding, tone_response
 
 SHORTEST_RADIUS = 0.5
 """Radius of the wave front [wavelengths] below which it is not followed."""
