@@ -175,7 +175,9 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
             first = members[np.argmax(strength[members])]
             partner[leader] = first
             total[leader] += power[members].sum()
-        others = np.setdiff1d((around[leader] & (strength <= strength[leader])).nonzero()[0], [partner[leader]])
+        beside = around[leader] & (strength <= strength[leader])
+        beside[partner[leader]] &= partner[leader] < 0
+        others = beside.nonzero()[0]
         ratio = power[others] / power[leader] * clear[others]
         disturbance[leader] = (0.5 * ratio[:, None] * (expected.seen[others] - expected.seen[leader]) ** 2).sum(axis=0)
     leader = np.concatenate([(~taken).nonzero()[0], taken.nonzero()[0]])
