@@ -22,10 +22,10 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import normalised_squares
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.bound import scheme_bound
 from rislam_rt.pipeline.run import run_slam
+from rislam_rt.pipeline.scores.bound import scheme_bound
 from rislam_rt.scene import load_scene
-from rislam_rt.slam.schemes.bp_slam import BpSlamConfig, run_static
+from rislam_rt.slam.schemes.bp_slam_static import BpSlamStaticConfig, run_static
 
 ANCHORS = np.array([[1.5, 6.0], [8.5, 0.8]])
 START_STD = np.array([0.1, 0.1, 0.01, 0.01])
@@ -48,7 +48,7 @@ class Scenario(NamedTuple):
     """Per step and anchor: ranges [m]."""
 
 
-def build_scenario(steps: int, config: BpSlamConfig, *, rng: np.random.Generator) -> Scenario:
+def build_scenario(steps: int, config: BpSlamStaticConfig, *, rng: np.random.Generator) -> Scenario:
     """A walk, and what it measures: order of the ranges, misses and false ranges are random."""
     turn = np.linspace(0.0, 2.0 * np.pi, 900)[:steps]
     position = np.stack([5.0 + 2.8 * np.cos(turn), 3.4 + 1.6 * np.sin(2.0 * turn)], axis=1)
@@ -63,7 +63,9 @@ def _images(anchor: Floats, count: int) -> Floats:
     return np.array([[-x, y], [20.0 - x, y], [x, -y], [x, 14.0 - y]])[:count]
 
 
-def _scan(agent: Floats, anchor: Floats, images: Floats, config: BpSlamConfig, *, rng: np.random.Generator) -> Floats:
+def _scan(
+    agent: Floats, anchor: Floats, images: Floats, config: BpSlamStaticConfig, *, rng: np.random.Generator
+) -> Floats:
     points = np.concatenate([anchor[None], images])
     lengths = np.linalg.norm(points - agent, axis=1) + config.range_std * rng.standard_normal(len(points))
     seen = lengths[rng.random(len(points)) < config.detection_probability]
@@ -78,7 +80,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--published", action="store_true")
     parser.add_argument("--steps", type=int, default=900)
-    parser.add_argument("--particles", type=int, default=BpSlamConfig().num_particles)
+    parser.add_argument("--particles", type=int, default=BpSlamStaticConfig().num_particles)
     parser.add_argument("--moving", choices=("bp_slam", "channel_slam"))
     parser.add_argument("--cycles", type=int, default=600)
     parser.add_argument("--set", action="append", default=[], dest="settings")
@@ -87,7 +89,7 @@ def main() -> None:
     if arguments.moving:
         print_moving(seeds, arguments.moving, (*ROOM, f"cycles={arguments.cycles}", *arguments.settings))
         return
-    config = BpSlamConfig(num_particles=arguments.particles, coupled=not arguments.published)
+    config = BpSlamStaticConfig(num_particles=arguments.particles, coupled=not arguments.published)
     rows = []
     print(
         "| seed | agent RMSE [m] | largest error [m] | features | images within 0.5 m | RMSE of those [m] | ms a step |"
@@ -107,7 +109,7 @@ def main() -> None:
     print(f"{mean_ms:.1f} ms of processor time a step, {1e-3 * mean_ms * arguments.steps:.1f} s a run")
 
 
-def run_seed(seed: int, steps: int, config: BpSlamConfig) -> tuple[float, float, float, float, float, float]:
+def run_seed(seed: int, steps: int, config: BpSlamStaticConfig) -> tuple[float, float, float, float, float, float]:
     """RMSE and largest error of the agent, features at the end, images found and their error, time of a step."""
     data, filter_rng = np.random.default_rng([seed, 1]), np.random.default_rng([seed, 2])
     truth = build_scenario(steps, config, rng=data)

@@ -166,7 +166,7 @@ def tum_samples() -> list[bytes]:
 
 def pipeline_reader(folder: Path) -> Callable[[bytes], object]:
     """Reads a pipeline file of any kind."""
-    from rislam_rt.pipeline.studies import load_any
+    from rislam_rt.studies import load_any
 
     file = folder / "pipeline.toml"
 
@@ -205,9 +205,9 @@ def result_targets(folder: Path) -> Iterator[tuple[str, Target]]:
 def make_run(folder: Path) -> Path:
     """A completed run of a few cycles."""
     from rislam_rt.pipeline import load_spec, run_slam
-    from rislam_rt.pipeline.identity import run_identity
-    from rislam_rt.pipeline.store import open_run
-    from rislam_rt.pipeline.summary import summarise
+    from rislam_rt.pipeline.scores.summary import summarise
+    from rislam_rt.pipeline.store.identity import run_identity
+    from rislam_rt.pipeline.store.run_folder import open_run
     from rislam_rt.scene import load_scene
 
     settings = ["channel=image_source", "cycles=12", "depth=1", 'schemes=["random"]']
@@ -221,7 +221,7 @@ def make_run(folder: Path) -> Path:
 
 def run_reader(folder: Path, name: str) -> Callable[[bytes], object]:
     """Reads a whole run one of whose files is the content."""
-    from rislam_rt.pipeline.store import read_run
+    from rislam_rt.pipeline.store.run_folder import read_run
 
     sound = (folder / name).read_bytes()
 
@@ -238,9 +238,9 @@ def run_reader(folder: Path, name: str) -> Callable[[bytes], object]:
 def cell_reader(folder: Path) -> tuple[Path, Callable[[bytes], object]]:
     """Reads a sweep's cell; one that will be run again counts as refused."""
     from rislam_rt.errors import ResultError
-    from rislam_rt.pipeline.sweeps import Sweep, build_cells
-    from rislam_rt.pipeline.sweeps.store import MISSING, read_row, write_cell
-    from rislam_rt.pipeline.sweeps.work import Outcome
+    from rislam_rt.sweeps import Sweep, build_cells
+    from rislam_rt.sweeps.store import MISSING, read_row, write_cell
+    from rislam_rt.sweeps.work import Outcome
 
     cell = build_cells(Sweep("math:hypot", base={"cycles": 3}))[0]
     write_cell(folder, cell, "math:hypot", Outcome({"rmse_m": [0.1, 0.2], "name": "random"}))

@@ -68,7 +68,7 @@ MUTANTS = (
         "        spread[:6, :6],\n", "        0.25 * spread[:6, :6],\n",
     ),
     Mutant(
-        "random codes for optimised ones", "pipeline/choose.py",
+        "random codes for optimised ones", "pipeline/code_policies.py",
         '        if method == "random":  # looks at no belief', "        if not is_own(method):",
     ),
     Mutant(
@@ -87,16 +87,16 @@ MUTANTS = (
         "        forms[0] = [-1, -1, -1, new, -1] if not verdict.is_wall else [new, -1, -1, -1, -1]\n",
     ),
     Mutant(
-        "half the bound", "information/recursion.py",
+        "half the bound", "information/posterior_crlb.py",
         "        agent[cycle] = spread[: 2 * axes] @ spread[: 2 * axes].T",
         "        agent[cycle] = 0.25 * spread[: 2 * axes] @ spread[: 2 * axes].T",
     ),
     Mutant(
-        "the bound knows the map", "information/recursion.py",
+        "the bound knows the map", "information/posterior_crlb.py",
         "        slope[:, 2 * axes :] = root * measured.unknown", "        slope[:, 2 * axes :] = 0.0",
     ),
     Mutant(
-        "the best code is turned by a level", "design/single.py",
+        "the best code is turned by a level", "design/single_path.py",
         "(passed < best[..., None]) - turn[..., None]) % levels",
         "(passed < best[..., None]) - turn[..., None] + (passed % 2)) % levels",
     ),
@@ -115,21 +115,21 @@ MUTANTS = (
         "into_disc(blind_axes(found.points[:, 1:] * [1.0, -1.0], radio))",
     ),
     Mutant(
-        "a sweep's seed hangs on its order", "pipeline/sweeps/axes.py",
+        "a sweep's seed hangs on its order", "sweeps/axes.py",
         "            seed = int.from_bytes(_digest([drawn, repetition, sweep.seed])[:8]) >> 1",
         "            seed = int.from_bytes(_digest([len(cells), sweep.seed])[:8]) >> 1",
     ),
     Mutant(
-        "a sweep takes any cell for its own", "pipeline/sweeps/store.py",
+        "a sweep takes any cell for its own", "sweeps/store.py",
         '        if found["ident"] == cell.ident:', "        if found:",
     ),
     Mutant(
-        "a damaged file passes", "pipeline/seal.py",
+        "a damaged file passes", "storage/seal.py",
         '    if content["checksum"] != checksum({key: value for key, value in content.items() if key != "checksum"}):',
         '    if not content["checksum"]:',
     ),
     Mutant(
-        "another room is the same run", "pipeline/identity.py",
+        "another room is the same run", "pipeline/store/identity.py",
         '            "scene": {"name": scene.name, "sha256": scene.digest},',
         '            "scene": {"name": scene.name},',
     ),

@@ -7,9 +7,9 @@ import typer
 from mkdocs.structure.files import File, Files
 
 from rislam_rt.cli.app import app
-from rislam_rt.pipeline.settings import Setting, list_settings
-from rislam_rt.pipeline.studies import load_any
+from rislam_rt.pipeline.specification.settings import Setting, list_settings
 from rislam_rt.shipped import first_sentence, shipped_pipelines
+from rislam_rt.studies import load_any
 
 WIDTHS = ".md-typeset td:first-child code {white-space: nowrap} .md-typeset td:nth-child(2) {min-width: 9rem}"
 """Of the table of settings: names are not broken in the middle, and what they mean has room on a narrow screen."""

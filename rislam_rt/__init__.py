@@ -51,24 +51,22 @@ _HOMES = {
     "rislam_rt.pipeline": (
         "load_spec",
         "run_slam",
+        "build_radio",
     ),
-    "rislam_rt.pipeline.spec": ("build_radio",),
-    "rislam_rt.pipeline.inputs": (
+    "rislam_rt.pipeline.recordings": (
         "Inputs",
         "dataset_to_inputs",
-    ),
-    "rislam_rt.pipeline.own": (
         "localise",
         "read_inputs",
         "inputs_of",
-    ),
-    "rislam_rt.pipeline.studies.unseen": (
-        "read_recording",
         "replay",
         "answers_from_arrays",
+    ),
+    "rislam_rt.studies.unseen": (
+        "read_recording",
         "score_run",
     ),
-    "rislam_rt.pipeline.sweeps": (
+    "rislam_rt.sweeps": (
         "Axis",
         "Sweep",
         "Effort",

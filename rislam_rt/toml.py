@@ -2,7 +2,10 @@
 
 import re
 import tomllib
+from collections.abc import Mapping
 from typing import Any
+
+from rislam_rt.errors import ConfigError
 
 MAX_LEVELS = 100
 """Tables within tables that a dotted key may name; the time that a longer one takes grows with its square."""
@@ -32,3 +35,20 @@ def parse_toml(text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except (RecursionError, OverflowError) as error:
         raise ValueError(f"nested too deeply, or a number too long ({type(error).__name__})") from None
+
+
+def put_dotted(settings: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
+    """The settings with one dotted key replaced; tables on the way are copied, or made.
+
+    Raises
+    ------
+    ConfigError
+        The key leads through a value that is no table.
+    """
+    head, dot, rest = key.partition(".")
+    if not dot:
+        return {**settings, head: value}
+    inner = settings.get(head, {})
+    if not isinstance(inner, Mapping):
+        raise ConfigError(f"'{key}': '{head}' holds {inner!r}, which is no table; check the key")
+    return {**settings, head: put_dotted(inner, rest, value)}

@@ -85,6 +85,6 @@ def write_json(file: Path | None, content: dict[str, Any]) -> None:
         return
     import json
 
-    from rislam_rt.pipeline.files import write_atomic
+    from rislam_rt.storage.files import write_atomic
 
     write_atomic(file, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())

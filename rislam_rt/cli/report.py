@@ -25,8 +25,8 @@ def command(
     Example: rislam-rt report runs/demo-paper_room-7-0123abcd --rerun demo.rrd
     """
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.long import read_any
-    from rislam_rt.pipeline.store import hold_run
+    from rislam_rt.pipeline.long.run import read_any
+    from rislam_rt.pipeline.store.run_folder import hold_run
     from rislam_rt.report import write_report
     from rislam_rt.report.tables import print_summary
 
@@ -34,8 +34,8 @@ def command(
         raise ConfigError(f"--gif: '{gif}' received; give a name that ends in .gif")
     summary, result = read_any(run)
     if rerun is not None:
-        from rislam_rt.pipeline.files import write_atomic
-        from rislam_rt.report.recording import recording_bytes
+        from rislam_rt.report.rerun_recording import recording_bytes
+        from rislam_rt.storage.files import write_atomic
 
         write_atomic(rerun, recording_bytes(result, run.resolve().name))
         typer.echo(f"recording: {rerun}")
@@ -50,8 +50,8 @@ def command(
 
 def _write_gif(result: "SlamResult", file: Path) -> Path:
     from rislam_rt.cli.progress import show_progress
-    from rislam_rt.pipeline.files import write_atomic
     from rislam_rt.report.animation import gif_bytes
+    from rislam_rt.storage.files import write_atomic
 
     with show_progress() as tell:
         write_atomic(file, gif_bytes(result, tell))

@@ -10,9 +10,9 @@ from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, pipeline_file, w
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
     from rislam_rt.model import Body
-    from rislam_rt.pipeline.inputs import Inputs
-    from rislam_rt.pipeline.studies.unseen import Answers
+    from rislam_rt.pipeline.recordings.inputs import Inputs
     from rislam_rt.slam import StartPrior
+    from rislam_rt.studies.unseen import Answers
 
 FARTHEST = 1e5
 """Largest coordinate [m], as in a scene."""
@@ -58,8 +58,8 @@ def command(
     import numpy as np
 
     from rislam_rt.pipeline import load_spec
-    from rislam_rt.pipeline.own import localise, read_inputs, run_rng
-    from rislam_rt.pipeline.radio import build_radio
+    from rislam_rt.pipeline.recordings.own_measurements import localise, read_inputs, run_rng
+    from rislam_rt.pipeline.specification.radio import build_radio
 
     spec = load_spec(config, set_ or ())
     prior = None if start is None else _prior(start, velocity, spec.start.position_std_m, spec.start.velocity_std_m_s)
@@ -115,7 +115,7 @@ def _triple(option: str, text: str) -> "Floats":
 def _true_positions(file: Path, cycles: int) -> "Floats":
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene.findings import Fault
-    from rislam_rt.scene.recorded import parse_tum
+    from rislam_rt.scene.recorded_poses import parse_tum
 
     try:
         _, position, _ = parse_tum(file.read_bytes())
@@ -170,8 +170,8 @@ def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
 
     import numpy as np
 
-    from rislam_rt.pipeline.files import write_atomic
     from rislam_rt.scene.write import tum_bytes
+    from rislam_rt.storage.files import write_atomic
 
     position = np.array([one.position for one in answers.estimates])
     heading = np.array([one.heading for one in answers.estimates])

@@ -11,11 +11,11 @@ from rislam_rt.cli.options import write_json
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from rislam_rt.pipeline.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec
-    from rislam_rt.pipeline.sweeps import Row
+    from rislam_rt.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec
+    from rislam_rt.sweeps import Row
 
 
-class Given(NamedTuple):
+class StudyOptions(NamedTuple):
     """What the command line says beside the settings."""
 
     pipeline: Path
@@ -26,17 +26,17 @@ class Given(NamedTuple):
     page: bool
 
 
-def run_compare_channels(spec: "CompareSpec", given: Given) -> None:
+def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
     """Compare both channels in all rooms; exit code 1 if a difference is unexplained or beyond its limit."""
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.studies.compare import comparison_table, run_comparison
-    from rislam_rt.pipeline.studies.spec import study_record
+    from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.study import write_comparison
     from rislam_rt.report.tables import print_validation
+    from rislam_rt.studies.compare import comparison_table, run_comparison
+    from rislam_rt.studies.spec import study_record
 
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'compare_channels' names its rooms; set 'rooms'")
@@ -59,19 +59,19 @@ def run_compare_channels(spec: "CompareSpec", given: Given) -> None:
         raise typer.Exit(1)
 
 
-def run_gain_curves(spec: "Fig4aSpec", given: Given) -> None:
+def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
     """Fig. 4(a): gain against distance."""
     import numpy as np
 
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene, scene_of
-    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.studies.fig4a import check_fig4a, run_fig4a
-    from rislam_rt.pipeline.studies.spec import study_record
+    from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.fig4a import fig4a_table, verdict
     from rislam_rt.report.study import write_fig4a
-    from rislam_rt.scene.names import safe_name
+    from rislam_rt.scene.file_names import safe_name
+    from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
+    from rislam_rt.studies.spec import study_record
 
     opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
     scene = opened.scene
@@ -89,16 +89,16 @@ def run_gain_curves(spec: "Fig4aSpec", given: Given) -> None:
     write_json(given.json, content)
 
 
-def run_swept(spec: "SweptSpec", given: Given) -> None:
+def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
     """A study on the sweep engine; its page grows while it runs. Exit code 1 if a cell failed."""
     from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.cli.progress import show_sweep
     from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.studies.swept import build_sweep
-    from rislam_rt.pipeline.studies.swept.record import swept_record
-    from rislam_rt.pipeline.sweeps import Effort, build_cells, run_sweep
-    from rislam_rt.pipeline.sweeps.store import check_folder
     from rislam_rt.report.swept import write_swept
+    from rislam_rt.studies.swept import build_sweep
+    from rislam_rt.studies.swept.record import swept_record
+    from rislam_rt.sweeps import Effort, build_cells, run_sweep
+    from rislam_rt.sweeps.store import check_folder
 
     sweep = build_sweep(spec, given.pipeline, given.scene)
     found = build_cells(sweep)
@@ -124,11 +124,11 @@ def run_swept(spec: "SweptSpec", given: Given) -> None:
         raise typer.Exit(1)
 
 
-def run_claims(spec: "ClaimsSpec", given: Given) -> None:
+def run_claims(spec: "ClaimsSpec", given: StudyOptions) -> None:
     """The claims' table, from what other studies left behind."""
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.studies.claims import judge, read_results
     from rislam_rt.report.claims import write_claims
+    from rislam_rt.studies.claims import judge, read_results
 
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'claims' runs in no room; leave it out")
@@ -157,8 +157,8 @@ def output_folder(out: Path | None, name: str, record: "Mapping[str, Any]") -> P
         There is a file of that name.
     """
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.identity import short_name
-    from rislam_rt.pipeline.seal import checksum
+    from rislam_rt.pipeline.store.identity import short_name
+    from rislam_rt.storage.seal import checksum
 
     folder = out or Path("runs") / short_name(name, checksum(record))
     if folder.exists() and not folder.is_dir():

@@ -10,7 +10,7 @@ from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption,
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rislam_rt.pipeline.sweeps import Effort, Report, Row, Sweep
+    from rislam_rt.sweeps import Effort, Report, Row, Sweep
 
 
 def command(
@@ -45,9 +45,9 @@ def command(
     import os
 
     from rislam_rt.cli.interrupts import Interrupted
-    from rislam_rt.pipeline.sweeps import Effort
-    from rislam_rt.pipeline.sweeps.slam import load_section, score_rows, slam_sweep
     from rislam_rt.report.tables import print_sweep
+    from rislam_rt.studies.pipeline_sweep import load_section, score_rows, slam_sweep
+    from rislam_rt.sweeps import Effort
 
     sweep = slam_sweep(pipeline, set_ or (), axis or (), scene=scene, repeat=repeat)
     limit = time_limit if time_limit is not None else load_section(pipeline, set_ or ()).time_limit_s
@@ -71,10 +71,10 @@ def _run(sweep: "Sweep", target: Path, effort: "Effort") -> "Report":
     """The sweep with its bar; scores and their picture grow beside the table."""
     from rislam_rt.cli.progress import show_sweep
     from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.sweeps import build_cells, run_sweep
-    from rislam_rt.pipeline.sweeps.slam import score_rows, write_scores
-    from rislam_rt.pipeline.sweeps.store import check_folder
     from rislam_rt.report.sweep import draw_scores
+    from rislam_rt.studies.pipeline_sweep import score_rows, write_scores
+    from rislam_rt.sweeps import build_cells, run_sweep
+    from rislam_rt.sweeps.store import check_folder
 
     check_folder(target)
     if effort.dask is None:

@@ -7,27 +7,27 @@ from typing import TYPE_CHECKING
 import typer
 
 from rislam_rt.cli.options import write_json
-from rislam_rt.cli.study import Given, output_folder
+from rislam_rt.cli.study import StudyOptions, output_folder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rislam_rt.pipeline.studies import UnseenSpec
-    from rislam_rt.pipeline.sweeps import Row
+    from rislam_rt.studies import UnseenSpec
+    from rislam_rt.sweeps import Row
 
 
-def run_unseen(spec: "UnseenSpec", given: Given) -> None:
+def run_unseen(spec: "UnseenSpec", given: StudyOptions) -> None:
     """Draw the rooms, run what the file asks for in each, print and write the score card; exit code 1 if one failed."""
     from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.cli.progress import show_sweep
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.studies.unseen import build_unseen, count_tests
-    from rislam_rt.pipeline.studies.unseen.record import unseen_record
-    from rislam_rt.pipeline.sweeps import Effort, build_cells, run_sweep
-    from rislam_rt.pipeline.sweeps.store import check_folder, read_timings
     from rislam_rt.report.unseen import write_unseen
     from rislam_rt.report.unseen.terminal import print_cards
+    from rislam_rt.studies.unseen import build_unseen, count_tests
+    from rislam_rt.studies.unseen.record import unseen_record
+    from rislam_rt.sweeps import Effort, build_cells, run_sweep
+    from rislam_rt.sweeps.store import check_folder, read_timings
 
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'unseen' draws its rooms; leave it out")

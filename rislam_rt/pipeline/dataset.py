@@ -11,8 +11,8 @@ import numpy as np
 from rislam_rt.errors import ResultError, StoreError
 from rislam_rt.model import MapEstimate, PathKind, Paths, SchemeResult, Trajectory
 from rislam_rt.model.result import STEPS
-from rislam_rt.pipeline.files import write_atomic
-from rislam_rt.pipeline.seal import SCHEMA
+from rislam_rt.storage.files import write_atomic
+from rislam_rt.storage.seal import SCHEMA
 
 if TYPE_CHECKING:
     import xarray as xr

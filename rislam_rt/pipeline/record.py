@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import NOTHING, RisCode, SchemeResult
 from rislam_rt.pipeline.cycle import Cycle
-from rislam_rt.pipeline.inputs import Inputs, inputs_to_dataset, seed_marks
+from rislam_rt.pipeline.recordings.inputs import Inputs, inputs_to_dataset, seed_marks
 from rislam_rt.pipeline.told import Told
 
 if TYPE_CHECKING:

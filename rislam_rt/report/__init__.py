@@ -1,4 +1,4 @@
-"""Floor 7: figures, tables and the page of a run."""
+"""Floor 8: figures, tables and the page of a run."""
 
 from rislam_rt.report.page import draw_figures, write_report
 

@@ -7,13 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from rislam_rt.channel.compare import OneSided
+from rislam_rt.channel.compare import OneSidedPath
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import PathKind, Paths
-from rislam_rt.pipeline.studies.compare import Certificate
 from rislam_rt.report.geometry import outline_edges
 from rislam_rt.report.room import path_points
 from rislam_rt.report.style import KIND, TRUTH, WALL, styled
+from rislam_rt.studies.compare import Certificate
 
 ALONE = "#CC79A7"
 """Colour of a path that only one side has."""
@@ -81,7 +81,7 @@ def _draw_alone(axis: Axes, certificate: Certificate) -> None:
     axis.text(0.0, -0.09, _proofs(one_sided), transform=axis.transAxes, va="top", fontsize=8.5)
 
 
-def _proofs(one_sided: Sequence[OneSided]) -> str:
+def _proofs(one_sided: Sequence[OneSidedPath]) -> str:
     """One line a path, the first few of them."""
     if not one_sided:
         return "nothing: both sides have the same paths"

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rislam_rt.pipeline.files import write_atomic
-from rislam_rt.pipeline.studies.claims import Claim
-from rislam_rt.pipeline.sweeps.record import json_bytes
 from rislam_rt.report.swept.entries import paragraph, table_lines
+from rislam_rt.storage.files import write_atomic
+from rislam_rt.studies.claims import Claim
+from rislam_rt.sweeps.record import json_bytes
 
 
 def write_claims(claims: Sequence[Claim], name: str, sources: Mapping[str, Any], folder: Path) -> Path:

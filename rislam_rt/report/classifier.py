@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.pipeline.studies.classifier.codes import POLICIES
-from rislam_rt.pipeline.studies.classifier.gather import Examples
-from rislam_rt.pipeline.studies.classifier.run import Training
-from rislam_rt.pipeline.studies.classifier.score import Score, by_value, mistakes, panel_dropped, rules
-from rislam_rt.pipeline.studies.classifier.spec import ClassifierSpec
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import paragraph
 from rislam_rt.slam.classify import FEATURES, network_arrays
+from rislam_rt.studies.classifier.codes import POLICIES
+from rislam_rt.studies.classifier.gather import Examples
+from rislam_rt.studies.classifier.run import Training
+from rislam_rt.studies.classifier.score import Score, by_value, mistakes, panel_dropped, rules
+from rislam_rt.studies.classifier.spec import ClassifierSpec
 
 COLOUR = {"network": "#0072B2", "single": "#56B4E9", "geometric": "#D55E00", "amplitude": "#009E73"}
 MARK = {"network": "o", "single": "^", "geometric": "s", "amplitude": "D"}

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.design import GainCurves
-from rislam_rt.pipeline.studies.fig4a import Fig4a
-from rislam_rt.pipeline.studies.spec import Fig4aSpec
 from rislam_rt.report.style import SCHEME, TRUTH, styled
+from rislam_rt.studies.fig4a import Fig4a
+from rislam_rt.studies.spec import Fig4aSpec
 
 SPHERE = "#009E73"
 NUM_SHOWN = 9

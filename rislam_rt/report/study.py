@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from rislam_rt.channel.compare import validation_page
-from rislam_rt.pipeline.files import write_atomic
-from rislam_rt.pipeline.studies.compare import Comparison
-from rislam_rt.pipeline.studies.fig4a import Fig4a
-from rislam_rt.pipeline.studies.spec import CompareSpec, Fig4aSpec
 from rislam_rt.report.certificate import draw_certificate
 from rislam_rt.report.fig4a import draw_fig4a, fig4a_csv, fig4a_page
 from rislam_rt.report.style import to_png
+from rislam_rt.storage.files import write_atomic
+from rislam_rt.studies.compare import Comparison
+from rislam_rt.studies.fig4a import Fig4a
+from rislam_rt.studies.spec import CompareSpec, Fig4aSpec
 
 COMPARISON, CERTIFICATE = "channel_validation", "figures/path_certificate.png"
 CURVES, CURVES_FIGURE = "fig4a", "figures/fig4a.png"

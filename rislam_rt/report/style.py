@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind
-from rislam_rt.pipeline.files import write_atomic
+from rislam_rt.storage.files import write_atomic
 
 DPI = 120
 TRUTH = "black"

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.pipeline.sweeps.slam import Score
 from rislam_rt.report.style import save_figure, scheme_colour, styled
+from rislam_rt.studies.pipeline_sweep import Score
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 LINES = ("-", "--", ":", "-.")

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
     from rislam_rt.channel.compare import PathReport, Validation
     from rislam_rt.design import Design
-    from rislam_rt.pipeline.sweeps.slam import Score
+    from rislam_rt.studies.pipeline_sweep import Score
 
 
 def print_summary(summary: Mapping[str, Any]) -> None:

@@ -2,7 +2,6 @@
 
 import json
 import signal
-import subprocess
 import sys
 import time
 from dataclasses import replace
@@ -10,28 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from rislam_rt.cli import main
-
 ROOT = Path(__file__).parents[2]
 SCENE = ROOT / "scenes" / "paper_room"
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
 SHORT = ("--set", "channel=image_source", "--set", "cycles=6")
-HEAVY = ("numpy", "scipy", "sionna", "mitsuba", "drjit", "matplotlib", "xarray", "trimesh")
-
-
-@pytest.fixture
-def run(capsys, monkeypatch, tmp_path):
-    """Run a command in an empty folder; returns exit code, output and error stream."""
-    monkeypatch.chdir(tmp_path)
-
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["rislam-rt", *map(str, arguments)])
-        with pytest.raises(SystemExit) as left:
-            main()
-        captured = capsys.readouterr()
-        return left.value.code, captured.out, captured.err
-
-    return _run
 
 
 @pytest.fixture
@@ -56,44 +37,6 @@ def test_new_room_from_corners(run):
     assert code == 0
     assert "brick" in out
     assert Path("mine/scene.toml").is_file()
-
-
-def test_help_and_version_import_nothing_heavy():
-    code = (
-        "import sys\n"
-        "from rislam_rt.cli import main\n"
-        "for words in (['--help'], ['run', '--help'], ['--version']):\n"
-        "    sys.argv = ['rislam-rt', *words]\n"
-        "    try:\n        main()\n"
-        "    except SystemExit as left:\n        assert left.code == 0, left.code\n"
-        f"print([name for name in {HEAVY} if name in sys.modules])\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "[]"
-
-
-def test_settings_are_printed_without_what_only_a_run_needs():
-    """Half a second of scipy, trimesh and plots for a list of settings; on modules, as clocks lie."""
-    heavy = [
-        "scipy.linalg",
-        "scipy.special",
-        "scipy.optimize",
-        "scipy.spatial",
-        "scipy.stats",
-        "trimesh",
-        "xarray",
-        "matplotlib",
-    ]
-    code = (
-        "import sys\n"
-        "from rislam_rt.cli import main\n"
-        "sys.argv = ['rislam-rt', 'config']\n"
-        "try:\n    main()\n"
-        "except SystemExit as left:\n    assert left.code in (0, None), left.code\n"
-        f"print([name for name in {heavy} if name in sys.modules])\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "[]"
 
 
 @pytest.mark.parametrize(
@@ -165,21 +108,6 @@ def test_bad_scene_is_one_line_with_file_and_field(run, edited, tmp_path, old, n
     assert field in err
     assert list(tmp_path.iterdir()) == []
     assert run("check", folder)[0] == 2
-
-
-def test_missing_library_is_one_line_and_exit_3(tmp_path):
-    import os
-
-    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(tmp_path / "libLLVM.so")}
-    for words in (["doctor"], ["run", PIPELINE], ["trace", SCENE]):
-        done = subprocess.run(
-            [sys.executable, "-m", "rislam_rt", *map(str, words)],
-            capture_output=True, text=True, cwd=tmp_path, env=environment, check=False,
-        )  # fmt: skip
-        assert done.returncode == 3
-        assert len(done.stderr.splitlines()) == 1
-        assert "DRJIT_LIBLLVM_PATH" in done.stderr
-        assert list(tmp_path.iterdir()) == []
 
 
 def test_unwritable_file_is_exit_4(run):

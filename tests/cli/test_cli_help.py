@@ -8,23 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rislam_rt.cli import main
-
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture
-def run(capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["rislam-rt", *map(str, arguments)])
-        with pytest.raises(SystemExit) as left:
-            main()
-        captured = capsys.readouterr()
-        return left.value.code, captured.out, captured.err
-
-    return _run
 
 
 def commands():

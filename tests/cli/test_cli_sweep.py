@@ -84,7 +84,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(run, tmp_path, words):
 
 
 def test_no_scheduler_is_exit_3(run, tmp_path, monkeypatch):
-    from rislam_rt.pipeline.sweeps import cluster
+    from rislam_rt.sweeps import cluster
 
     assert cluster.CONNECT_SECONDS <= 3  # the command as a whole is to end within 10 s
     monkeypatch.setattr(cluster, "CONNECT_SECONDS", 0.2)
@@ -116,7 +116,7 @@ def test_a_sweep_touches_nothing_of_the_user(run, tmp_path):
 
 
 def test_interrupt_is_one_line(run, monkeypatch):
-    import rislam_rt.pipeline.sweeps as sweeps
+    import rislam_rt.sweeps as sweeps
 
     def interrupted(*_, **__):
         raise KeyboardInterrupt

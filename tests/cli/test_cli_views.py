@@ -1,28 +1,8 @@
 """`show --html` and `report --gif`: files that stand alone, and one line for what cannot be."""
 
-import sys
 from pathlib import Path
 
-import pytest
-
-from rislam_rt.cli import main
-
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
-
-
-@pytest.fixture
-def run(capsys, monkeypatch, tmp_path):
-    """Run a command in an empty folder; returns exit code, output and error stream."""
-    monkeypatch.chdir(tmp_path)
-
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["rislam-rt", *map(str, arguments)])
-        with pytest.raises(SystemExit) as left:
-            main()
-        captured = capsys.readouterr()
-        return left.value.code, captured.out, captured.err
-
-    return _run
 
 
 def test_show_writes_a_page_that_turns_and_a_picture_if_asked(run, tmp_path):

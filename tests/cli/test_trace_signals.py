@@ -1,35 +1,18 @@
 """`trace --signals`: a data set that says what was sent through which paths, and nothing written when it cannot be."""
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from rislam_rt.cli import main
 from rislam_rt.measurement import load_signals
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline.dataset import dataset_to_paths, read_dataset
 
 SCENE = Path(__file__).parents[2] / "scenes" / "paper_room"
 FEW = ("--signals", "--channel", "image_source", "--depth", 1, "--cycles", 401, "--stride", 200)
-
-
-@pytest.fixture
-def run(capsys, monkeypatch, tmp_path):
-    """Run a command in an empty folder; returns exit code, output and error stream."""
-    monkeypatch.chdir(tmp_path)
-
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["rislam-rt", *map(str, arguments)])
-        with pytest.raises(SystemExit) as left:
-            main()
-        captured = capsys.readouterr()
-        return left.value.code, captured.out, captured.err
-
-    return _run
 
 
 def synthesis(data):

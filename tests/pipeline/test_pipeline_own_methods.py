@@ -13,9 +13,9 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import SlamResult, empty_map, pose_estimate
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.own_methods import load_own, own_code, own_digests
-from rislam_rt.pipeline.sweeps import Effort, run_sweep
-from rislam_rt.pipeline.sweeps.slam import slam_sweep
 from rislam_rt.shipped import find_pipeline
+from rislam_rt.studies.pipeline_sweep import slam_sweep
+from rislam_rt.sweeps import Effort, run_sweep
 
 FAULTS = """
 import sys

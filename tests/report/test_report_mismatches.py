@@ -5,10 +5,10 @@ import json
 import pytest
 from test_report_swept import RECORD, rows
 
-from rislam_rt.pipeline.studies.swept import HardwareSpec, RobustnessSpec
-from rislam_rt.pipeline.sweeps.axes import Cell
-from rislam_rt.pipeline.sweeps.store import Row
 from rislam_rt.report.swept import write_swept
+from rislam_rt.studies.swept import HardwareSpec, RobustnessSpec
+from rislam_rt.sweeps.axes import Cell
+from rislam_rt.sweeps.store import Row
 
 COMPASS = {
     "name": "compass",

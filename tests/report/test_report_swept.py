@@ -6,15 +6,15 @@ import json
 import numpy as np
 import pytest
 
-from rislam_rt.pipeline.studies.claims import judge, read_results
-from rislam_rt.pipeline.studies.swept import AblationsSpec, Fig4bSpec, Fig4cSpec, RoomsSpec, group_rows
-from rislam_rt.pipeline.studies.swept.sweep import SNR
-from rislam_rt.pipeline.sweeps.axes import Cell
-from rislam_rt.pipeline.sweeps.store import Row
 from rislam_rt.report.claims import claims_page, write_claims
 from rislam_rt.report.swept import write_swept
 from rislam_rt.report.swept.entries import bound_beside, scheme_entry, what_limits
 from rislam_rt.report.swept.rooms import budget, missed_aims
+from rislam_rt.studies.claims import judge, read_results
+from rislam_rt.studies.swept import AblationsSpec, Fig4bSpec, Fig4cSpec, RoomsSpec, group_rows
+from rislam_rt.studies.swept.sweep import SNR
+from rislam_rt.sweeps.axes import Cell
+from rislam_rt.sweeps.store import Row
 
 RECORD = {
     "kind": "made up", "seed": 7, "scenes": {"paper_room": {"sha256": "0" * 64}}, "versions": {},

@@ -18,12 +18,19 @@ def _load() -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    sys.path.insert(0, str(file.parent))
     sys.modules["hard_cases"] = module
     spec.loader.exec_module(module)
     return module
 
 
 hard = _load()
+
+
+@pytest.mark.parametrize("number", range(3, SAMPLE, 4))
+def test_window_filter_survives(number: int) -> None:
+    verdict = hard.run_case(hard.draw_case(hard.KINDS[(5 * number) % len(hard.KINDS)], number, "window", most=12))
+    assert not verdict.faults
 
 
 @pytest.mark.parametrize("number", range(SAMPLE))

@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.evaluate import Interval
-from rislam_rt.pipeline.studies.swept import AblationsSpec, Group, paired_gain
 from rislam_rt.report.style import TRUTH, styled
 from rislam_rt.report.swept.entries import (
     interval_entry,
@@ -19,7 +18,8 @@ from rislam_rt.report.swept.entries import (
     table_lines,
     trouble,
 )
-from rislam_rt.report.swept.lines import mark_metres
+from rislam_rt.report.swept.error_curves import mark_metres
+from rislam_rt.studies.swept import AblationsSpec, Group, paired_gain
 
 WORSE, BETTER, SAME = "#D55E00", "#0072B2", "#8c8c8c"
 

@@ -11,7 +11,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import Interval
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.studies.swept import Group, spread
+from rislam_rt.studies.swept import Group, spread
 
 NEAR_BOUND = 1.5
 """RMSE over the posterior bound up to which the bound is what limits."""

@@ -7,8 +7,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.evaluate import Interval
-from rislam_rt.pipeline.studies.swept import Fig4bSpec, Group, paired_difference, paired_gain
-from rislam_rt.pipeline.studies.swept.sweep import SNR
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import (
     NOTHING,
@@ -23,7 +21,9 @@ from rislam_rt.report.swept.entries import (
     trouble,
     what_limits,
 )
-from rislam_rt.report.swept.lines import draw_schemes, explain_lines
+from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines
+from rislam_rt.studies.swept import Fig4bSpec, Group, paired_difference, paired_gain
+from rislam_rt.studies.swept.sweep import SNR
 
 OURS = "optimized"
 """The scheme that the paper proposes."""

@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.evaluate import Interval
-from rislam_rt.pipeline.studies.swept import Group, paired_gain, spread
 from rislam_rt.report.style import MARKER, scheme_colour, styled
 from rislam_rt.report.swept.entries import (
     interval_entry,
@@ -21,7 +20,8 @@ from rislam_rt.report.swept.entries import (
     trouble,
     what_limits,
 )
-from rislam_rt.report.swept.lines import draw_schemes, explain_lines, label_ends, mark_metres
+from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines, label_ends, mark_metres
+from rislam_rt.studies.swept import Group, paired_gain, spread
 
 
 def fig4c_content(groups: Sequence[Group]) -> dict[str, Any]:

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.pipeline.studies.swept import Group, HardwareSpec
-from rislam_rt.pipeline.studies.swept.spec import CALIBRATED, MismatchSection
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import NOTHING, paragraph, ratio, table_lines
+from rislam_rt.studies.swept import Group, HardwareSpec
+from rislam_rt.studies.swept.spec import CALIBRATED, MismatchSection
 
 SCORES = ("false", "panel", "landmarks", "components", "error_over_std", "left")
 HEARD, MORE_FALSE = 0.9, 2.0

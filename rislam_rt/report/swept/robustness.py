@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.evaluate import Interval
-from rislam_rt.pipeline.studies.swept import Group, RobustnessSpec, paired_gain
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import (
     interval_entry,
@@ -20,7 +19,8 @@ from rislam_rt.report.swept.entries import (
     table_lines,
     trouble,
 )
-from rislam_rt.report.swept.lines import mark_metres
+from rislam_rt.report.swept.error_curves import mark_metres
+from rislam_rt.studies.swept import Group, RobustnessSpec, paired_gain
 
 WORST = 3
 """Mismatches that are named."""

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.pipeline.studies.swept import Group
 from rislam_rt.report.style import MARKER, scheme_colour, styled
 from rislam_rt.report.swept.entries import (
     metres,
@@ -19,7 +18,8 @@ from rislam_rt.report.swept.entries import (
     trouble,
     what_limits,
 )
-from rislam_rt.report.swept.lines import mark_metres
+from rislam_rt.report.swept.error_curves import mark_metres
+from rislam_rt.studies.swept import Group
 
 AIMS: dict[str, float] = {
     "rmse_m": 0.04,

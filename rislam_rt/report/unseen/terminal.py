@@ -7,10 +7,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from rislam_rt.pipeline.sweeps import Row
-from rislam_rt.report.unseen.cards import by_series, read_runs
 from rislam_rt.report.unseen.files import unseen_content
 from rislam_rt.report.unseen.page import ROWS
+from rislam_rt.report.unseen.score_cards import by_series, read_runs
+from rislam_rt.sweeps import Row
 
 
 def print_cards(rows: Sequence[Row], timings: Sequence[Mapping[str, Any]]) -> None:

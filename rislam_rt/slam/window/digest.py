@@ -12,9 +12,10 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.tracks import PANEL
-from rislam_rt.slam.window.gauss import TURN, Window, now, pose_covariance, poses
+from rislam_rt.slam.window.gauss import Window, now, pose_covariance, poses
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log
+from rislam_rt.slam.window.steps import TURN
 
 TOGETHER = 10.0
 """Measurements over which the pull of neighbours keeps its sign."""
@@ -79,7 +80,7 @@ def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: 
     crowd = max(LEVELS.crowd, float(np.mean(np.minimum(scatter, 10.0) ** 2)))
     number = np.array([len(at) for at in rows])[:, None]
     # the difference of two alternated codes holds the panel's paths and nothing of the others
-    pure = np.array([bool((log.side[at] == PANEL).all()) for at in rows])[:, None]
+    pure = np.array([bool((log.side[at] >= PANEL).all()) for at in rows])[:, None]
     around = np.where(pure, 1.0, crowd)
     scatter = np.sqrt((4.0 * around + number * scatter**2) / (4.0 + number))
     count = len(rows)

@@ -15,20 +15,14 @@ is made again at the present estimate whenever that is worth it. The first pose 
 tells where the start was, whose error stands beside the Gaussian.
 """
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-
-HEAD = 7
-"""Numbers of the head before the features: position, velocity, offset of the compass."""
-TURN = 3
-"""Axis of the rate of turn, after those of the room."""
-POSE = 4
-"""Numbers of a pose that measurements depend on: position, offset of the compass."""
+from rislam_rt.slam.window.factor import factorise, inverse
+from rislam_rt.slam.window.steps import FIRST, HEAD, POSE, TURN, basis, carry_on, latest, starts
 
 
 class Quadratic(NamedTuple):
@@ -116,33 +110,23 @@ def begin(position: Floats, velocity: Floats, std: Floats, *, turns: bool = Fals
     )  # fmt: skip
 
 
-@lru_cache(maxsize=4)
-def _basis(steps: bytes, turns: bool) -> Floats:
-    """(A, K, K + 1): each axis of the poses by its first place, its first rate, and its accelerations."""
-    step = np.frombuffer(steps)
-    count = len(step) + 1
-    time = np.concatenate([[0.0], np.cumsum(step)])
-    after = np.arange(count)[:, None] > np.arange(len(step))
-    reach = np.where(after, 0.5 * step**2 + step * (time[:, None] - time[1:]), 0.0)
-    moved = np.concatenate([np.ones((count, 1)), time[:, None], reach], axis=1)
-    turned = np.concatenate([np.ones((count, 1)), np.zeros((count, 1)), np.where(after, step, 0.0)], axis=1)
-    basis = np.stack([moved] * 3 + [turned] * turns)
-    basis.flags.writeable = False
-    return basis
+def begin_with(
+    position: Floats, velocity: Floats, std: Floats, features: Floats, covariance: Floats, *, turns: bool
+) -> Window:
+    """One pose, and features (3F,) known beforehand, with a covariance (3F, 3F)."""
+    alone, count = begin(position, velocity, std, turns=turns), len(features)
+    spread = scipy.linalg.block_diag(alone.covariance, covariance)
+    information = scipy.linalg.block_diag(alone.prior.hessian, inverse(covariance))
+    head, size = np.concatenate([alone.head, features]), POSE + count
+    pose = np.concatenate([alone.slots.middle[0], features])
+    slots = Quadratic(np.zeros((1, size, size)), np.zeros((1, size)), pose[None])
+    prior = Quadratic(information, np.zeros(len(head)), head)
+    return alone._replace(head=head, prior=prior, slots=slots, covariance=spread)
 
 
-FIRST = np.array([0, 1, 2, 6, 3, 4, 5])
-"""The head's numbers in the order of a basis: first places, then first rates."""
-
-
-def _starts(free: int) -> Integers:
-    """The head's numbers that a basis of so many axes spans, rate by rate after place by place."""
-    return FIRST if free > TURN else np.arange(6)
-
-
-def basis_of(window: Window) -> Floats:
-    """(A, K, K + 1) (see `_basis`)."""
-    return _basis(window.step.tobytes(), window.turns)
+def _basis(window: Window) -> Floats:
+    """(A, K, K + 1) (see `steps.basis`)."""
+    return basis(window.step.tobytes(), window.turns)
 
 
 def poses(window: Window) -> Floats:
@@ -151,39 +135,14 @@ def poses(window: Window) -> Floats:
     numbers = np.concatenate([window.head[[0, 1, 2, 6]][:free, None], np.zeros((free, 1)), window.accel.T], axis=1)
     numbers[:3, 1] = window.head[3:6]
     found = np.full((window.num_poses, POSE), window.head[6])
-    found[:, :free] = (basis_of(window) @ numbers[..., None])[..., 0].T
+    found[:, :free] = (_basis(window) @ numbers[..., None])[..., 0].T
     return found
-
-
-def _carry(dt: float, free: int) -> Floats:
-    """(7, 7 + A): the next pose, velocity and offset from the last ones and the step's accelerations."""
-    found = np.eye(HEAD, HEAD + free)
-    axes = np.arange(3)
-    found[axes, 3 + axes] = found[3 + axes, HEAD + axes] = dt
-    found[axes, HEAD + axes] = 0.5 * dt**2
-    if free > TURN:
-        found[6, HEAD + TURN] = dt
-    return found
-
-
-@lru_cache(maxsize=4)
-def _latest(steps: bytes, turns: bool) -> Floats:
-    """(7, 7 + (K - 1) A): the last pose, velocity and offset from the head and all accelerations."""
-    last, step, free = _basis(steps, turns)[:, -1], np.frombuffer(steps), 3 + turns
-    design = np.eye(HEAD, HEAD + len(step) * free)
-    for axis in range(3):
-        design[axis, 3 + axis] = last[axis, 1]
-        design[axis, HEAD + axis :: free], design[3 + axis, HEAD + axis :: free] = last[axis, 2:], step
-    if turns:
-        design[6, HEAD + TURN :: free] = last[TURN, 2:]
-    design.flags.writeable = False
-    return design
 
 
 def now(window: Window) -> tuple[Floats, Floats]:
     """Mean (7 + 3F,) and covariance of the last pose, its velocity, the compass offset, and the features."""
     size, whole = len(window.head), window.covariance
-    design = _latest(window.step.tobytes(), window.turns)
+    design = latest(window.step.tobytes(), window.turns)
     start, later = design[:, :HEAD], design[:, HEAD:]
     mean = window.head.copy()
     mean[:HEAD] = start @ mean[:HEAD] + later @ window.accel.ravel()
@@ -197,10 +156,10 @@ def now(window: Window) -> tuple[Floats, Floats]:
 
 def pose_covariance(window: Window, axis: int) -> Floats:
     """(K, K) covariance of all poses along one axis."""
-    basis, size, free = basis_of(window)[axis], len(window.head), window.accel.shape[1]
+    along, size, free = _basis(window)[axis], len(window.head), window.accel.shape[1]
     rate = [] if axis == TURN else [3 + axis]
     rows = np.concatenate([[FIRST[axis]], rate, np.arange(size + axis, len(window.covariance), free)]).astype(np.int64)
-    used = basis if rate else np.delete(basis, 1, axis=1)
+    used = along if rate else np.delete(along, 1, axis=1)
     return np.asarray(used @ window.covariance[np.ix_(rows, rows)] @ used.T)
 
 
@@ -231,14 +190,14 @@ def slide(window: Window) -> Window:
     # the next pose and the acceleration in between, instead of the oldest pose
     dt, accel = float(window.step[0]), window.accel[0]
     change = np.eye(size, size + free)
-    back = _carry(-dt, free)
+    back = carry_on(-dt, free)
     change[:HEAD, :HEAD], change[:HEAD, size:] = back[:, :HEAD], back[:, HEAD:]
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
     steep[size:] += window.precision[0] * accel
     gain = np.linalg.solve(wide[size:, size:], wide[size:, :size]).T
     left = wide[:size, :size] - gain @ wide[size:, :size]
-    carry = _carry(dt, free)
+    carry = carry_on(dt, free)
     head = window.head.copy()
     head[:HEAD] = carry @ np.concatenate([head[:HEAD], accel])
     prior = Quadratic(0.5 * (left + left.T), steep[:size] - gain @ steep[size:], head)
@@ -266,7 +225,7 @@ def solve(window: Window, *, spread: bool = True) -> Window:
         covariance = inverse(hessian)
         change = -covariance @ gradient
     else:
-        covariance, change = window.covariance, -_scaled(hessian).solve(gradient)
+        covariance, change = window.covariance, -factorise(hessian).solve(gradient)
     return window._replace(
         head=window.head + change[:size],
         accel=window.accel + change[size:].reshape(window.accel.shape),
@@ -282,9 +241,9 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     slope, slots = window.slots.slope(spot), window.slots.hessian
     hessian, gradient = np.zeros((size + steps * free,) * 2), np.zeros(size + steps * free)
     # axis by axis: a pose's place along one does not hang on the accelerations along the others
-    basis, start = basis_of(window), _starts(free)
-    back = np.swapaxes(basis, 1, 2)
-    inner = back[:, None] @ (np.moveaxis(slots[:, :free, :free], 0, 2)[..., None] * basis)
+    along, start = _basis(window), starts(free)
+    back = np.swapaxes(along, 1, 2)
+    inner = back[:, None] @ (np.moveaxis(slots[:, :free, :free], 0, 2)[..., None] * along)
     inner = np.moveaxis(inner, 2, 0).swapaxes(2, 3)
     cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape((steps + 2) * free, size - HEAD)
     pull = (back @ slope[:, :free].T[..., None])[..., 0].T.ravel()
@@ -337,41 +296,6 @@ def weigh_holds(window: Window) -> Window:
     log_right = -0.5 * (cavity - holds.aim) ** 2 / spread - 0.5 * np.log(2.0 * np.pi * spread)
     odds = np.clip(holds.log_odds + log_right, -30.0, 30.0)
     return window._replace(holds=holds._replace(probability=1.0 / (1.0 + np.exp(-odds))))
-
-
-class _Scaled(NamedTuple):
-    """A Cholesky factor of a symmetric positive matrix that was scaled to a unit diagonal."""
-
-    factor: Floats
-    scale: Floats
-
-    def solve(self, right: Floats) -> Floats:
-        """The matrix's inverse times (D,)."""
-        found, _ = scipy.linalg.lapack.dpotrs(self.factor, right * self.scale, lower=1)
-        return np.asarray(found * self.scale)
-
-
-def _scaled(matrix: Floats) -> _Scaled:
-    """The factor, damped where rounding made the matrix indefinite."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-30))
-    scaled = matrix * scale * scale[:, None]
-    for damping in (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3):
-        factor, bad = scipy.linalg.lapack.dpotrf(
-            (scaled + damping * np.eye(len(scaled)) if damping else scaled).T, lower=1
-        )
-        if not bad:
-            break
-    return _Scaled(factor, scale)
-
-
-def inverse(matrix: Floats) -> Floats:
-    """Of a symmetric positive matrix, damped where rounding made it indefinite."""
-    factor, scale = _scaled(matrix)
-    inside, _ = scipy.linalg.lapack.dpotri(factor, lower=1)
-    inside *= scale * scale[:, None]
-    full = inside + inside.T
-    np.fill_diagonal(full, np.diag(inside))
-    return np.asarray(full)
 
 
 def add_feature(window: Window, place: Floats, holds: Holds, ridge: float = 1e-6) -> Window:

@@ -11,8 +11,9 @@ from rislam_rt.slam.returns import linearise
 from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.gauss import POSE, Quadratic, Window, poses
+from rislam_rt.slam.window.gauss import Quadratic, Window, poses
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.steps import POSE
 
 
 class Log(NamedTuple):

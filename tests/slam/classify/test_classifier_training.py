@@ -7,11 +7,12 @@ import pytest
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind
-from rislam_rt.pipeline.studies import ClassifierSpec, load_any
-from rislam_rt.pipeline.studies.classifier.gather import CLUTTER, OVER_RX, OVER_TX, Examples
-from rislam_rt.pipeline.studies.classifier.random_rooms import random_room
-from rislam_rt.pipeline.studies.classifier.run import balance
-from rislam_rt.pipeline.studies.classifier.score import (
+from rislam_rt.scene.random_rooms.box_rooms import random_room
+from rislam_rt.slam.classify import FEATURES, Network, blend, classify
+from rislam_rt.studies import ClassifierSpec, load_any
+from rislam_rt.studies.classifier.gather import CLUTTER, OVER_RX, OVER_TX, Examples
+from rislam_rt.studies.classifier.run import balance
+from rislam_rt.studies.classifier.score import (
     by_value,
     mean_over_rooms,
     mistakes,
@@ -20,8 +21,7 @@ from rislam_rt.pipeline.studies.classifier.score import (
     right_by_class,
     score,
 )
-from rislam_rt.pipeline.studies.classifier.train import loss_and_slope, train_network
-from rislam_rt.slam.classify import FEATURES, Network, blend, classify
+from rislam_rt.studies.classifier.train import loss_and_slope, train_network
 
 FILE = Path(__file__).parents[3] / "pipelines" / "train_classifier.toml"
 

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
-from rislam_rt.slam.schemes.bp_slam.features import Features, Scan, birth_ratio, make_features, no_features
-from rislam_rt.slam.schemes.bp_slam.ranges import Bistatic, Direct, length_of, random_directions
-from rislam_rt.slam.schemes.bp_slam.update import Belief, predict_belief, update_belief
+from rislam_rt.slam.schemes.bp_slam_static import BpSlamStaticConfig
+from rislam_rt.slam.schemes.bp_slam_static.features import Features, make_features, no_features
+from rislam_rt.slam.schemes.bp_slam_static.update import Belief, predict_belief, update_belief
+from rislam_rt.slam.schemes.shared.ranges import Bistatic, Direct, length_of, random_directions
+from rislam_rt.slam.schemes.shared.scan import Scan, birth_ratio
 
 COUNT = 64
-CONFIG = BpSlamConfig(num_particles=COUNT, coupled=False)
+CONFIG = BpSlamStaticConfig(num_particles=COUNT, coupled=False)
 STD = np.array([0.1])
 
 
@@ -45,7 +46,7 @@ def test_existence_after_a_range(miss: float) -> None:
     e, scan = 0.3, Scan(np.array([5.0 + miss]), STD)
     likelihood = np.exp(-0.5 * (miss / 0.1) ** 2) / (0.1 * np.sqrt(2.0 * np.pi))
     ratio = CONFIG.detection_probability * likelihood / CONFIG.clutter_density
-    fresh = 1.0 + birth_ratio(scan, 6.0, Direct(), 2, CONFIG)[0]
+    fresh = 1.0 + birth_ratio(scan, 6.0, Direct(), 2, CONFIG.odds)[0]
     there = e * ((1.0 - CONFIG.detection_probability) * fresh + ratio)
     assert existence_after(scan.length, e, 6.0) == pytest.approx(there / (there + (1.0 - e) * fresh), rel=1e-9)
 
@@ -55,18 +56,18 @@ def test_birth_ratio_integrates_to_the_undetected() -> None:
     length = np.linspace(1e-6, CONFIG.max_range, 4001)
     scan = Scan(length, np.full(len(length), 0.1))
     for dims in (2, 3):
-        density = birth_ratio(scan, 6.0, Direct(), dims, CONFIG) * CONFIG.clutter_density
+        density = birth_ratio(scan, 6.0, Direct(), dims, CONFIG.odds) * CONFIG.clutter_density
         assert np.trapezoid(density, length) == pytest.approx(6.0 * CONFIG.detection_probability, rel=1e-4)
 
 
 def test_a_far_feature_is_linear() -> None:
     """A cloud far away, wide along the line of sight: mean and variance are Kalman's, to four standard errors."""
-    count, config = 8192, BpSlamConfig(num_particles=8192, coupled=False, detection_probability=0.999)
+    count, config = 8192, BpSlamStaticConfig(num_particles=8192, coupled=False, detection_probability=0.999)
     rng = np.random.default_rng(2)
     cloud = np.array([[1000.0, 0.0]]) + np.array([0.3, 0.01]) * rng.standard_normal((1, count, 2))
     features = make_features(cloud, np.array([0.999]), np.array([0]), np.array([5]))
     scan = Scan(np.array([1000.2]), STD)
-    wide = BpSlamConfig(
+    wide = BpSlamStaticConfig(
         num_particles=count, coupled=False, detection_probability=config.detection_probability, max_range=2000.0
     )
     after, info = update_belief(belief_of(features, 1e-9, count), (scan,), Direct(), wide, rng=rng)

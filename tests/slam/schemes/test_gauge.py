@@ -6,8 +6,8 @@ from rooms import BODY, CYCLE, HEADING, RADIO, build_room, measurement_of
 
 from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes import bp_slam
-from rislam_rt.slam.schemes.bp_slam.course import Course, advance, begin
-from rislam_rt.slam.schemes.bp_slam.gauge import over_all_turns
+from rislam_rt.slam.schemes.shared.course import Course, advance, begin
+from rislam_rt.slam.schemes.shared.gauge import over_all_turns
 
 PLACE, WALK = np.array([0.5, 0.7]), np.array([0.08, 0.06])
 ALONG, ACROSS = np.array([0.8, 0.6]), np.array([-0.6, 0.8])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.schemes.bp_slam import associate
+from rislam_rt.slam.schemes.shared.association import associate
 
 
 def enumerate_marginals(missed: Floats, pair: Floats, fresh: Floats) -> Floats:

@@ -1,15 +1,18 @@
 """Both rivals in the setting of the package: both ends move, and the interface is that of its own filter."""
 
+import inspect
 from typing import Any
 
 import numpy as np
 import pytest
 from rooms import BODY, CYCLE, HEADING, RADIO, build_room, measurement_of
 
+from rislam_rt import slam
+from rislam_rt.errors import ConfigError
 from rislam_rt.model import SensorModel
 from rislam_rt.slam import Outcome
 from rislam_rt.slam.filter import REMOVED
-from rislam_rt.slam.schemes import bp_slam, channel_slam
+from rislam_rt.slam.schemes import RIVALS, bp_slam, channel_slam
 
 SCHEMES = [
     pytest.param(bp_slam, bp_slam.BpSlamConfig(sigma_a=0.01, planes=False), id="bp_slam"),
@@ -66,3 +69,18 @@ def test_a_known_height_stays(scheme: Any, config: Any) -> None:
     for measurement in room.measurements:
         state, _ = scheme.step(state, measurement, None, CYCLE, HEADING, config, rng=rng)
     assert np.all(scheme.estimate(state, config).samples[:, 2] == room.start.position[2])
+
+
+@pytest.mark.parametrize("field", ["max_features", "sigma_a", "detection_probability", "height", "wanderers"])
+def test_bad_settings_are_named(field: str) -> None:
+    """With the name of the field."""
+    with pytest.raises(ConfigError, match=f"bp_slam.{field}"):
+        bp_slam.BpSlamConfig(**{field: "up" if field == "height" else -1})
+
+
+@pytest.mark.parametrize("name", list(RIVALS))
+def test_every_rival_takes_what_the_default_takes(name: str) -> None:
+    """Names and order of the arguments of the four functions."""
+    for function in ("init", "step", "predict", "estimate"):
+        own, default = (inspect.signature(getattr(each, function)) for each in (RIVALS[name], slam))
+        assert list(own.parameters) == list(default.parameters)

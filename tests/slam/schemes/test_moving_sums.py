@@ -6,11 +6,11 @@ from rooms import BODY, CYCLE, HEADING, RADIO, build_room
 
 from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes import bp_slam
-from rislam_rt.slam.schemes.bp_slam.correct import absorb, claims
-from rislam_rt.slam.schemes.bp_slam.course import Course, advance, begin
-from rislam_rt.slam.schemes.bp_slam.features import Scan
-from rislam_rt.slam.schemes.bp_slam.ranges import Bistatic
-from rislam_rt.slam.schemes.bp_slam.sums import Sums, born, carry, look, prune, unit_of
+from rislam_rt.slam.schemes.shared.correct import absorb, claims
+from rislam_rt.slam.schemes.shared.course import Course, advance, begin
+from rislam_rt.slam.schemes.shared.ranges import Bistatic
+from rislam_rt.slam.schemes.shared.scan import Odds, Scan
+from rislam_rt.slam.schemes.shared.sums import Sums, born, carry, look, prune, unit_of
 
 CONFIG = bp_slam.BpSlamConfig(sigma_a=0.01)
 MODEL = Bistatic(np.array([-0.05, 0.0, 0.0]), np.array([0.05, 0.0, 0.0]), True)
@@ -89,7 +89,7 @@ def test_the_range_to_a_wall_is_that_of_the_image() -> None:
 
 def test_one_gaussian_and_one_certain_range_are_a_kalman_filter() -> None:
     """Joint posterior of course and feature in moments against `P - P h h' P / s`, up to the share of misses."""
-    config = bp_slam.BpSlamConfig(sigma_a=0.01, moving_detection=1.0 - 1e-12)
+    odds = Odds(1.0 - 1e-12, 1.0, 30.0)
     course = course_after(4, 2)
     rows = prune(one_feature(course), 0.0, 0.9, 5)
     rng = np.random.default_rng(3)
@@ -100,8 +100,8 @@ def test_one_gaussian_and_one_certain_range_are_a_kalman_filter() -> None:
     sight = look(sums, course, PLACE, MODEL)
     scan = Scan(sight.length + 0.01, np.array([0.02]))
     fresh = np.array([1.0 + 1e-12])
-    found = claims(sums, sight, course, scan, fresh, config)
-    after, moved = absorb(sums, sight, course, scan, found, config)
+    found = claims(sums, sight, course, scan, fresh, odds)
+    after, moved = absorb(sums, sight, course, scan, found, odds)
     direction = sight.by_course[0]
     spread = direction @ course.covariance @ direction + sight.own[0] + 0.02**2
     gain = course.covariance @ direction / spread

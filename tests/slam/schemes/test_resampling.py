@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.slam.schemes.resampling import (
+from rislam_rt.slam.schemes.shared.resampling import (
     cell_levels,
     cell_order,
     effective_fraction,

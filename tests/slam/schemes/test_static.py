@@ -7,7 +7,7 @@ import pytest
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
-from rislam_rt.slam.schemes.bp_slam import BpSlamConfig, StaticResult, run_static
+from rislam_rt.slam.schemes.bp_slam_static import BpSlamStaticConfig, StaticResult, run_static
 
 ANCHORS = np.array([[1.5, 6.0], [8.5, 0.8]])
 IMAGES = (np.array([[-1.5, 6.0], [18.5, 6.0]]), np.array([[11.5, 0.8], [8.5, -0.8]]))
@@ -22,7 +22,7 @@ def walk() -> Floats:
 
 def run(seed: int, coupled: bool, steps: int = STEPS) -> StaticResult:
     rng, truth = np.random.default_rng(seed), walk()[:steps]
-    config = BpSlamConfig(num_particles=256, coupled=coupled)
+    config = BpSlamStaticConfig(num_particles=256, coupled=coupled)
     ranges = []
     for point in truth:
         row = []
@@ -75,9 +75,9 @@ def test_bad_input_is_named(
         run_static(anchors, ranges, start, np.ones(len(start)), rng=np.random.default_rng(1))
 
 
-@pytest.mark.parametrize("field", ["num_particles", "sigma_a", "detection_probability", "height"])
+@pytest.mark.parametrize("field", ["num_particles", "sigma_a", "detection_probability", "feature_std"])
 def test_bad_settings_are_named(field: str) -> None:
     """With the name of the field."""
-    wrong: dict[str, Any] = {field: "up" if field == "height" else 0}
-    with pytest.raises(ConfigError, match=f"bp_slam.{field}"):
-        BpSlamConfig(**wrong)
+    wrong: dict[str, Any] = {field: -1}
+    with pytest.raises(ConfigError, match=f"bp_slam_static.{field}"):
+        BpSlamStaticConfig(**wrong)

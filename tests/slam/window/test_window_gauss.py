@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam.window import gauss, motion
-from rislam_rt.slam.window.gauss import HEAD, POSE, Holds, Quadratic
+from rislam_rt.slam.window.gauss import Holds, Quadratic
+from rislam_rt.slam.window.steps import HEAD, POSE
 
 DT, CYCLES, SIGMA_A = 0.1, 12, 0.5
 

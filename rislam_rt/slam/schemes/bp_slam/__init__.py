@@ -1,24 +1,9 @@
-"""BP-SLAM (Leitinger et al., arXiv 1801.04463): range only, potential features, loopy data association.
+"""BP-SLAM (Leitinger et al., arXiv 1801.04463) by delays alone, for an agent that carries both ends.
 
-`run_static` is the published form, on plain arrays. `init, predict, step, estimate` are the moving form, with the
-interface of the package's own filter.
+Potential features, loopy data association. `init, predict, step, estimate` are those of every estimator.
 """
 
-from rislam_rt.slam.schemes.bp_slam.association import Association, associate
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
-from rislam_rt.slam.schemes.bp_slam.moving import BpSlamState, estimate, init, predict, step
-from rislam_rt.slam.schemes.bp_slam.static import FeatureTable, StaticResult, run_static
+from rislam_rt.slam.schemes.bp_slam.filter import BpSlamState, estimate, init, predict, step
 
-__all__ = [
-    "Association",
-    "BpSlamConfig",
-    "BpSlamState",
-    "FeatureTable",
-    "StaticResult",
-    "associate",
-    "estimate",
-    "init",
-    "predict",
-    "run_static",
-    "step",
-]
+__all__ = ["BpSlamConfig", "BpSlamState", "estimate", "init", "predict", "step"]

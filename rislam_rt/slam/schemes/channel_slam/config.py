@@ -6,6 +6,9 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
+from rislam_rt.slam.schemes.shared.checks import check_counts, check_height, check_inside, check_not_negative
+from rislam_rt.slam.schemes.shared.scan import Odds
+from rislam_rt.slam.schemes.shared.sums import axes_filtered
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,52 +58,24 @@ class ChannelSlamConfig:
     """Positions handed to the phase design."""
 
     def __post_init__(self) -> None:
-        for name in ("birth_turns", "max_paths", "course_stride", "confirm_hits", "num_samples"):
-            if getattr(self, name) < 1:
-                raise ConfigError(f"channel_slam.{name}: {getattr(self, name)} received; give at least 1")
-        if self.max_misses < 0:
-            raise ConfigError(f"channel_slam.max_misses: {self.max_misses} received; give 0 or more")
-        for name in ("sigma_a", "smallest_std", "gate", "range_acceleration", "strain_limit", "shown_std"):
-            _check(name, getattr(self, name), np.inf, "a positive number")
-        for name in ("share_threshold", "outlier_probability"):
-            _check(name, getattr(self, name), 1.0, "a number in (0, 1)")
-        for name in ("drift_length_std", "drift_angle_std"):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                received = getattr(self, name)
-                raise ConfigError(f"channel_slam.{name}: {received} received; give a number that is not negative")
+        name = "channel_slam"
+        check_counts(name, self, ("birth_turns", "max_paths", "course_stride", "confirm_hits", "num_samples"))
+        check_counts(name, self, ("max_misses",), 0)
+        positive = ("sigma_a", "smallest_std", "gate", "range_acceleration", "strain_limit", "shown_std")
+        check_inside(name, self, positive, np.inf, "a positive number")
+        check_inside(name, self, ("share_threshold", "outlier_probability"), 1.0, "a number in (0, 1)")
+        check_not_negative(name, self, ("drift_length_std", "drift_angle_std"))
         if not 0.0 <= self.wanderers < 1.0:
-            raise ConfigError(f"channel_slam.wanderers: {self.wanderers} received; give a share below 1")
-        if self.height not in ("known", "estimated"):
-            raise ConfigError(f"channel_slam.height: '{self.height}' received; give 'known' or 'estimated'")
-        if self.specular_ratio is not None:
-            _check("specular_ratio", self.specular_ratio, np.inf, "a positive number, or none")
+            raise ConfigError(f"{name}.wanderers: {self.wanderers} received; give a share below 1")
+        check_height(name, self.height)
+        check_inside(name, self, ("specular_ratio",), np.inf, "a positive number, or none")
 
     @property
     def axes(self) -> Floats:
         """(3,) ones for the axes that are filtered."""
-        return np.array([1.0, 1.0, 1.0 if self.height == "estimated" else 0.0])
+        return axes_filtered(self.height)
 
     @property
-    def weak_kinds(self) -> Floats:
-        """(3,) probabilities of point, wall and wanderer for the transmitter of a weak path."""
-        return np.array([1.0 - self.wanderers, 0.0, self.wanderers])
-
-    @property
-    def strong_kinds(self) -> Floats:
-        """(3,) the same for a path as strong as a wall return; a corner of two walls returns like a point."""
-        return np.array([0.2, 0.5, 0.3])
-
-    @property
-    def moving_detection(self) -> float:
-        """A tracked range either belongs to its transmitter or not; with `clutter_density`, the odds of the two."""
-        return 0.5
-
-    @property
-    def clutter_density(self) -> float:
-        """Odds of `outlier_probability`, spread over a metre [1/m]."""
-        return self.outlier_probability / (1.0 - self.outlier_probability)
-
-
-def _check(name: str, value: float, below: float, wanted: str) -> None:
-    if not (np.isfinite(value) and 0.0 < value < below):
-        raise ConfigError(f"channel_slam.{name}: {value} received; give {wanted}")
+    def odds(self) -> Odds:
+        """A tracked range either belongs to its transmitter or not: the odds of `outlier_probability`, over a metre."""
+        return Odds(0.5, self.outlier_probability / (1.0 - self.outlier_probability), 1.0)

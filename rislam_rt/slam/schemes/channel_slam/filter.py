@@ -5,7 +5,7 @@ there, labels are taken as known, there is no model of detection, and a path tha
 with it. Unlike there, no transmitter stands in the room: both ends move with the agent, so that a virtual transmitter
 is a point `a` at range `|p_T - a| + |a - p_R|`. Gaussian sums stand in for the particles of a virtual transmitter
 (Ulmschneider, Gentner, Jost and Dammann, 2018), and a Gaussian over the course for those of the agent: a hundred
-particles, resampled, keep one course and forget what delays never told (see `bp_slam.gauge`).
+particles, resampled, keep one course and forget what delays never told (see `shared.gauge`).
 """
 
 from typing import NamedTuple
@@ -18,16 +18,16 @@ from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, 
 from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los
 from rislam_rt.slam.inputs import check_step
-from rislam_rt.slam.schemes.bp_slam.association import Association
-from rislam_rt.slam.schemes.bp_slam.correct import absorb, is_strong
-from rislam_rt.slam.schemes.bp_slam.course import Course, advance, begin
-from rislam_rt.slam.schemes.bp_slam.features import Scan
-from rislam_rt.slam.schemes.bp_slam.ranges import Bistatic
-from rislam_rt.slam.schemes.bp_slam.report import ahead_of, known_points, lift, reported
-from rislam_rt.slam.schemes.bp_slam.sums import Sight, Sums, born, carry, join, look, no_sums, prune, spread_of
 from rislam_rt.slam.schemes.channel_slam import tracker
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
 from rislam_rt.slam.schemes.channel_slam.tracker import Tracks, assign, follow, no_tracks
+from rislam_rt.slam.schemes.shared.association import Association
+from rislam_rt.slam.schemes.shared.correct import absorb, is_strong
+from rislam_rt.slam.schemes.shared.course import Course, advance, begin
+from rislam_rt.slam.schemes.shared.ranges import Bistatic
+from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, reported
+from rislam_rt.slam.schemes.shared.scan import Scan
+from rislam_rt.slam.schemes.shared.sums import Sight, Sums, born, carry, join, kinds_of, look, no_sums, prune, spread_of
 
 STRAIN_RATE = 0.1
 """Share of the latest cycle in the running means of squared innovations."""
@@ -165,7 +165,7 @@ def _correct(
     squares = _squares(state.sums, sight, state.course, scan, hit, shown)
     missed = 1.0 - own.sum(axis=1, keepdims=True)
     found = Association(own, np.concatenate([own, missed], axis=1), 1.0 - own.sum(axis=0), 1)
-    sums, course = absorb(state.sums, sight, state.course, scan, found, config)
+    sums, course = absorb(state.sums, sight, state.course, scan, found, config.odds)
     strains = dict(state.strains)
     for name, square in zip(sums.ident[hit].tolist(), squares.tolist(), strict=True):
         strains[name] = strains.get(name, 1.0) + STRAIN_RATE * (square - strains.get(name, 1.0))
@@ -192,9 +192,10 @@ def _give_birth(
     rows = rows[np.argsort(label[rows])][: config.max_paths - len(state.sums.ident)]
     sums = state.sums
     for row in rows:
-        kinds, one = (config.strong_kinds if strong[row] else config.weak_kinds)[None], slice(row, row + 1)
+        one = slice(row, row + 1)
         new = born(
-            scan.length[one], scan.std[one], kinds, np.ones(1), state.course, state.pose[0], config.birth_turns,
+            scan.length[one], scan.std[one], kinds_of(strong[one], config.wanderers), np.ones(1), state.course,
+            state.pose[0], config.birth_turns,
             int(label[row]),
         )  # fmt: skip
         sums = join(sums, new)

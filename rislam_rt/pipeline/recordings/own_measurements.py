@@ -1,0 +1,292 @@
+"""Measurements of one's own: from a table, a CSV or a NetCDF file to what an estimator is given, checked on entry."""
+
+import csv
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.errors import ConfigError, StoreError
+from rislam_rt.information import amplitude_std, measurement_std
+from rislam_rt.model import Body, Measurement, RadioConfig
+from rislam_rt.pipeline.dataset import read_dataset
+from rislam_rt.pipeline.recordings.inputs import Inputs, dataset_to_inputs, marked_rng
+from rislam_rt.pipeline.recordings.replay import Answers, replay
+from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.slam import StartPrior
+
+COLUMNS: dict[str, tuple[str, str]] = {
+    "time_s": (
+        "s",
+        "of the cycle; rows of one time are one cycle, a row without a delay is a cycle in which nothing was heard",
+    ),
+    "heading_rad": ("rad", 'compass; may be left out with slam.heading = "velocity"'),
+    "delay_s": ("s", "of the component, Tx to Rx"),
+    "cos_x": ("1", "direction cosine of the arriving ray along the body's x (forward)"),
+    "cos_y": ("1", "along the body's y (left); the ray arrives from above"),
+    "theta_r_rad": ("rad", "instead of cosines: zenith angle of arrival, body frame"),
+    "phi_r_rad": ("rad", "and azimuth, body frame"),
+    "amplitude": ("1", "modulus of the path's gain"),
+    "snr_db": ("dB", "instead: SNR after integration over the signal and all antennas"),
+    "delay_std_s": ("s", "standard deviation; that of a lone path at its SNR if left out"),
+    "cos_x_std": ("1", "likewise"),
+    "cos_y_std": ("1", "likewise"),
+    "amplitude_std": ("1", "likewise"),
+    "panel_probability": ("1", "that it ran over the panel, where the receiver can tell"),
+}
+"""Columns of a table: unit and meaning."""
+LONGEST_DELAY = 1e-5
+"""[s] 3 km: no room; a number above is of another unit."""
+ROUNDING = 1e-6
+"""By how much the squares of two cosines may sum to more than 1: what tables of six digits leave."""
+FINEST_STD = 1e-15
+"""[s] a standard deviation below a third of a micrometre is of another unit, too."""
+
+
+def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator) -> Answers:
+    """Pose and map, cycle by cycle, from measurements alone: no scene, no channel, no truth.
+
+    Parameters
+    ----------
+    inputs
+        From `read_inputs`, `inputs_of` or a recording.
+    spec
+        Radio, receiver and estimator; the estimator is that of the first of its schemes.
+    """
+    return replay(inputs, spec.model_dump(), spec.schemes[0], rng=rng)
+
+
+def run_rng(file: str | Path) -> np.random.Generator | None:
+    """What the filter of a run drew from, if the file holds a run's measurements: led by the same numbers, it gives the
+    same estimate to the bit.
+    """
+    return marked_rng(read_dataset(Path(file))) if _is_netcdf(Path(file)) else None
+
+
+def _is_netcdf(file: Path) -> bool:
+    return file.suffix.lower() in (".nc", ".h5", ".hdf5")
+
+
+def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, body: Body | None = None) -> Inputs:
+    """The measurements of a CSV file (`COLUMNS`) or of a NetCDF file (as recordings are written).
+
+    Parameters
+    ----------
+    start
+        What is known of the first pose; a NetCDF file brings its own, a CSV file needs it.
+    radio
+        Turns SNRs into amplitudes, and gives standard deviations that the table lacks.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read, or a value is of a wrong unit or range; the line says which.
+    """
+    file = Path(file)
+    if _is_netcdf(file):
+        try:
+            data = read_dataset(file)
+        except StoreError:
+            what = "not a readable NetCDF file" if file.exists() else "no such file"
+            raise ConfigError(f"{file}: {what}; give one as a run folder's measurements_<scheme>.nc") from None
+        try:
+            return checked(dataset_to_inputs(data), str(file))
+        except (KeyError, ValueError, TypeError) as error:
+            raise ConfigError(
+                f"{file}: {type(error).__name__} {str(error)[:80]}; give one as a run folder's measurements_<scheme>.nc"
+            ) from None
+    table = _read_csv(file)
+    if start is None:
+        raise ConfigError(f"{file}: a CSV file does not say where the agent starts; give --start X,Y,Z")
+    return inputs_of(table, start, radio, body, place=str(file))
+
+
+def inputs_of(
+    table: Mapping[str, Any], start: StartPrior, radio: RadioConfig, body: Body | None = None, *, place: str = "table"
+) -> Inputs:
+    """The measurements of a table: a mapping (or a data frame) from names of `COLUMNS` to arrays, a row a component.
+
+    Raises
+    ------
+    ConfigError
+        A column is unknown, missing, or has a value of a wrong unit or range.
+    """
+    columns = {str(name): _numbers(table[name], str(name), place) for name in table}
+    _check_names(columns, place)
+    time = columns["time_s"]
+    if not np.isfinite(time).all() or (np.diff(time) < 0.0).any():
+        raise ConfigError(f"{place}: time_s: not in order; sort the rows by time")
+    cycles, cycle = np.unique(time, return_inverse=True)
+    for name in ("delay_s", "heading_rad"):
+        if np.isinf(columns.get(name, 0.0)).any():
+            raise ConfigError(f"{place}: {name}: infinite; give a number, or leave the field empty")
+    heard = np.isfinite(columns["delay_s"])
+    filled = _filled({name: column[heard] for name, column in columns.items()}, radio, place)
+    probability = filled.get("panel_probability")
+    measurements = []
+    for number in range(len(cycles)):
+        rows = cycle[heard] == number
+        parts = {name: filled[name][rows] for name in _PARTS}
+        measurements.append(Measurement(**parts, from_panel=None if probability is None else probability[rows]))
+    first = np.searchsorted(cycle, np.arange(len(cycles)))
+    heading = columns.get("heading_rad", np.zeros(len(time)))[first]
+    if not np.isfinite(heading).all():
+        raise ConfigError(f"{place}: heading_rad: empty in cycle {int(np.argmin(np.isfinite(heading)))}; fill it")
+    if np.abs(heading).max() > 2.0 * np.pi:
+        raise ConfigError(
+            f"{place}: heading_rad: {np.abs(heading).max():g} is more than a turn; give radians, not degrees"
+        )
+    if "heading_rad" in columns:  # the compass shows the first heading, too
+        start = replace(start, heading=float(heading[0]))
+    nothing = (None,) * len(cycles)
+    made = Inputs(start, body or Body(), None, cycles - cycles[0], heading, tuple(measurements), nothing)
+    return checked(made, place)
+
+
+def checked(inputs: Inputs, place: str) -> Inputs:
+    """The inputs, if units and ranges are such as a room has.
+
+    Raises
+    ------
+    ConfigError
+        They are not.
+    """
+    for cycle, one in enumerate(inputs.measurements):
+        where = f"{place}: cycle {cycle}"
+        if (one.tau > LONGEST_DELAY).any():
+            raise ConfigError(
+                f"{where}: delay of {one.tau.max():g} s received; delays are in seconds, a room's below "
+                f"{LONGEST_DELAY:g} (were these nanoseconds, or metres?)"
+            )
+        if (one.tau < 0.0).any():  # 0: a false component at the edge of a receiver's window
+            raise ConfigError(f"{where}: delay of {one.tau.min():g} s received; give none below 0")
+        reach = np.abs(one.cosines).max(initial=0.0)
+        if reach > 1.0:
+            raise ConfigError(f"{where}: cosine of {reach:g} received; give direction cosines from -1 to 1, not angles")
+        squares = np.sum(one.cosines**2, axis=-1).max(initial=0.0)
+        if squares > 1.0 + ROUNDING:
+            raise ConfigError(
+                f"{where}: cosines whose squares sum to {squares:g} received, which no direction has; give at most 1 "
+                "(bring estimates beyond the horizon back to it)"
+            )
+        for name in ("tau_std", "cosines_std", "amplitude", "amplitude_std"):
+            value = getattr(one, name)
+            if not (np.isfinite(value) & (value > 0.0)).all():
+                raise ConfigError(f"{where}: {name} of {value.min():g} received; give positive, finite numbers")
+        if (one.tau_std < FINEST_STD).any():
+            raise ConfigError(f"{where}: tau_std of {one.tau_std.min():g} s received; give seconds")
+    if (np.diff(inputs.time) <= 0.0).any():
+        raise ConfigError(f"{place}: time: not increasing; give each cycle its own")
+    return inputs
+
+
+_PARTS = ("tau", "cosines", "amplitude", "tau_std", "cosines_std", "amplitude_std")
+
+
+def _numbers(column: Any, name: str, place: str) -> Floats:
+    if np.iscomplexobj(column):
+        raise ConfigError(f"{place}: {name}: complex numbers received; give real ones (amplitude: the modulus)")
+    try:
+        return np.asarray(column, dtype=np.float64).reshape(-1)
+    except (TypeError, ValueError):
+        raise ConfigError(f"{place}: {name}: not numbers; mend the column") from None
+
+
+def _check_names(columns: Mapping[str, Floats], place: str) -> None:
+    for name in columns:
+        if name not in COLUMNS:
+            raise ConfigError(f"{place}: {name}: unknown column; the known ones are {', '.join(COLUMNS)}")
+    for needed in (
+        ("time_s",),
+        ("delay_s",),
+        ("cos_x", "theta_r_rad"),
+        ("cos_y", "phi_r_rad"),
+        ("amplitude", "snr_db"),
+    ):
+        if not any(name in columns for name in needed):
+            raise ConfigError(f"{place}: {' or '.join(needed)}: column missing; add it")
+        if len(needed) == 2 and all(name in columns for name in needed):
+            raise ConfigError(f"{place}: {' and '.join(needed)}: columns that say the same; leave one out")
+    if ("cos_x" in columns) != ("cos_y" in columns):
+        raise ConfigError(f"{place}: a cosine beside an angle; give cos_x and cos_y, or theta_r_rad and phi_r_rad")
+    lengths = {len(column) for column in columns.values()}
+    if len(lengths) > 1:
+        raise ConfigError(f"{place}: columns of different lengths ({sorted(lengths)}); give a row a component")
+    if lengths == {0}:
+        raise ConfigError(f"{place}: no rows; give at least one cycle")
+
+
+def _filled(columns: Mapping[str, Floats], radio: RadioConfig, place: str) -> dict[str, Floats]:
+    """The parts of measurements, what is left out worked out from the SNR."""
+    if "amplitude" in columns:
+        amplitude = columns["amplitude"]
+        with np.errstate(over="ignore"):
+            snr = radio.integrated_snr(amplitude)
+    else:
+        with np.errstate(over="ignore"):  # infinity is refused below
+            snr = np.power(10.0, columns["snr_db"] / 10.0)
+        amplitude = np.sqrt(snr * radio.noise_psd / (radio.array.num_antennas * radio.energy))
+    if "cos_x" in columns and "cos_y" in columns:
+        cosines = np.stack([columns["cos_x"], columns["cos_y"]], axis=-1)
+    else:
+        theta, phi = columns["theta_r_rad"], columns["phi_r_rad"]
+        if (np.abs(theta) > np.pi).any() or (np.abs(phi) > 2.0 * np.pi).any():
+            raise ConfigError(f"{place}: theta_r_rad, phi_r_rad: beyond a full turn; give radians, not degrees")
+        if (theta < 0.0).any() or (theta > 0.5 * np.pi).any():
+            raise ConfigError(
+                f"{place}: theta_r_rad: outside 0 to pi/2; a zenith angle of rays from above, which a planar array "
+                "cannot tell from their mirror images below: leave others out"
+            )
+        cosines = np.sin(theta)[:, None] * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
+    bound = measurement_std(snr, radio)
+    std = np.stack(
+        [columns.get(name, bound.cosines[:, axis]) for axis, name in enumerate(("cos_x_std", "cos_y_std"))], axis=-1
+    )
+    found = {
+        "tau": columns["delay_s"],
+        "cosines": cosines,
+        "amplitude": amplitude,
+        "tau_std": columns.get("delay_std_s", bound.tau),
+        "cosines_std": std,
+        "amplitude_std": columns.get("amplitude_std", np.full(len(snr), amplitude_std(radio))),
+    }
+    for name, value in found.items():
+        if not np.isfinite(value).all():
+            raise ConfigError(
+                f"{place}: {name}: not a finite number in row {int(np.argwhere(~np.isfinite(value))[0][0])}"
+            )
+    if "panel_probability" in columns:
+        found["panel_probability"] = probability = columns["panel_probability"]
+        if not ((probability >= 0.0) & (probability <= 1.0)).all():
+            raise ConfigError(f"{place}: panel_probability: not from 0 to 1, or empty; mend the column")
+    return found
+
+
+def _read_csv(file: Path) -> dict[str, list[float]]:
+    """Columns by name; an empty field is NaN."""
+    try:
+        with file.open(newline="", encoding="utf-8-sig") as lines:
+            reader = csv.DictReader(lines)
+            names = [name.strip() for name in reader.fieldnames or ()]
+            rows = list(reader)
+    except FileNotFoundError:
+        raise ConfigError(f"{file}: no such file; give a CSV or NetCDF file of measurements") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ConfigError(f"{file}: cannot be read ({str(error)[:80]}); give a CSV file in UTF-8") from None
+    if not rows:
+        raise ConfigError(f"{file}: no rows; give a header and a row a component")
+    if len(set(names)) < len(names):
+        raise ConfigError(f"{file}: line 1: a column is there twice; leave one out")
+    table: dict[str, list[float]] = {}
+    for number, row in enumerate(rows, start=2):
+        for name, text in row.items():
+            if name is None or text is None:
+                raise ConfigError(f"{file}: line {number}: another number of fields than the header; mend it")
+            try:
+                table.setdefault(name.strip(), []).append(float(text) if text.strip() else np.nan)
+            except ValueError:
+                raise ConfigError(f"{file}: line {number}: {name}: '{text[:40]}' is no number; mend it") from None
+    return table

@@ -1,0 +1,165 @@
+"""What an estimator was given, cycle by cycle, and what it answered: so that others can be given the same."""
+
+from collections.abc import Mapping, Sequence
+from time import process_time
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SlamEstimate, empty_map
+from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
+from rislam_rt.pipeline.recordings.inputs import Inputs
+from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.told import tell_settings
+from rislam_rt.slam import StartPrior
+from rislam_rt.toml import put_dotted
+
+
+class Answers(NamedTuple):
+    """What an estimator made of them."""
+
+    estimates: tuple[SlamEstimate, ...]
+    """(K,)."""
+    infos: tuple[Any, ...]
+    """(K,) diagnostics; of each, `landmark` and `outcome` are read."""
+    seconds: float
+    """CPU time [s] of a cycle, step and estimate."""
+
+
+class Report(NamedTuple):
+    """What is read of an estimator's diagnostics."""
+
+    landmark: Integers
+    """(M,) number of the landmark that each component went to, -1 for none."""
+    outcome: str = "ok"
+    """`diverged` where the estimator holds itself for lost."""
+
+
+def answers_from_arrays(
+    inputs: Inputs,
+    position: Floats,
+    covariance: Floats | None = None,
+    maps: Sequence[MapEstimate] | None = None,
+    lost: Booleans | None = None,
+    landmark: Sequence[Integers] | None = None,
+) -> Answers:
+    """The answers of an estimator that is none of this package's, from plain arrays.
+
+    Parameters
+    ----------
+    position
+        (K, 3) [m].
+    covariance
+        (K, 3, 3) of the position [m^2]; without it there is no NEES.
+    maps
+        (K,) one a cycle, or the last one alone; without them nothing is found.
+    lost
+        (K,) whether it holds itself for lost.
+    landmark
+        (K,) numbers (M,) of the landmarks, as in the maps, that each cycle's components were taken for.
+    """
+    cycles, known = len(position), list(maps or [])
+    found = (cycles - len(known)) * [empty_map()] + known
+    spread = np.zeros((cycles, 6, 6))
+    if covariance is not None:
+        spread[:, :3, :3] = covariance
+    estimates = [
+        SlamEstimate(place, np.zeros(3), float(heading), cov, np.zeros((0, 3)), inputs.body, one)
+        for place, heading, cov, one in zip(position, inputs.heading, spread, found, strict=True)
+    ]
+    none = [np.full(len(m), -1) for m in inputs.measurements]
+    said = np.zeros(cycles, dtype=np.bool_) if lost is None else lost
+    infos = [Report(np.asarray(own), "diverged" if s else "ok") for own, s in zip(landmark or none, said, strict=True)]
+    return Answers(tuple(estimates), tuple(infos), 0.0)
+
+
+class Recorder:
+    """An estimator that remembers what passes through it."""
+
+    def __init__(self, inner: Estimator) -> None:
+        self.inner = inner
+        self.begin: tuple[StartPrior, Body, DataSheet | None]
+        self.steps: list[tuple[Measurement, RisCode | None, float, float]] = []
+        self.estimates: list[SlamEstimate] = []
+        self.infos: list[Any] = []
+        self.seconds = 0.0
+
+    @property
+    def estimator(self) -> Estimator:
+        """To be used in the inner one's place."""
+        return self.inner._replace(init=self._init, step=self._step, estimate=self._estimate)
+
+    @property
+    def inputs(self) -> Inputs:
+        """What the estimator was given."""
+        measurements, codes, dt, heading = zip(*self.steps, strict=True)
+        return Inputs(*self.begin, np.cumsum(dt), np.array(heading, dtype=np.float64), measurements, codes)
+
+    @property
+    def answers(self) -> Answers:
+        """What it answered."""
+        return Answers(tuple(self.estimates), tuple(self.infos), self.seconds / max(len(self.steps), 1))
+
+    def _init(
+        self, start: StartPrior, body: Body, panel: DataSheet | None, *settings: Any, rng: np.random.Generator
+    ) -> Any:
+        self.begin = (start, body, panel)
+        return self.inner.init(start, body, panel, *settings, rng=rng)
+
+    def _step(
+        self, state: Any, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: Any,
+        *, rng: np.random.Generator,
+    ) -> Any:  # fmt: skip
+        self.steps.append((measurement, code, dt, heading))
+        begin = process_time()
+        state, info = self.inner.step(state, measurement, code, dt, heading, config, rng=rng)
+        self.seconds += process_time() - begin
+        self.infos.append(info)
+        return state, info
+
+    def _estimate(self, state: Any, config: Any) -> SlamEstimate:
+        begin = process_time()
+        found: SlamEstimate = self.inner.estimate(state, config)
+        self.seconds += process_time() - begin
+        self.estimates.append(found)
+        return found
+
+
+def replay(
+    inputs: Inputs,
+    config: Mapping[str, Any],
+    scheme: str,
+    changes: Mapping[str, Any] | None = None,
+    estimator: Estimator | None = None,
+    *,
+    rng: np.random.Generator,
+) -> Answers:
+    """Lead an estimator through recorded inputs; nothing is traced and nothing drawn but what the estimator draws.
+
+    Codes are those of the recording: an estimator that would have designed others is scored on the same data.
+
+    Parameters
+    ----------
+    config
+        The specification of the recorded run.
+    scheme
+        Its name, which says whose estimator is run, unless `estimator` gives one.
+    changes
+        Settings by dotted key, as `slam.filter`.
+    """
+    content = dict(config)
+    for key, value in (changes or {}).items():
+        content = put_dotted(content, key, value)
+    spec = PipelineSpec.model_validate(content)
+    settings = tell_settings(build_settings(spec), spec.told)
+    recorder = Recorder(estimator or ESTIMATORS[SCHEMES[scheme].estimator])
+    run = recorder.estimator
+    own = run.config(settings)
+    state = run.init(inputs.start, inputs.body, inputs.panel, settings.sensor, own, rng=rng)
+    steps = zip(inputs.measurements, inputs.codes, np.diff(inputs.time, prepend=0.0), inputs.heading, strict=True)
+    for measurement, code, dt, heading in steps:
+        state, _ = run.step(state, measurement, code, float(dt), float(heading), own, rng=rng)
+        run.estimate(state, own)
+    return recorder.answers

@@ -1,0 +1,39 @@
+"""Checks of settings that all schemes' configurations make."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.errors import ConfigError
+
+HEIGHTS = ("known", "estimated")
+"""`known` keeps the height and the vertical velocity of the start, `estimated` filters them."""
+
+
+def check_counts(section: str, config: Any, names: Iterable[str], least: int = 1) -> None:
+    """Whole numbers of at least `least`."""
+    for name in names:
+        if getattr(config, name) < least:
+            raise ConfigError(f"{section}.{name}: {getattr(config, name)} received; give at least {least}")
+
+
+def check_inside(section: str, config: Any, names: Iterable[str], below: float, wanted: str) -> None:
+    """Numbers above zero and below a limit; None, where a setting may be left out, passes."""
+    for name in names:
+        value = getattr(config, name)
+        if value is not None and not (np.isfinite(value) and 0.0 < value < below):
+            raise ConfigError(f"{section}.{name}: {value} received; give {wanted}")
+
+
+def check_not_negative(section: str, config: Any, names: Iterable[str]) -> None:
+    """Finite numbers of zero or more."""
+    for name in names:
+        if not 0.0 <= getattr(config, name) < np.inf:
+            raise ConfigError(f"{section}.{name}: {getattr(config, name)} received; give a number that is not negative")
+
+
+def check_height(section: str, height: str) -> None:
+    """One of `HEIGHTS`."""
+    if height not in HEIGHTS:
+        raise ConfigError(f"{section}.height: '{height}' received; give 'known' or 'estimated'")

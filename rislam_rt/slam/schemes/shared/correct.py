@@ -1,0 +1,129 @@
+"""Loopy association of ranges to Gaussian sums, and the messages between the features and the agent's course.
+
+Source: Leitinger et al., arXiv 1801.04463, section V, with messages as Gaussian sums. A feature's message to the agent
+is a mixture over its Gaussians, over the ranges that it may have made, over "missed" and "does not exist"; it is
+multiplied in and the product brought back to one Gaussian of the same mean and covariance.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.schemes.shared.association import Association, associate
+from rislam_rt.slam.schemes.shared.course import Course
+from rislam_rt.slam.schemes.shared.scan import Odds, Scan
+from rislam_rt.slam.schemes.shared.sums import Sight, Sums, spread_of
+
+NO_VARIANCE = 1e12
+"""Variance [m^2] of a range that tells nothing."""
+
+
+ROUNDS, TOLERANCE = 30, 1e-3
+"""Loopy association ends at this many rounds, or as messages change by less: finer than the sums that it weighs."""
+
+
+class Pull(NamedTuple):
+    """One range in place of all that a Gaussian may have made: same mean and variance of the predicted range after."""
+
+    miss: Floats
+    """(C,) innovation [m]."""
+    variance: Floats
+    """(C,) [m^2]; `NO_VARIANCE` where ranges contradict each other, or there is none."""
+    log_factor: Floats
+    """(C,) logarithm of the factor on the Gaussian's share."""
+
+
+def claims(sums: Sums, sight: Sight, course: Course, scan: Scan, fresh: Floats, odds: Odds) -> Association:
+    """Marginals of the association of K features and M ranges."""
+    pair = np.zeros((len(sums.ident), len(scan.length)))
+    np.add.at(pair, sums.owner, sums.share[:, None] * _ratios(sight.length, spread_of(sight, course), scan, odds))
+    missed = 1.0 - sums.existence * odds.detection_probability
+    return associate(missed, sums.existence[:, None] * pair, fresh, ROUNDS, TOLERANCE)
+
+
+def _ratios(length: Floats, spread: Floats, scan: Scan, odds: Odds) -> Floats:
+    """Likelihood ratios (C, M) `p_d f(z) / clutter`."""
+    variance = spread[:, None] + scan.std**2
+    square = (scan.length - length[:, None]) ** 2 / variance
+    peak = odds.detection_probability / (odds.clutter_density * np.sqrt(2.0 * np.pi * variance))
+    return np.where(square < 60.0, np.exp(-0.5 * square), 0.0) * peak
+
+
+def absorb(sums: Sums, sight: Sight, course: Course, scan: Scan, found: Association, odds: Odds) -> tuple[Sums, Course]:
+    """Features and course after the ranges, feature by feature, the surest first."""
+    ref, edges = course.mean.copy(), np.searchsorted(sums.owner, np.arange(len(sums.ident) + 1))
+    existence, share = sums.existence.copy(), sums.share.copy()
+    pulls = np.zeros((2, len(sums.owner)))
+    for row in np.argsort(-existence, kind="stable"):
+        part = slice(edges[row], edges[row + 1])
+        by_course, own = sight.by_course[part], sight.own[part]
+        gain = by_course @ course.covariance
+        spread = own + np.einsum("cn,cn->c", gain, by_course)
+        seen = sight.length[part] + by_course @ (course.mean - ref)
+        near = (found.feature[row, :-1] > 1e-4).nonzero()[0]
+        pull = _pull(seen, spread, Scan(scan.length[near], scan.std[near]), found.to_feature[row, near], odds)
+        weight = share[part] * np.exp(pull.log_factor)
+        total = weight.sum()
+        existence[row] = existence[row] * total / (existence[row] * total + 1.0 - existence[row])
+        share[part] = weight / total
+        course = _mix(course, gain, spread + pull.variance, pull.miss, existence[row] * share[part])
+        pulls[:, part] = pull.miss + seen - sight.length[part], pull.variance
+    inner = np.einsum("cij,cj->ci", sums.covariance, sight.by_mean)
+    # products of the messages are symmetric but for rounding
+    course = course._replace(covariance=0.5 * (course.covariance + course.covariance.T))
+    gain = inner / (sight.own + pulls[1])[:, None]
+    slope = sums.slope - gain[:, :, None] * sight.by_course[:, None]
+    change = course.mean - ref
+    moved = sums._replace(
+        base=sums.base + sums.base_slope @ change,
+        walk=sums.walk + sums.walk_slope @ change,
+        existence=existence,
+        mean=sums.mean + gain * pulls[0][:, None] + slope @ change,
+        slope=slope,
+        covariance=sums.covariance - gain[:, :, None] * inner[:, None],
+        share=share,
+    )
+    return moved, course
+
+
+def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds) -> Pull:
+    """What C Gaussians of one feature learn: moments over the ranges and "missed", as one range."""
+    ratio = _ratios(seen, spread, scan, odds) * message
+    none = 1.0 - odds.detection_probability
+    total = none + ratio.sum(axis=1)
+    belief = ratio / total[:, None]
+    shrink = spread[:, None] / (spread[:, None] + scan.std**2)
+    shift = shrink * (scan.length - seen[:, None])
+    mean = (belief * shift).sum(axis=1)
+    after = (none / total) * spread + (belief * (spread[:, None] * (1.0 - shrink) + shift**2)).sum(axis=1) - mean**2
+    told = after < (1.0 - 1e-9) * spread
+    lost = np.where(told, 1.0 - after / spread, 1.0)
+    variance = np.where(told, np.maximum(after, 1e-18) / lost, NO_VARIANCE)
+    miss = np.where(told, mean * (spread + variance) / spread, 0.0)
+    return Pull(miss, variance, np.log(total))
+
+
+def _mix(course: Course, gain: Floats, variance: Floats, miss: Floats, weight: Floats) -> Course:
+    """Course after one feature's message: moments over its Gaussians; the rest of the weight changes nothing."""
+    rows = np.flatnonzero(weight > 1e-4)
+    if not len(rows):
+        return course
+    weight, miss, variance = weight[rows], miss[rows], variance[rows]
+    part = gain[rows] / variance[:, None]
+    mean = (weight * miss) @ part
+    parts = np.concatenate([part, mean[None]])
+    scale = np.concatenate([weight * (miss**2 - variance), [-1.0]])
+    return course._replace(mean=course.mean + mean, covariance=course.covariance + (parts.T * scale) @ parts)
+
+
+def newborn(found: Association, fresh: Floats, birth_threshold: float) -> tuple[Integers, Floats]:
+    """Rows of the ranges that start a feature, and its probability of existing."""
+    alive = found.unclaimed * (fresh - 1.0) / fresh
+    rows = np.flatnonzero(alive >= birth_threshold)
+    return rows, alive[rows]
+
+
+def is_strong(ratio: Floats, specular_ratio: float | None) -> Booleans:
+    """(M,) whether a component is as strong as only a wall return is."""
+    return ratio > (np.inf if specular_ratio is None else specular_ratio)

@@ -1,0 +1,88 @@
+"""What both rivals hand on: the pose over all turns and mirror images, and their features as points of a map."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.model import Body, MapEstimate, SlamEstimate
+from rislam_rt.slam.schemes.shared.course import Course
+from rislam_rt.slam.schemes.shared.gauge import over_all_turns
+from rislam_rt.slam.schemes.shared.sums import POINT, Sums, unit_of
+
+STEP = 1e-6
+"""Step of central differences [m, 1, rad]."""
+
+
+class Points(NamedTuple):
+    """V features that are points, where the filter works."""
+
+    ident: Integers
+    """(V,)."""
+    mean: Floats
+    """(V, 3) [m]."""
+    covariance: Floats
+    """(V, 3, 3) [m^2]."""
+
+    def keep(self, rows: Booleans) -> "Points":
+        """Some of them."""
+        return Points._make(column[rows] for column in self)
+
+
+def lift(known: Floats, height: Floats) -> Floats:
+    """(2, 3) position and velocity of the numbers (4,) or (6,) that are filtered, and `height` (2,) if they lack it."""
+    known = known.reshape(2, -1)
+    return known if known.shape[1] == 3 else np.concatenate([known, height[:, None]], axis=1)
+
+
+def reported(
+    course: Course, height: Floats, heading: float, body: Body, points: Points, num_samples: int
+) -> SlamEstimate:
+    """Mean and covariance of the pose, samples of it, and the map."""
+    belief, axes = over_all_turns(course), course.axes
+    position, velocity = lift(belief.mean, height)
+    rows = np.r_[0:axes, 3 : 3 + axes]
+    covariance = np.zeros((6, 6))
+    covariance[np.ix_(rows, rows)] = belief.covariance
+    # the same draws in every cycle: the samples move smoothly, and nothing depends on who drew before
+    draws = np.random.default_rng(0).standard_normal((num_samples, 3))
+    value, vector = np.linalg.eigh(covariance[:3, :3])
+    samples = position + draws @ (vector * np.sqrt(np.maximum(value, 0.0))).T
+    samples[:, axes:] = position[axes:]
+    return SlamEstimate(position, velocity, heading, covariance, samples, body, _map(points))
+
+
+def ahead_of(now: SlamEstimate, dt: float) -> SlamEstimate:
+    """The belief carried over `dt` [s] without noise."""
+    move, way = np.eye(6), dt * now.velocity
+    move[:3, 3:] = dt * np.eye(3)
+    covariance = move @ now.covariance @ move.T
+    return replace(now, position=now.position + way, covariance=covariance, samples=now.samples + way)
+
+
+def known_points(sums: Sums, threshold: float) -> Points:
+    """Features that exist and are rather points than walls or wanderers, with the moments of their sums."""
+    count, point = len(sums.ident), sums.kind == POINT
+    held = np.bincount(sums.owner[point], sums.share[point], minlength=count)
+    shown = np.flatnonzero((sums.existence > threshold) & (held > 0.5))
+    part = np.flatnonzero(point & np.isin(sums.owner, shown))
+    owner = sums.owner[part]
+    row, share = np.searchsorted(shown, owner), sums.share[part] / held[owner]
+    moved = sums.mean[part] + STEP * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])[:, None]
+    place = sums.base[owner] + moved[..., :1] * unit_of(moved, sums.walk[owner], sums.speed[owner])
+    jacobian = np.moveaxis(place[1:4] - place[4:], 0, 2) / (2.0 * STEP)
+    mean, covariance = np.zeros((len(shown), 3)), np.zeros((len(shown), 3, 3))
+    np.add.at(mean, row, share[:, None] * place[0])
+    apart = place[0] - mean[row]
+    own = jacobian @ sums.covariance[part] @ jacobian.swapaxes(1, 2) + apart[:, :, None] * apart[:, None]
+    np.add.at(covariance, row, share[:, None, None] * own)
+    return Points(sums.ident[shown], mean, covariance)
+
+
+def _map(points: Points) -> MapEstimate:
+    count = len(points.ident)
+    return MapEstimate(
+        points.ident, points.mean, points.covariance, np.full(count, -1), np.zeros(count), np.zeros(count),
+        np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2)),
+    )  # fmt: skip

@@ -1,0 +1,233 @@
+"""Potential features as Gaussian sums given the agent's course; their ranges, birth, motion and pruning.
+
+A Gaussian holds three numbers about the place where the agent was at the feature's birth: distance, angle off the
+direction that it walked in, and turn about that direction. On a straight walk ranges tell the first two and never the
+third; in these coordinates the belief stays Gaussian while it shrinks along two axes only.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.schemes.shared.course import Course, Step
+from rislam_rt.slam.schemes.shared.ranges import Bistatic, length_of
+
+POINT, PLANE, DRIFT = 0, 1, 2
+"""What a Gaussian holds its feature for: a point that stays, a wall (the image of the Tx moves), or a point that
+wanders, as a path over a wall and a scatterer seems to."""
+
+NUDGE = 1e-5
+"""Step of central differences [m, m/s]."""
+LEAST_SPEED = 1e-3
+"""An agent that stands counts as one this fast [m/s]."""
+LEAST_ACROSS = 1e-4
+"""Smallest squared sine, for cosines that a Gaussian has beyond one."""
+UPRIGHT, UPRIGHT_STD = (0.0, 0.5 * np.pi, np.pi), 0.02
+"""Turns of walls and of the ceiling about a level walk, and how far off they may be [rad]."""
+
+
+STRONG_KINDS = np.array([0.2, 0.5, 0.3])
+"""Probabilities of point, wall and wanderer for a path as strong as a wall return; a corner of two walls returns like a
+point."""
+
+
+def kinds_of(strong: Booleans, wanderers: float) -> Floats:
+    """(M, 3) probabilities of point, wall and wanderer for new features of strong and of weak paths."""
+    return np.where(strong[:, None], STRONG_KINDS, np.array([1.0 - wanderers, 0.0, wanderers]))
+
+
+def axes_filtered(height: str) -> Floats:
+    """(3,) ones for the axes that a filter filters, with a height that is `known` or `estimated`."""
+    return np.array([1.0, 1.0, 1.0 if height == "estimated" else 0.0])
+
+
+class Sums(NamedTuple):
+    """C Gaussians of K potential features, those of one feature side by side; the course has n numbers."""
+
+    base: Floats
+    """(K, 3) mean of the agent's position at the birth [m]."""
+    base_slope: Floats
+    """(K, 3, n) by how much it moves with the course."""
+    walk: Floats
+    """(K, 3) mean of the agent's velocity at the birth [m/s]."""
+    walk_slope: Floats
+    """(K, 3, n)."""
+    speed: Floats
+    """(K,) what was taken for its horizontal speed then [m/s]; a unit of the second number, and never changed."""
+    existence: Floats
+    """(K,)."""
+    ident: Integers
+    """(K,) number for life."""
+    owner: Integers
+    """(C,) row of the feature, ascending."""
+    kind: Integers
+    """(C,) POINT, PLANE or DRIFT."""
+    mean: Floats
+    """(C, 3) distance [m], angle and turn [rad], with the course at its mean."""
+    slope: Floats
+    """(C, 3, n)."""
+    covariance: Floats
+    """(C, 3, 3) given the course."""
+    share: Floats
+    """(C,) shares of one feature sum to one."""
+
+
+class Sight(NamedTuple):
+    """Ranges that C Gaussians predict, to first order in all and to second in the angles."""
+
+    length: Floats
+    """(C,) [m], curvature included."""
+    by_mean: Floats
+    """(C, 3)."""
+    by_course: Floats
+    """(C, n), through the agent and through the feature."""
+    own: Floats
+    """(C,) variance given the course [m^2]."""
+
+
+def no_sums(size: int) -> Sums:
+    """None yet."""
+    none, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
+    rows, slopes = np.zeros((0, 3)), np.zeros((0, 3, size))
+    return Sums(
+        rows, slopes, rows, slopes, none, none, whole, whole, whole, rows, slopes, np.zeros((0, 3, 3)), none
+    )  # fmt: skip
+
+
+def carry(sums: Sums, step: Step, wander: Floats) -> Sums:
+    """The same beliefs about a new course; Gaussians of kind DRIFT widen by standard deviations `wander` (3,)."""
+    width = len(step.residual)
+    covariance = sums.covariance.copy()
+    missed = sums.slope[:, :, :width]
+    covariance += missed @ step.residual @ missed.swapaxes(1, 2)
+    lost = sums.base_slope[:, :, :width]
+    covariance[:, 0, 0] += np.einsum("kia,ab,kib->k", lost, step.residual, lost)[sums.owner]
+    covariance[sums.kind == DRIFT] += np.diag(wander**2)
+    return sums._replace(
+        slope=sums.slope @ step.transfer,
+        base_slope=sums.base_slope @ step.transfer,
+        walk_slope=sums.walk_slope @ step.transfer,
+        covariance=covariance,
+    )
+
+
+def axes_of(walk: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors (..., 3) along walks (..., 3) and level across them, and their horizontal speeds (...,)."""
+    speed = np.sqrt(walk[..., 0] ** 2 + walk[..., 1] ** 2 + LEAST_SPEED**2)
+    ahead = np.stack([walk[..., 0], walk[..., 1], np.zeros_like(speed)], axis=-1) / speed[..., None]
+    aside = np.stack([-ahead[..., 1], ahead[..., 0], np.zeros_like(speed)], axis=-1)
+    return np.stack([ahead, aside], axis=-2), speed
+
+
+def unit_of(mean: Floats, walk: Floats, usual: Floats) -> Floats:
+    """Directions (..., 3) of features; of unit length where the cosine is one of an angle."""
+    axes, speed = axes_of(walk)
+    cosine = mean[..., 1] * usual / speed
+    across = np.sqrt(np.maximum(1.0 - cosine**2, LEAST_ACROSS))
+    level = axes[..., 0, :] * cosine[..., None] + axes[..., 1, :] * (across * np.cos(mean[..., 2]))[..., None]
+    level[..., 2] += across * np.sin(mean[..., 2])
+    return np.asarray(level)
+
+
+def lengths(kind: Integers, mean: Floats, walk: Floats, usual: Floats, moved: Floats, model: Bistatic) -> Floats:
+    """Ranges (..., C) [m] with the agent `moved` (..., C, 3) from the base, where it had the velocity `walk`.
+
+    The law of cosines takes cosines beyond one without a bend, which a Gaussian has on its rim.
+    """
+    unit, distance = unit_of(mean, walk, usual), mean[..., 0]
+    static = _leg(distance, unit, moved + model.tx) + _leg(distance, unit, moved + model.rx)
+    depth = 2.0 * (distance - np.sum(unit * (moved + model.tx), axis=-1))
+    image = length_of(model.tx - model.rx + depth[..., None] * unit)
+    return np.where(kind == PLANE, image, static)
+
+
+def _leg(distance: Floats, unit: Floats, end: Floats) -> Floats:
+    square = distance**2 - 2.0 * distance * np.sum(unit * end, axis=-1) + np.sum(end**2, axis=-1)
+    return np.asarray(np.sqrt(np.maximum(square, 1e-4)))
+
+
+def look(sums: Sums, course: Course, place: Floats, model: Bistatic) -> Sight:
+    """Ranges of all Gaussians from the present position `place` (3,), by central differences."""
+    owner, kind, mean = sums.owner, sums.kind, sums.mean
+    spread = np.sum((sums.slope @ course.covariance) * sums.slope, axis=2)
+    std = np.sqrt(np.maximum(np.einsum("cii->ci", sums.covariance) + spread, 1e-14))
+    walk, usual, moved = sums.walk[owner], sums.speed[owner], place - sums.base[owner]
+    nudge = np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    seen = lengths(kind, mean + nudge[:, None] * std, walk, usual, moved, model)
+    shift = NUDGE * np.concatenate([np.eye(3), -np.eye(3)])[:, None]
+    aside = lengths(kind, mean, walk, usual, moved + shift, model)
+    faster = lengths(kind, mean, walk + shift, usual, moved, model)
+    by_place, by_walk = ((side[:3] - side[3:]).T / (2.0 * NUDGE) for side in (aside, faster))
+    by_mean = ((seen[1:4] - seen[4:]) / (2.0 * std.T)).T
+    bend = (seen[1:4] + seen[4:] - 2.0 * seen[0]).T
+    here = -sums.base_slope[owner]
+    here[:, range(course.axes), range(course.axes)] += 1.0
+    by_course = np.einsum("ci,cin->cn", by_place, here) + np.einsum("ci,cin->cn", by_mean, sums.slope)
+    by_course += np.einsum("ci,cin->cn", by_walk, sums.walk_slope[owner])
+    blind = course.turn()
+    by_course -= np.outer(by_course @ blind, blind)
+    own = np.einsum("ci,cij,cj->c", by_mean, sums.covariance, by_mean) + 0.5 * np.sum(bend**2, axis=1)
+    return Sight(seen[0] + 0.5 * bend.sum(axis=1), by_mean, by_course, own)
+
+
+def spread_of(sight: Sight, course: Course) -> Floats:
+    """Variance (C,) of predicted ranges [m^2]."""
+    return np.asarray(sight.own + np.sum((sight.by_course @ course.covariance) * sight.by_course, axis=1))
+
+
+def born(
+    length: Floats, std: Floats, kinds: Floats, existence: Floats, course: Course, place: Floats, turns: int,
+    first: int,
+) -> Sums:  # fmt: skip
+    """One new feature a range, over all directions of the upper half space; `kinds` (M, 3) are shares of the kinds."""
+    count, size = len(length), len(course.mean)
+    speed = np.zeros(3)
+    speed[: course.axes] = course.mean[course.axes : 2 * course.axes]
+    turn = (np.arange(turns) + 0.5) * np.pi / turns
+    direction = np.concatenate([turn, np.array(UPRIGHT), [0.5 * np.pi]])
+    kind = np.repeat([POINT, PLANE, DRIFT], [turns, len(UPRIGHT), 1])
+    spread = np.repeat([0.5 * np.pi / turns if turns > 1 else 0.9, UPRIGHT_STD, 0.5], [turns, len(UPRIGHT), 1])
+    prior = 1.0 / np.bincount(kind)[kind]
+    mean = np.zeros((count, len(kind), 3))
+    mean[..., 0], mean[..., 2] = 0.5 * length[:, None], direction
+    covariance = np.zeros((count, len(kind), 3, 3))
+    covariance[..., 0, 0] = (0.5 * std[:, None]) ** 2
+    covariance[..., 1, 1], covariance[..., 2, 2] = 1.0 / 3.0, spread**2
+    share = kinds[:, kind] * prior
+    used = (share > 0.0).ravel()
+    base_slope = np.zeros((count, 3, size))
+    base_slope[:, range(course.axes), range(course.axes)] = 1.0
+    walk_slope = np.zeros((count, 3, size))
+    walk_slope[:, range(course.axes), range(course.axes, 2 * course.axes)] = 1.0
+    total = int(used.sum())
+    return Sums(
+        np.tile(place, (count, 1)), base_slope, np.tile(speed, (count, 1)), walk_slope,
+        np.full(count, axes_of(speed)[1]), existence, first + np.arange(count),
+        np.repeat(np.arange(count), len(kind))[used], np.tile(kind, count)[used], mean.reshape(-1, 3)[used],
+        np.zeros((total, 3, size)), covariance.reshape(-1, 3, 3)[used], share.ravel()[used],
+    )  # fmt: skip
+
+
+def join(one: Sums, other: Sums) -> Sums:
+    """Both."""
+    moved = other._replace(owner=other.owner + len(one.ident))
+    return Sums._make(np.concatenate(pair) for pair in zip(one, moved, strict=True))
+
+
+def prune(sums: Sums, least_existence: float, least_share: float, most: int) -> Sums:
+    """Without improbable features, and without Gaussians of small share; every feature keeps its best."""
+    count = len(sums.ident)
+    rank = np.argsort(np.argsort(-sums.existence, kind="stable"), kind="stable")
+    keep = (sums.existence >= least_existence) & (rank < most)
+    best = np.zeros(count)
+    np.maximum.at(best, sums.owner, sums.share)
+    rows = keep[sums.owner] & ((sums.share >= least_share) | (sums.share >= best[sums.owner]))
+    number = np.cumsum(keep) - 1
+    owner = number[sums.owner[rows]]
+    total = np.bincount(owner, sums.share[rows], minlength=int(keep.sum()))
+    return Sums(
+        sums.base[keep], sums.base_slope[keep], sums.walk[keep], sums.walk_slope[keep], sums.speed[keep],
+        sums.existence[keep], sums.ident[keep], owner, sums.kind[rows], sums.mean[rows], sums.slope[rows],
+        sums.covariance[rows], sums.share[rows] / total[owner],
+    )  # fmt: skip

@@ -1,0 +1,92 @@
+"""One process at a time in a folder.
+
+The lock is the kernel's (`flock`), which ends with the process however that ends: one that died leaves a file behind,
+and the next takes it over. The file says who holds it.
+"""
+
+import fcntl
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from rislam_rt.errors import ConfigError
+from rislam_rt.storage.files import refused
+
+LOCK_FILE = ".rislam-rt-lock"
+
+
+@contextmanager
+def hold(folder: Path, what: str) -> Iterator[None]:
+    """Keep other processes out of a folder that exists; `what` is at work in it.
+
+    Raises
+    ------
+    ConfigError
+        Another process is at work there; the line says which.
+    StoreError
+        The disk refused.
+    """
+    file = folder / LOCK_FILE
+    try:
+        handle = _take(file)
+    except BlockingIOError as error:
+        other = str(error.args[0])
+        text = f"{folder}: another {what} is at work there ({other}); wait for it, or give another folder"
+        raise ConfigError(text) from None
+    except OSError as error:
+        raise refused(file, error) from None
+    try:
+        yield
+    finally:
+        # while it is held: who opened it meanwhile finds that it is no longer the file of that name, and asks again
+        with suppress(OSError):
+            file.unlink()
+        os.close(handle)
+
+
+def _take(file: Path) -> int:
+    """The open and locked file; `BlockingIOError` names who has it."""
+    while True:
+        handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+        try:
+            _lock(handle)
+            here = os.fstat(handle)
+            there = os.stat(file) if file.exists() else None
+            if there is not None and (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino):
+                _sign(handle)
+                return handle
+        except FileNotFoundError:
+            pass
+        except BaseException:
+            os.close(handle)
+            raise
+        os.close(handle)
+
+
+def _lock(handle: int) -> None:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise BlockingIOError(_holder(handle)[0]) from None
+    except OSError:  # a file system without locks: what the file says is all there is
+        name, alive = _holder(handle)
+        if alive:
+            raise BlockingIOError(name) from None
+
+
+def _sign(handle: int) -> None:
+    with suppress(OSError):  # a full disk: the lock holds without a name
+        os.ftruncate(handle, 0)
+        os.pwrite(handle, json.dumps({"pid": os.getpid(), "host": os.uname().nodename}).encode(), 0)
+
+
+def _holder(handle: int) -> tuple[str, bool]:
+    """Who holds the lock, and whether it lives as far as this machine can tell."""
+    try:
+        said = json.loads(os.pread(handle, 1000, 0))
+        pid, host = int(said["pid"]), str(said["host"])[:80]
+    except (ValueError, KeyError, TypeError):
+        return "a process that has not yet said its number", False
+    return f"process {pid} on {host}", host != os.uname().nodename or Path(f"/proc/{pid}").exists()

@@ -1,0 +1,108 @@
+"""Gather examples in random rooms, train and choose on them, and score once on the named rooms."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.model import Scene
+from rislam_rt.pipeline.run import Progress
+from rislam_rt.slam.classify import Network
+from rislam_rt.studies.classifier.gather import Examples
+from rislam_rt.studies.classifier.score import (
+    Score,
+    f1,
+    importance,
+    mean_over_rooms,
+    right_by_class,
+    rules,
+    score,
+)
+from rislam_rt.studies.classifier.sets import Sets, gather_sets
+from rislam_rt.studies.classifier.spec import ClassifierSpec
+from rislam_rt.studies.classifier.train import train_network
+
+ALL, DRAWN, RANDOM = "all test rooms", "drawn rooms", "random rooms (validation)"
+
+
+class Training(NamedTuple):
+    """The network and what it is worth."""
+
+    network: Network
+    sets: Sets
+    scores: dict[str, dict[str, Score]]
+    """By named room (and `ALL`, `DRAWN`, `RANDOM`), by rule."""
+    mean: dict[str, Floats]
+    """Mean (3,) over the test rooms' F1 with its interval, by rule."""
+    restarts: list[tuple[float, float]]
+    """Of each random start's network: mean over the path classes of the share told rightly on the random rooms for
+    validation, which chooses, and F1 on all test rooms."""
+    importance: dict[str, Floats]
+    """Loss of F1 on all test rooms, feature by feature, several shuffles each."""
+
+
+def run_training(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Progress | None = None) -> Training:
+    """Everything that a specification asks for; its seed decides all draws.
+
+    Raises
+    ------
+    SceneError
+        A room is too full for random walks.
+    TraceError, SetupError
+        The traced channel failed, or the machine lacks what it needs.
+    """
+    return train_and_score(gather_sets(scenes, spec, progress=progress), spec)
+
+
+def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:
+    """Fit from several random starts, keep the best on the validation rooms, score it on all."""
+    starts = np.random.default_rng(spec.seed).spawn(spec.network.restarts)
+    networks = [_fit(sets.train, spec, rng=child) for child in starts]
+    tested = sets.tested
+    restarts = [(right_by_class(sets.validation, rules(net)["network"]), _f1_of(tested, net)) for net in networks]
+    network = networks[int(np.argmax([chosen for chosen, _ in restarts]))]
+    places = {**sets.test, ALL: tested, DRAWN: sets.all_drawn, RANDOM: sets.validation}
+    judges = rules(network)
+    scores = {
+        name: {
+            rule: score(examples, judge, spec.coverage, rng=np.random.default_rng(spec.seed))
+            for rule, judge in judges.items()
+        }
+        for name, examples in places.items()
+    }
+    filled = [examples for examples in sets.test.values() if examples.keep.any()]
+    mean = {
+        rule: mean_over_rooms(filled, judge, spec.coverage, rng=np.random.default_rng(spec.seed))
+        for rule, judge in judges.items()
+    }
+    lost = importance(tested, network, rng=np.random.default_rng(spec.seed))
+    return Training(network, sets, scores, mean, restarts, lost)
+
+
+def _fit(examples: Examples, spec: ClassifierSpec, *, rng: np.random.Generator) -> Network:
+    """One network from one random start."""
+    known, section = examples.pick(examples.labelled & ~examples.near), spec.network
+    return train_network(
+        known.features, known.keep, balance(known), section.hidden, section.penalty, section.iterations, rng=rng
+    )
+
+
+def balance(examples: Examples) -> Floats:
+    """Weights (N,) of examples: keep and remove count alike, and so does every path class of either, however rare.
+
+    Within a class an example counts by one over the root of its walk's number of examples.
+    """
+    _, row, count = np.unique(examples.walk, return_inverse=True, return_counts=True)
+    weight = 1.0 / np.sqrt(count[row])
+    for side in (examples.keep, ~examples.keep):
+        kinds = np.unique(examples.kind[side])
+        for kind in kinds:
+            own = examples.kind == kind
+            weight[own] *= 0.5 / (len(kinds) * weight[own].sum())
+    return np.asarray(weight)
+
+
+def _f1_of(examples: Examples, network: Network) -> float:
+    known = examples.pick(examples.labelled)
+    return f1(known.keep, rules(network)["network"](known))

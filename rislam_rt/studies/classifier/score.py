@@ -1,0 +1,181 @@
+"""How good a classifier is: F1 of "keep", intervals over walks, what each feature is worth."""
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.model import PathKind
+from rislam_rt.slam.classify import FEATURES, Network, blend, classify_geometric, log_odds
+from rislam_rt.studies.classifier.codes import POLICIES
+from rislam_rt.studies.classifier.gather import Examples
+
+AMPLITUDE_RULE = 0.35
+"""Amplitude over that of free space above which the plain rule removes (`SlamConfig.specular_ratio`)."""
+LEGS = ("", "", " reciprocal", " both legs")
+"""What a path class over walls is called by the legs they are on: none, Rx, Tx, both."""
+NUM_RESAMPLES = 1000
+NUM_SHUFFLES = 5
+
+Rule = Callable[[Examples], Booleans]
+"""Which examples are kept."""
+
+
+class Score(NamedTuple):
+    """Of one rule on one set of examples; clutter counts in `clutter_kept` alone."""
+
+    f1: float
+    """2 TP / (2 TP + FP + FN) of keep; NaN-free: 1 where there is nothing to keep and nothing was kept."""
+    low: float
+    high: float
+    precision: float
+    recall: float
+    removed: float
+    """Share of LOS and wall returns that were removed."""
+    clutter_kept: float
+    """Share of clutter that was kept."""
+
+
+def rules(network: Network) -> dict[str, Rule]:
+    """The network and what it is compared with; what is near is removed by all of them."""
+    return {
+        "network": lambda e: ~e.near & (odds_over_life(e, network) > 0.0),
+        "single": lambda e: ~e.near & (log_odds(e.features, network) > 0.0),
+        "geometric": lambda e: ~e.near & (classify_geometric(e.features) > 0.5),
+        "amplitude": lambda e: ~e.near & (e.ratio < AMPLITUDE_RULE),
+    }
+
+
+def odds_over_life(examples: Examples, network: Network) -> Floats:
+    """Log odds (N,) of keep, blended over the looks that each track has had so far."""
+    fresh = log_odds(examples.features, network)
+    found, held = np.empty(len(fresh)), dict[tuple[int, int, int], tuple[float, int]]()
+    names = zip(examples.walk.tolist(), examples.policy.tolist(), examples.track.tolist(), strict=True)
+    for row, name in enumerate(names):
+        odds, looks = held.get(name, (0.0, 0))
+        found[row] = blend(np.array(odds), np.array(looks), fresh[row])
+        held[name] = (float(found[row]), looks + 1)
+    return found
+
+
+def score(examples: Examples, rule: Rule, coverage: float, *, rng: np.random.Generator) -> Score:
+    """F1 with its interval by resampling walks, which are independent of each other as single cycles are not."""
+    kept = rule(examples)
+    labelled, tables = examples.labelled, _tables(examples, kept)
+    draws = rng.integers(len(tables), size=(NUM_RESAMPLES, len(tables)))
+    tail = 50.0 * (1.0 - coverage)
+    low, high = np.percentile(_f1(tables[draws].sum(axis=1)), [tail, 100.0 - tail])
+    hit, false, missed, right = tables.sum(axis=0)
+    clutter = kept[~labelled]
+    return Score(
+        float(_f1(tables.sum(axis=0)[None])[0]),
+        float(low),
+        float(high),
+        _share(hit, hit + false),
+        _share(hit, hit + missed),
+        _share(right, right + false),
+        float(clutter.mean()) if len(clutter) else 0.0,
+    )
+
+
+def mean_over_rooms(rooms: list[Examples], rule: Rule, coverage: float, *, rng: np.random.Generator) -> Floats:
+    """Mean (3,) of the rooms' F1 with its interval, walks resampled within each room."""
+    draws = []
+    for examples in rooms:
+        tables = _tables(examples, rule(examples))
+        picks = rng.integers(len(tables), size=(NUM_RESAMPLES, len(tables)))
+        draws.append(np.append(_f1(tables[picks].sum(axis=1)), _f1(tables.sum(axis=0)[None])))
+    mean = np.mean(draws, axis=0)
+    tail = 50.0 * (1.0 - coverage)
+    return np.array([mean[-1], *np.percentile(mean[:-1], [tail, 100.0 - tail])])
+
+
+def importance(examples: Examples, network: Network, *, rng: np.random.Generator) -> dict[str, Floats]:
+    """Loss of F1 (S,) when one feature is shuffled among the examples, S times."""
+    known = examples.pick(examples.labelled & ~examples.near)
+    full = f1(known.keep, odds_over_life(known, network) > 0.0)
+    lost: dict[str, Floats] = {}
+    for column, name in enumerate(FEATURES):
+        drops = []
+        for _ in range(NUM_SHUFFLES):
+            features = known.features.copy()
+            features[:, column] = rng.permutation(features[:, column])
+            drops.append(full - f1(known.keep, odds_over_life(known._replace(features=features), network) > 0.0))
+        lost[name] = np.array(drops)
+    return lost
+
+
+def by_value(examples: Examples, rule: Rule, value: Floats, edges: tuple[int, ...]) -> dict[str, tuple[float, int]]:
+    """F1, and how many examples, in bins `edges[i] <= value < edges[i + 1]` of age or SNR."""
+    kept, known = rule(examples), examples.labelled & ~examples.near
+    bins = {}
+    for low, high in pairwise(edges):
+        rows = known & (value >= low) & (value < high)
+        if rows.any():
+            name = f"{low} to {high - 1}" if high - low > 1 else f"{low}"
+            bins[name] = (f1(examples.keep[rows], kept[rows]), int(rows.sum()))
+    return bins
+
+
+def path_classes(examples: Examples) -> dict[str, Booleans]:
+    """Which examples (N,) are of each path class, those over walls apart by the legs that the walls are on."""
+    found = {}
+    for kind in PathKind:
+        over_walls = kind in (PathKind.VS, PathKind.VRIS)
+        for legs, words in enumerate(LEGS) if over_walls else ((0, ""),):
+            rows = (examples.kind == kind) & (examples.legs == legs)
+            if rows.any():
+                found[kind.name + words] = rows
+    return found
+
+
+def mistakes(examples: Examples, rule: Rule) -> dict[str, tuple[int, int]]:
+    """Wrong examples by path class: wrong, and how many there are."""
+    wrong = rule(examples) != examples.keep
+    return {name: (int(np.sum(wrong & rows)), int(np.sum(rows))) for name, rows in path_classes(examples).items()}
+
+
+def right_by_class(examples: Examples, rule: Rule) -> float:
+    """Mean over the path classes of the share that is told rightly: a rare class counts as a common one does."""
+    kept = rule(examples)
+    shares = [np.mean((kept == examples.keep)[examples.kind == kind]) for kind in PathKind if kind in examples.kind]
+    return float(np.mean(shares)) if shares else 1.0
+
+
+def panel_dropped(examples: Examples, rule: Rule) -> dict[str, tuple[int, int]]:
+    """Looks at the panel's direct path in which it is removed, and all of them, by the policy of the codes."""
+    dropped, panel = ~rule(examples), examples.kind == PathKind.RIS
+    rows = {name: panel & (examples.policy == number) for number, name in enumerate(POLICIES)}
+    return {name: (int(np.sum(dropped & own)), int(np.sum(own))) for name, own in rows.items()}
+
+
+def f1(keep: Booleans, kept: Booleans) -> float:
+    """F1 of keep."""
+    return float(_f1(np.array(_counts(kept, keep, np.ones(len(keep), dtype=np.bool_)))[None])[0])
+
+
+def _tables(examples: Examples, kept: Booleans) -> Integers:
+    """(walks, 4) counts of each walk, clutter left out."""
+    walks = np.unique(examples.walk)
+    return np.array([_counts(kept, examples.keep, examples.labelled & (examples.walk == walk)) for walk in walks])
+
+
+def _counts(kept: Booleans, keep: Booleans, rows: Booleans) -> tuple[int, int, int, int]:
+    """Kept rightly, kept wrongly, removed wrongly, removed rightly."""
+    return (
+        int(np.sum(rows & kept & keep)),
+        int(np.sum(rows & kept & ~keep)),
+        int(np.sum(rows & ~kept & keep)),
+        int(np.sum(rows & ~kept & ~keep)),
+    )
+
+
+def _f1(tables: Any) -> Floats:
+    hit, false, missed = tables[:, 0], tables[:, 1], tables[:, 2]
+    return np.asarray(np.where(hit + false + missed > 0, 2.0 * hit / np.maximum(2 * hit + false + missed, 1), 1.0))
+
+
+def _share(part: float, whole: float) -> float:
+    return float(part / whole) if whole else 1.0

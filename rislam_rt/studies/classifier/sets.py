@@ -1,0 +1,133 @@
+"""Examples to learn from, to choose by and to test on: walks through random rooms and through named ones."""
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.errors import SceneError
+from rislam_rt.measurement import with_reference_snr
+from rislam_rt.model import RadioConfig, Scene, Trajectory
+from rislam_rt.pipeline.run import Progress, build_channel
+from rislam_rt.pipeline.specification.radio import build_radio
+from rislam_rt.scene.random_rooms import draw_room
+from rislam_rt.scene.random_rooms.box_rooms import random_room
+from rislam_rt.studies.classifier.codes import AIMED, POLICIES, set_codes
+from rislam_rt.studies.classifier.gather import Examples, gather_walk, join
+from rislam_rt.studies.classifier.spec import LEARNT_FIRST, ClassifierSpec, build_receiver
+from rislam_rt.studies.classifier.walks import random_walk
+
+DEPTH = 2
+"""Wall bounces, both legs together, in random rooms."""
+BLIND = tuple(number for number in range(len(POLICIES)) if number not in AIMED)
+"""Policies that know nothing of the agent."""
+_TRIES = 20
+
+
+class Sets(NamedTuple):
+    """Examples to learn from, to choose by, and to test on."""
+
+    train: Examples
+    validation: Examples
+    test: dict[str, Examples]
+    """By named room."""
+    drawn: dict[str, Examples]
+    """By room of `scene.random_rooms`, none of which was learnt from."""
+
+    @property
+    def tested(self) -> Examples:
+        """All named rooms together."""
+        return join(list(self.test.values()))
+
+    @property
+    def all_drawn(self) -> Examples:
+        """All drawn rooms together."""
+        return join(list(self.drawn.values()))
+
+
+def gather_sets(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Progress | None = None) -> Sets:
+    """Everything that a specification asks for; its seed decides all draws.
+
+    Raises
+    ------
+    SceneError
+        A room is too full for random walks.
+    TraceError, SetupError
+        The traced channel failed, or the machine lacks what it needs.
+    """
+    tell = progress or (lambda stage, at, total: None)
+    total, rooms = spec.train + spec.validation, list[Examples]()
+    tell("rooms to learn from", 0, total)
+    for number in range(total):
+        rooms.append(gather_random(number, spec))
+        tell("rooms to learn from", number + 1, total)
+    test, drawn = dict[str, Examples](), dict[str, Examples]()
+    tell("rooms to test on", 0, len(scenes) + spec.drawn)
+    for scene, room in zip(scenes, spec.rooms, strict=True):
+        test[scene.name] = gather_room(scene, room.depth, spec)
+        tell("rooms to test on", len(test), len(scenes) + spec.drawn)
+    for seed in range(spec.drawn_first, spec.drawn_first + spec.drawn):
+        drawn[f"random_{seed}"] = gather_drawn(seed, spec)
+        tell("rooms to test on", len(test) + len(drawn), len(scenes) + spec.drawn)
+    return Sets(join(rooms[: spec.train]), join(rooms[spec.train :]), test, drawn)
+
+
+def gather_random(number: int, spec: ClassifierSpec) -> Examples:
+    """Examples of one walk through the random room of a number: under a code that knows the agent, and one that does
+    not. Every other room is one of `scene.random_rooms`, with the motion that is drawn there."""
+    rng = np.random.default_rng([spec.seed, number])
+    snr = float(rng.uniform(spec.snr_low_db, spec.snr_high_db))
+    radio, policies = with_reference_snr(build_radio(spec.radio), snr), (rng.choice(BLIND), rng.choice(AIMED))
+    if number % 2:
+        scene = draw_room(LEARNT_FIRST + LEARNT_FIRST * (spec.seed % LEARNT_FIRST) + number).scene
+        return gather_motion(scene, first_cycles(scene, spec.cycles), DEPTH, radio, spec, number, policies, rng=rng)
+    for _ in range(_TRIES):
+        scene = random_room(f"random_{number}", rng=rng)
+        try:
+            motion = random_walk(scene, spec.cycles, rng=rng)
+        except SceneError:  # too full for a walk: another room
+            continue
+        return gather_motion(scene, motion, DEPTH, radio, spec, number, policies, rng=rng)
+    raise SceneError(f"random room {number}: no walk of {spec.cycles} cycles in {_TRIES} rooms; give fewer cycles")
+
+
+def gather_drawn(seed: int, spec: ClassifierSpec) -> Examples:
+    """Examples of the room of a seed along its own motion, under every policy."""
+    scene, rng = draw_room(seed).scene, np.random.default_rng([spec.seed, seed, 1])
+    policies = range(len(POLICIES))
+    return gather_motion(
+        scene, first_cycles(scene, spec.cycles), DEPTH, build_radio(spec.radio), spec, seed, policies, rng=rng
+    )
+
+
+def gather_room(scene: Scene, depth: int, spec: ClassifierSpec) -> Examples:
+    """Examples of walks through a named room under every policy; they depend on its name and the seed alone."""
+    name, radio = zlib.crc32(scene.name.encode()), build_radio(spec.radio)
+    parts = []
+    for walk in range(spec.walks):
+        rng = np.random.default_rng([spec.seed, name, 0, walk])
+        motion, number = random_walk(scene, spec.cycles, rng=rng), 1000 * (name % 1_000_000) + walk
+        parts.append(gather_motion(scene, motion, depth, radio, spec, number, range(len(POLICIES)), rng=rng))
+    return join(parts)
+
+
+def gather_motion(
+    scene: Scene, motion: Trajectory, depth: int, radio: RadioConfig, spec: ClassifierSpec, walk: int,
+    policies: Sequence[int], *, rng: np.random.Generator,
+) -> Examples:  # fmt: skip
+    """Examples along a motion, once for each policy of the panel; once in a room without one."""
+    paths = build_channel(spec.channel, replace(scene, agent=motion), radio, depth).paths(motion)
+    receiver, panel = build_receiver(spec.receiver), None if scene.ris is None else scene.ris.spec
+    parts = []
+    for policy in policies if panel is not None else [-1]:
+        lit = set_codes(paths, panel, POLICIES[policy], rng=rng)
+        parts.append(gather_walk(lit, motion, radio, receiver, (walk, policy), spec.stride, rng=rng))
+    return join(parts)
+
+
+def first_cycles(scene: Scene, cycles: int) -> Trajectory:
+    """The first cycles of a room's own motion."""
+    agent, rows = scene.agent, slice(cycles)
+    return replace(agent, **{name: getattr(agent, name)[rows] for name in ("time", "position", "velocity", "heading")})

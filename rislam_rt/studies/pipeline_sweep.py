@@ -1,0 +1,256 @@
+"""Sweeps of the main job: a pipeline file, axes over its settings, and what comes out at every point of them."""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, get_args, get_origin
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from rislam_rt.errors import ConfigError, RislamError
+from rislam_rt.evaluate import bootstrap, rms_over_runs
+from rislam_rt.model import Scene
+from rislam_rt.pipeline.own_methods import own_digests
+from rislam_rt.pipeline.run import check_run, library_versions, prepare_channel, run_slam
+from rislam_rt.pipeline.scores.summary import summarise
+from rislam_rt.pipeline.specification.read import Table, build_spec, make_way, read_table
+from rislam_rt.pipeline.specification.section import Positive, Section
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.scene import load_scene
+from rislam_rt.storage.files import write_atomic
+from rislam_rt.sweeps.axes import Axis, Scalar, Sweep, Value, parse_axis
+from rislam_rt.sweeps.record import json_bytes
+from rislam_rt.sweeps.store import DONE, MISSING, Row, csv_bytes
+
+FUNCTION = f"{__name__}:run_cell"
+STORED_AS = "rislam_rt.pipeline.sweeps.slam:run_cell"
+"""Its first name, by which stored cells know it."""
+
+
+class SweepSection(Section):
+    """The table `[sweep]` of a pipeline file; the command line comes first."""
+
+    repeat: Annotated[int, Field(ge=1, le=1_000_000)] = 5
+    """Runs with different seeds at every point of the axes."""
+    paired: list[str] | None = None
+    """Axes along which a repetition draws the same noise; all of them by default."""
+    time_limit_s: Positive | None = None
+    axes: dict[str, list[Scalar | list[Scalar]]] = Field(default={})
+    """Values by dotted key."""
+
+
+class _File(Section):
+    sweep: SweepSection = SweepSection()
+
+
+class Score(NamedTuple):
+    """One scheme at one point of the axes, over all repetitions."""
+
+    point: Mapping[str, Value]
+    scheme: str
+    rmse: tuple[float, ...]
+    """Of each repetition that ended [m]."""
+    interval: tuple[float, float] | None
+    """95 % bootstrap interval of the RMSE over the repetitions [m]; None for a single one."""
+    diverged: int
+    failed: int
+    missing: int
+    """Repetitions that have not run yet."""
+
+    @property
+    def overall(self) -> float | None:
+        """RMSE over all repetitions that ended [m]; None if none did."""
+        return float(rms_over_runs(np.array(self.rmse))) if self.rmse else None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, one level deep but for the list of errors."""
+        low, high = self.interval or (None, None)
+        counts = {"runs": len(self.rmse), "diverged": self.diverged, "failed": self.failed, "missing": self.missing}
+        scores = {"rmse_m": self.overall, "low_m": low, "high_m": high, **counts, "each_m": list(self.rmse)}
+        return {**self.point, "scheme": self.scheme, **scores}
+
+
+def load_section(path: Path, overrides: Sequence[str] = ()) -> SweepSection:
+    """The table `[sweep]` of a pipeline file.
+
+    Raises
+    ------
+    ConfigError
+        A key is unknown, or a value of the wrong type or out of range. One line.
+    """
+    table = read_table(path, overrides)
+    return build_spec(Table(path, {"sweep": table.sweep or {}}, table.changed), _File, lambda _: None).sweep
+
+
+def slam_sweep(
+    path: Path, overrides: Sequence[str] = (), axes: Sequence[str] = (), *, scene: Path | None = None,
+    repeat: int | None = None,
+) -> Sweep:  # fmt: skip
+    """The sweep of a pipeline file, every cell of which has been checked to be one that can run.
+
+    Parameters
+    ----------
+    overrides
+        `key=value` settings, for all cells.
+    axes
+        `key=v1,v2,...`, over those of the file.
+    scene
+        Folder that comes before the one that the pipeline names.
+    repeat
+        Repetitions, before those of the file.
+
+    Raises
+    ------
+    ConfigError, SceneError
+        A cell could not run. One line.
+    """
+    section = load_section(path, overrides)
+    found = {key: Axis(key, tuple(values)) for key, values in section.axes.items()}
+    given = [parse_axis(text) for text in axes]
+    twice = [axis.key for number, axis in enumerate(given) if axis.key in {other.key for other in given[:number]}]
+    if twice:
+        raise ConfigError(f"--axis {twice[0]}: given twice; give all its values in one, as {twice[0]}=V1,V2")
+    found |= {axis.key: axis for axis in given}
+    for key in ("seed", "kind", "name", "description"):
+        if key in found:
+            raise ConfigError(f"axis '{key}': no setting to go through; use --repeat for seeds")
+    table = read_table(path, overrides)
+    make_way(table, tuple(found))
+    if scene is not None:
+        table.content["scene"] = os.path.relpath(scene, path.parent)
+    elif "scene" in found:
+        table.content.setdefault("scene", found["scene"].values[0])
+    if "scene" not in table.content:
+        raise ConfigError(f"{path}: scene: not given; add it, or give --scene DIR")
+    spec = build_spec(table, PipelineSpec, build_settings)
+    typed = tuple(typed_axis(axis) for axis in found.values())
+    return Sweep(
+        FUNCTION,
+        typed,
+        spec.model_dump(mode="json", exclude={"seed", "description"}),
+        repeat or section.repeat,
+        spec.seed,
+        tuple(section.paired if section.paired is not None else found),
+        {"beside": os.path.abspath(path.parent)},
+        _depends(path, tuple(found)),
+        spec.name,
+        STORED_AS,
+    )
+
+
+def typed_axis(axis: Axis) -> Axis:
+    """The axis with values as the pipeline has them: whole numbers become real, single values lists, where need be."""
+    model: Any = PipelineSpec
+    *parents, leaf = axis.key.split(".")
+    for part in parents:
+        kinds = _kinds(model.model_fields[part].annotation) if part in model.model_fields else []
+        model = next((kind for kind in kinds if issubclass(kind, BaseModel)), Section)
+    if leaf not in model.model_fields:
+        return axis  # building the first cell tells what is wrong with the key
+    annotation = model.model_fields[leaf].annotation
+    kinds = _kinds(annotation)
+
+    def typed(value: Value) -> Value:
+        if get_origin(annotation) is list and not isinstance(value, list):
+            return [value]
+        return float(value) if type(value) is int and float in kinds and int not in kinds else value
+
+    return Axis(axis.key, tuple(map(typed, axis.values)))
+
+
+def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
+    """The scores of one run, its times apart; what its settings say already is left out."""
+    plain = dict(settings)
+    beside = Path(plain.pop("beside"))
+    spec = PipelineSpec.model_validate({**plain, "seed": seed})
+    prepare_channel(spec.channel)
+    result = run_slam(load_scene(beside / str(spec.scene)), spec, rng=np.random.default_rng(seed))
+    summary = summarise(result)
+    told = {name: summary[name] for name in ("source", "schemes")}
+    return {**_split(told, times=False), "timing": _split(summary, times=True)}
+
+
+def score_rows(rows: Sequence[Row]) -> list[Score]:
+    """Scores in the order of the axes; failures are counted, never dropped."""
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(repr(row.cell.point), []).append(row)
+    scores = []
+    for group in groups.values():
+        point = group[0].cell.point
+        missing = sum(row.state == MISSING for row in group)
+        for scheme in group[0].cell.settings["schemes"]:
+            ended = [row.result["schemes"][scheme] for row in group if row.state == DONE]
+            rmse = tuple(float(score["rmse_m"]) for score in ended)
+            diverged = sum(bool(score["diverged"]) for score in ended)
+            scores.append(
+                Score(point, scheme, rmse, _interval(rmse), diverged, len(group) - len(ended) - missing, missing)
+            )
+    return scores
+
+
+def write_scores(scores: Sequence[Score], folder: Path) -> None:
+    """`scores.csv` and `scores.json` beside the table of the cells.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    content = [score.as_dict() for score in scores]
+    write_atomic(folder / "scores.json", json_bytes(content))
+    write_atomic(folder / "scores.csv", csv_bytes(content))
+
+
+def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
+    """Room and versions that a cell's result depends on; says what is wrong with the cell, if anything is."""
+    load = cache(load_scene)
+    versions = library_versions()
+
+    def depends(settings: Mapping[str, Any]) -> dict[str, Any]:
+        spec = build_spec(Table(path, dict(settings), ()), PipelineSpec, build_settings)
+        room: Scene = load(path.parent / str(spec.scene))
+        check_run(room, spec)
+        own = own_digests([*spec.schemes, spec.channel])
+        return {"scene_sha256": room.digest, "versions": versions} | ({"own": own} if own else {})
+
+    def named(settings: Mapping[str, Any]) -> dict[str, Any]:
+        try:
+            return depends(settings)
+        except RislamError as error:
+            if not keys:
+                raise
+            text = str(error).removeprefix(f"{path}: ")
+            raise type(error)(f"axes {', '.join(keys)}: {text}") from None
+
+    return named
+
+
+def _kinds(annotation: Any) -> list[type]:
+    """All plain types in an annotation."""
+    parts = get_args(annotation)
+    if not parts:
+        return [annotation] if isinstance(annotation, type) else []
+    return [kind for part in parts for kind in _kinds(part)]
+
+
+def _split(summary: Mapping[str, Any], *, times: bool) -> dict[str, Any]:
+    """What of a summary comes from the clock, or all else."""
+    kept: dict[str, Any] = {}
+    for name, value in summary.items():
+        clock = name.endswith("seconds") or name == "over_budget"
+        if clock or not isinstance(value, Mapping):
+            if clock == times:
+                kept[name] = value
+        elif (inner := _split(value, times=times)) or not times:
+            kept[name] = inner
+    return kept
+
+
+def _interval(rmse: Sequence[float]) -> tuple[float, float] | None:
+    if len(rmse) < 2:
+        return None
+    found = bootstrap(np.array(rmse), rng=np.random.default_rng(0), statistic=rms_over_runs)
+    return found.lower, found.upper

@@ -1,0 +1,115 @@
+"""What the pipeline file of a study may say."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from rislam_rt.model import Scene
+from rislam_rt.pipeline.run import library_versions
+from rislam_rt.pipeline.specification.radio import RadioSection
+from rislam_rt.pipeline.specification.section import Count, Name, Positive, Section
+from rislam_rt.pipeline.specification.spec import DesignerSection
+
+Depth = Annotated[int, Field(ge=0, le=4)]
+Seed = Annotated[int, Field(ge=0, lt=2**63)]
+
+
+class RoomSection(Section):
+    """One room of a comparison."""
+
+    scene: str
+    """Scene folder, relative to the pipeline file."""
+    depth: Depth = 3
+    """Largest number of wall bounces on a path, both legs together."""
+    picture: bool = False
+    """Whether the certificate's picture is of this room."""
+
+
+class StudySpec(Section):
+    """What all studies share."""
+
+    kind: str
+    """Which study the file is."""
+    name: Name
+    """Of folders and pages."""
+    description: str = ""
+    """For readers alone."""
+    seed: Seed = 7
+    """Of every random draw."""
+    radio: RadioSection = RadioSection()
+
+
+class CompareSpec(StudySpec):
+    """Traced against analytic paths at random poses of many rooms."""
+
+    kind: Literal["compare_channels"]
+    """Which study the file is."""
+    poses: Annotated[int, Field(ge=1, le=100_000)] = 200
+    """Random poses in each room."""
+    rooms: Annotated[list[RoomSection], Field(min_length=1)]
+    """The rooms: `scene`, `depth`, `picture`."""
+
+    @model_validator(mode="after")
+    def _each_room_once(self) -> "CompareSpec":
+        if len({room.scene for room in self.rooms}) < len(self.rooms):
+            raise ValueError("rooms: each scene at most once")
+        if sum(room.picture for room in self.rooms) > 1:
+            raise ValueError("rooms: 'picture' for one of them at most")
+        return self
+
+
+class Fig4aSpec(StudySpec):
+    """Gain of the direct path over the panel against distance, as in Fig. 4(a)."""
+
+    kind: Literal["fig4a"]
+    """Which study the file is."""
+    scene: str | None = None
+    """Scene folder, relative to the pipeline file; `--scene` comes first."""
+    channel: Literal["traced", "image_source"] = "traced"
+    """Ray tracer, or exact image sources."""
+    elements: list[Literal["tang", "energy"]] = Field(default=["tang", "energy"], min_length=1)
+    """Element patterns, one after the other, whatever the scene's panel has."""
+    places: Annotated[int, Field(ge=2, le=10_000)] = 25
+    """On the straight line from the trajectory's start to the panel, at the start's height."""
+    closest_m: Positive = 0.2
+    """Horizontal distance from the panel at the last place."""
+    sphere_radius_m: Positive | None = None
+    """Of the sphere in the panel's place; half the panel's longer side by default."""
+    seeds: Count = 10
+    """How often the designer runs at each place."""
+    draws: Count = 1000
+    """Random codes at each place."""
+    coverage: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9
+    """Of the intervals over seeds and over draws."""
+    design: DesignerSection = DesignerSection()
+
+    @model_validator(mode="after")
+    def _each_element_once(self) -> "Fig4aSpec":
+        if len(set(self.elements)) < len(self.elements):
+            raise ValueError("elements: each at most once")
+        return self
+
+
+class ClaimsSpec(Section):
+    """The paper's claims against the figures that other studies left behind."""
+
+    kind: Literal["claims"]
+    """Which study the file is."""
+    name: Name
+    """Of folders and pages."""
+    description: str = ""
+    """For readers alone."""
+    results: str = "../docs/results"
+    """Folder of `fig4a.json`, `fig4b.json` and `fig4c.json`, relative to the pipeline file."""
+
+
+def study_record(spec: StudySpec, scenes: list[Scene]) -> dict[str, Any]:
+    """What is needed to repeat a study: configuration, seed, versions, and the hash of every scene."""
+    return {
+        "kind": spec.kind,
+        "name": spec.name,
+        "seed": spec.seed,
+        "scenes": {scene.name: {"sha256": scene.digest} for scene in scenes},
+        "versions": library_versions(),
+        "config": spec.model_dump(mode="json"),
+    }

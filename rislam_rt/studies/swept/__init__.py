@@ -1,0 +1,38 @@
+"""Studies that go through settings and seeds on the sweep engine: their specifications, cells and scores."""
+
+from rislam_rt.studies.swept.cell import cell_spec
+from rislam_rt.studies.swept.collect import Group, group_rows, paired_difference, paired_gain, spread
+from rislam_rt.studies.swept.spec import (
+    SWEPT,
+    AblationsSpec,
+    Fig4bSpec,
+    Fig4cSpec,
+    HardwareSpec,
+    MismatchSection,
+    RobustnessSpec,
+    RoomsSpec,
+    SweptSpec,
+    VariantSection,
+)
+from rislam_rt.studies.swept.sweep import build_sweep, check_swept
+
+__all__ = [
+    "SWEPT",
+    "AblationsSpec",
+    "Fig4bSpec",
+    "Fig4cSpec",
+    "Group",
+    "HardwareSpec",
+    "MismatchSection",
+    "RobustnessSpec",
+    "RoomsSpec",
+    "SweptSpec",
+    "VariantSection",
+    "build_sweep",
+    "cell_spec",
+    "check_swept",
+    "group_rows",
+    "paired_difference",
+    "paired_gain",
+    "spread",
+]

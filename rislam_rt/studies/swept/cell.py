@@ -1,0 +1,77 @@
+"""One cell of a swept study: one room and seed, traced once, and every scheme in it under the same noise."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.measurement import paper_snr_db
+from rislam_rt.model import SlamResult
+from rislam_rt.pipeline.run import Stage, prepare_channel, result_of, run_scheme, set_stage
+from rislam_rt.pipeline.scores.summary import summarise_scheme
+from rislam_rt.pipeline.specification.read import Table, build_spec
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.scene import load_scene
+from rislam_rt.sweeps.work import one_line
+from rislam_rt.toml import put_dotted
+
+FUNCTION = f"{__name__}:run_cell"
+STORED_AS = "rislam_rt.pipeline.studies.swept.cell:run_cell"
+"""Its first name, by which stored cells know it."""
+CLOCK = ("seconds", "step_seconds", "over_budget")
+"""Scores that differ from run to run."""
+
+
+def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
+    """The scores of all schemes; one that fails costs no other, and says why."""
+    spec = cell_spec(settings)
+    prepare_channel(spec.channel)
+    scene = load_scene(Path(settings["beside"]) / str(settings["scene"]))
+    stage = set_stage(scene, spec, rng=np.random.default_rng(seed))
+    schemes: dict[str, Any] = {}
+    timing: dict[str, Any] = {"trace_seconds": stage.seconds}
+    for name in spec.schemes:
+        begin = process_time()
+        try:
+            result = result_of(stage, spec, {name: run_scheme(name, stage, spec, lambda *_: None)}, seed=seed)
+            scores = _scores(result, name)
+        except Exception as error:  # whatever it is, it is this scheme's alone
+            schemes[name] = {"failed": one_line(error)}
+            continue
+        timing[name] = {key: scores.pop(key) for key in CLOCK} | {"cpu_seconds": process_time() - begin}
+        schemes[name] = scores
+    return {"schemes": schemes, "paper_snr_db": _paper_snr(stage, spec), "timing": timing}
+
+
+def cell_spec(settings: Mapping[str, Any], path: Path | None = None) -> PipelineSpec:
+    """The main job that a cell runs: the study's `run`, then the panel's size, then what the variant sets.
+
+    Raises
+    ------
+    ConfigError
+        A key is unknown, a value of the wrong type or out of range.
+    """
+    content: dict[str, Any] = {"name": "cell", **settings["run"]}
+    if size := settings.get("size"):
+        content = put_dotted(put_dotted(content, "room.panel_rows", size), "room.panel_cols", size)
+    for key, value in settings["variants"].get(settings.get("variant", ""), {}).items():
+        content = put_dotted(content, key, value)
+    return build_spec(Table(path or Path("run"), content, ()), PipelineSpec, build_settings)
+
+
+def _scores(result: SlamResult, name: str) -> dict[str, Any]:
+    return summarise_scheme(result, result.schemes[name])
+
+
+def _paper_snr(stage: Stage, spec: PipelineSpec) -> float:
+    """SNR [dB] as the paper has it, of the mean power at some twenty places of the way, panel at level 0."""
+    settings, rows = build_settings(spec), np.arange(len(stage.scene.agent))
+    rows = rows[:: max(1, len(rows) // 20)]
+    per_cycle = ("valid", "tau", "departure", "arrival", "gain", "vertices")
+    fields: dict[str, Any] = {name: getattr(stage.paths, name)[rows] for name in per_cycle}
+    few = replace(stage.paths, **fields, ris=None)
+    found = paper_snr_db(few, settings.radio, settings.receiver, heading=stage.scene.agent.heading[rows])
+    return float(10.0 * np.log10(np.mean(10.0 ** (found / 10.0))))

@@ -1,0 +1,86 @@
+"""One cell of a study of the front end: what the receiver reports at some places, and what of it is so."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.channel.doppler import doppler_shift
+from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.measurement import FrontEnd, measure
+from rislam_rt.model import PathKind, Paths, Trajectory
+from rislam_rt.pipeline.room.front_end import prepare_front_end
+from rislam_rt.pipeline.run import prepare_channel, set_stage
+from rislam_rt.pipeline.signals import panel_codes
+from rislam_rt.pipeline.specification.spec import Settings, build_settings
+from rislam_rt.ris import rephase
+from rislam_rt.scene import load_scene
+from rislam_rt.studies.swept.cell import cell_spec
+
+HALF = 0.683
+"""Share of a normal error within one standard deviation."""
+
+
+def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
+    """False components, whether the panel's direct path is heard, and errors over reported deviations.
+
+    Once as set, and once more with an estimator that is told of the faults, on the same front end and noise.
+    """
+    begin, spec = process_time(), cell_spec(settings)
+    prepare_channel(spec.channel)
+    scene = load_scene(Path(settings["beside"]) / str(settings["scene"]))
+    stage = set_stage(scene, spec, rng=np.random.default_rng(seed))
+    made, motion = build_settings(spec), stage.scene.agent
+    build = np.random.default_rng(stage.seeds.hardware)
+    front_end = prepare_front_end(stage.paths, motion, stage.body, made, rng=build)
+    codes = panel_codes(stage.scene, stage.paths, "focused", rng=np.random.default_rng(stage.seeds.design))
+    paths = stage.paths if codes is None else rephase(stage.paths, codes)
+    places = np.linspace(len(motion) // 2, len(motion) - 1, int(settings["places"])).astype(int)
+
+    def looks(front_end: FrontEnd | None) -> list[dict[str, Any]]:
+        noise = np.random.default_rng(stage.seeds.noise)
+        return [_look(paths, motion, int(cycle), made, front_end, rng=noise.spawn(1)[0]) for cycle in places]
+
+    left = front_end.correction.left if front_end is not None and front_end.correction is not None else None
+    found = {"schemes": {}, "receiver": {**_scores(looks(front_end)), "left": left}}
+    if front_end is not None:
+        told = front_end._replace(config=replace(front_end.config, told=True))
+        found["told"] = {**_scores(looks(told)), "left": left}
+    return {**found, "timing": {"cpu_seconds": process_time() - begin}}
+
+
+def _look(
+    paths: Paths, motion: Trajectory, cycle: int, made: Settings, front_end: FrontEnd | None,
+    *, rng: np.random.Generator
+) -> dict[str, Any]:  # fmt: skip
+    """Counts and whitened errors of one cycle."""
+    heading, shift = float(motion.heading[cycle]), doppler_shift(paths, motion, made.radio.wavelength)[cycle]
+    measurement, truth = measure(
+        paths, cycle, heading, made.radio, made.receiver, None, shift, front_end, rng=rng
+    )  # fmt: skip
+    true = truth.path >= 0
+    kind = np.where(true, paths.kind[truth.path], -1)
+    arrival = (paths.arrival[cycle, truth.path] @ rotation_z(motion.heading[cycle]))[:, :2]
+    error = (measurement.cosines - arrival) / measurement.cosines_std
+    return {
+        "false": int(np.sum(~true)),
+        "components": len(true),
+        "panel": bool(np.any(kind == PathKind.RIS)),
+        "landmarks": int(np.sum(kind >= PathKind.PS)),
+        "error": error[true & (kind != PathKind.LOS)],
+    }
+
+
+def _scores(looks: list[dict[str, Any]]) -> dict[str, Any]:
+    error: Floats = np.abs(np.concatenate([look["error"] for look in looks]))
+    return {
+        "false": float(np.mean([look["false"] for look in looks])),
+        "components": float(np.mean([look["components"] for look in looks])),
+        "landmarks": float(np.mean([look["landmarks"] for look in looks])),
+        "panel": float(np.mean([look["panel"] for look in looks])),
+        "error_over_std": float(np.quantile(error, HALF)) if error.size else None,
+    }

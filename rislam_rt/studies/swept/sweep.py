@@ -1,0 +1,114 @@
+"""A swept study as a sweep: its axes, what its cells depend on, and a check of all of them beforehand."""
+
+import os
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from rislam_rt.errors import ConfigError, RislamError
+from rislam_rt.pipeline.own_methods import own_digests
+from rislam_rt.pipeline.run import check_run, library_versions
+from rislam_rt.scene import load_scene
+from rislam_rt.studies.swept.cell import FUNCTION, STORED_AS, cell_spec
+from rislam_rt.studies.swept.spec import (
+    AblationsSpec,
+    Fig4bSpec,
+    Fig4cSpec,
+    HardwareSpec,
+    RobustnessSpec,
+    RoomsSpec,
+    SweptSpec,
+)
+from rislam_rt.sweeps import Axis, Sweep
+
+RECEIVER = "rislam_rt.studies.swept.receiver:run_cell"
+"""Of a cell that looks at the receiver alone."""
+RECEIVER_STORED_AS = "rislam_rt.pipeline.studies.swept.receiver:run_cell"
+SNR = "run.radio.reference_snr_db"
+"""Axis of Fig. 4(b)."""
+
+
+def build_sweep(spec: SweptSpec, pipeline: Path, scene: Path | None = None) -> Sweep:
+    """The sweep of a study. All axes are paired: a repetition has the same motion and noise at every point.
+
+    Parameters
+    ----------
+    pipeline
+        The study's file, which scene folders are relative to.
+    scene
+        Folder that comes before the one that the file names.
+
+    Raises
+    ------
+    ConfigError
+        No scene is named.
+    """
+    beside = pipeline.parent
+    axes = _axes(spec)
+    base: dict[str, Any] = {"run": dict(spec.run)}
+    if isinstance(spec, RoomsSpec):
+        if scene is not None:
+            raise ConfigError(f"--scene {scene}: a pipeline of kind 'rooms' names its rooms; set 'scenes'")
+    else:
+        named = os.path.relpath(scene, beside) if scene is not None else getattr(spec, "scene", None)
+        if named is None:
+            raise ConfigError(f"{pipeline}: scene: not given; add it, or give --scene DIR")
+        base["scene"] = named
+    variants = {variant.name: dict(variant.set) for variant in spec.all_variants}
+    local = {"beside": os.path.abspath(beside), "variants": variants}
+    keys = tuple(axis.key for axis in axes)
+    function, stored = FUNCTION, STORED_AS
+    if isinstance(spec, HardwareSpec):
+        base["places"], function, stored = spec.places, RECEIVER, RECEIVER_STORED_AS
+    return Sweep(
+        function, axes, base, spec.repetitions, spec.seed, keys, local, _depends(pipeline, local), spec.name,
+        stored,
+    )  # fmt: skip
+
+
+def check_swept(spec: SweptSpec) -> None:
+    """Whether the settings of the main job, and every variant of them, are such; rooms are looked at by the sweep.
+
+    Raises
+    ------
+    ConfigError
+        They are not. The message begins with the field.
+    """
+    variants = {variant.name: dict(variant.set) for variant in spec.all_variants}
+    for name in variants or [""]:
+        try:
+            cell_spec({"run": spec.run, "variant": name, "variants": variants})
+        except ConfigError as error:
+            place = f"run, with variant '{name}'" if name else "run"
+            raise ConfigError(f"{place}: {str(error).removeprefix('run: ')}") from None
+
+
+def _axes(spec: SweptSpec) -> tuple[Axis, ...]:
+    if isinstance(spec, Fig4bSpec):
+        return Axis("variant", tuple(case.name for case in spec.cases)), Axis(SNR, tuple(spec.snr_db))
+    if isinstance(spec, Fig4cSpec):
+        return (Axis("size", tuple(spec.sizes)),)
+    if isinstance(spec, AblationsSpec | RobustnessSpec | HardwareSpec):
+        return (Axis("variant", tuple(variant.name for variant in spec.all_variants)),)
+    assert isinstance(spec, RoomsSpec)
+    rooms = Axis("scene", tuple(spec.scenes))
+    return (rooms, Axis("variant", tuple(variant.name for variant in spec.variants))) if spec.variants else (rooms,)
+
+
+def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
+    """All settings of a cell, defaults filled in, its room and the versions."""
+    load, versions = cache(load_scene), library_versions()
+
+    def depends(settings: Mapping[str, Any]) -> dict[str, Any]:
+        spec = cell_spec({**settings, **local}, pipeline)
+        room = load(pipeline.parent / str(settings["scene"]))
+        try:
+            check_run(room, spec)
+        except RislamError as error:
+            raise type(error)(f"{pipeline}: {settings['scene']}: {error}") from None
+        config = spec.model_dump(mode="json", exclude={"name", "description", "scene", "seed"})
+        own = own_digests([*spec.schemes, spec.channel])
+        return {"config": config, "scene_sha256": room.digest, "versions": versions} | ({"own": own} if own else {})
+
+    return depends

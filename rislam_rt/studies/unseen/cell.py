@@ -1,0 +1,112 @@
+"""One cell: one room at one SNR under one variant, every scheme in it; the room is traced once for all its cells."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import fields
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.pipeline.estimators import ESTIMATORS
+from rislam_rt.pipeline.recordings.replay import Recorder
+from rislam_rt.pipeline.run import Stage, prepare_channel, run_scheme, set_stage
+from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.scene.random_rooms import RandomRoom, draw_room
+from rislam_rt.studies.swept.cell import cell_spec
+from rislam_rt.studies.unseen.file import Recording
+from rislam_rt.studies.unseen.save import save_room, save_run, save_signals
+from rislam_rt.studies.unseen.score import score_run
+from rislam_rt.studies.unseen.truth import build_truth
+from rislam_rt.sweeps.work import one_line
+
+FUNCTION = f"{__name__}:run_cell"
+STORED_AS = "rislam_rt.pipeline.studies.unseen.cell:run_cell"
+"""Its first name, by which stored cells know it."""
+SEEN_BY_TRACER_NOT = ("name", "description", "scene", "seed", "schemes", "receiver", "design", "slam")
+"""Settings that the true motion and the paths do not depend on, beside those of the rivals and the noise."""
+
+
+def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
+    """The score cards of all schemes; one that fails costs no other, and says why.
+
+    All randomness comes of the room's own seed, so that every variant and SNR has the same motion and noise.
+    """
+    spec = cell_spec(settings)
+    prepare_channel(spec.channel)
+    room, stage = find_stage(int(settings["room"]), trace_key(spec))
+    schemes: dict[str, Any] = {}
+    timing: dict[str, Any] = {"trace_seconds": stage.seconds}
+    keep = Keep(str(settings.get("save", "nothing")), Path(settings.get("data", ".")), cell_label(settings))
+    for asked in spec.schemes:
+        try:
+            schemes[asked], timing[asked] = _run(scheme_here(asked, room), stage, spec, room_traits(room), keep)
+        except Exception as error:  # whatever it is, it is this scheme's alone
+            schemes[asked] = {"failed": one_line(error)}
+    return {"traits": room_traits(room), "schemes": schemes, "timing": timing}
+
+
+class Keep(NamedTuple):
+    """What is left of a run beside its scores."""
+
+    what: str
+    """As `UnseenSpec.save`."""
+    folder: Path
+    label: str
+    """Of the cell, in the names of files."""
+
+
+def _run(
+    name: str, stage: Stage, spec: PipelineSpec, traits: Mapping[str, Any], keep: Keep
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Scores and times of one scheme."""
+    recorder = Recorder(ESTIMATORS[SCHEMES[name].estimator])
+    result = run_scheme(name, stage, spec, lambda *_: None, recorder.estimator)
+    truth = build_truth(stage.scene, stage.paths, result, spec)
+    scores = {"ran": name, **score_run(truth, recorder.inputs, recorder.answers)}
+    if keep.what != "nothing":
+        label = f"{keep.label}{name}"
+        config = spec.model_dump(mode="json")
+        save_run(Recording(recorder.inputs, truth, name, config, traits, scores), keep.folder, label)
+        save_room(stage.scene, traits, keep.folder)
+        if keep.what == "signals":
+            save_signals(stage, result, spec, traits, keep.folder, label)
+    return scores, {"cycle_s": recorder.answers.seconds}
+
+
+def cell_label(settings: Mapping[str, Any]) -> str:
+    """Variant and SNR, for names of files."""
+    snr = settings["run"].get("radio", {}).get("reference_snr_db")
+    parts = [str(settings["variant"])] if settings.get("variant") else []
+    return "".join(f"{part}_" for part in [*parts, *([f"{snr:g}dB"] if snr is not None else [])])
+
+
+def scheme_here(asked: str, room: RandomRoom) -> str:
+    """The scheme itself, or, in a room without a panel, that of the same estimator which needs none."""
+    scheme = SCHEMES[asked]
+    if room.scene.ris is not None or not scheme.panel:
+        return asked
+    return next(name for name, s in SCHEMES.items() if s.estimator == scheme.estimator and not s.panel)
+
+
+def trace_key(spec: PipelineSpec) -> str:
+    """The settings that decide true motion and paths, as text."""
+    content = spec.model_dump(mode="json", exclude={*SEEN_BY_TRACER_NOT, "bp_slam", "channel_slam"})
+    content["radio"] |= {"reference_snr_db": None, "noise_psd": None}
+    return json.dumps(content, sort_keys=True)
+
+
+@lru_cache(maxsize=2)
+def find_stage(seed: int, key: str) -> tuple[RandomRoom, Stage]:
+    """A room, its true motion and its paths; the last ones are kept, as cells of one room follow each other."""
+    spec = PipelineSpec.model_validate({**json.loads(key), "name": "trace", "schemes": ["no_ris"]})
+    room = draw_room(seed)
+    return room, set_stage(room.scene, spec, rng=np.random.default_rng(seed))
+
+
+def room_traits(room: RandomRoom) -> dict[str, Any]:
+    """The classes of a room, plain."""
+    traits = {field.name: getattr(room, field.name) for field in fields(room) if field.name != "scene"}
+    return {**traits, "scatterers": len(room.scene.scatterers)}

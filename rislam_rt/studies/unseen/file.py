@@ -1,0 +1,104 @@
+"""A recorded run as one NetCDF file: what an estimator is given, and, kept apart by name, the truth."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.errors import RislamError, StoreError
+from rislam_rt.pipeline.dataset import Entry, read_dataset, told, write_dataset
+from rislam_rt.pipeline.recordings.inputs import Inputs, dataset_to_inputs, inputs_to_dataset
+from rislam_rt.studies.unseen.truth import Truth
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+TRUTH: dict[str, Entry] = {
+    "position": (("time", "xyz"), "m", "midpoint of Tx and Rx"),
+    "velocity": (("time", "xyz"), "m/s", "velocity"),
+    "landmark": (("landmark", "xyz"), "m", "scatterers, then the panel if there is one"),
+    "landmark_audible": (("time", "landmark"), "1", "whether one of its paths is above the detection threshold"),
+    "wall_middle": (("wall", "xyz"), "m", "centroid of the surface; walls in one plane are one"),
+    "wall_normal": (("wall", "xyz"), "1", "unit normal"),
+    "wall_spread": (("wall", "xyz", "xyz_"), "m2", "covariance of the points of the surface"),
+    "wall_audible": (("time", "wall"), "1", "whether a path over it is above the detection threshold"),
+    "path_kind": (("path",), "1", "0 LOS, 1 VT, 2 PS, 3 VS, 4 RIS, 5 VRIS"),
+    "path_landmark": (("path",), "1", "landmark of the path, -1 for LOS and VT"),
+    "component_path": (("time", "component"), "1", "path of each component, -1 clutter, -9 no component"),
+    "bound": (("time",), "m", "posterior bound of the position, RMS"),
+    "relative_bound": (("time",), "m", "the same with the start exactly known"),
+}
+"""What is for scoring alone; in the file each name begins with `true_`."""
+
+
+class Recording(NamedTuple):
+    """One run as it lies in a file."""
+
+    inputs: Inputs
+    truth: Truth
+    scheme: str
+    """That ran, and chose the codes."""
+    config: Mapping[str, Any]
+    """The specification of the run."""
+    traits: Mapping[str, Any]
+    """The room's seed and classes."""
+    scores: Mapping[str, Any]
+    """The card of the estimator that ran."""
+
+
+def write_recording(recording: Recording, path: Path) -> None:
+    """Write one file, whole or not at all.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"{path.parent}: cannot be made ({error.strerror}); check permissions") from None
+    write_dataset(recording_to_dataset(recording), path)
+
+
+def read_recording(path: str | Path) -> Recording:
+    """What `write_recording` wrote.
+
+    Raises
+    ------
+    StoreError
+        The file is missing or damaged, or holds something else.
+    """
+    data = read_dataset(Path(path))
+    try:
+        return dataset_to_recording(data)
+    except (KeyError, ValueError, TypeError, RislamError) as error:
+        raise StoreError(
+            f"{path}: not a recorded run ({type(error).__name__}: {str(error)[:80]}); write it again"
+        ) from None
+
+
+def recording_to_dataset(recording: Recording) -> "xr.Dataset":
+    """Variables of `INPUTS` and, with `true_` before them, of `TRUTH`; the rest as attributes."""
+    truth = recording.truth
+    about = {name: json.dumps(getattr(recording, name)) for name in ("config", "traits", "scores")}
+    data = inputs_to_dataset(recording.inputs, **about, scheme=recording.scheme, true_panel=int(truth.panel))
+    content: dict[str, Any] = {}
+    for name, entry in TRUTH.items():
+        value = getattr(truth, name)
+        plain = value.astype(np.int8) if value.dtype == np.bool_ else value
+        content[f"true_{name}"] = (entry[0], plain, told(entry))
+    return data.assign(content)
+
+
+def dataset_to_recording(data: "xr.Dataset") -> Recording:
+    """The inverse of `recording_to_dataset`."""
+    marks = data.attrs
+    values = {name: data[f"true_{name}"].to_numpy() for name in TRUTH}
+    for name in ("landmark_audible", "wall_audible"):
+        values[name] = values[name].astype(np.bool_)
+    truth = Truth(**values, panel=bool(marks["true_panel"]))
+    config, traits, scores = (json.loads(marks[name]) for name in ("config", "traits", "scores"))
+    return Recording(dataset_to_inputs(data), truth, str(marks["scheme"]), config, traits, scores)

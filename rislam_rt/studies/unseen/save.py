@@ -1,0 +1,72 @@
+"""What a cell leaves beside its scores: recorded runs, rooms, samples."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.model import RisCode, Scene, SchemeResult
+from rislam_rt.pipeline.dataset import write_dataset
+from rislam_rt.pipeline.run import Stage
+from rislam_rt.pipeline.signals import SignalsSpec, build_signals
+from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.pipeline.walk import without_panel
+from rislam_rt.ris import rephase
+from rislam_rt.scene import write_scene
+from rislam_rt.studies.unseen.file import Recording, write_recording
+
+
+def save_run(recording: Recording, folder: Path, label: str) -> Path:
+    """The recorded run as `<room>/<label>.nc`; returns the file.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    file = room_folder(folder, recording.traits) / f"{label}.nc"
+    write_recording(recording, file)
+    return file
+
+
+def save_room(scene: Scene, traits: Mapping[str, Any], folder: Path) -> None:
+    """The room as a scene folder, with the motion of the runs, once.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    target = room_folder(folder, traits) / "scene"
+    if not target.exists():
+        write_scene(scene, target)
+
+
+def save_signals(
+    stage: Stage, result: SchemeResult, spec: PipelineSpec, traits: Mapping[str, Any], folder: Path, label: str
+) -> None:
+    """Samples of the received signal under the codes that were applied, as `<room>/<label>_signals.nc`.
+
+    The noise is drawn anew from the room's seed: these are other looks at the same run than the recorded components.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    section = spec.receiver.model_copy(update={"estimator": "waveform"})
+    own = SignalsSpec(seed=int(traits["seed"]), code="zero", radio=spec.radio, receiver=section)
+    paths = without_panel(stage.paths)
+    if result.levels:
+        paths = rephase(stage.paths, RisCode(result.applied, result.levels))
+    rng = np.random.default_rng(stage.seeds.noise)
+    data = build_signals(stage.scene, paths, own, rng=rng, on_cycle=lambda: None)
+    target = room_folder(folder, traits)
+    target.mkdir(parents=True, exist_ok=True)
+    write_dataset(data.assign_attrs(code="as applied"), target / f"{label}_signals.nc")
+
+
+def room_folder(folder: Path, traits: Mapping[str, Any]) -> Path:
+    """Where all of a room lies."""
+    return folder / f"room_{int(traits['seed']):05d}"

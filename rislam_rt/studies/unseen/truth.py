@@ -1,0 +1,145 @@
+"""What a run's score is measured against: true motion, landmarks, walls, when each could be heard, and the bounds."""
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.walls import Walls, build_walls
+from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
+from rislam_rt.information import posterior_bound
+from rislam_rt.model import PathKind, Paths, Scene, SchemeResult
+from rislam_rt.pipeline.scores.bound import bound_problem
+from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings, build_settings
+
+
+class Truth(NamedTuple):
+    """K cycles, N landmarks, W planes, P paths, up to M components a cycle."""
+
+    position: Floats
+    """(K, 3) [m]."""
+    velocity: Floats
+    """(K, 3) [m/s]."""
+    landmark: Floats
+    """(N, 3) [m], the panel last if there is one."""
+    panel: bool
+    landmark_audible: Booleans
+    """(K, N) whether one of its paths is above the detection threshold."""
+    wall_middle: Floats
+    """(W, 3) [m] centroid of each plane's surface; walls in one plane are one."""
+    wall_normal: Floats
+    """(W, 3)."""
+    wall_spread: Floats
+    """(W, 3, 3) [m^2] covariance of the points of its surface."""
+    wall_audible: Booleans
+    """(K, W) whether a path over it is above the threshold."""
+    path_kind: Integers
+    """(P,)."""
+    path_landmark: Integers
+    """(P,)."""
+    component_path: Integers
+    """(K, M) path of each component, -1 clutter, -9 beyond their number."""
+    bound: Floats
+    """(K,) least RMS position error [m]."""
+    relative_bound: Floats
+    """(K,) the same of the position relative to the start: the start taken as the origin."""
+
+
+def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineSpec) -> Truth:
+    """The truth of one scheme in one run, under the codes that it applied."""
+    settings, walls = build_settings(spec), build_walls(scene)
+    audible = audible_paths(paths.with_gain(result.gain), settings)
+    group = coplanar(walls)
+    middle, normal, spread = _surfaces(walls, group)
+    over = np.zeros((paths.num_paths, len(middle)), dtype=np.bool_)
+    for path in range(paths.num_paths):
+        _, _, tx, rx = paths.identity(path)
+        over[path, group[[*tx, *rx]]] = True
+    of = paths.landmark[:, None] == np.arange(len(scene.landmarks))
+    bound, relative = run_bounds(scene, paths, result, spec)
+    return Truth(
+        scene.agent.position,
+        scene.agent.velocity,
+        scene.landmark_positions,
+        scene.ris is not None,
+        (audible[:, :, None] & of).any(axis=1),
+        middle,
+        normal,
+        spread,
+        (audible.astype(np.int64) @ over) > 0,
+        paths.kind,
+        paths.landmark,
+        result.component_path,
+        bound,
+        relative,
+    )
+
+
+def run_bounds(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineSpec) -> tuple[Floats, Floats]:
+    """Least RMS position errors (K,) [m], absolute, and relative to the start.
+
+    The motion's law is white acceleration of the root mean square that this motion truly has, so that a lively one has
+    a looser bound; what a filter is told of it does not count. No measurement of an unknown room tells where it lies:
+    relative to the start is what remains when the start is known exactly.
+    """
+    problem = bound_problem(scene, paths, result.gain, result.scheme, spec.model_dump(mode="json"))
+    axes, time = problem.motion.axes, scene.agent.time
+    push = np.diff(scene.agent.velocity[:, :axes], axis=0) / np.diff(time)[:, None]
+    told = problem.motion.acceleration
+    motion = replace(problem.motion, acceleration=float(np.sqrt(np.mean(push**2))) if len(push) else told)
+    found = [
+        posterior_bound(problem.rows, time, law, problem.unknown_std).rms
+        for law in (motion, replace(motion, start_position=0.0))
+    ]
+    return found[0], found[1]
+
+
+def audible_paths(paths: Paths, settings: Settings) -> Booleans:
+    """(K, P) which paths are above the detection threshold, on the side that the array hears.
+
+    Wall returns count where the estimator uses them.
+    """
+    sensor = settings.sensor
+    heard = paths.valid & (settings.radio.integrated_snr(paths.gain) >= sensor.threshold)
+    heard &= (paths.tau >= sensor.window[0]) & (paths.tau <= sensor.window[1])
+    if settings.radio.array.pattern == "upper":
+        heard &= paths.arrival[..., 2] >= 0.0
+    wanted = paths.landmark >= 0
+    if settings.slam.use_vt:
+        wanted |= paths.kind == PathKind.VT
+    return np.asarray(heard & wanted)
+
+
+def coplanar(walls: Walls) -> Integers:
+    """(W,) number of the plane of each wall, in the order of the walls: what an agent can tell apart."""
+    group = np.full(len(walls), -1)
+    count = 0
+    for wall in range(len(walls)):
+        if group[wall] >= 0:
+            continue
+        cosine = walls.normal @ walls.normal[wall]
+        same = (np.abs(cosine) >= np.cos(COPLANAR_ANGLE)) & (group < 0)
+        same &= np.abs(walls.offset * np.sign(cosine) - walls.offset[wall]) <= COPLANAR_OFFSET
+        same[wall] = True
+        group[same] = count
+        count += 1
+    return group
+
+
+def _surfaces(walls: Walls, group: Integers) -> tuple[Floats, Floats, Floats]:
+    """Centroid, normal and covariance of the points of each plane's surface.
+
+    Over a triangle the mean of x x^T is (sum of v v^T + s s^T) / 12, with its corners v and their sum s.
+    """
+    count = int(group.max(initial=-1)) + 1
+    middle, normal, spread = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3, 3))
+    merged = replace(walls, wall_of_triangle=group[walls.wall_of_triangle])
+    for number in range(count):
+        normal[number] = walls.normal[int(np.argmax(group == number))]
+        middle[number], weight = merged.surface(number)
+        corner: Any = walls.triangles[merged.wall_of_triangle == number] - middle[number]
+        total = corner.sum(axis=1)
+        square = np.einsum("tci,tcj->tij", corner, corner) + np.einsum("ti,tj->tij", total, total)
+        spread[number] = np.einsum("t,tij->ij", weight, square) / 12.0
+    return middle, normal, spread

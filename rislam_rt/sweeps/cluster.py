@@ -1,0 +1,71 @@
+"""Cells on a Dask cluster: each thread of a Dask worker leads a worker of ours, so that a cell can do it no harm."""
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+from rislam_rt.errors import ConfigError, SetupError
+from rislam_rt.sweeps.work import LOST, Outcome, Task
+from rislam_rt.sweeps.worker_pool import Crew, Run
+
+CONNECT_SECONDS = 3
+"""How long to wait for the scheduler, which is there already: it only has to answer."""
+
+_CREW = Crew()
+"""Of the Dask worker that this module is imported in."""
+
+
+@contextmanager
+def crew_there(address: str, limit: float | None) -> Iterator[tuple[Run, int]]:
+    """Workers of the cluster at `address`, as many at a time as it has threads, and that number.
+
+    Its machines need this package and the cell's function, importable, and the folders that the settings name.
+
+    Raises
+    ------
+    ConfigError
+        The address is empty.
+    SetupError
+        Dask is not installed, there is no scheduler at the address, or it has gone.
+    """
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError:
+        raise SetupError("--dask needs dask.distributed, which is missing; pip install 'rislam-rt[cluster]'") from None
+    if not address.strip():
+        raise ConfigError("--dask: no address received; give that of a scheduler, e.g. tcp://127.0.0.1:8786")
+    try:
+        client = distributed.Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+    except Exception as error:  # an address that is none raises nearly anything
+        cause = " ".join(str(error).split())[:120]
+        raise SetupError(f"--dask {address}: no scheduler answers ({cause}); start one, or mend the address") from None
+
+    def run(tasks: Iterable[tuple[str, Task]]) -> Iterator[tuple[str, Outcome]]:
+        futures = {client.submit(do_cell, task, limit, key=f"cell-{name}"): name for name, task in tasks}
+        for future in distributed.as_completed(futures, loop=client.loop):
+            yield futures[future], _outcome(future, address)
+            future.release()
+
+    with client:
+        yield run, max(1, sum(client.nthreads().values()))
+        client.run(dismiss_idle)
+
+
+def do_cell(task: Task, limit: float | None) -> tuple[Any, ...]:
+    """One cell, on a Dask worker; the outcome as plain data."""
+    return tuple(_CREW.do(Task(*task), limit))
+
+
+def _outcome(future: Any, address: str) -> Outcome:
+    """What the cluster says. It tries a cell whose machine is lost on others, and gives up after some."""
+    if future.status == "finished":
+        return Outcome(*future.result())
+    if future.status == "error":
+        return Outcome(cause=LOST, message=f"its Dask worker was lost ({type(future.exception()).__name__})")
+    raise SetupError(f"--dask {address}: the scheduler has gone; start it again, the same command goes on from here")
+
+
+def dismiss_idle() -> None:
+    """End the workers that wait for nothing."""
+    _CREW.dismiss()

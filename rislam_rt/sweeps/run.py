@@ -1,0 +1,211 @@
+"""The engine: what is there already is not done again, what fails is written down, and the rest goes on."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+from typing import NamedTuple
+
+from rislam_rt.errors import ConfigError
+from rislam_rt.sweeps.axes import Cell, Sweep, build_cells
+from rislam_rt.sweeps.cost import Cost, estimate_cost
+from rislam_rt.sweeps.store import (
+    DONE,
+    MISSING,
+    Row,
+    append_timing,
+    check_folder,
+    open_folder,
+    read_row,
+    read_timings,
+    write_cell,
+    write_table,
+)
+from rislam_rt.sweeps.work import LOST, Outcome, Task, find_function
+from rislam_rt.sweeps.worker_pool import Run, crew_here
+
+TABLE_SECONDS = 1.0
+"""Least time between two writings of the growing table."""
+TABLE_SHARE = 0.1
+"""Largest share of the time that goes into the growing table, and into what is drawn from it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How to run, which never changes what comes out."""
+
+    jobs: int = 1
+    """Cells at a time on this machine."""
+    dask: str | None = None
+    """Address of a Dask scheduler; its workers do the cells instead."""
+    time_limit: float | None = None
+    """Longest time a cell may take [s]; what a limit stops is a failure, and that does change what comes out."""
+    retry: bool = False
+    """Whether cells that failed before are done again; those that were killed from outside are in any case."""
+    only_estimate: bool = False
+    """Whether to stop once the cost is known: after one cell, if nothing else tells it."""
+
+    def __post_init__(self) -> None:
+        if self.jobs < 1:
+            raise ConfigError(f"--jobs: {self.jobs} received; give at least 1")
+        if self.time_limit is not None and not self.time_limit > 0.0:
+            raise ConfigError(f"--time-limit: {self.time_limit:g} received; give a positive number of seconds")
+
+
+class Told(NamedTuple):
+    """Where a sweep stands: given when its cost is known, and after every cell."""
+
+    done: int
+    """Cells that ended well, in this run or before."""
+    failed: int
+    total: int
+    cost: Cost
+    """Of what is left."""
+    last: Row | None
+    """The cell that just ended."""
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """All cells in their order."""
+
+    rows: tuple[Row, ...]
+    cost: Cost
+    """Of what is left, if the sweep was to stop at the estimate."""
+
+    @property
+    def failed(self) -> tuple[Row, ...]:
+        """Cells that failed, now or before."""
+        return tuple(row for row in self.rows if row.failed)
+
+
+def run_sweep(
+    sweep: Sweep,
+    folder: Path,
+    effort: Effort | None = None,
+    *,
+    tell: Callable[[Told], None] | None = None,
+    grow: Callable[[Sequence[Row]], None] | None = None,
+) -> Report:
+    """Do all cells that are not there yet and leave one file for each in `folder`.
+
+    Whenever it is stopped, and however, another call goes on from the cells that are there; the files are the same,
+    byte for byte, as those of a run that was never stopped, on one process or many, here or on a cluster.
+
+    Parameters
+    ----------
+    tell
+        Called when the cost is known and after every cell.
+    grow
+        Called with all rows whenever the table is written, at the end too: draws figures that grow.
+
+    Raises
+    ------
+    ConfigError, ResultError
+        The settings are unusable, the folder holds something else, or another sweep is at work in it.
+    StoreError
+        The disk refused.
+    SetupError
+        Dask is asked for and not there.
+    """
+    effort = effort or Effort()
+    find_function(sweep.function)
+    cells = build_cells(sweep)
+    with ExitStack() as stack:
+        check_folder(folder)
+        left = any(read_row(folder, cell).state != DONE for cell in cells)
+        # a cluster first: one that is not there leaves no folder behind
+        hired = _hire(stack, effort) if left and effort.dask is not None else None
+        stack.enter_context(open_folder(folder, sweep))
+        board = _Board(sweep, folder, effort, cells, tell, grow)
+        stack.callback(board.write)
+        if board.left:
+            run, board.width = hired or _hire(stack, effort)
+            for share in _shares(board):
+                for ident, outcome in run(share):
+                    board.take(ident, outcome)
+        else:
+            board.show(None)
+    return Report(tuple(board.rows.values()), board.cost())
+
+
+def _hire(stack: ExitStack, effort: Effort) -> tuple[Run, int]:
+    """Who does the cells, and how many at a time."""
+    if effort.dask is None:
+        return stack.enter_context(crew_here(effort.jobs, effort.time_limit)), effort.jobs
+    from rislam_rt.sweeps.cluster import crew_there
+
+    return stack.enter_context(crew_there(effort.dask, effort.time_limit))
+
+
+def _shares(board: "_Board") -> Iterator[list[tuple[str, Task]]]:
+    """All that is to be done; one cell first, if nothing else says what the rest will cost."""
+    tasks = list(board.left.items())
+    if board.cost().seconds is None:
+        yield tasks[:1]
+        tasks = tasks[1:]
+    board.show(None)
+    if tasks and not board.effort.only_estimate:
+        yield tasks
+
+
+class _Board:
+    """The state of a run: what is done, what is left, and who wants to know."""
+
+    def __init__(
+        self,
+        sweep: Sweep,
+        folder: Path,
+        effort: Effort,
+        cells: Sequence[Cell],
+        tell: Callable[[Told], None] | None,
+        grow: Callable[[Sequence[Row]], None] | None,
+    ) -> None:
+        self.sweep, self.folder, self.effort, self.tell, self.grow = sweep, folder, effort, tell, grow
+        self.rows = {cell.ident: read_row(folder, cell) for cell in cells}
+        self.left = {
+            cell.ident: Task(sweep.function, {**cell.settings, **sweep.local}, cell.seed)
+            for cell in cells
+            if self.rows[cell.ident].state in (MISSING, LOST) or (effort.retry and self.rows[cell.ident].failed)
+        }
+        self.width = effort.jobs
+        self.timings = read_timings(folder)
+        self.due = 0.0
+        self.known: tuple[float, Cost] | None = None
+
+    def take(self, ident: str, outcome: Outcome) -> None:
+        """A cell has ended."""
+        cell = self.rows[ident].cell
+        self.rows[ident] = row = write_cell(self.folder, cell, self.sweep.label, outcome)
+        append_timing(self.folder, cell, outcome)
+        self.timings.append({"point": cell.point, "seconds": outcome.seconds})
+        self.left.pop(ident)
+        if monotonic() >= self.due:
+            self.write()
+        self.show(row)
+
+    def cost(self) -> Cost:
+        """Of what is left, worked out anew at most once in `TABLE_SECONDS`."""
+        if self.known is None or self.known[1].seconds is None or not self.left or monotonic() >= self.known[0]:
+            left = [self.rows[ident].cell for ident in self.left]
+            self.known = monotonic() + TABLE_SECONDS, estimate_cost(left, self.timings, self.width)
+        return self.known[1]
+
+    def show(self, last: Row | None) -> None:
+        """Tell where the sweep stands."""
+        if self.tell is not None:
+            states = [row.state for row in self.rows.values()]
+            done = states.count(DONE)
+            failed = len(states) - done - sum(row.cell.ident in self.left for row in self.rows.values())
+            self.tell(Told(done, failed, len(states), self.cost(), last))
+
+    def write(self) -> None:
+        """Bring the table up to date."""
+        begin = monotonic()
+        rows = list(self.rows.values())
+        write_table(self.folder, rows)
+        if self.grow is not None:
+            self.grow(rows)
+        taken = monotonic() - begin
+        self.due = monotonic() + max(TABLE_SECONDS, taken / TABLE_SHARE)

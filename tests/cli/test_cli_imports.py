@@ -1,0 +1,62 @@
+"""What a command loads, and what it says when something to load is missing."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+SCENE = ROOT / "scenes" / "paper_room"
+PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
+HEAVY = ("numpy", "scipy", "sionna", "mitsuba", "drjit", "matplotlib", "xarray", "trimesh")
+
+
+def test_help_and_version_import_nothing_heavy():
+    code = (
+        "import sys\n"
+        "from rislam_rt.cli import main\n"
+        "for words in (['--help'], ['run', '--help'], ['--version']):\n"
+        "    sys.argv = ['rislam-rt', *words]\n"
+        "    try:\n        main()\n"
+        "    except SystemExit as left:\n        assert left.code == 0, left.code\n"
+        f"print([name for name in {HEAVY} if name in sys.modules])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_settings_are_printed_without_what_only_a_run_needs():
+    """Half a second of scipy, trimesh and plots for a list of settings; on modules, as clocks lie."""
+    heavy = [
+        "scipy.linalg",
+        "scipy.special",
+        "scipy.optimize",
+        "scipy.spatial",
+        "scipy.stats",
+        "trimesh",
+        "xarray",
+        "matplotlib",
+    ]
+    code = (
+        "import sys\n"
+        "from rislam_rt.cli import main\n"
+        "sys.argv = ['rislam-rt', 'config']\n"
+        "try:\n    main()\n"
+        "except SystemExit as left:\n    assert left.code in (0, None), left.code\n"
+        f"print([name for name in {heavy} if name in sys.modules])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_missing_library_is_one_line_and_exit_3(tmp_path):
+    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(tmp_path / "libLLVM.so")}
+    for words in (["doctor"], ["run", PIPELINE], ["trace", SCENE]):
+        done = subprocess.run(
+            [sys.executable, "-m", "rislam_rt", *map(str, words)],
+            capture_output=True, text=True, cwd=tmp_path, env=environment, check=False,
+        )  # fmt: skip
+        assert done.returncode == 3
+        assert len(done.stderr.splitlines()) == 1
+        assert "DRJIT_LIBLLVM_PATH" in done.stderr
+        assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,106 @@
+"""One cell: what it gives does not depend on how it is asked for, and what it leaves can be replayed to the bit."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rislam_rt.errors import ConfigError, StoreError
+from rislam_rt.scene import load_scene
+from rislam_rt.studies import UnseenSpec, load_any
+from rislam_rt.studies.unseen import (
+    answers_from_arrays,
+    build_unseen,
+    count_tests,
+    read_recording,
+    replay,
+    score_run,
+)
+from rislam_rt.studies.unseen.cell import find_stage, run_cell
+from rislam_rt.sweeps import build_cells
+
+RUN = {
+    "channel": "image_source", "depth": 1, "cycles": 30, "schemes": ["random"], "slam": {"use_vt": True},
+    "motion": {"sigma_a_m_s2": 0.01}, "radio": {"reference_snr_db": 13.0},
+}  # fmt: skip
+WITH_PANEL, WITHOUT = 22, 3
+"""Rooms whose classes the tests reckon with."""
+
+
+def cell(room: int, **more: Any) -> dict[str, Any]:
+    return run_cell({"run": RUN, "variants": {}, "room": room, **more}, 0)
+
+
+def test_a_cell_gives_the_same_again_and_traces_a_room_once() -> None:
+    first = cell(WITH_PANEL)
+    before = find_stage.cache_info().misses
+    second = cell(WITH_PANEL)
+    assert find_stage.cache_info().misses == before
+    assert first["schemes"] == second["schemes"]
+    assert first["schemes"]["random"]["ran"] == "random"
+    assert cell(WITHOUT)["schemes"]["random"]["ran"] == "no_ris"
+
+
+def test_a_recording_is_read_back_and_replayed_to_the_bit(tmp_path: Path) -> None:
+    scores = cell(WITH_PANEL, save="components", data=str(tmp_path))["schemes"]["random"]
+    folder = tmp_path / f"room_{WITH_PANEL:05d}"
+    recording = read_recording(folder / "13dB_random.nc")
+    assert dict(recording.scores) == scores
+    answers = replay(recording.inputs, recording.config, recording.scheme, rng=np.random.default_rng(0))
+    again = score_run(recording.truth, recording.inputs, answers)
+    assert {name: again[name] for name in again} == {name: scores[name] for name in again}
+    # another setting is another estimator
+    other = replay(recording.inputs, recording.config, "random", {"slam.sigma_a": 0.5}, rng=np.random.default_rng(0))
+    assert score_run(recording.truth, recording.inputs, other)["rmse_m"] != scores["rmse_m"]
+    # the room beside it is a scene like any other, with the motion of the run
+    assert np.allclose(load_scene(folder / "scene").agent.position, recording.truth.position, atol=1e-6)
+
+
+def test_plain_arrays_are_scored_like_an_estimator(tmp_path: Path) -> None:
+    cell(WITHOUT, save="components", data=str(tmp_path))
+    recording = read_recording(tmp_path / f"room_{WITHOUT:05d}" / "13dB_no_ris.nc")
+    inputs, truth = recording.inputs, recording.truth
+    told = inputs.start.position + np.outer(inputs.time, inputs.start.velocity)
+    scores = score_run(truth, inputs, answers_from_arrays(inputs, told))
+    assert scores["relative_rmse_m"] == pytest.approx(scores["dead_reckoning_m"])
+    assert scores["births"] == 0
+    assert scores["nees"] is None
+
+
+def test_what_is_no_recording_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "x.nc").write_bytes(b"no")
+    with pytest.raises(StoreError, match="not a readable NetCDF file"):
+        read_recording(tmp_path / "x.nc")
+    with pytest.raises(StoreError, match="no such file"):
+        read_recording(tmp_path / "y.nc")
+
+
+def pipeline(folder: Path, *lines: str) -> Path:
+    file = folder / "unseen.toml"
+    file.write_text('kind = "unseen"\nname = "x"\n' + "\n".join(lines) + '\n[run]\nschemes = ["random"]\n')
+    return file
+
+
+def test_cells_of_a_room_follow_each_other(tmp_path: Path) -> None:
+    spec = load_any(pipeline(tmp_path, "first = 3", "rooms = 3", "snr_db = [13.0, 0.0]"))
+    assert isinstance(spec, UnseenSpec)
+    cells = build_cells(build_unseen(spec, tmp_path / "unseen.toml", tmp_path))
+    assert [c.point["room"] for c in cells] == [3, 3, 4, 4, 5, 5]
+    assert len({c.ident for c in cells}) == 6
+
+
+def test_rooms_for_development_and_for_tests_do_not_mix(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="both sides of 10000"):
+        load_any(pipeline(tmp_path, "first = 9_999", "rooms = 2"))
+
+
+def test_every_run_of_test_rooms_is_counted_once(tmp_path: Path) -> None:
+    file = pipeline(tmp_path)
+    for rooms, counted in ((2, 1), (2, 1), (3, 2)):
+        spec = load_any(file, ["first=10000", f"rooms={rooms}"])
+        assert isinstance(spec, UnseenSpec)
+        assert count_tests(spec, file) == counted
+    dev = load_any(file, ["rooms=2"])
+    assert isinstance(dev, UnseenSpec)
+    assert count_tests(dev, file) == 2

@@ -1,0 +1,174 @@
+"""The score card on results made by hand, whose scores are known."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from rislam_rt.model import Body, MapEstimate, Measurement, PathKind, RisSpec, SlamEstimate, empty_map
+from rislam_rt.pipeline.recordings.replay import Answers, Inputs
+from rislam_rt.slam import StartPrior
+from rislam_rt.studies.unseen.score import lost_scores, score_run
+from rislam_rt.studies.unseen.truth import Truth
+
+K = 150
+TIME = 0.1 * np.arange(K)
+TOLD = np.array([0.012, -0.009, 0.0])
+WALLS = np.array([[5.0, 0.0, 1.5], [0.0, 4.0, 1.5]])
+NORMALS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+POINTS = np.array([[2.0, 2.0, 2.0], [3.0, 1.0, 3.0]])
+KINDS = np.array([PathKind.PS, PathKind.VS, PathKind.RIS, PathKind.VT])
+
+
+class Info(NamedTuple):
+    landmark: Any
+    outcome: str = "ok"
+
+
+def truth() -> Truth:
+    position = 1.0 + np.outer(TIME, [0.1, 0.05, 0.0])
+    spread = np.array([np.diag([0.0, 1.3, 0.75]), np.diag([2.1, 0.0, 0.75])])
+    audible = np.ones((K, 2), dtype=np.bool_)
+    audible[:20] = False
+    parts = np.tile([0, 2, 1, -1], (K, 1))
+    return Truth(
+        position, np.tile([0.1, 0.05, 0.0], (K, 1)), POINTS, True, audible, WALLS, NORMALS, spread, audible.copy(),
+        KINDS, np.array([0, 0, 1, -1]), parts, np.full(K, 0.02), np.full(K, 0.001),
+    )  # fmt: skip
+
+
+def panel() -> RisSpec:
+    return RisSpec(4, 4, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
+
+
+def inputs() -> Inputs:
+    none = np.zeros(0)
+    nothing = Measurement(none, np.zeros((0, 2)), none, none, np.zeros((0, 2)), none)
+    start = StartPrior(truth().position[0] + TOLD, np.array([0.1, 0.06, 0.0]), 0.0)
+    return Inputs(start, Body(), panel(), TIME, np.zeros(K), K * (nothing,), K * (None,))
+
+
+def whole_map(shift: Any = TOLD) -> MapEstimate:
+    """Both landmarks, the second as the panel, an image, and both walls, one of them turned round."""
+    normal = NORMALS * [[1.0], [-1.0]]
+    offset = np.einsum("wi,wi->w", normal, WALLS + shift)
+    position = np.concatenate([POINTS, [[8.0, 2.0, 2.0]]]) + shift
+    return MapEstimate(
+        np.array([4, 7, 9]), position, np.tile(1e-6 * np.eye(3), (3, 1, 1)), np.array([-1, -1, 0]),
+        np.array([0.0, 0.9, 0.0]), np.ones(3), normal, offset, np.full((2, 2), 1e-3),
+    )  # fmt: skip
+
+
+def answers(error: Any = TOLD, found: MapEstimate | None = None, from_cycle: int = 30, std: float = 0.01) -> Answers:
+    covariance = np.diag([std**2, std**2, 0.0, 1e-4, 1e-4, 0.0])
+    position = truth().position + error
+    estimates = [
+        SlamEstimate(
+            position[k], np.zeros(3), 0.0, covariance, np.zeros((0, 3)), Body(),
+            (found or whole_map()) if k >= from_cycle else empty_map(),
+        )
+        for k in range(K)
+    ]  # fmt: skip
+    infos = [Info(np.array([4, 7, 9, -1]) if k >= from_cycle else np.full(4, -1)) for k in range(K)]
+    return Answers(tuple(estimates), tuple(infos), 0.001)
+
+
+def test_a_perfect_run_has_the_starts_error_alone() -> None:
+    scores = score_run(truth(), inputs(), answers())
+    assert scores["rmse_m"] == pytest.approx(np.linalg.norm(TOLD))
+    assert scores["relative_rmse_m"] < 1e-12
+    assert scores["ratio"] == pytest.approx(np.linalg.norm(TOLD) / 0.02)
+    assert scores["nees"] == pytest.approx(np.sum(TOLD**2) / 0.01**2 / 2.0)
+    assert not scores["lost"]
+    assert not scores["silent"]
+    assert scores["walls_heard"] == scores["walls_found"] == scores["walls_good"] == 2
+    assert scores["points_heard"] == scores["points_found"] == 2
+    assert scores["panel_found"]
+    assert scores["ghost_walls"] == scores["ghost_points"] == 0
+    assert scores["gospa_m"] < 1e-12
+    # audible from cycle 20 on, in the map from cycle 30 on
+    for name in ("wall_delay_s", "point_delay_s", "panel_delay_s"):
+        assert scores[name] == pytest.approx(1.0)
+    # told 0.01 m/s too much along y: the error grows evenly with time
+    assert scores["dead_reckoning_m"] == pytest.approx(0.01 * np.sqrt(np.mean(TIME**2)))
+
+
+def test_relative_errors_and_what_is_late() -> None:
+    error = TOLD + np.outer(np.where(TIME >= 10.0, 0.003, 0.0), [1.0, 0.0, 0.0])
+    scores = score_run(truth(), inputs(), answers(error))
+    assert scores["late_relative_rmse_m"] == pytest.approx(0.003)
+    assert scores["late_relative_ratio"] == pytest.approx(3.0)
+    assert scores["relative_rmse_m"] == pytest.approx(0.003 * np.sqrt(np.mean(TIME >= 10.0)))
+
+
+def test_kinds_of_births() -> None:
+    scores = score_run(truth(), inputs(), answers())
+    assert (scores["births"], scores["births_judged"], scores["births_right"]) == (3, 3, 3)
+    # what the filter holds for a point gets the components of an image, and the other way round
+    crossed = answers()
+    infos = [i._replace(landmark=np.array([9, 7, 4, -1])) if k >= 30 else i for k, i in enumerate(crossed.infos)]
+    scores = score_run(truth(), inputs(), crossed._replace(infos=tuple(infos)))
+    assert (scores["births"], scores["births_judged"], scores["births_right"]) == (3, 3, 1)
+
+
+def test_walls_far_off_are_ghosts_and_those_a_little_off_are_found_but_not_well() -> None:
+    found = whole_map()
+    turned = np.array([np.cos(0.03), 0.0, np.sin(0.03)])
+    normal = np.array([turned, [0.0, 0.0, 1.0]])
+    offset = np.array([turned @ (WALLS[0] + TOLD), 9.0])
+    scores = score_run(truth(), inputs(), answers(found=_with_walls(found, normal, offset)))
+    assert (scores["walls_found"], scores["walls_good"], scores["ghost_walls"]) == (1, 0, 1)
+    assert scores["wall_deg"] == pytest.approx(np.degrees(0.03))
+    assert scores["wall_m"] < 1e-9
+
+
+def test_a_landmark_that_is_nowhere_is_a_ghost() -> None:
+    away = whole_map(TOLD + np.array([0.0, 0.0, 30.0]))
+    scores = score_run(truth(), inputs(), answers(found=away))
+    assert scores["points_found"] == 0
+    assert scores["ghost_points"] == 2
+    assert not scores["panel_found"]
+
+
+def test_without_a_panel_there_is_none_to_find() -> None:
+    scores = score_run(truth(), inputs()._replace(panel=None), answers())
+    assert scores["points_heard"] == 1
+    assert not scores["panel_heard"]
+    assert scores["ghost_points"] == 1
+
+
+@pytest.mark.parametrize(("cycles", "lost"), [(9, False), (10, True)])
+def test_lost_is_far_off_for_a_second(cycles: int, lost: bool) -> None:
+    error = np.zeros(K)
+    error[50 : 50 + cycles] = 0.11
+    scores = lost_scores(error, np.full(K, 0.01), np.full(K, 0.01), TIME, K * ["ok"])
+    assert scores["lost"] is lost
+    assert scores["silent"] is lost
+    assert scores["lost_at_s"] == (pytest.approx(5.0) if lost else None)
+
+
+def test_lost_asks_for_more_where_the_bound_is_large() -> None:
+    assert not lost_scores(np.full(K, 0.4), np.full(K, 0.1), np.full(K, 0.1), TIME, K * ["ok"])["lost"]
+    assert lost_scores(np.full(K, 0.6), np.full(K, 0.1), np.full(K, 0.1), TIME, K * ["ok"])["lost"]
+
+
+def test_an_alarm_counts_from_the_loss_on() -> None:
+    error = np.where(TIME >= 5.0, 1.0, 0.0)
+    early, late = K * ["ok"], K * ["ok"]
+    early[20], late[140] = "diverged", "diverged"
+    assert lost_scores(error, np.full(K, 0.01), np.full(K, 0.01), TIME, early)["silent"]
+    assert not lost_scores(error, np.full(K, 0.01), np.full(K, 0.01), TIME, late)["silent"]
+
+
+def test_a_deviation_that_covers_the_error_says_so_too() -> None:
+    error, bound, outcomes = np.where(TIME >= 5.0, 1.0, 0.0), np.full(K, 0.01), K * ["ok"]
+    assert lost_scores(error, bound, np.full(K, 0.19), TIME, outcomes)["silent"]
+    assert not lost_scores(error, bound, np.full(K, 0.21), TIME, outcomes)["silent"]
+    assert lost_scores(error, bound, np.full(K, 0.21), TIME, outcomes)["lost"]
+
+
+def _with_walls(found: MapEstimate, normal: Any, offset: Any) -> MapEstimate:
+    return MapEstimate(
+        found.ident, found.position, found.covariance, found.parent, found.ris_probability, found.strength, normal,
+        offset, found.wall_std,
+    )  # fmt: skip
