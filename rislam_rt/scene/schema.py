@@ -1,7 +1,6 @@
 """`scene.toml`: the keys, their types and ranges. Unknown keys are refused; all bad fields are found at once."""
 
 import unicodedata
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -9,6 +8,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from rislam_rt.scene.findings import Fault, Faults, one_line
 from rislam_rt.shipped import shipped_rooms
+from rislam_rt.spelling import did_you_mean, nearest
 from rislam_rt.toml import parse_toml
 
 MAX_SCENE_BYTES = 4_000_000
@@ -312,9 +312,9 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
         The file cannot be read or its content is not a scene.
     """
     if not path.is_file():
-        near = get_close_matches(path.parent.name, shipped_rooms(), 1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        raise Fault("no such scene file", f"{hint}give a scene folder, its scene.toml, or the name of a built-in room")
+        hint = did_you_mean(nearest(path.parent.name, shipped_rooms()))
+        wanted = f"{hint} give a scene folder, its scene.toml, or the name of a built-in room".lstrip()
+        raise Fault("no such scene file", wanted)
     try:
         with path.open("rb") as file:
             content = file.read(MAX_SCENE_BYTES + 1)
@@ -333,8 +333,8 @@ def _remark(item: Any, lone_panel: bool) -> str:
     if item["type"] == "missing":
         return f"{place}: missing"
     if item["type"] == "extra_forbidden":
-        near = get_close_matches(str(item["loc"][-1]), _known_keys(), n=1)
-        return f"{place}: unknown key" + (f" (did you mean '{near[0]}'?)" if near else "")
+        hint = did_you_mean(nearest(str(item["loc"][-1]), _known_keys()))
+        return f"{place}: unknown key" + (f" ({hint})" if hint else "")
     message = item["msg"].removeprefix("Value error, ")
     if item["type"] == "string_pattern_mismatch":
         message = "give letters and digits of any script, '_', '-' and '.' only, and not dots alone"

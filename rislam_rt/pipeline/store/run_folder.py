@@ -30,10 +30,11 @@ from rislam_rt.pipeline.dataset import (
 from rislam_rt.pipeline.record import given_to_dataset
 from rislam_rt.pipeline.store.identity import RunIdentity
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.write import scene_files, toml_bytes, tum_bytes
+from rislam_rt.scene.write import scene_files, tum_bytes
 from rislam_rt.storage.files import TEMPORARY, make_folders, remove_empty, remove_temporaries, write_atomic
 from rislam_rt.storage.lock import LOCK_FILE, hold
 from rislam_rt.storage.seal import file_digest, read_sealed, seal
+from rislam_rt.toml import toml_bytes
 
 RUN_FILE, PATHS_FILE, SUMMARY_FILE = "run.json", "paths.nc", "summary.json"
 RUNNING, DONE = "running", "done"
