@@ -10,7 +10,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import check_run
-from rislam_rt.pipeline.walk import without_panel
+from rislam_rt.pipeline.scheme_simulation import without_panel
 
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
 
@@ -36,7 +36,7 @@ def test_a_scheme_does_not_depend_on_the_others(short_result, run_short):
 def test_gains_are_those_of_the_applied_code(room, short_result):
     from rislam_rt.channel.image_source import ImageSourceChannel
     from rislam_rt.model import RisCode
-    from rislam_rt.pipeline.spec import PipelineSpec, build_settings
+    from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 
     radio = build_settings(PipelineSpec.model_validate(short_result.config)).radio
     channel = ImageSourceChannel(replace(room, agent=room.agent[:8]), radio, 2)
