@@ -6,13 +6,14 @@ from importlib import import_module
 from typing import Any
 
 from rislam_rt.errors import ConfigError, SetupError
-from rislam_rt.sweeps.work import LOST, Outcome, Task
-from rislam_rt.sweeps.worker_pool import Crew, Run
+from rislam_rt.sweeps.local_pool import SAME_BITS, Run, outcome_of
+from rislam_rt.sweeps.work import LOST, Outcome, Task, attempt
+from rislam_rt.worker_pool import Pool
 
 CONNECT_SECONDS = 3
 """How long to wait for the scheduler, which is there already: it only has to answer."""
 
-_CREW = Crew()
+_POOL = Pool(SAME_BITS)
 """Of the Dask worker that this module is imported in."""
 
 
@@ -54,7 +55,7 @@ def crew_there(address: str, limit: float | None) -> Iterator[tuple[Run, int]]:
 
 def do_cell(task: Task, limit: float | None) -> tuple[Any, ...]:
     """One cell, on a Dask worker; the outcome as plain data."""
-    return tuple(_CREW.do(Task(*task), limit))
+    return tuple(outcome_of(_POOL.do(attempt, (Task(*task),), limit), limit))
 
 
 def _outcome(future: Any, address: str) -> Outcome:
@@ -68,4 +69,4 @@ def _outcome(future: Any, address: str) -> Outcome:
 
 def dismiss_idle() -> None:
     """End the workers that wait for nothing."""
-    _CREW.dismiss()
+    _POOL.dismiss()
