@@ -10,7 +10,7 @@ from rislam_rt.progress import Tell
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn, TaskID
 
-    from rislam_rt.sweeps import Cost, Told
+    from rislam_rt.sweeps import SweepCost, SweepProgress
 
 
 def _bars(*columns: "ProgressColumn") -> "Progress":
@@ -45,7 +45,7 @@ def show_progress() -> Iterator[Tell]:
 
 
 @contextmanager
-def show_sweep() -> "Iterator[Callable[[Told], None]]":
+def show_sweep() -> "Iterator[Callable[[SweepProgress], None]]":
     """Show a sweep: its cost before it starts, a bar with the time left, and every failure as it comes."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 
@@ -53,7 +53,7 @@ def show_sweep() -> "Iterator[Callable[[Told], None]]":
     with _bars(*columns) as bar:
         task = bar.add_task("cells", total=None, left="one cell goes first, to tell the cost")
 
-        def tell(told: "Told") -> None:
+        def tell(told: "SweepProgress") -> None:
             if told.last is None and not verbosity().quiet:
                 bar.console.print(describe_cost(told), markup=False, highlight=False)
             elif told.last is not None and told.last.failed:
@@ -68,7 +68,7 @@ def show_sweep() -> "Iterator[Callable[[Told], None]]":
         yield tell
 
 
-def describe_cost(told: "Told") -> str:
+def describe_cost(told: "SweepProgress") -> str:
     """How many cells there are, how many are there, and what the rest will cost."""
     there = f"{told.total} cells, {told.done} done" + (f", {told.failed} failed" if told.failed else "")
     if not told.cost.cells:
@@ -76,7 +76,7 @@ def describe_cost(told: "Told") -> str:
     return f"{there}; {told.cost.cells} left at about {told.cost.cell_seconds or 0.0:.3g} s each: {clock(told.cost)}"
 
 
-def clock(cost: "Cost") -> str:
+def clock(cost: "SweepCost") -> str:
     """The time that is left as `h:mm:ss`."""
     if cost.seconds is None:
         return "unknown time"

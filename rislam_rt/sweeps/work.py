@@ -22,7 +22,7 @@ class Task(NamedTuple):
     seed: int
 
 
-class Outcome(NamedTuple):
+class CellOutcome(NamedTuple):
     """What became of a cell: plain data, ready for the wire."""
 
     result: Mapping[str, Any] | None = None
@@ -39,7 +39,7 @@ class Outcome(NamedTuple):
     """What the function itself says of its times."""
 
 
-def attempt(task: Task, tell: object = None) -> Outcome:
+def attempt(task: Task, tell: object = None) -> CellOutcome:
     """Do one cell; an exception is an outcome. A cell has no progress to `tell` of."""
     begin, cpu = perf_counter(), process_time()
     result, cause, message, timing = None, "", "", None
@@ -51,7 +51,9 @@ def attempt(task: Task, tell: object = None) -> Outcome:
         result = found
     except BaseException as error:  # SystemExit too: a library must not end the worker without a word
         cause, message = RAISED, one_line(error)
-    return Outcome(result, cause, message, perf_counter() - begin, process_time() - cpu, os.uname().nodename, timing)
+    return CellOutcome(
+        result, cause, message, perf_counter() - begin, process_time() - cpu, os.uname().nodename, timing
+    )
 
 
 def find_function(name: str) -> Any:
