@@ -14,8 +14,8 @@ from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.specification.spec import Settings, build_settings
 from rislam_rt.slam import StartPrior
 from rislam_rt.slam.filter import glance_of, stranger_density
-from rislam_rt.slam.window import WindowState
 from rislam_rt.slam.schemes.bp_slam.filter import told
+from rislam_rt.slam.window import WindowState
 
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
 RECEIVERS = (
