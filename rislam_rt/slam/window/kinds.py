@@ -37,7 +37,6 @@ LOG_NONE = np.log(0.05)
 """Of a path of no kind here: over walls that the map lacks."""
 OVER_PANEL = 0.2
 """Share of such paths that run over panels, where there are any."""
-LOG_VOLUME = float(np.log(4.0 / 3.0 * np.pi * LEVELS.size**3))
 BEHIND = -4.0
 """Log probability of a thing behind a wall that stands between it and the agent, or of a wall that stands before known
 things: the walls of a room that is not convex end somewhere."""
@@ -113,7 +112,9 @@ def judge(
     track = table.trials.track
     rivals = np.where(table.known >= 0, np.log(max(len(book.walls), 1)), 0.0)
     rivals[table.kind == IMAGE] = np.log(max(len(book.points), 1))
-    evidence = fits.log_evidence - LOG_VOLUME - np.where(table.trials.is_wall | table.trials.is_pair, np.log(8.0), 0.0)
+    evidence = (
+        fits.log_evidence - LEVELS.log_volume - np.where(table.trials.is_wall | table.trials.is_pair, np.log(8.0), 0.0)
+    )
     evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair, lonely[track], 0.0)
     evidence += _amplitudes(table, fits, digest, book, scene) + _opacity(table, fits, digest, known, book)
     evidence += _beside(table, digest, known, book, scene)
@@ -127,7 +128,7 @@ def judge(
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
-    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LOG_VOLUME + LOG_NONE
+    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LEVELS.log_volume + LOG_NONE
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
     none += np.logaddexp(np.log(1.0 - OVER_PANEL), np.log(OVER_PANEL) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
@@ -207,7 +208,7 @@ def _shared(
     gap = off[first, second]
     log_place = -0.5 * np.vecdot(gap, np.linalg.solve(spread, gap[..., None])[..., 0])
     log_place -= 0.5 * np.linalg.slogdet(spread)[1] + 1.5 * np.log(2.0 * np.pi)
-    log_place += LOG_VOLUME + np.where(wall[first], np.log(8.0), 0.0)
+    log_place += LEVELS.log_volume + np.where(wall[first], np.log(8.0), 0.0)
     other = track[good[second]]
     odds = np.full((len(good), count), -np.inf)
     np.logaddexp.at(odds, (first, other), evidence[good[second]] + log_place - total[other])
@@ -294,13 +295,12 @@ def beliefs(place: Floats, digest: Digest, known: Known, book: Book) -> Holds:
     rise, std = abs(span[2]) / reach, LEVELS.lean * reach
     axes: list[Floats] = []
     log_odds: list[float] = []
-    even = np.log(LEVELS.upright / (1.0 - LEVELS.upright))
     if rise > 0.9:
         axes += [AXES[0], AXES[1]]
-        log_odds += 2 * [even + np.log(reach)]
+        log_odds += 2 * [LEVELS.log_upright + np.log(reach)]
     elif rise < 0.35:
         axes.append(AXES[2])
-        log_odds.append(even + np.log(reach))
+        log_odds.append(LEVELS.log_upright + np.log(reach))
         others = known.place[book.walls] - digest.middle
         if len(others):
             flat = np.linalg.norm(others[:, :2], axis=1) > 0.95 * np.linalg.norm(others, axis=1)
@@ -334,13 +334,9 @@ def _upright(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
         variance = np.vecdot(holds.axis, holds.axis @ fits.covariance[row]) + holds.std**2
         log_right = -0.5 * (holds.axis @ span) ** 2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
         # odds hold the width: right against a density of one over it
-        each = np.logaddexp(0.0, holds.log_odds + log_right) - np.log1p(EVEN)
+        each = np.logaddexp(0.0, holds.log_odds + log_right) - np.logaddexp(0.0, LEVELS.log_upright)
         gain[row] = (each[:1] if trials.is_pair[row] and turn[0, 0] < 0.0 else each).sum()
     return gain
-
-
-EVEN = LEVELS.upright / (1.0 - LEVELS.upright)
-"""Odds that a direction is as it is held to be."""
 
 
 def wanted(verdict: Verdict, length: float) -> bool:

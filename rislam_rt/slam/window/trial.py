@@ -78,12 +78,10 @@ def try_all(trials: Trials, digest: Digest) -> Fits:
     for turn in range(STEPS + 1):
         now = _equations(trials, digest, active, place[active], error[active], trust[active])
         cost[active] = now.cost
-        if turn >= 2 or turn == STEPS:
-            inverse = np.linalg.inv(now.normal)
-            covariance[active] = inverse[:, common:, common:]
+        if turn == STEPS:
+            covariance[active] = np.linalg.inv(now.normal)[:, common:, common:]
             held[active] = np.linalg.inv(now.normal[:, common:, common:])
             log_det[active] = np.linalg.slogdet(now.normal)[1]
-        if turn == STEPS:
             break
         trust[active] = now.trust
         step = np.linalg.solve(now.normal, now.slope[..., None])[..., 0]
