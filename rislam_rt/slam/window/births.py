@@ -102,13 +102,11 @@ def _missing_legs(context: Context, histories: Digest, mean: Floats) -> Floats:
     along, share = ray @ away.T, reach / length[:, None]
     leg = (np.abs(along - share) < LEG) | (np.abs(along) > 1.0 - LEG)
     found = (leg & (share < 0.995) & bright).sum(axis=1)
-    return LOG_MISSING[np.minimum(found, 2)]
+    return LEVELS.log_rare * (1.0 - 0.5 * np.minimum(found, 2))
 
 
 LEG = 0.04
 """Difference of cosines up to which one return may be a leg of another's right angle, or lie along its line."""
-LOG_MISSING = np.log(np.array([0.02, 0.3, 1.0]))
-"""Log probability that none, one, both of the single returns of two walls are heard, where they are heard together."""
 
 
 def explanations(

@@ -19,8 +19,8 @@ LEVEL = 0.02
 """Third direction cosine down to which returns are heard: those of upright walls arrive level."""
 FAINT = 0.5
 """SNR below which a return is not looked for: it moves nothing in its cell by more than the noise does."""
-PANEL_STD = 0.7
-"""Spread of the panel's predicted log amplitude: its gain hangs on phases, hence on millimetres."""
+PANEL_STD = float(np.pi / np.sqrt(24.0))
+"""Spread of the panel's predicted log amplitude: that of a Rayleigh variable, as phases hang on millimetres."""
 
 
 class Scene(NamedTuple):
@@ -178,7 +178,7 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
         if taken[leader] or not len(members):
             continue
         taken[members] = True
-        by_itself[members] = np.maximum(1.0 - clear[leader], ALONE)
+        by_itself[members] = np.maximum(1.0 - clear[leader], LEVELS.rare)
         partner[leader] = members[np.argmax(strength[members])]
         total[leader] += power[members].sum()
     paired = (partner >= 0).nonzero()[0]
@@ -218,8 +218,6 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
 
 EDGE = 1.15
 """Distance in cells up to which a weaker path moves a stronger one: cells have no sharp edge."""
-ALONE = 0.05
-"""Least probability that what lies in a stronger one's cell comes out by itself: cells have no sharp edge."""
 TWIN_STD = 0.03
 """Relative difference of a return and its reciprocal in amplitude: a baseline of 0.1 m at some metres."""
 

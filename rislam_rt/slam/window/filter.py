@@ -166,8 +166,6 @@ def smoothed(state: WindowState) -> Floats:
 
 START = ((3, 0.5), (10, 1.0))
 """Steps that may have been livelier than thought, and standard deviation [m/s^2] of their accelerations then."""
-LOG_START = np.log(0.01)
-"""Log probability of a manoeuvre that nothing announced."""
 MISSED, STRAINED = 1.5, 1.5
 """Standard deviations by which fewer returns show than should, and mean square of their innovations, from which on a
 manoeuvre is looked for."""
@@ -192,7 +190,7 @@ def _notice(
             precision[-steps:, lively] = np.minimum(precision[-steps:, lively], liveliness**-2.0)
             trial = gauss.solve(state.window._replace(precision=precision))
             view = view_of(trial)
-            if view.score + LOG_START > best.score:
+            if view.score + LEVELS.log_rare > best.score:
                 best, window = view, trial
     if not len(best.expected.seen) or not len(glance.seen):
         return state._replace(window=window), best

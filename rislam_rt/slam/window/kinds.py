@@ -35,11 +35,6 @@ LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 
 """Log prior of each kind; over known walls, of all walls together; of known points in walls, of all points together."""
 LOG_NONE = np.log(0.05)
 """Of a path of no kind here: over walls that the map lacks."""
-OVER_PANEL = 0.2
-"""Share of such paths that run over panels, where there are any."""
-BEHIND = -4.0
-"""Log probability of a thing behind a wall that stands between it and the agent, or of a wall that stands before known
-things: the walls of a room that is not convex end somewhere."""
 DEPTH = 0.15
 """Distance [m] beyond a wall from which on a thing is behind it, and not on it."""
 
@@ -130,7 +125,7 @@ def judge(
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
     none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LEVELS.log_volume + LOG_NONE
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
-    none += np.logaddexp(np.log(1.0 - OVER_PANEL), np.log(OVER_PANEL) + over_panels)
+    none += np.logaddexp(np.log1p(-LEVELS.panels), np.log(LEVELS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
     evidence += _shared(table, fits, evidence, none, explained)
     verdicts, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
@@ -279,12 +274,12 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
         reach = np.linalg.norm(out, axis=1)
         feet = 0.5 * (known.place[walls] + middle)
         depth = foot @ (out / reach[:, None]).T - np.vecdot(feet, out) / reach
-        total += BEHIND * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        total += LEVELS.log_rare * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
         before = normal @ feet.T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, BEHIND, 0.0) * (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        total += np.where(wall, LEVELS.log_rare, 0.0) * (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
     if len(book.points):
         depth = normal @ known.place[book.points].T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, BEHIND, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        total += np.where(wall, LEVELS.log_rare, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
     return np.where(pair, 0.0, total)
 
 

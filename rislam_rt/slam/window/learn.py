@@ -43,13 +43,11 @@ def pack(forms: Integers, book: Book) -> Integers:
 
 SCATTER_RATE = 0.1
 """Share of the latest residual in its running mean square."""
-FIRST = np.array([0.8, 0.6, 0.4, 0.4, 0.4])
-"""Probability that nothing stands in the way of a path over so many walls, before it was looked for."""
 
 
 def recall(sights: Sights, expected: Expected, book: Book) -> tuple[Floats, Floats]:
     """Probability (R,) that nothing stands in the way of each return now, and its scatter (R,)."""
-    first, scatter = FIRST[expected.bounces], np.full(len(expected.seen), LEVELS.crowd)
+    first, scatter = LEVELS.steady ** (1.0 + expected.bounces), np.full(len(expected.seen), LEVELS.crowd)
     if len(sights.code):
         code = pack(expected.forms, book)
         place = np.minimum(np.searchsorted(sights.code, code), len(sights.code) - 1)

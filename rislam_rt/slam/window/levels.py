@@ -51,13 +51,31 @@ class Levels(NamedTuple):
     """Probability that in a cycle what stands in the way of a path goes away again."""
     shown: float = 0.95
     """Probability that a path above the threshold with nothing in its way is reported by itself."""
-    dead: float = 0.01
-    """Probability of existence below which a feature is taken back."""
 
     @property
     def stay(self) -> float:
         """Probability that a step is as lively as the one before."""
         return 1.0 - self.rare
+
+    @property
+    def dead(self) -> float:
+        """Probability of existence below which a feature is taken back."""
+        return self.rare
+
+    @property
+    def log_rare(self) -> float:
+        """Of an unannounced manoeuvre; of a thing behind a wall; half of it of a wall that is not heard by itself."""
+        return float(np.log(self.rare))
+
+    @property
+    def weaker(self) -> float:
+        """Share of the weaker of two paths that are a wall's loss apart in the place of both, and its spread."""
+        return float(1.0 / (1.0 + np.exp(-self.wall_ratio)))
+
+    @property
+    def steady(self) -> float:
+        """Probability that nothing stands in the way of a leg that was not looked for before."""
+        return self.cleared / (self.cleared + self.rare)
 
     @property
     def blocked(self) -> float:
