@@ -14,15 +14,9 @@ from rislam_rt.slam.window.guesses import BESIDE, known_features
 from rislam_rt.slam.window.kinds import NEW, Verdict, judge, wanted
 from rislam_rt.slam.window.learn import seed
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.numerics import MOST, NEAR, STRIDE
 from rislam_rt.slam.window.retract import behind, release
 from rislam_rt.slam.window.steps import HEAD
-
-NEAR = np.array([0.3, 0.15, 0.15])
-"""Gap in length [m] and cosines up to which a return of the map is weighed as a track's explanation."""
-MOST = 2
-"""Explanations of one track by the map that are weighed, the nearest."""
-STRIDE = 3
-"""Cycles between two examinations."""
 
 
 def births(context: Context, expected: Expected, groups: Clusters) -> Context:

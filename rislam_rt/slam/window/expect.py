@@ -13,12 +13,9 @@ from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise,
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.forms import enumerate_forms, forms_of, possible_legs
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.numerics import EDGE, FAINT, LEVEL
 from rislam_rt.slam.window.steps import HEAD
 
-LEVEL = 0.02
-"""Third direction cosine down to which returns are heard: those of upright walls arrive level."""
-FAINT = 0.5
-"""SNR below which a return is not looked for: it moves nothing in its cell by more than the noise does."""
 PANEL_STD = float(np.pi / np.sqrt(24.0))
 """Spread of the panel's predicted log amplitude: that of a Rayleigh variable, as phases hang on millimetres."""
 
@@ -216,8 +213,6 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
     )
 
 
-EDGE = 1.15
-"""Distance in cells up to which a weaker path moves a stronger one: cells have no sharp edge."""
 TWIN_STD = 0.03
 """Relative difference of a return and its reciprocal in amplitude: a baseline of 0.1 m at some metres."""
 

@@ -21,13 +21,11 @@ from rislam_rt.slam.window.learn import Sights, learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.look import Look, echoes, look
+from rislam_rt.slam.window.numerics import DAMPING, REFRESH
 from rislam_rt.slam.window.retract import condemned, release
 from rislam_rt.slam.window.steps import TURN
 from rislam_rt.slam.window.suspect import weigh_tracks
 from rislam_rt.slam.window.tracks import Tracks
-
-REFRESH = 5
-"""Cycles between two re-linearisations of the whole window."""
 
 
 class WindowState(NamedTuple):
@@ -283,10 +281,6 @@ def liven(state: WindowState) -> WindowState:
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
     return state._replace(window=window._replace(precision=precision), level=level)
-
-
-DAMPING = 0.3
-"""Share of the new in each step's log precision."""
 
 
 class _Followed(NamedTuple):

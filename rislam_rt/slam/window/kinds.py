@@ -28,6 +28,7 @@ from rislam_rt.slam.window.guesses import (
 )
 from rislam_rt.slam.window.identify import identify
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.panel import Identity, unknown
 from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
 
@@ -35,8 +36,6 @@ LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 
 """Log prior of each kind; over known walls, of all walls together; of known points in walls, of all points together."""
 LOG_NONE = np.log(0.05)
 """Of a path of no kind here: over walls that the map lacks."""
-DEPTH = 0.15
-"""Distance [m] beyond a wall from which on a thing is behind it, and not on it."""
 
 
 class Verdict(NamedTuple):
@@ -213,10 +212,6 @@ def _shared(
 
 ASIDE = 10.0
 """Log evidence behind a track's best from which on a hypothesis does not speak for others."""
-NEARBY = 2.0
-"""Distance [m] beyond which two places are not compared."""
-MOST_SHARED = 4.0
-"""Log odds that one more track may add, so that no chance coincidence decides alone."""
 COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(4 + 3) log(1 + chi^2 / 4)` for chi^2 with 3 degrees of freedom."""
 
@@ -265,7 +260,7 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
     middle, walls, wall = digest.middle, book.walls, table.trials.is_wall
     pair = table.trials.is_pair
     foot = np.where(wall[:, None], 0.5 * (fits.place + middle), fits.place)
-    slack = DEPTH + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
+    slack = LEVELS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
     total = np.zeros(len(foot))
     span = fits.place - middle
     normal = span / np.maximum(np.linalg.norm(span, axis=1), 1e-6)[:, None]

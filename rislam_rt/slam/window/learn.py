@@ -12,6 +12,7 @@ from rislam_rt.slam.window.book import Book, learn_ratio
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene
 from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.numerics import SCATTER_RATE
 from rislam_rt.slam.window.panel import Sight, gains, spread_places, weigh
 from rislam_rt.slam.window.steps import HEAD
 
@@ -39,10 +40,6 @@ def pack(forms: Integers, book: Book) -> Integers:
     for column in known.T:
         code = code * 4096 + column + 1
     return code
-
-
-SCATTER_RATE = 0.1
-"""Share of the latest residual in its running mean square."""
 
 
 def recall(sights: Sights, expected: Expected, book: Book) -> tuple[Floats, Floats]:

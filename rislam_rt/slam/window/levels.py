@@ -15,8 +15,6 @@ class Levels(NamedTuple):
     hidden what lies behind it."""
     tail: float = 4.0
     """Degrees of freedom of Student's t, where the receiver tells no tails: neighbours that the map lacks."""
-    gate: float = 16.3
-    """Squared Mahalanobis distance of delay and cosines beyond which nothing associates (chi^2, 3 dof: 0.999)."""
     wall_ratio: float = -0.6
     """Mean log amplitude reflection of a wall: concrete to plasterboard at 10 GHz, ITU-R P.2040."""
     wall_ratio_std: float = 0.5
@@ -49,6 +47,8 @@ class Levels(NamedTuple):
     """Cycles over which the pull of such neighbours keeps its sign: phases turn once in half a wavelength of motion."""
     cleared: float = 0.05
     """Probability that in a cycle what stands in the way of a path goes away again."""
+    depth: float = 0.15
+    """Distance [m] beyond a wall from which on a thing is behind it, and not on it: furniture, frames."""
     shown: float = 0.95
     """Probability that a path above the threshold with nothing in its way is reported by itself."""
 

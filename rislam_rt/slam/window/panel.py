@@ -28,11 +28,7 @@ from rislam_rt.slam.identity import (
 from rislam_rt.slam.moments import even_draws, square_root
 from rislam_rt.slam.tracks import PANEL, UNTOLD
 from rislam_rt.slam.window.levels import LEVELS
-
-DRAWS = 12
-"""Places of the belief over which the panel's predicted gain is averaged."""
-CERTAIN = 30.0
-"""Log odds beyond which an identity is no longer in question."""
+from rislam_rt.slam.window.numerics import CERTAIN, DRAWS
 
 
 class Identity(NamedTuple):

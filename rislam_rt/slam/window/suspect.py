@@ -11,7 +11,8 @@ from rislam_rt.slam.tracks import OTHER
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.expect import Scene
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.panel import DRAWS, Sight, gains, weigh
+from rislam_rt.slam.window.numerics import DRAWS
+from rislam_rt.slam.window.panel import Sight, gains, weigh
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.tracks import Tracks
 

@@ -15,13 +15,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window.digest import Digest
 from rislam_rt.slam.window.levels import LEVELS
-
-STEPS = 4
-"""Gauss-Newton steps: the first guesses are within the linear range of the truth."""
-HOPELESS = 60.0
-"""Log likelihood behind the best hypothesis of a track from which on one is not followed."""
-RIDGE = 1e-3
-"""Information [1/m^2] that keeps blind directions finite: (30 m)^-2."""
+from rislam_rt.slam.window.numerics import HOPELESS, RIDGE, STEPS
 
 
 class Trials(NamedTuple):
