@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body, DataSheet, RadioConfig, RisCode, RisSpec
 from rislam_rt.model.sensor import SensorModel
 from rislam_rt.ris import leg_response, panel_gain
-from rislam_rt.slam.identity import point_amplitude
+from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.forms import enumerate_forms, forms_of, possible_legs
@@ -95,7 +95,7 @@ def amplitudes(
     point = returns.point
     moving = point == TX
     strength, strength_std = book.log_strength
-    free = np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * rx_length)) + ratio
+    free = np.log(image_amplitude(rx_length, radio)) + ratio
     unit = point_amplitude(np.ones(()), np.maximum(tx_length, 1e-3), rx_length, radio)
     level = np.where(moving, free, np.log(unit) + ratio + strength[point])
     spread = np.sqrt(np.where(moving, 0.0, strength_std[point] ** 2) + variance + (0.3 * LEVELS.fading) ** 2)

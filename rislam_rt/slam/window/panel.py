@@ -14,6 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import amplitude_std
 from rislam_rt.model import DataSheet, RadioConfig, RisCode, SensorModel
+from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.identity import (
     DOUBT,
     STRENGTHS,
@@ -22,7 +23,6 @@ from rislam_rt.slam.identity import (
     log_panel_missed,
     log_scatterer,
     log_scatterer_missed,
-    predicted_panel_gain,
     weigh_silence,
 )
 from rislam_rt.slam.moments import even_draws, square_root
@@ -111,7 +111,7 @@ def gains(sight: Sight, ris: DataSheet | None, code: RisCode | None, radio: Radi
         return None
     ends, ratio = (sight.tx[:, None], sight.rx[:, None]), sight.ratio[:, None]
     parts = zip(ris.panels, ris.parts(code), strict=True)
-    return np.stack([predicted_panel_gain(spec, part, sight.place, *ends, ratio, radio) for spec, part in parts])
+    return np.stack([panel_path_gain(spec, part, sight.place, *ends, ratio, radio) for spec, part in parts])
 
 
 def weigh(before: Identity, sight: Sight, gain: Complexes | None, sensor: SensorModel) -> Identity:
