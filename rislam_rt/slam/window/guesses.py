@@ -122,7 +122,7 @@ def hypotheses(digest: Digest, known: Known, book: Book, use_vt: bool) -> Hypoth
     kind, walled = np.repeat(kinds, count), np.repeat(knowns, count)
     trials = Trials(
         np.tile(np.arange(count), len(kinds)), np.isin(kind, WALLS), kind == TWO_WALLS, np.concatenate(starts),
-        *(field.reshape(-1, *field.shape[2:]) for field in (turns, shifts, doubts)), kind == BESIDE,
+        turns.reshape(-1, 2, 3, 3), shifts.reshape(-1, 2, 3), doubts.reshape(-1, 2, 3, 3), kind == BESIDE,
         _beyond(kind, walled, known), kind == IMAGE,
     )  # fmt: skip
     return Hypotheses(kind, walled, trials)
