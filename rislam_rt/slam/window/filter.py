@@ -15,6 +15,7 @@ from rislam_rt.slam.window import gauss, motion, tracks
 from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.book import Book, empty_book, idents, image_ident
 from rislam_rt.slam.window.context import Context
+from rislam_rt.slam.window.excess import grow, take_in
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, conditioned_share
 from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.learn import Sights, learn, no_sights
@@ -52,6 +53,8 @@ class WindowState(NamedTuple):
     """Running log odds that the map explains nothing of what is heard."""
     codes: tuple[RisCode | None, ...]
     """(K,) as the agent believes they were applied."""
+    excess: Floats
+    """(6, 6) covariance of position and velocity that lively steps may add to the window's (see `excess`)."""
     passed: Floats
     """(P, 3) [m] positions that left the window, each with the hindsight of its whole length."""
 
@@ -73,7 +76,7 @@ def init(
     return WindowState(
         0, config, window, empty_book(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_sights(),
         gait, gait,
-        np.array([start.heading]), start.position_std * free, scene, 0.0, (None,), np.zeros((0, 3)),
+        np.array([start.heading]), start.position_std * free, scene, 0.0, (None,), np.zeros((6, 6)), np.zeros((0, 3)),
     )  # fmt: skip
 
 
@@ -101,6 +104,7 @@ def step(
     state, view = _notice(state, heading, code, glance, strangers)
     mean, poses, expected, groups = view.mean, view.poses, view.expected, view.groups
     shows, scatter, row, pick = view.shows, view.scatter, view.row, view.pick
+    before = gauss.now(state.window)[1]
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(LEVELS.stay))))
 
     log = append(state.log, glance, state.cycle, state.cycle - state.window.num_poses + 1)
@@ -138,6 +142,8 @@ def step(
     state = state._replace(
         window=context.window, book=context.book, log=context.log, tracks=context.tracks, sights=context.sights
     )  # fmt: skip
+    after = gauss.now(state.window)[1]
+    state = state._replace(excess=take_in(state.excess, before[:6, :6], after[:6, :6]))
     outcome = _outcome(len(measurement), len(state.book.ident), state.doubt)
     info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome)
     return state._replace(cycle=state.cycle + 1), info
@@ -153,8 +159,11 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = gauss.slide(window), headings[1:]
     level = state.level @ motion.transition(LEVELS.stay)
-    window = gauss.extend(window, dt, _precisions(level))
-    return state._replace(window=window, gait=gait, heading=np.append(headings, heading), passed=passed)
+    window = gauss.extend(window, dt, precision := _precisions(level))
+    excess = grow(state.excess, dt, motion.expected_variance(level)[COLUMNS[:3]] - 1.0 / precision[:3])
+    return state._replace(
+        window=window, gait=gait, heading=np.append(headings, heading), excess=excess, passed=passed
+    )  # fmt: skip
 
 
 def smoothed(state: WindowState) -> Floats:
