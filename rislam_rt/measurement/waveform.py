@@ -13,7 +13,7 @@ from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_gri
 from rislam_rt.measurement.estimation.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding
 from rislam_rt.measurement.false_alarms import detection_threshold
-from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_swing, in_step
+from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_gain_variation, scaled_to_fit
 from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
 from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
 from rislam_rt.measurement.received import Received
@@ -79,7 +79,7 @@ def capture(
     """
     heard = split(received, config)
     elements = None if front_end is None else radio.array.positions(1.0) + front_end.offset
-    swing = 1.0 if front_end is None else draw_swing(front_end.config, rng=rng)
+    swing = 1.0 if front_end is None else draw_gain_variation(front_end.config, rng=rng)
     clean = [tones(one, radio, config, elements) for one in heard]
     direct = leakage * np.sqrt(radio.energy / num_tones(radio, config))
     if not config.alternation:
@@ -92,7 +92,7 @@ def capture(
     ]
     under = [samples for samples, _ in heard_under]
     if front_end is not None and front_end.correction is not None:
-        under[1:] = [in_step(other, under[0]) for other in under[1:]]
+        under[1:] = [scaled_to_fit(other, under[0]) for other in under[1:]]
     level = sum(noise for _, noise in heard_under) / len(signs)
     return [Capture(share * _signed_sum(under, signs[number]), level, number) for number in range(config.num_captures)]
 
