@@ -27,7 +27,7 @@ from rislam_rt.measurement.joint_bound import joint_errors
 from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sensor_model import build_sensor
-from rislam_rt.measurement.slot_motion import split
+from rislam_rt.measurement.slot_motion import split_by_code
 from rislam_rt.model import Measurement, PathTruth, RadioConfig, SensorModel
 
 NEGLIGIBLE = 1e-3
@@ -65,7 +65,7 @@ def measure_bound(
     whether heard or not, so that two codes see the same noise; the `num_extra` columns beyond have theirs from a
     generator of their own, so that they change nobody else's.
     """
-    sensor, captures = build_sensor(radio, config), split(received, config)
+    sensor, captures = build_sensor(radio, config), split_by_code(received, config)
     draws = rng.standard_normal((len(captures), num_paths, 5))
     if num_extra:
         more = rng.spawn(1)[0].standard_normal((len(captures), num_extra, 5))

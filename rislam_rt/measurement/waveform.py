@@ -18,7 +18,7 @@ from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
 from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.signal import num_tones, tones
-from rislam_rt.measurement.slot_motion import codes_in_turn, split
+from rislam_rt.measurement.slot_motion import codes_in_turn, split_by_code
 from rislam_rt.measurement.true_identity import identify
 from rislam_rt.measurement.variance_inflation import crowding, mirror_variance, peak_bias, unmirrored
 from rislam_rt.model import Measurement, PathTruth, RadioConfig
@@ -77,7 +77,7 @@ def capture(
     leakage
         Gain of the direct path before its cancellation: a real receiver's cancellation leaves something of it.
     """
-    heard = split(received, config)
+    heard = split_by_code(received, config)
     elements = None if front_end is None else radio.array.positions(1.0) + front_end.offset
     swing = 1.0 if front_end is None else draw_gain_variation(front_end.config, rng=rng)
     clean = [tones(one, radio, config, elements) for one in heard]
@@ -138,7 +138,7 @@ def measure_waveform(
 def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
     """Column (N,) of the path that each component most likely is, by what its capture holds; -1 for none."""
     path = np.full(len(found.tau), -1)
-    for number, heard in enumerate(split(received, config)):
+    for number, heard in enumerate(split_by_code(received, config)):
         mine = found.capture == number
         path[mine] = identify(found.tau[mine], found.cosines[mine], found.gain[mine], heard, radio)
     return path
