@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import measurement_std
-from rislam_rt.measurement.components import capped, into_disc
+from rislam_rt.measurement.components import capped_cosine_std, clip_to_unit_disc
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimation.estimate import NOTHING, Estimate, estimate_paths
@@ -183,7 +183,7 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
     samples = one.samples / np.sqrt(one.noise_psd)
     found = estimate_paths(sounding, grid, samples, threshold, window, config.max_components, known)
     parameters, gain, deviation, amplitude_std = _resolved(found, one.samples.size, radio)
-    cosines = into_disc(unmirrored(parameters[:, 1:], radio))
+    cosines = clip_to_unit_disc(unmirrored(parameters[:, 1:], radio))
     variance = deviation**2 * peak_bias(np.abs(gain) ** 2 * one.samples.size)[:, None]
     variance *= crowding(parameters, threshold, radio)
     mirrored = mirror_variance(cosines, np.sqrt(variance[:, 1:]), radio)
@@ -193,7 +193,7 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
         cosines,
         scale * gain,
         np.sqrt(variance[:, 0]) / radio.bandwidth,
-        np.hypot(capped(np.sqrt(variance[:, 1:]), radio), np.sqrt(mirrored)),
+        np.hypot(capped_cosine_std(np.sqrt(variance[:, 1:]), radio), np.sqrt(mirrored)),
         scale * amplitude_std,
         np.full(len(gain), one.number),
     )
