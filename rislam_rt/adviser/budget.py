@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.adviser.codes import codes_of, under
+from rislam_rt.adviser.codes import codes_of, paths_under_codes
 from rislam_rt.adviser.detection import DetectionForecast, forecast_detection
 from rislam_rt.adviser.reasons import Reasons, build_reasons
 from rislam_rt.arrays import Floats, Integers
@@ -76,7 +76,7 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLin
         return [_link(name, "", [_all_places(paths, looked)], reasons, n) for n, name in enumerate(scene.landmarks)]
     links: list[LandmarkLink] = []
     for codes in codes_of(paths, scene.ris.spec, settings.radio, rng=rng):
-        heard = [_all_places(under(paths, scene.ris.spec, levels), looked) for levels in codes.levels]
+        heard = [_all_places(paths_under_codes(paths, scene.ris.spec, levels), looked) for levels in codes.levels]
         if codes.name == "aimed":
             links += [_link(s.name, "", heard, reasons, n) for n, s in enumerate(scene.scatterers)]
         links += [
