@@ -62,7 +62,7 @@ class Survey(NamedTuple):
 def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
     """Find the paths at places along the way, by exact image sources."""
     rows = np.unique(np.linspace(0, len(scene.agent) - 1, places).round().astype(np.int64))
-    scene = replace(scene, agent=at_rows(scene.agent, rows))
+    scene = replace(scene, agent=trajectory_at(scene.agent, rows))
     faces = sum(len(reflector.faces) for reflector in scene.reflectors)
     channel = ImageSourceChannel(scene, settings.radio, next((depth for most, depth in DEPTHS if faces <= most), 0))
     return Survey(scene, channel.paths(scene.agent), settings, channel.depth)
@@ -86,7 +86,7 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLin
     return links
 
 
-def at_rows(motion: Trajectory, rows: Integers) -> Trajectory:
+def trajectory_at(motion: Trajectory, rows: Integers) -> Trajectory:
     """The cycles of these rows."""
     return Trajectory(
         motion.time[rows], motion.position[rows], motion.velocity[rows], motion.heading[rows], motion.body

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.adviser.advice import advise
-from rislam_rt.adviser.budget import LandmarkLink, Survey, at_rows, link_budget, survey
+from rislam_rt.adviser.budget import LandmarkLink, Survey, link_budget, survey, trajectory_at
 from rislam_rt.adviser.codes import aimed_codes, paths_under_codes
 from rislam_rt.adviser.cost import COUNTED, cost_words, trace_cost
 from rislam_rt.adviser.coverage import panel_coverage
@@ -164,7 +164,7 @@ def test_the_map_agrees_with_the_budget(paper: Scene, office: Scene) -> None:
     assert isinstance(office.ris, RisPanel)
     step = coverage.x[1] - coverage.x[0]
     assert np.hypot(coverage.x[x] - office.ris.center[0], coverage.y[y] - office.ris.center[1]) < 2.0 * step
-    here = replace(office, agent=at_rows(office.agent, np.array([0])))
+    here = replace(office, agent=trajectory_at(office.agent, np.array([0])))
     point = np.array([[coverage.x[x], coverage.y[y], coverage.height]])
     still = replace(here, agent=replace(here.agent, position=point, heading=np.zeros(1)))
     paths = ImageSourceChannel(still, said.radio, 0).paths(still.agent)
@@ -196,7 +196,7 @@ def test_two_panels_are_judged_as_each_alone(paper: Scene) -> None:
 
 def test_the_cost_counts_what_there_is(paper: Scene) -> None:
     costs = trace_cost(paper, settings().radio, 6)
-    middle = at_rows(paper.agent, np.array([len(paper.agent) // 2]))
+    middle = trajectory_at(paper.agent, np.array([len(paper.agent) // 2]))
     for cost in costs:
         paths = ImageSourceChannel(paper, settings().radio, cost.depth).paths(middle)
         assert cost.paths == paths.valid.sum()
