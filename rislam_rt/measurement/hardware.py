@@ -136,7 +136,7 @@ def digitise(
     config, leakage = front_end.config, sent.leakage
     heard = front_end.matrix @ clean + leakage * front_end.residue
     noisy = add_noise(_shaken(heard, config, radio, rng), radio.noise_psd, rng=rng)
-    mixed = sent.swing * (noisy + front_end.image[:, None] * iq_image(noisy))
+    mixed = sent.swing * (noisy + front_end.image[:, None] * image_spectrum(noisy))
     samples, extra = convert(mixed, receiver.converter_bits, radio, config.clip_rms)
     level = radio.noise_psd + extra
     if config.told:
@@ -152,7 +152,7 @@ def digitise(
 def correct(samples: Complexes, unit: float, correction: Correction) -> Complexes:
     """Samples with residue, image, the array's errors and the gain control taken out; `unit` is the root of the energy
     a tone over that of a whole sounding."""
-    plain = samples - correction.image[:, None] * iq_image(samples)
+    plain = samples - correction.image[:, None] * image_spectrum(samples)
     if correction.loudness:
         direct = abs(np.vdot(correction.direct, plain))
         plain = plain * (unit * correction.loudness / max(direct, np.finfo(np.float64).tiny))
@@ -169,7 +169,7 @@ def scaled_to_fit(samples: Complexes, other: Complexes) -> Complexes:
     return np.asarray(samples * (np.vdot(samples, other) / np.vdot(samples, samples)))
 
 
-def iq_image(spectrum: Complexes) -> Complexes:
+def image_spectrum(spectrum: Complexes) -> Complexes:
     """Conjugate tones (..., M) in reverse order: what a mixer's image adds to them."""
     return np.conj(spectrum[..., ::-1])
 

@@ -17,7 +17,7 @@ from rislam_rt.measurement import (
     receive,
     to_samples,
 )
-from rislam_rt.measurement.hardware import Sent, _clipped, digitise, iq_image, scaled_to_fit
+from rislam_rt.measurement.hardware import Sent, _clipped, digitise, image_spectrum, scaled_to_fit
 from rislam_rt.measurement.received import direct_gain
 from rislam_rt.measurement.signal import convert, to_tones
 from rislam_rt.model import RadioConfig
@@ -114,7 +114,7 @@ def test_an_image_lies_mirrored_in_frequency_and_beside_in_time():
     """Mixing the conjugate of the samples in time is mixing mirrored conjugate tones: one by FFT, one by indices."""
     spectrum = signal()
     in_time = to_tones(np.conj(to_samples(spectrum, RADIO)), RADIO)
-    np.testing.assert_allclose(in_time, iq_image(spectrum), atol=1e-12 * np.abs(spectrum).max() * 128)
+    np.testing.assert_allclose(in_time, image_spectrum(spectrum), atol=1e-12 * np.abs(spectrum).max() * 128)
 
 
 def test_what_clipping_cuts_off_a_normal_signal():
