@@ -6,6 +6,7 @@ silent whatever it is. A receiver that alternates codes tells more: what only th
 update serves features and tracks from cycle to cycle, and births over a whole history.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -27,11 +28,7 @@ from rislam_rt.slam.identity import (
 from rislam_rt.slam.moments import even_draws, square_root
 from rislam_rt.slam.tracks import PANEL, UNTOLD
 from rislam_rt.slam.window.levels import LEVELS
-
-DRAWS = 12
-"""Places of the belief over which the panel's predicted gain is averaged."""
-CERTAIN = 30.0
-"""Log odds beyond which an identity is no longer in question."""
+from rislam_rt.slam.window.numerics import CERTAIN, DRAWS
 
 
 class Identity(NamedTuple):
@@ -64,19 +61,18 @@ class Identity(NamedTuple):
         return Identity(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
 
-def _strength_prior() -> Floats:
-    log = -0.5 * ((STRENGTHS - np.log(LEVELS.strength)) / LEVELS.strength_std) ** 2
+@lru_cache(maxsize=1)
+def _strength_prior(middle: float, spread: float) -> Floats:
+    """(G,) log probability of a point's strength beforehand."""
+    log = -0.5 * ((STRENGTHS - np.log(middle)) / spread) ** 2
     return np.asarray(log - np.logaddexp.reduce(log))
-
-
-STRENGTH_PRIOR = _strength_prior()
-"""(G,) log probability of a point's strength beforehand."""
 
 
 def unknown(count: int, panels: int = 1) -> Identity:
     """Points of which nothing is known but that panels are fewer than scatterers."""
     return Identity(
-        np.tile(STRENGTH_PRIOR, (count, 1)), np.full((count, panels), np.log(LEVELS.panels)),
+        np.tile(_strength_prior(LEVELS.strength, LEVELS.strength_std), (count, 1)),
+        np.full((count, panels), np.log(LEVELS.panels)),
         np.zeros((count, panels + 1)),
     )  # fmt: skip
 
