@@ -8,7 +8,7 @@ REFRESH = 5
 """Cycles between two re-linearisations of the whole window."""
 DAMPING = 0.3
 """Share of the new in each step's log precision."""
-STEPS = 3
+STEPS = 4
 """Gauss-Newton steps: the first guesses are within the linear range of the truth."""
 HOPELESS = 30.0
 """Log likelihood behind the best hypothesis of a track from which on one is not followed."""
