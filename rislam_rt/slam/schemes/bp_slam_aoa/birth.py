@@ -1,0 +1,154 @@
+"""What a component may be the first sight of, how often, and where it would then be."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
+from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, WANDERER, Ends, Features
+from rislam_rt.slam.schemes.shared.course import Course
+
+SLICES = 5
+"""Gaussians over the elevation of a path whose cosines do not tell it."""
+UPRIGHT, LEVEL = 0.7, 0.2
+"""Shares of upright and of level surfaces; the rest slopes."""
+OTHER_RATIO, OTHER_RATIO_STD = -2.5, 1.2
+"""Log amplitude of a wanderer over that of free space of the same length, and its spread."""
+
+
+class Scan(NamedTuple):
+    """What the receiver reported in one cycle, without what is no path of the room."""
+
+    seen: Floats
+    """(M, 3) length [m] and two cosines."""
+    std: Floats
+    """(M, 3)."""
+    log_amplitude: Floats
+    """(M,)."""
+    log_std: Floats
+    """(M,)."""
+    false: Floats
+    """(M,) false components expected per metre, unit of each cosine and e-fold, where each lies."""
+
+
+class Guesses(NamedTuple):
+    """Gaussians that one component may be the first sight of."""
+
+    kind: Integers
+    """(G,)."""
+    density: Floats
+    """(G,) expected ones per metre, unit of each cosine and e-fold of amplitude."""
+    place: Floats
+    """(G, 3) with the agent at its mean [m]."""
+    slope: Floats
+    """(G, 3, 3) on its present position."""
+    covariance: Floats
+    """(G, 3, 3)."""
+    strength: Floats
+    """(G,) log amplitude above the law of the kind."""
+    strength_std: Floats
+    """(G,)."""
+
+
+def log_normal(miss: Floats, variance: Floats) -> Floats:
+    """Logarithm of a scalar normal density."""
+    return -0.5 * (miss**2 / variance + np.log(2.0 * np.pi * variance))
+
+
+def elevations(radial: float, std: float) -> tuple[Floats, Floats, Floats]:
+    """Elevations (E,) [rad], their deviations, and the integral of each slice over solid angle and likelihood.
+
+    The horizontal part of an arrival tells its elevation by the cosine: well from above, badly near the horizon.
+    """
+    sine = np.sqrt(max(1.0 - radial**2, 0.0))
+    if sine > 4.0 * std / radial:
+        return np.array([np.arccos(radial)]), np.array([std / sine]), np.array([1.0 / sine])
+    top = np.arccos(np.clip(radial - 3.0 * std, 0.0, 1.0))
+    middle = (np.arange(SLICES) + 0.5) * top / SLICES
+    weight = np.exp(log_normal(radial - np.cos(middle), np.array(std**2))) * np.cos(middle) * top / SLICES
+    return middle, np.full(SLICES, 0.5 * top / SLICES), weight / radial
+
+
+def guess(
+    scan: Scan, row: int, agent: Floats, ends: Ends, free: float, window: float, config: BpSlamAoaConfig
+) -> Guesses:
+    """All that component `row` may be of; `window` is the longest length that is reported [m]."""
+    length, level = float(scan.seen[row, 0]), scan.seen[row, 1:]
+    std, turn = float(scan.std[row, 1:].mean()), ends.rotation[:2, :2] @ level
+    radial = float(np.clip(np.hypot(*turn), min(std, 1.0), 1.0))
+    azimuth, rise, lean, solid = float(np.arctan2(turn[1], turn[0])), *elevations(radial, std)
+    upright = np.exp(log_normal(np.array(radial - 1.0), np.array(std**2)))
+    flat = np.exp(-0.5 * radial**2 / (std**2 + config.lean**2)) / (2.0 * np.pi * (std**2 + config.lean**2))
+    count = len(rise)
+    kind = np.concatenate([[WALL, WALL], np.full(count, WALL), np.full(count, POINT), np.full(count, WANDERER)])
+    elevation = np.concatenate([[0.0, 0.5 * np.pi], rise, rise, rise])
+    wide = np.concatenate([[config.lean, config.lean], lean, lean, lean])
+    across = std / radial
+    inside = float(length < 2.0 * config.region)
+    wall, point = 0.5 * inside * config.walls / config.region, 0.125 * inside * config.points * length**2
+    point /= 2.0 * np.pi * config.region**3 / 3.0
+    density = np.concatenate([
+        [UPRIGHT * wall * upright / (2.0 * np.pi * radial), LEVEL * wall * flat],
+        (1.0 - UPRIGHT - LEVEL) * wall * solid / (2.0 * np.pi),
+        point * solid,
+        config.wanderers / window * solid / (2.0 * np.pi),
+    ])  # fmt: skip
+    spread = np.array([scan.std[row, 0] * np.sqrt(config.crowd), across * np.sqrt(config.crowd)])
+    place, slope, covariance = _places(kind, length, azimuth, elevation, spread, wide, agent, ends)
+    covariance[1] += (config.lean * length) ** 2 * np.diag([1.0, 1.0, 0.0])  # a level surface leans either way
+    law = np.where(kind == POINT, -2.0 * np.log(0.5 * length) - 0.5 * np.log(4.0 * np.pi), -np.log(length))
+    strength = float(scan.log_amplitude[row]) - free - law
+    usual = np.array([config.wall_ratio, np.log(config.strength), OTHER_RATIO])[kind]
+    usual_std = np.array([config.wall_ratio_std, config.strength_std, OTHER_RATIO_STD])[kind]
+    noise = config.fading**2 + float(scan.log_std[row]) ** 2
+    loud = np.exp(log_normal(strength - usual, usual_std**2 + noise))
+    gain = usual_std**2 / (usual_std**2 + noise)
+    after = usual + gain * (strength - usual)
+    return Guesses(kind, density * loud, place, slope, covariance, after, np.sqrt(gain * noise))
+
+
+def _places(
+    kind: Integers, length: float, azimuth: float, elevation: Floats, spread: Floats, wide: Floats, agent: Floats,
+    ends: Ends,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    """Places (G, 3), slopes (G, 3, 3) on the agent's position and covariances (G, 3, 3)."""
+
+    def at(length: Floats | float, azimuth: Floats | float, elevation: Floats) -> tuple[Floats, Floats]:
+        flat = np.cos(elevation)
+        unit = np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)], axis=-1)
+        tx, rx = agent + ends.tx, agent + ends.rx
+        apart = rx - tx
+        way = (length**2 - apart @ apart) / (2.0 * (length + unit @ apart))
+        image = rx + np.asarray(length)[..., None] * unit
+        normal = image - tx
+        normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+        mirrored = np.sum(normal * (image + tx), axis=-1, keepdims=True) * normal
+        return np.where((kind == WALL)[:, None], mirrored, rx + way[..., None] * unit), normal
+
+    place, normal = at(length, azimuth, elevation)
+    step = 1e-6
+    columns = [
+        (at(length + a * step, azimuth + b * step, elevation + c * step)[0] - place) / step
+        for a, b, c in np.eye(3)
+    ]  # fmt: skip
+    jacobian = np.stack(columns, axis=-1)
+    std = np.stack([np.full(len(kind), spread[0]), np.full(len(kind), spread[1]), wide], axis=-1)
+    root = jacobian * std[:, None]
+    mirror = 2.0 * normal[:, :, None] * normal[:, None]
+    slope = np.where((kind == WALL)[:, None, None], mirror, np.eye(3))
+    return place, slope, root @ root.swapaxes(1, 2) + 1e-10 * np.eye(3)
+
+
+def born(found: list[Guesses], existence: Floats, course: Course, first: int, scatter: float) -> Features:
+    """One new feature for each set of guesses."""
+    count = np.array([len(each.kind) for each in found])
+    parts = Guesses._make(np.concatenate(column) for column in zip(*found, strict=True))
+    owner = np.repeat(np.arange(len(found)), count)
+    slope = np.zeros((len(owner), 3, len(course.mean)))
+    slope[:, :, :3] = parts.slope
+    total = np.bincount(owner, parts.density)
+    return Features(
+        existence, first + np.arange(len(found)), owner, parts.kind, parts.density / total[owner], parts.place, slope,
+        parts.covariance, parts.strength, parts.strength_std**2, np.full(len(owner), np.log(scatter)),
+    )  # fmt: skip

@@ -1,0 +1,210 @@
+"""BP-SLAM that hears what the default filter hears: delays, angles and amplitudes, both ends moving, heading known."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
+from rislam_rt.slam.config import StartPrior
+from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, free_space, glance_of, is_los
+from rislam_rt.slam.inputs import check_step
+from rislam_rt.slam.schemes.bp_slam_aoa.birth import Scan, born, guess
+from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
+from rislam_rt.slam.schemes.bp_slam_aoa.features import Ends, Features, carry, join, look, no_features, prune
+from rislam_rt.slam.schemes.bp_slam_aoa.report import known_map, pose_moments
+from rislam_rt.slam.schemes.bp_slam_aoa.update import View, absorb, claims, expect_scan, likelihoods
+from rislam_rt.slam.schemes.shared.association import Association
+from rislam_rt.slam.schemes.shared.course import Course, Step, advance
+from rislam_rt.slam.schemes.shared.report import ahead_of
+
+LEAST_FALSE = 1e-12
+"""Density of false components that is reckoned with at least."""
+VERTICAL_STD = 0.003
+"""White vertical acceleration of an agent on a level floor [m/s^2]."""
+NIS_LIMIT = 3.0
+"""Running mean of the NIS per degree of freedom above which the filter says that it has diverged."""
+STRAIN_RATE = 0.05
+"""Share of the latest cycle in that mean."""
+
+
+class BpSlamAoaState(NamedTuple):
+    """All that the filter knows."""
+
+    course: Course
+    """Relative to the start [m]."""
+    features: Features
+    fresh: float
+    """Share of the features that were expected at the start, and were never seen."""
+    next_ident: int
+    cycle: int
+    gait: Floats
+    """(4,) probabilities that the last step was calm, lively, fast, climbing."""
+    heading: float
+    """[rad]."""
+    strain: float
+    """Running mean of the NIS per degree of freedom: 1 when all is well."""
+    start: StartPrior
+    body: Body
+    sensor: SensorModel
+    """What the agent is told of its receiver."""
+
+
+def init(
+    start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: BpSlamAoaConfig, *,
+    rng: np.random.Generator,
+) -> BpSlamAoaState:  # fmt: skip
+    """The start prior, and no features. `ris` is taken for the interface and not used; nothing is drawn."""
+    std = np.concatenate([np.zeros(3), start.velocity_std * np.array([1.0, 1.0, 0.0])])
+    mean = np.concatenate([np.zeros(3), start.velocity])
+    course = Course(mean, np.diag(std**2), mean, 3, np.diag(std**2), 0.0)
+    gait = np.array([1.0, 0.0, 0.0, 0.0])
+    return BpSlamAoaState(
+        course, no_features(6), 1.0, 0, 0, gait, float(start.heading), 1.0, start, body, sensor
+    )  # fmt: skip
+
+
+def predict(state: BpSlamAoaState, dt: float, config: BpSlamAoaConfig) -> SlamEstimate:
+    """The belief carried over `dt` [s] without noise."""
+    return ahead_of(estimate(state, config), dt)
+
+
+def step(
+    state: BpSlamAoaState, measurement: Measurement, code: RisCode | None, dt: float, heading: float,
+    config: BpSlamAoaConfig, *, rng: np.random.Generator,
+) -> tuple[BpSlamAoaState, StepInfo]:  # fmt: skip
+    """Advance by one cycle: `dt` [s] since the last, `heading` [rad]. `code` and `rng` are there for the interface.
+
+    Raises
+    ------
+    ConfigError
+        Time step or heading is no number.
+    """
+    check_step(dt, heading)
+    scan, rows = _scan(state, measurement)
+    landmark = np.full(len(measurement), REMOVED)
+    state, view, ends = _predict(state._replace(heading=float(heading)), dt, scan, config)
+    free = free_space(state.sensor.radio)
+    window = SPEED_OF_LIGHT * state.sensor.window[1]
+    guesses = [guess(scan, row, state.course.mean[:3], ends, free, window, config) for row in range(len(rows))]
+    births = state.fresh * np.array([each.density.sum() for each in guesses])
+    fresh = scan.false + births
+    density = likelihoods(view, state.course, scan)
+    found, _ = claims(state.features, view, density, fresh)
+    landmark[rows], nis = _claimed(state, view, scan, found, config)
+    dof = 3 * int((landmark >= 0).sum())
+    features, course = absorb(state.features, view, state.course, scan, found, fresh)
+    alive = found.unclaimed * births / fresh
+    new = np.flatnonzero(alive >= config.birth_threshold)
+    if len(new):
+        features = join(
+            features, born([guesses[row] for row in new], alive[new], course, state.next_ident, config.crowd)
+        )
+    features = prune(features, config.pruning_threshold, config.share_threshold, config.max_features)
+    strain = state.strain + (STRAIN_RATE * (nis / dof - state.strain) if dof else 0.0)
+    count = int((features.existence > config.detection_threshold).sum())
+    report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, count, _outcome(len(measurement), count, strain))
+    return state._replace(
+        course=course, features=features, next_ident=state.next_ident + len(new), strain=strain, cycle=state.cycle + 1
+    ), report
+
+
+def estimate(state: BpSlamAoaState, config: BpSlamAoaConfig) -> SlamEstimate:
+    """Mean and covariance of the pose, samples of it, points and walls of the map."""
+    position, velocity, covariance, samples = pose_moments(state.course, state.start, config.num_samples)
+    known = known_map(state.features, state.course, state.start, config.detection_threshold)
+    return SlamEstimate(position, velocity, state.heading, covariance, samples, state.body, known)
+
+
+def _scan(state: BpSlamAoaState, measurement: Measurement) -> tuple[Scan, Integers]:
+    """The components without the direct path, and their rows."""
+    sensor = state.sensor
+    glance = glance_of(measurement, sensor.radio)
+    rows = np.flatnonzero(~is_los(glance, state.body))
+    glance = glance.take(rows)
+    snr = sensor.radio.integrated_snr(np.exp(glance.log_amplitude))
+    false = sensor.false_alarm_density(glance.seen[:, 0] / SPEED_OF_LIGHT, glance.seen[:, 1:]) / SPEED_OF_LIGHT
+    false = np.maximum(false * 2.0 * snr * sensor.false_alarm_snr_density(snr), LEAST_FALSE)
+    return Scan(glance.seen, glance.std, glance.log_amplitude, glance.log_amplitude_std, false), rows
+
+
+def _levels(config: BpSlamAoaConfig) -> Floats:
+    """(4, 3) standard deviations of the acceleration of a calm, a lively, a fast and a climbing step [m/s^2]."""
+    calm, lively, fast = config.sigma_a, config.lively_std, 4.0 * config.lively_std
+    up = min(VERTICAL_STD, calm)
+    return np.array([[calm, calm, up], [lively, lively, up], [fast, fast, up], [calm, calm, lively]])
+
+
+def _predict(
+    state: BpSlamAoaState, dt: float, scan: Scan, config: BpSlamAoaConfig
+) -> tuple[BpSlamAoaState, View, Ends]:  # fmt: skip
+    """Agent and features carried to this cycle, by the gait that explains what is heard best."""
+    turn = rotation_z(np.asarray(state.heading))
+    upper = state.sensor.radio.array.pattern == "upper"
+    ends = Ends(turn @ state.body.tx_offset, turn @ state.body.rx_offset, turn, upper)
+    levels, free = _levels(config), free_space(state.sensor.radio)
+    stay = np.array([0.1 * config.calm_again / 3.0] * 3)
+    move = np.full((4, 4), 0.0)
+    move[0] = [1.0 - stay.sum(), *stay]
+    move[1:, 0] = config.calm_again
+    move[1:, 1:] = 0.05 * (1.0 - config.calm_again)
+    move[range(1, 4), range(1, 4)] = 0.9 * (1.0 - config.calm_again)
+    prior = state.gait @ move
+
+    def ahead(level: int) -> tuple[BpSlamAoaState, View]:
+        if dt == 0.0:
+            moved = state
+        else:
+            keep = len(state.course.mean) == 6 or state.cycle % config.course_stride == 0 or level > 0
+            course, carried = advance(state.course, dt, levels[level], keep)
+            moved = state._replace(course=course, features=_survive(state.features, carried, config))
+        sight = look(moved.features, moved.course, ends, free)
+        return moved, expect_scan(moved.features, sight, scan, state.sensor, config)
+
+    moved, view = ahead(0)
+    rare = scan.false + 1e-6
+    scores = np.log(np.maximum(prior, 1e-30))
+    if dt > 0.0 and len(moved.features.ident):
+        for level in range(4):
+            more = np.diag((0.5 * dt**2 * levels[level]) ** 2 - (0.5 * dt**2 * levels[0]) ** 2)
+            scores[level] += claims(moved.features, view, likelihoods(view, moved.course, scan, more), rare)[1]
+    gait = np.exp(scores - scores.max())
+    best = int(np.argmax(gait))
+    if best:
+        moved, view = ahead(best)
+    unseen = config.birth_mean + (1.0 - config.birth_mean) * 0.7 * state.fresh if dt > 0.0 else state.fresh
+    return moved._replace(gait=gait / gait.sum(), fresh=unseen), view, ends
+
+
+def _survive(features: Features, carried: Step, config: BpSlamAoaConfig) -> Features:
+    moved = carry(features, carried, config.drift_std)
+    return moved._replace(existence=config.survival_probability * moved.existence)
+
+
+def _claimed(
+    state: BpSlamAoaState, view: View, scan: Scan, found: Association, config: BpSlamAoaConfig
+) -> tuple[Integers, float]:
+    """Feature number of each component (`UNUSED` for none), and the NIS over those claimed, by their likeliest Gaussian."""
+    features, numbers, nis = state.features, np.full(len(scan.seen), UNUSED), 0.0
+    sure = (features.existence > config.detection_threshold)[:, None]
+    for row, shown in zip(*np.nonzero((found.feature[:, :-1] > 0.5) & sure), strict=True):
+        own = np.flatnonzero(features.owner == row)
+        best = own[np.argmax(features.share[own])]
+        numbers[shown] = features.ident[row]
+        by_course = view.sight.by_course[best]
+        spread = view.sight.own[best] + view.disturbance[best] + by_course @ state.course.covariance @ by_course.T
+        spread = spread + np.diag(np.exp(features.log_scatter[best]) * scan.std[shown] ** 2)
+        miss = scan.seen[shown] - view.sight.seen[best]
+        nis += float(miss @ np.linalg.solve(spread, miss))
+    return numbers, nis
+
+
+def _outcome(num_measurements: int, num_features: int, strain: float) -> Outcome:
+    if num_measurements == 0:
+        return Outcome.NO_MEASUREMENTS
+    if num_features == 0:
+        return Outcome.NO_LANDMARKS
+    return Outcome.DIVERGED if strain > NIS_LIMIT else Outcome.OK
