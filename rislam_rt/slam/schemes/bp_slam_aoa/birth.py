@@ -9,6 +9,10 @@ from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, WANDERER, Ends, Features
 from rislam_rt.slam.schemes.shared.course import Course
 
+NUDGE = 1e-6
+"""Step of differences [m, rad]."""
+LEAST_VARIANCE = 1e-10
+"""Of a new feature's place along any axis [m^2]."""
 SLICES = 5
 """Gaussians over the elevation of a path whose cosines do not tell it."""
 UPRIGHT, LEVEL = 0.7, 0.2
@@ -33,18 +37,16 @@ class Scan(NamedTuple):
 
 
 class Guesses(NamedTuple):
-    """Gaussians that one component may be the first sight of."""
+    """G Gaussians that one component may be the first sight of."""
 
     kind: Integers
     """(G,)."""
     density: Floats
     """(G,) expected ones per metre, unit of each cosine and e-fold of amplitude."""
-    place: Floats
-    """(G, 3) with the agent at its mean [m]."""
-    slope: Floats
-    """(G, 3, 3) on its present position."""
-    covariance: Floats
-    """(G, 3, 3)."""
+    polar: Floats
+    """(G, 3) length [m], azimuth and elevation of the arrival, room axes [rad]."""
+    std: Floats
+    """(G, 3) their standard deviations."""
     strength: Floats
     """(G,) log amplitude above the law of the kind."""
     strength_std: Floats
@@ -70,12 +72,10 @@ def elevations(radial: float, std: float) -> tuple[Floats, Floats, Floats]:
     return middle, np.full(SLICES, 0.5 * top / SLICES), weight / radial
 
 
-def guess(
-    scan: Scan, row: int, agent: Floats, ends: Ends, free: float, window: float, config: BpSlamAoaConfig
-) -> Guesses:
+def guess(scan: Scan, row: int, rotation: Floats, free: float, window: float, config: BpSlamAoaConfig) -> Guesses:
     """All that component `row` may be of; `window` is the longest length that is reported [m]."""
     length, level = float(scan.seen[row, 0]), scan.seen[row, 1:]
-    std, turn = float(scan.std[row, 1:].mean()), ends.rotation[:2, :2] @ level
+    std, turn = float(scan.std[row, 1:].mean()), rotation[:2, :2] @ level
     radial = float(np.clip(np.hypot(*turn), min(std, 1.0), 1.0))
     azimuth, rise, lean, solid = float(np.arctan2(turn[1], turn[0])), *elevations(radial, std)
     upright = np.exp(log_normal(np.array(radial - 1.0), np.array(std**2)))
@@ -94,9 +94,11 @@ def guess(
         point * solid,
         config.wanderers / window * solid / (2.0 * np.pi),
     ])  # fmt: skip
-    spread = np.array([scan.std[row, 0] * np.sqrt(config.crowd), across * np.sqrt(config.crowd)])
-    place, slope, covariance = _places(kind, length, azimuth, elevation, spread, wide, agent, ends)
-    covariance[1] += (config.lean * length) ** 2 * np.diag([1.0, 1.0, 0.0])  # a level surface leans either way
+    crowd = np.sqrt(config.crowd)
+    polar = np.stack([np.full(len(kind), length), np.full(len(kind), azimuth), elevation], axis=1)
+    spread = np.stack(
+        [np.full(len(kind), float(scan.std[row, 0]) * crowd), np.full(len(kind), across * crowd), wide], axis=1
+    )
     law = np.where(kind == POINT, -2.0 * np.log(0.5 * length) - 0.5 * np.log(4.0 * np.pi), -np.log(length))
     strength = float(scan.log_amplitude[row]) - free - law
     usual = np.array([config.wall_ratio, np.log(config.strength), OTHER_RATIO])[kind]
@@ -105,50 +107,41 @@ def guess(
     loud = np.exp(log_normal(strength - usual, usual_std**2 + noise))
     gain = usual_std**2 / (usual_std**2 + noise)
     after = usual + gain * (strength - usual)
-    return Guesses(kind, density * loud, place, slope, covariance, after, np.sqrt(gain * noise))
+    return Guesses(kind, density * loud, polar, spread, after, np.sqrt(gain * noise))
 
 
-def _places(
-    kind: Integers, length: float, azimuth: float, elevation: Floats, spread: Floats, wide: Floats, agent: Floats,
-    ends: Ends,
-) -> tuple[Floats, Floats, Floats]:  # fmt: skip
-    """Places (G, 3), slopes (G, 3, 3) on the agent's position and covariances (G, 3, 3)."""
-
-    def at(length: Floats | float, azimuth: Floats | float, elevation: Floats) -> tuple[Floats, Floats]:
-        flat = np.cos(elevation)
-        unit = np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)], axis=-1)
-        tx, rx = agent + ends.tx, agent + ends.rx
-        apart = rx - tx
-        way = (length**2 - apart @ apart) / (2.0 * (length + unit @ apart))
-        image = rx + np.asarray(length)[..., None] * unit
-        normal = image - tx
-        normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-        mirrored = np.sum(normal * (image + tx), axis=-1, keepdims=True) * normal
-        return np.where((kind == WALL)[:, None], mirrored, rx + way[..., None] * unit), normal
-
-    place, normal = at(length, azimuth, elevation)
-    step = 1e-6
-    columns = [
-        (at(length + a * step, azimuth + b * step, elevation + c * step)[0] - place) / step
-        for a, b, c in np.eye(3)
-    ]  # fmt: skip
-    jacobian = np.stack(columns, axis=-1)
-    std = np.stack([np.full(len(kind), spread[0]), np.full(len(kind), spread[1]), wide], axis=-1)
-    root = jacobian * std[:, None]
-    mirror = 2.0 * normal[:, :, None] * normal[:, None]
-    slope = np.where((kind == WALL)[:, None, None], mirror, np.eye(3))
-    return place, slope, root @ root.swapaxes(1, 2) + 1e-10 * np.eye(3)
-
-
-def born(found: list[Guesses], existence: Floats, course: Course, first: int, scatter: float) -> Features:
+def born(
+    found: list[Guesses], existence: Floats, course: Course, ends: Ends, first: int, config: BpSlamAoaConfig
+) -> Features:
     """One new feature for each set of guesses."""
-    count = np.array([len(each.kind) for each in found])
+    owner = np.repeat(np.arange(len(found)), [len(each.kind) for each in found])
     parts = Guesses._make(np.concatenate(column) for column in zip(*found, strict=True))
-    owner = np.repeat(np.arange(len(found)), count)
+    place, by_agent, by_polar = _placed(parts.kind, parts.polar, course.mean[:3], ends)
+    root = by_polar * parts.std[:, None]
+    covariance = root @ root.swapaxes(1, 2) + LEAST_VARIANCE * np.eye(3)
+    level = (parts.kind == WALL) & (parts.polar[:, 2] > 0.5 * np.pi - 1e-9)  # such a surface leans either way
+    covariance[level] += (config.lean * parts.polar[level, 0])[:, None, None] ** 2 * np.diag([1.0, 1.0, 0.0])
     slope = np.zeros((len(owner), 3, len(course.mean)))
-    slope[:, :, :3] = parts.slope
+    slope[:, :, :3] = by_agent
     total = np.bincount(owner, parts.density)
     return Features(
-        existence, first + np.arange(len(found)), owner, parts.kind, parts.density / total[owner], parts.place, slope,
-        parts.covariance, parts.strength, parts.strength_std**2, np.full(len(owner), np.log(scatter)),
+        existence, first + np.arange(len(found)), owner, parts.kind, parts.density / total[owner], place, slope,
+        covariance, parts.strength, parts.strength_std**2, np.full(len(owner), np.log(config.crowd)),
     )  # fmt: skip
+
+
+def _placed(kind: Integers, polar: Floats, agent: Floats, ends: Ends) -> tuple[Floats, Floats, Floats]:
+    """Places (G, 3) and their derivatives (G, 3, 3) by the agent's position and by length, azimuth and elevation."""
+    tx, rx, is_wall = agent + ends.tx, agent + ends.rx, (kind == WALL)[:, None]
+    length, azimuth, elevation = (polar + NUDGE * np.concatenate([np.zeros((1, 3)), np.eye(3)])[:, None]).T
+    flat = np.cos(elevation)
+    unit = np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)], axis=-1)
+    way = (length**2 - (rx - tx) @ (rx - tx)) / (2.0 * (length + unit @ (rx - tx)))
+    image = rx + length[..., None] * unit
+    normal = image - tx
+    normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    mirrored = np.sum(normal * (image + tx), axis=-1, keepdims=True) * normal
+    place = np.where(is_wall[:, None], mirrored, rx + way[..., None] * unit)
+    normal = normal[:, 0]
+    by_agent = np.where(is_wall[:, None], 2.0 * normal[:, :, None] * normal[:, None], np.eye(3))
+    return place[:, 0], by_agent, np.moveaxis(place[:, 1:] - place[:, :1], 1, 2) / NUDGE

@@ -96,7 +96,7 @@ def carry(features: Features, step: Step, drift: float) -> Features:
     covariance = features.covariance + missed @ step.residual @ missed.swapaxes(1, 2)
     covariance[features.kind == WANDERER] += drift**2 * np.eye(3)
     return features._replace(
-        slope=features.slope @ step.transfer,
+        slope=through(features.slope, step.transfer),
         covariance=covariance,
         strength_variance=features.strength_variance + AMPLITUDE_WALK**2,
     )
@@ -121,7 +121,7 @@ def returns_of(kind: Integers, place: Floats, agent: Floats, ends: Ends) -> Floa
 def look(features: Features, course: Course, ends: Ends, free: float) -> Sight:
     """Returns of all Gaussians from the present mean position; `free` is the log amplitude of 1 m in free space."""
     kind, mean, agent = features.kind, features.mean, course.mean[:3]
-    spread = features.covariance + features.slope @ course.covariance @ features.slope.swapaxes(1, 2)
+    spread = features.covariance + spread_over(features.slope, course)
     value, vector = np.linalg.eigh(spread)
     axes = (vector * np.sqrt(np.maximum(value, 1e-14))[:, None]).transpose(2, 0, 1)
     small = np.broadcast_to(NUDGE * np.eye(3)[:, None], axes.shape)
@@ -137,6 +137,16 @@ def look(features: Features, course: Course, ends: Ends, free: float) -> Sight:
     in_view = np.where(far[0, :, 3] > -0.05, 1.0, 0.0) if ends.upper else np.ones(len(kind))
     seen = far[0, :, :3] + 0.5 * bend.sum(axis=2)
     return Sight(seen, by_mean, by_place, by_course, own, far[0, :, 4] + free + features.strength, in_view)
+
+
+def through(rows: Floats, matrix: Floats) -> Floats:
+    """Rows (C, 3, n) times a matrix (n, m), as one product."""
+    return np.asarray((rows.reshape(3 * len(rows), len(matrix)) @ matrix).reshape(len(rows), 3, matrix.shape[1]))
+
+
+def spread_over(rows: Floats, course: Course) -> Floats:
+    """Covariance (C, 3, 3) that rows (C, 3, n) make of the course's."""
+    return through(rows, course.covariance) @ rows.swapaxes(1, 2)
 
 
 def join(one: Features, other: Features) -> Features:

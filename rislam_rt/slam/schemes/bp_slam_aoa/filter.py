@@ -16,11 +16,13 @@ from rislam_rt.slam.schemes.bp_slam_aoa.birth import Scan, born, guess
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.features import Ends, Features, carry, join, look, no_features, prune
 from rislam_rt.slam.schemes.bp_slam_aoa.report import known_map, pose_moments
-from rislam_rt.slam.schemes.bp_slam_aoa.update import View, absorb, claims, expect_scan, likelihoods
+from rislam_rt.slam.schemes.bp_slam_aoa.update import View, absorb, claims, expect_scan, likelihoods, spread_of
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.course import Course, Step, advance
 from rislam_rt.slam.schemes.shared.report import ahead_of
 
+LIVELY_STRIDE = 5
+"""The course's stride while steps are lively."""
 LEAST_FALSE = 1e-12
 """Density of false components that is reckoned with at least."""
 VERTICAL_STD = 0.003
@@ -89,10 +91,10 @@ def step(
     state, view, ends = _predict(state._replace(heading=float(heading)), dt, scan, config)
     free = free_space(state.sensor.radio)
     window = SPEED_OF_LIGHT * state.sensor.window[1]
-    guesses = [guess(scan, row, state.course.mean[:3], ends, free, window, config) for row in range(len(rows))]
+    guesses = [guess(scan, row, ends.rotation, free, window, config) for row in range(len(rows))]
     births = state.fresh * np.array([each.density.sum() for each in guesses])
     fresh = scan.false + births
-    density = likelihoods(view, state.course, scan)
+    density = likelihoods(view, spread_of(view.sight, state.course), scan)
     found, _ = claims(state.features, view, density, fresh)
     landmark[rows], nis = _claimed(state, view, scan, found, config)
     dof = 3 * int((landmark >= 0).sum())
@@ -101,7 +103,7 @@ def step(
     new = np.flatnonzero(alive >= config.birth_threshold)
     if len(new):
         features = join(
-            features, born([guesses[row] for row in new], alive[new], course, state.next_ident, config.crowd)
+            features, born([guesses[row] for row in new], alive[new], course, ends, state.next_ident, config)
         )
     features = prune(features, config.pruning_threshold, config.share_threshold, config.max_features)
     strain = state.strain + (STRAIN_RATE * (nis / dof - state.strain) if dof else 0.0)
@@ -158,7 +160,11 @@ def _predict(
         if dt == 0.0:
             moved = state
         else:
-            keep = len(state.course.mean) == 6 or state.cycle % config.course_stride == 0 or level > 0
+            keep = (
+                len(state.course.mean) == 6
+                or state.cycle % config.course_stride == 0
+                or (level > 0 and state.cycle % LIVELY_STRIDE == 0)
+            )
             course, carried = advance(state.course, dt, levels[level], keep)
             moved = state._replace(course=course, features=_survive(state.features, carried, config))
         sight = look(moved.features, moved.course, ends, free)
@@ -168,9 +174,10 @@ def _predict(
     rare = scan.false + 1e-6
     scores = np.log(np.maximum(prior, 1e-30))
     if dt > 0.0 and len(moved.features.ident):
+        spread = spread_of(view.sight, moved.course)
         for level in range(4):
             more = np.diag((0.5 * dt**2 * levels[level]) ** 2 - (0.5 * dt**2 * levels[0]) ** 2)
-            scores[level] += claims(moved.features, view, likelihoods(view, moved.course, scan, more), rare)[1]
+            scores[level] += claims(moved.features, view, likelihoods(view, spread, scan, more), rare)[1]
     gait = np.exp(scores - scores.max())
     best = int(np.argmax(gait))
     if best:

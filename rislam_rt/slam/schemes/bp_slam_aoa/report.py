@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import MapEstimate
 from rislam_rt.slam.config import StartPrior
-from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, Features
+from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, Features, spread_over
 from rislam_rt.slam.schemes.shared.course import Course
 
 
@@ -28,7 +28,7 @@ def pose_moments(course: Course, start: StartPrior, count: int) -> tuple[Floats,
 
 def known_map(features: Features, course: Course, start: StartPrior, threshold: float) -> MapEstimate:
     """Features that exist, each by its likeliest Gaussian; wanderers have no place."""
-    total = features.covariance + features.slope @ course.covariance @ features.slope.swapaxes(1, 2)
+    total = features.covariance + spread_over(features.slope, course)
     best = np.zeros(len(features.ident))
     np.maximum.at(best, features.owner, features.share)
     shown = (features.existence[features.owner] > threshold) & (features.share > 0.5)

@@ -10,18 +10,23 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import SensorModel
 from rislam_rt.model.sensor import merged_pull
 from rislam_rt.slam.schemes.bp_slam_aoa.birth import Scan, log_normal
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
-from rislam_rt.slam.schemes.bp_slam_aoa.features import Features, Sight
+from rislam_rt.slam.schemes.bp_slam_aoa.features import Features, Sight, spread_over, through
 from rislam_rt.slam.schemes.shared.association import Association, associate
 from rislam_rt.slam.schemes.shared.course import Course
 
 GATE = 40.0
 """Squared Mahalanobis distance beyond which nothing associates (chi^2, 3 dof: 1e-8)."""
+SLACK = 0.1
+"""How far the agent may turn out to be from where it was expected for a pair still to be looked at [m]."""
 NO_VARIANCE = 1e12
 """Variance of a measurement that tells nothing, in units of what it is about."""
+LEAST_WEIGHT = 1e-3
+"""Probability of a Gaussian below which it moves nothing but itself."""
 SCATTER_RATE = 0.1
 """Share of the latest residual in what is learnt of a feature's scatter."""
 MOST_SCATTER = 9.0
@@ -60,14 +65,14 @@ def expect_scan(features: Features, sight: Sight, scan: Scan, sensor: SensorMode
     loud = sight.log_amplitude[:, None] + np.sqrt(variance)[:, None] * HERMITE[0]
     snr = sensor.radio.integrated_snr(np.exp(np.clip(loud, -60.0, 5.0)))
     detection = config.visible * sight.in_view * (sensor.detection_probability(snr) @ HERMITE[1])
-    inside = np.where(sight.seen[:, 0] < sensor.window[1] * 299792458.0, 1.0, 0.0)
+    inside = np.where(sight.seen[:, 0] < sensor.window[1] * SPEED_OF_LIGHT, 1.0, 0.0)
     hidden, pull, disturbance = _neighbours(features, sight, detection, sensor)
     seen = sight._replace(seen=sight.seen + pull)
     detection = np.clip(detection * inside * (1.0 - hidden), 1e-4, 1.0 - 1e-4)
     spread = seen.own[:, 0, 0] + disturbance[:, 0, 0]
     noise = np.exp(features.log_scatter)
     wide = np.sqrt(spread[:, None] + noise[:, None] * scan.std[:, 0] ** 2)
-    near = np.abs(scan.seen[:, 0] - seen.seen[:, :1]) < 0.5 + np.sqrt(GATE) * wide
+    near = np.abs(scan.seen[:, 0] - seen.seen[:, :1]) < SLACK + np.sqrt(GATE) * wide
     gaussian, component = near.nonzero()
     miss = scan.log_amplitude[component] - seen.log_amplitude[gaussian]
     loudness = log_normal(miss, variance[gaussian] + scan.log_std[component] ** 2) + np.log(detection[gaussian])
@@ -78,10 +83,12 @@ def expect_scan(features: Features, sight: Sight, scan: Scan, sensor: SensorMode
 def _neighbours(features: Features, sight: Sight, detection: Floats, sensor: SensorModel) -> tuple[Floats, ...]:
     """Probability (C,) of coming out as part of a louder return; mean (C, 3) and covariance of the pull of fainter ones."""
     weight = features.existence[features.owner] * features.share * detection
-    gap = sight.seen[None] - sight.seen[:, None]  # (c, other, 3)
-    scaled = gap / np.array([299792458.0, 1.0, 1.0])
-    close = sensor.may_merge(scaled) & (features.owner[:, None] != features.owner)
-    louder = sight.log_amplitude[None] - sight.log_amplitude[:, None]
+    sure = np.flatnonzero(weight > 0.1)
+    weight = weight[sure]
+    gap = sight.seen[sure] - sight.seen[:, None]
+    close = sensor.may_merge(gap / np.array([SPEED_OF_LIGHT, 1.0, 1.0]))
+    close &= features.owner[:, None] != features.owner[sure]
+    louder = sight.log_amplitude[sure] - sight.log_amplitude[:, None]
     held = np.where(close, weight, 0.0)
     hidden = 1.0 - np.prod(1.0 - np.where(louder > 0.0, held, 0.0), axis=1)
     mean, variance = merged_pull(np.exp(np.minimum(louder, 0.0)))
@@ -91,19 +98,27 @@ def _neighbours(features: Features, sight: Sight, detection: Floats, sensor: Sen
     return hidden, pull, np.einsum("co,coi,coj->cij", second, gap, gap)
 
 
-def likelihoods(view: View, course: Course, scan: Scan, more: Floats | None = None) -> Floats:
+def spread_of(sight: Sight, course: Course) -> Floats:
+    """Covariance (C, 3, 3) of predicted returns."""
+    return sight.own + spread_over(sight.by_course, course)
+
+
+def likelihoods(view: View, spread: Floats, scan: Scan, more: Floats | None = None) -> Floats:
     """Densities (N,) of the pairs times detection; `more` (3, 3) is added to the covariance of the agent's position."""
     gaussian, component, noise, log_loudness = view.pairs
-    by_course = view.sight.by_course
-    spread = view.sight.own + view.disturbance + by_course @ course.covariance @ by_course.swapaxes(1, 2)
+    total = (spread + view.disturbance)[gaussian]
     if more is not None:
-        spread = spread + view.sight.by_place @ more @ view.sight.by_place.swapaxes(1, 2)
-    total = spread[gaussian] + noise[:, None] * np.eye(3)
-    miss = scan.seen[component] - view.sight.seen[gaussian]
-    square = np.einsum("ni,ni->n", miss, np.linalg.solve(total, miss[..., None])[..., 0])
-    _, size = np.linalg.slogdet(total)
-    log = -0.5 * (square + size + 3.0 * np.log(2.0 * np.pi)) + log_loudness
-    return np.where(square < GATE, np.exp(log), 0.0)
+        by_place = view.sight.by_place[gaussian]
+        total = total + by_place @ more @ by_place.swapaxes(1, 2)
+    total[:, range(3), range(3)] += noise
+    return np.exp(_log_density(scan.seen[component] - view.sight.seen[gaussian], np.linalg.inv(total)) + log_loudness)
+
+
+def _log_density(miss: Floats, precision: Floats) -> Floats:
+    """Log normal densities (N,) of innovations (N, 3) with precisions (N, 3, 3); none beyond the gate."""
+    square = np.einsum("ni,nij,nj->n", miss, precision, miss)
+    log = 0.5 * (np.log(np.maximum(np.linalg.det(precision), 1e-300)) - square - 3.0 * np.log(2.0 * np.pi))
+    return np.where(square < GATE, log, -np.inf)
 
 
 def claims(features: Features, view: View, density: Floats, fresh: Floats) -> tuple[Association, float]:
@@ -134,13 +149,21 @@ def absorb(
     edges = np.searchsorted(features.owner, np.arange(len(features.ident) + 1))
     pair_edges = np.searchsorted(view.pairs.gaussian, np.arange(len(features.owner) + 1))
     existence = features.existence.copy()
-    fields = {name: getattr(features, name).copy() for name in ("share", "strength", "strength_variance", "log_scatter")}
+    fields = {
+        name: getattr(features, name).copy() for name in ("share", "strength", "strength_variance", "log_scatter")
+    }
     pull, told = np.zeros((len(features.owner), 3)), np.zeros((len(features.owner), 3, 3))
     for row in np.argsort(-existence, kind="stable"):
         part = slice(int(edges[row]), int(edges[row + 1]))
         pairs = slice(int(pair_edges[part.start]), int(pair_edges[part.stop]))
+        if pairs.start == pairs.stop:
+            share = fields["share"][part] * (1.0 - view.detection[part])
+            total = float(share.sum())
+            existence[row] = existence[row] * total / (existence[row] * total + 1.0 - existence[row])
+            fields["share"][part], told[part] = share / total, NO_VARIANCE * np.eye(3)
+            continue
         by_course = sight.by_course[part]
-        gain = by_course @ course.covariance
+        gain = through(by_course, course.covariance)
         spread = sight.own[part] + gain @ by_course.swapaxes(1, 2)
         seen = sight.seen[part] + by_course @ (course.mean - ref)
         heard = Heard(view, scan, part, pairs, found.to_feature[row] / fresh)
@@ -206,10 +229,7 @@ def learn(heard: Heard, seen: Floats, spread: Floats, features: Features) -> Lea
     inverse = np.linalg.inv(total)
     miss = scan.seen[component] - seen[mine]
     pulled = (inverse @ miss[..., None])[..., 0]
-    square = np.einsum("ni,ni->n", miss, pulled)
-    _, size = np.linalg.slogdet(total)
-    log = -0.5 * (square + size + 3.0 * np.log(2.0 * np.pi)) + log_loudness
-    weight = np.where(square < GATE, np.exp(log), 0.0) * heard.message[component]
+    weight = np.exp(_log_density(miss, inverse) + log_loudness) * heard.message[component]
     count = len(seen)
     none = 1.0 - view.detection[part]
     factor = none + np.bincount(mine, weight, minlength=count)
@@ -255,7 +275,7 @@ def _as_one(mean: Floats, after: Floats, before: Floats) -> tuple[Floats, Floats
 
 def _mix(course: Course, gain: Floats, spread: Floats, learnt: Learnt, weight: Floats) -> Course:
     """Course after one feature's message: moments over its Gaussians; the rest of the weight changes nothing."""
-    rows = np.flatnonzero(weight > 1e-4)
+    rows = np.flatnonzero(weight > LEAST_WEIGHT)
     if not len(rows):
         return course
     gain, weight = gain[rows], weight[rows]
