@@ -6,10 +6,11 @@ from pathlib import Path
 from textwrap import fill
 
 from rislam_rt.errors import SceneError
+from rislam_rt.scene.built_in_rooms import ROOMS, RoomFiles
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
-from rislam_rt.scene.rooms import ROOMS, Room
-from rislam_rt.scene.write import toml_bytes, write_files
+from rislam_rt.scene.write import write_files
+from rislam_rt.toml import toml_bytes
 
 
 def new_scene(template: str, folder: str | Path, *, overwrite: bool = False) -> Path:
@@ -36,7 +37,7 @@ def room_name(folder: Path, template: str) -> str:
     return name if name.strip("._-") else template
 
 
-def room_files(room: Room, origin: str = "") -> dict[str, bytes]:
+def room_files(room: RoomFiles, origin: str = "") -> dict[str, bytes]:
     """The files of a scene folder: relative name -> content. `origin`: where it comes from, if not from the build."""
     files = {f"meshes/{name}.ply": ply_bytes(mesh.vertices, mesh.faces) for name, mesh in room.meshes.items()}
     name = room.table["name"]

@@ -1,8 +1,6 @@
 """From a `Scene` to a scene folder, whole or not at all."""
 
-import json
 import os
-import re
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -14,10 +12,11 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError, StoreError
 from rislam_rt.model import Material, RisPanel, Scatterer, Scene, Trajectory
+from rislam_rt.scene.file_names import safe_name
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
-from rislam_rt.scene.names import safe_name
 from rislam_rt.scene.solids import solid_mesh
+from rislam_rt.toml import toml_bytes
 
 TRAJECTORY_FILE = "path.tum"
 
@@ -81,17 +80,6 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
     return folder
 
 
-def toml_bytes(table: Mapping[str, Any]) -> bytes:
-    """A scene table as TOML: plain keys first, then (lists of) tables; numbers so that they read back equal."""
-    lines = [f"{key} = {toml_value(value)}" for key, value in table.items() if not _is_table(value)]
-    for key, value in table.items():
-        for section in value if isinstance(value, list) and _is_table(value) else [value]:
-            if isinstance(section, Mapping):
-                lines += ["", f"[[{key}]]" if isinstance(value, list) else f"[{key}]"]
-                lines += [f"{name} = {toml_value(item)}" for name, item in section.items()]
-    return ("\n".join(lines) + "\n").encode()
-
-
 def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
     """Poses as TUM lines `timestamp x y z qx qy qz qw`; the quaternion is the heading about z."""
     lines = ["# timestamp x y z qx qy qz qw"]
@@ -120,28 +108,6 @@ def _publish(staged: Path, folder: Path, files: Mapping[str, bytes]) -> None:
     for name in files:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (staged / name).replace(folder / name)
-
-
-def _is_table(value: Any) -> bool:
-    return isinstance(value, Mapping) or (isinstance(value, list) and bool(value) and isinstance(value[0], Mapping))
-
-
-def toml_value(value: Any) -> str:
-    """A value as TOML; tables inline, numbers so that they read back equal."""
-    if isinstance(value, str):
-        # TOML's strings are JSON's, but for DEL.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, bool | int | np.integer):
-        return str(value).lower()
-    if isinstance(value, float):
-        return repr(float(value))
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_toml_key(key)} = {toml_value(item)}" for key, item in value.items()) + " }"
-    return "[" + ", ".join(toml_value(item) for item in value) + "]"
-
-
-def _toml_key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else str(toml_value(key))
 
 
 def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:

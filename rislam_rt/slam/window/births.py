@@ -10,12 +10,12 @@ from rislam_rt.slam.window.context import Context, resolve
 from rislam_rt.slam.window.digest import Digest, digest
 from rislam_rt.slam.window.expect import Clusters, Expected
 from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.gauss import HEAD
 from rislam_rt.slam.window.guesses import BESIDE, known_features
 from rislam_rt.slam.window.kinds import NEW, Verdict, judge, wanted
 from rislam_rt.slam.window.learn import seed
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.retract import behind, release
+from rislam_rt.slam.window.steps import HEAD
 
 NEAR = np.array([0.3, 0.15, 0.15])
 """Gap in length [m] and cosines up to which a return of the map is weighed as a track's explanation."""
@@ -40,9 +40,10 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.book, mean[:3])
     histories = digest(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
     told = explanations(context, rows, histories, expected, groups, mean, covariance)
-    panel = context.book.panel
+    panels = context.book.panels
     lonely = _missing_legs(context, histories, mean)
-    over = [(row, value, 0 <= panel == int(forms[0, 0])) for row, value, forms in told]
+    over = [(row, value, panels.index(base) if (base := int(forms[0, 0])) >= 0 and base in panels else -1)
+            for row, value, forms in told]  # fmt: skip
     verdicts, shares = judge(context, ats, histories, known, over, lonely)
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked, returns = context.tracks.looked.copy(), context.scene.use_vt

@@ -12,7 +12,7 @@ from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.errors import TraceError
 from rislam_rt.model import RadioConfig
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.rooms import ROOMS
+from rislam_rt.scene.built_in_rooms import ROOMS
 from rislam_rt.scene.xml import scene_of_xml, sionna_scenes, write_xml
 
 RADIO = RadioConfig()

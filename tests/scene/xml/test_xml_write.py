@@ -10,7 +10,7 @@ from rislam_rt.cli.new import is_xml
 from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.model import Material
 from rislam_rt.scene import check_scene, load_scene
-from rislam_rt.scene.rooms import ROOMS
+from rislam_rt.scene.built_in_rooms import ROOMS
 from rislam_rt.scene.xml import new_from_xml, read_xml, write_xml
 
 

@@ -1,0 +1,50 @@
+"""What a room's builder returns, and the tables that most rooms share."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from rislam_rt.scene.meshes import Mesh
+
+PAPER_MATERIAL = {"reflection": 0.85}
+
+BASELINE = {"tx_offset_m": [-0.04388, -0.02397, 0.0], "rx_offset_m": [0.04388, 0.02397, 0.0]}
+"""0.1 m between Tx and Rx, turned 0.5 rad: parallel to no edge and no diagonal."""
+
+CYCLES = {"cycles": 600, "cycle_s": 0.1}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomFiles:
+    """A scene as files: the table of `scene.toml`, meshes by file name, other files, and what its README says."""
+
+    table: dict[str, Any]
+    meshes: dict[str, Mesh]
+    readme: str
+    files: dict[str, bytes] = field(default_factory=dict)
+
+
+def reflector(name: str, material: dict[str, Any] | None = None) -> dict[str, Any]:
+    """The table of a reflector with a PLY mesh of its own."""
+    return {"name": name, "mesh": f"meshes/{name}.ply", "material": material or PAPER_MATERIAL}
+
+
+def sphere(name: str, position: list[float], radius: float = 0.05) -> dict[str, Any]:
+    """The table of a spherical scatterer; the paper's radius by default."""
+    return {"name": name, "position": position, "radius": radius}
+
+
+def panel(
+    center: list[float], normal: list[float], up: list[float], host: str = "ceiling", size: int = 6
+) -> dict[str, Any]:
+    """The table of a panel like the paper's, anywhere."""
+    return {
+        "center": center,
+        "normal": normal,
+        "up": up,
+        "rows": size,
+        "cols": size,
+        "spacing_m": [0.015, 0.015],
+        "levels": 4,
+        "element": "tang",
+        "host": host,
+    }
