@@ -18,8 +18,12 @@ class BpSlamAoaConfig:
     """The same of a lively one [m/s^2]: a turn or a stop within a second."""
     calm_again: float = 0.1
     """Probability that a lively step is followed by a calm one; a tenth of it the other way round."""
+    use_vt: bool = True
+    """Whether wall returns are features (walls), or set aside; as for the default filter, unless said otherwise."""
+    specular_ratio: float = 0.35
+    """Amplitude over that of free space of the same length, above which a component that is set aside is one."""
     visible: float = 0.9
-    """Probability that a path which its amplitude makes audible is reported: what stands in the way hides the others."""
+    """Probability that a path which its amplitude makes audible is reported: things that stand in the way hide it."""
     survival_probability: float = 0.999
     """That a feature is still there after one step."""
     walls: float = 7.0
@@ -49,7 +53,7 @@ class BpSlamAoaConfig:
     drift_std: float = 0.01
     """Random walk of a wanderer in one step [m]."""
     crowd: float = 9.0
-    """Mean square of a residual in reported deviations, before any is seen: 1 + the SNR of what a cell holds besides."""
+    """Mean square of a residual in reported deviations, before any is seen: 1 + SNR of what a cell holds besides."""
     detection_threshold: float = 0.5
     """Existence probability above which a potential feature counts as detected."""
     pruning_threshold: float = 1e-4
@@ -67,8 +71,8 @@ class BpSlamAoaConfig:
         name = "bp_slam_aoa"
         check_counts(name, self, ("max_features", "num_samples", "course_stride"))
         positive = (
-            "sigma_a", "lively_std", "walls", "points", "wanderers", "birth_mean", "region", "wall_ratio_std",
-            "strength", "strength_std", "fading", "lean",
+            "sigma_a", "lively_std", "specular_ratio", "walls", "points", "wanderers", "birth_mean", "region",
+            "wall_ratio_std", "strength", "strength_std", "fading", "lean",
         )  # fmt: skip
         check_inside(name, self, positive, np.inf, "a positive number")
         check_inside(name, self, ("visible", "calm_again"), 1.0, "a number in (0, 1)")

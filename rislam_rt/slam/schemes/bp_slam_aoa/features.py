@@ -165,6 +165,8 @@ def prune(features: Features, least_existence: float, least_share: float, most: 
     rows = keep[features.owner] & ((own >= least_share) | (own >= best[features.owner]))
     owner = (np.cumsum(keep) - 1)[features.owner[rows]]
     total = np.bincount(owner, own[rows], minlength=int(keep.sum()))
-    gaussians = [column[rows] for column in features[3:]]
-    left = Features(features.existence[keep], features.ident[keep], owner, *gaussians)
-    return left._replace(share=left.share / total[owner])
+    return Features(
+        features.existence[keep], features.ident[keep], owner, features.kind[rows], own[rows] / total[owner],
+        features.mean[rows], features.slope[rows], features.covariance[rows], features.strength[rows],
+        features.strength_variance[rows], features.log_scatter[rows],
+    )  # fmt: skip

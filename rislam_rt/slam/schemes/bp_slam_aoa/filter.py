@@ -1,6 +1,5 @@
 """BP-SLAM that hears what the default filter hears: delays, angles and amplitudes, both ends moving, heading known."""
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from rislam_rt.slam.schemes.bp_slam_aoa.features import Ends, Features, carry, j
 from rislam_rt.slam.schemes.bp_slam_aoa.report import known_map, pose_moments
 from rislam_rt.slam.schemes.bp_slam_aoa.update import View, absorb, claims, expect_scan, likelihoods, spread_of
 from rislam_rt.slam.schemes.shared.association import Association
+from rislam_rt.slam.schemes.shared.correct import is_strong
 from rislam_rt.slam.schemes.shared.course import Course, Step, advance
 from rislam_rt.slam.schemes.shared.report import ahead_of
 
@@ -86,7 +86,7 @@ def step(
         Time step or heading is no number.
     """
     check_step(dt, heading)
-    scan, rows = _scan(state, measurement)
+    scan, rows = _scan(state, measurement, config)
     landmark = np.full(len(measurement), REMOVED)
     state, view, ends = _predict(state._replace(heading=float(heading)), dt, scan, config)
     free = free_space(state.sensor.radio)
@@ -121,11 +121,12 @@ def estimate(state: BpSlamAoaState, config: BpSlamAoaConfig) -> SlamEstimate:
     return SlamEstimate(position, velocity, state.heading, covariance, samples, state.body, known)
 
 
-def _scan(state: BpSlamAoaState, measurement: Measurement) -> tuple[Scan, Integers]:
-    """The components without the direct path, and their rows."""
+def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConfig) -> tuple[Scan, Integers]:
+    """The components without the direct path (and wall returns that are set aside), and their rows."""
     sensor = state.sensor
     glance = glance_of(measurement, sensor.radio)
-    rows = np.flatnonzero(~is_los(glance, state.body))
+    aside = is_los(glance, state.body) | is_strong(glance.ratio, None if config.use_vt else config.specular_ratio)
+    rows = np.flatnonzero(~aside)
     glance = glance.take(rows)
     snr = sensor.radio.integrated_snr(np.exp(glance.log_amplitude))
     false = sensor.false_alarm_density(glance.seen[:, 0] / SPEED_OF_LIGHT, glance.seen[:, 1:]) / SPEED_OF_LIGHT
@@ -194,7 +195,7 @@ def _survive(features: Features, carried: Step, config: BpSlamAoaConfig) -> Feat
 def _claimed(
     state: BpSlamAoaState, view: View, scan: Scan, found: Association, config: BpSlamAoaConfig
 ) -> tuple[Integers, float]:
-    """Feature number of each component (`UNUSED` for none), and the NIS over those claimed, by their likeliest Gaussian."""
+    """Feature number of each component (`UNUSED` for none), and the NIS of those claimed, by the likeliest Gaussian."""
     features, numbers, nis = state.features, np.full(len(scan.seen), UNUSED), 0.0
     sure = (features.existence > config.detection_threshold)[:, None]
     for row, shown in zip(*np.nonzero((found.feature[:, :-1] > 0.5) & sure), strict=True):

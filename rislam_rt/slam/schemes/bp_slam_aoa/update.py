@@ -81,7 +81,7 @@ def expect_scan(features: Features, sight: Sight, scan: Scan, sensor: SensorMode
 
 
 def _neighbours(features: Features, sight: Sight, detection: Floats, sensor: SensorModel) -> tuple[Floats, ...]:
-    """Probability (C,) of coming out as part of a louder return; mean (C, 3) and covariance of the pull of fainter ones."""
+    """Probability (C,) of coming out as part of a louder return; mean (C, 3) and covariance of the pull of others."""
     weight = features.existence[features.owner] * features.share * detection
     sure = np.flatnonzero(weight > 0.1)
     weight = weight[sure]
@@ -111,14 +111,15 @@ def likelihoods(view: View, spread: Floats, scan: Scan, more: Floats | None = No
         by_place = view.sight.by_place[gaussian]
         total = total + by_place @ more @ by_place.swapaxes(1, 2)
     total[:, range(3), range(3)] += noise
-    return np.exp(_log_density(scan.seen[component] - view.sight.seen[gaussian], np.linalg.inv(total)) + log_loudness)
+    precision = np.asarray(np.linalg.inv(total), dtype=np.float64)
+    return np.exp(_log_density(scan.seen[component] - view.sight.seen[gaussian], precision) + log_loudness)
 
 
 def _log_density(miss: Floats, precision: Floats) -> Floats:
     """Log normal densities (N,) of innovations (N, 3) with precisions (N, 3, 3); none beyond the gate."""
     square = np.einsum("ni,nij,nj->n", miss, precision, miss)
     log = 0.5 * (np.log(np.maximum(np.linalg.det(precision), 1e-300)) - square - 3.0 * np.log(2.0 * np.pi))
-    return np.where(square < GATE, log, -np.inf)
+    return np.asarray(np.where(square < GATE, log, -np.inf), dtype=np.float64)
 
 
 def claims(features: Features, view: View, density: Floats, fresh: Floats) -> tuple[Association, float]:
