@@ -53,6 +53,9 @@ CASES = [
     Case("window", "random", WINDOW, 103, 0.05, 50.0, 1.0),
     Case("window", "random", WINDOW, 233, 0.05, 20.0, 0.55),
     Case("window", "random", WINDOW, 266, 0.05, 20.0, 0.55),
+    Case("bp_slam_aoa", "bp_slam_aoa", {"use_vt": True}, 103, 0.015, 20.0, 1.0),
+    Case("bp_slam_aoa", "bp_slam_aoa", {"use_vt": True}, 233, 0.015, 6.0, 0.55),
+    Case("bp_slam_aoa", "bp_slam_aoa", {"use_vt": True}, 266, 0.015, 9.0, 0.75),
 ]
 
 
@@ -71,7 +74,7 @@ def test_it_errs_no_more_than_it_says(case: Case) -> None:
 
 
 @pytest.mark.parametrize(
-    "case", [CASES[1], CASES[2], CASES[5], CASES[7], CASES[9]], ids=lambda case: f"{case.name}-{case.room}"
+    "case", [CASES[1], CASES[2], CASES[5], CASES[7], CASES[9], CASES[13]], ids=lambda case: f"{case.name}-{case.room}"
 )
 def test_an_estimator_that_learns_nothing_fails(case: Case) -> None:
     scores = run(case, deaf(ESTIMATORS[SCHEMES[case.scheme].estimator]))
@@ -80,7 +83,7 @@ def test_an_estimator_that_learns_nothing_fails(case: Case) -> None:
     assert scores["births"] == 0
 
 
-@pytest.mark.parametrize("case", [*CASES[:4], *CASES[9:]], ids=lambda case: f"{case.name}-{case.room}")
+@pytest.mark.parametrize("case", [*CASES[:4], *CASES[9:12]], ids=lambda case: f"{case.name}-{case.room}")
 def test_most_births_are_of_the_right_kind(case: Case) -> None:
     scores = run(case, None)
     assert scores["births_judged"] >= 3

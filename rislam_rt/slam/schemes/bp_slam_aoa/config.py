@@ -30,7 +30,7 @@ class BpSlamAoaConfig:
     """Walls expected in the region before the first scan, Poisson."""
     points: float = 3.0
     """Points that scatter, likewise."""
-    wanderers: float = 20.0
+    wanderers: float = 5.0
     """Paths of no kind (over several walls, over walls and points), likewise."""
     birth_mean: float = 0.03
     """Share of these that appears anew in a step."""
