@@ -35,7 +35,7 @@ class Walls:
     """(W,) for each wall those that lie on it: where they are, they reflect and it does not."""
     hosts: tuple[int, ...]
     """The wall behind each panel, -1 where there is none."""
-    shades: Occluders
+    occluders: Occluders
     """What hides but is no wall: it never reflects."""
 
     def __len__(self) -> int:

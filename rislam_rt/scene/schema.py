@@ -91,7 +91,7 @@ class ReflectorSection(SceneSection):
     origin: Vector | None = None
 
 
-class ShadeSection(SceneSection):
+class OccluderSection(SceneSection):
     """A mesh that hides what lies behind it and reflects nothing: clutter too small or too round to be a mirror."""
 
     name: Name
@@ -241,7 +241,7 @@ class SceneSpec(SceneSection):
     name: Name
     reflector: Annotated[list[ReflectorSection], Field(min_length=1, max_length=10_000)]
     scatterer: list[ScattererSection] = []
-    shade: Annotated[list[ShadeSection], Field(max_length=10_000)] = []
+    shade: Annotated[list[OccluderSection], Field(max_length=10_000)] = []
     meshes: MeshesSection = MeshesSection()
     ris: Annotated[list[RisSection], BeforeValidator(_listed), Field(max_length=100)] = []
     """`[ris]` for one panel, `[[ris]]` for several."""
@@ -258,7 +258,7 @@ class SceneSpec(SceneSection):
         return self
 
     @model_validator(mode="after")
-    def _panels_told_apart(self) -> "SceneSpec":
+    def _panels_distinct(self) -> "SceneSpec":
         names = [panel.name for panel in self.ris]
         if len(set(names)) < len(names):
             raise ValueError(f"ris.name: {', '.join(names)} received; give every panel a name of its own")
@@ -344,7 +344,7 @@ def _remark(item: Any, lone_panel: bool) -> str:
 
 
 def _known_keys() -> list[str]:
-    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, ShadeSection, MeshesSection,
+    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, OccluderSection, MeshesSection,
                 RisSection, AgentSection, WalkSection, LimitsSection)  # fmt: skip
     return [key for section in sections for key in section.model_fields]
 

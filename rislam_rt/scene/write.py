@@ -39,8 +39,8 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
     files = {mesh_file(r.name): ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
     for scatterer in scene.scatterers:
         if scatterer.shade is not None and not _has_own_shadow(scatterer):
-            files[_shade_file(scatterer)] = ply_bytes(scatterer.shade.vertices, scatterer.shade.faces)
-    for shade in scene.shades:
+            files[_occluder_file(scatterer)] = ply_bytes(scatterer.shade.vertices, scatterer.shade.faces)
+    for shade in scene.occluders:
         files[mesh_file(shade.name)] = ply_bytes(shade.vertices, shade.faces)
     agent = _agent_table(scene.agent)
     if "trajectory" in agent:
@@ -71,7 +71,7 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
         folder.parent.mkdir(parents=True, exist_ok=True)
         staged = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
         try:
-            _stage(files, staged)
+            _write_staged(files, staged)
             _publish(staged, folder, files)
         finally:
             shutil.rmtree(staged, ignore_errors=True)
@@ -90,7 +90,7 @@ def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def _stage(files: Mapping[str, bytes], staged: Path) -> None:
+def _write_staged(files: Mapping[str, bytes], staged: Path) -> None:
     for name, content in files.items():
         target = staged / name
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -116,7 +116,7 @@ def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
         {"name": r.name, "mesh": mesh_file(r.name), "material": _material_table(r.material)} for r in scene.reflectors
     ]
     table["scatterer"] = [_scatterer_table(scatterer) for scatterer in scene.scatterers]
-    table["shade"] = [{"name": shade.name, "mesh": mesh_file(shade.name)} for shade in scene.shades]
+    table["shade"] = [{"name": shade.name, "mesh": mesh_file(shade.name)} for shade in scene.occluders]
     panels = [_panel_table(panel) for panel in scene.panels]
     table["ris"] = panels[0] if len(panels) == 1 else panels
     table["agent"] = agent
@@ -144,7 +144,7 @@ def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
     ):
         table["rcs_m2"] = scatterer.rcs
     if scatterer.shade is not None:
-        table |= {"shadow": True} if _has_own_shadow(scatterer) else {"mesh": _shade_file(scatterer)}
+        table |= {"shadow": True} if _has_own_shadow(scatterer) else {"mesh": _occluder_file(scatterer)}
     return table
 
 
@@ -157,7 +157,7 @@ def _has_own_shadow(scatterer: Scatterer) -> bool:
     return np.array_equal(mesh.vertices, shade.vertices) and np.array_equal(mesh.faces, shade.faces)
 
 
-def _shade_file(scatterer: Scatterer) -> str:
+def _occluder_file(scatterer: Scatterer) -> str:
     return mesh_file(scatterer.name)
 
 

@@ -63,13 +63,13 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
     surfaces, unseen = _seen(found)
     palette = MaterialAssignment(options.materials, options.rest)
     reflectors = _reflectors(surfaces, pieces, parts, palette)
-    shades = _shades(found, pieces, list(reflectors))
+    occluders = _occluders(found, pieces, list(reflectors))
     if palette.unused():
         names = ", ".join([*reflectors, *sorted({p.material for p in parts if p.material})][:12])
         raise Fault(f"--material {palette.unused()[0]}: nothing has that name", f"give one of: {names}")
-    said = account(facets, found, surfaces, unseen, reflectors, shades, options, scanned=bool(about))
+    said = account(facets, found, surfaces, unseen, reflectors, occluders, options, scanned=bool(about))
     remarks = [*notes, *about, *said]
-    return RoomDraft(reflectors, shades, remarks + palette.remarks())
+    return RoomDraft(reflectors, occluders, remarks + palette.remarks())
 
 
 def _seen(found: SortedSurfaces) -> tuple[list[Surface], float]:
@@ -113,7 +113,7 @@ def _reflectors(
     return found
 
 
-def _shades(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str]) -> dict[str, Mesh]:
+def _occluders(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str]) -> dict[str, Mesh]:
     """Clutter by the piece that it belongs to."""
     by_piece: dict[int, list[Floats]] = {}
     for clutter in found.clutter:

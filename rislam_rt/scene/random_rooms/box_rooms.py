@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import Material, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade, Trajectory
+from rislam_rt.model import Material, Occluder, Reflector, RisPanel, RisSpec, Scatterer, Scene, Trajectory
 from rislam_rt.scene.built_in_rooms.shapes import block, hexahedron
 from rislam_rt.scene.solids import sphere_mesh
 
@@ -81,7 +81,7 @@ def _sphere(name: str, size: Floats, rng: np.random.Generator) -> Scatterer:
     shade = None
     if radius > 0.1 and rng.uniform() < SHADING:
         mesh = sphere_mesh(center, radius)
-        shade = Shade(mesh.vertices, mesh.faces)
+        shade = Occluder(mesh.vertices, mesh.faces)
     return Scatterer(name, center, float(np.pi * radius**2), radius, shade=shade)
 
 

@@ -24,7 +24,7 @@ def as_written(name: str, folder: Path):
     write_xml(room, folder)
     (folder / "scene.toml").unlink()
     read, _ = scene_of_xml(folder / "scene.xml", name)
-    return replace(read, scatterers=room.scatterers, shades=room.shades, agent=room.agent)
+    return replace(read, scatterers=room.scatterers, occluders=room.occluders, agent=room.agent)
 
 
 def round_trip(scene, file: Path, poses: int, depth: int = 2):

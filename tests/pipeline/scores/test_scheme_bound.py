@@ -7,22 +7,19 @@ import pytest
 from scipy.stats import ncx2
 
 from rislam_rt.channel.walls import build_walls
-from rislam_rt.information import (
-    MotionPrior,
-    assumed_std,
-    build_landmark_model,
-    heard_paths,
-    plane_tangents,
-    posterior_bound,
-)
+from rislam_rt.geometry.mirror_chain import plane_tangents
+from rislam_rt.information import MotionPrior, assumed_std, build_landmark_model, heard_paths, posterior_bound
 from rislam_rt.information.prior import FLOOR_TILT, UPRIGHT_TILT
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.run import set_stage
-from rislam_rt.pipeline.scores.bound import over_distortion, scheme_bound
+from rislam_rt.pipeline.run import prepare_setup
+from rislam_rt.pipeline.scheme_simulation import without_panel
+from rislam_rt.pipeline.scores.bound import (
+    over_distortion,
+    scheme_bound,
+)
 from rislam_rt.pipeline.scores.summary import map_score, summarise
 from rislam_rt.pipeline.specification.spec import build_settings
-from rislam_rt.pipeline.walk import without_panel
 
 PIPELINE = Path(__file__).parents[3] / "pipelines" / "trace_then_slam.toml"
 SHORT = ["channel=image_source", "cycles=40", "depth=1"]
@@ -32,7 +29,7 @@ SEEN = "radio.reference_snr_db=60.0"
 
 @pytest.fixture(scope="module")
 def stage(room):
-    return set_stage(room, load_spec(PIPELINE, SHORT), rng=np.random.default_rng(1))
+    return prepare_setup(room, load_spec(PIPELINE, SHORT), rng=np.random.default_rng(1))
 
 
 def bound(stage, scheme, *settings, gain=None):

@@ -68,7 +68,7 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
         if _is_shell(bounds, box):  # walls that were drawn apart
             shell += regions.tolist()
         else:
-            others.append(RegionGroup(guess_kind(bounds, box), "", regions, False))
+            others.append(RegionGroup(kind_by_shape(bounds, box), "", regions, False))
     return [RegionGroup("", "", np.array(sorted(shell), dtype=np.int64), True), *others]
 
 
@@ -112,7 +112,7 @@ def place_free_name(name: str) -> str:
     return "" if re.fullmatch(r"(walls?|floors?|ceilings?|roof|wand|boden|decke)?[_\d]*", plain) else plain
 
 
-def guess_kind(bounds: Floats, room: Floats) -> str:
+def kind_by_shape(bounds: Floats, room: Floats) -> str:
     """What a thing is called by its size and place; a name, nothing that is computed with."""
     size, floor = bounds[1] - bounds[0], float(room[0, 2])
     bottom, top = float(bounds[0, 2]) - floor, float(bounds[1, 2]) - floor

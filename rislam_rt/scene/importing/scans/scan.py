@@ -60,7 +60,7 @@ class ScanPlane(NamedTuple):
     """[m] Short side of the rectangle with the same second moments."""
 
 
-def thin_cloud(mesh: Welded) -> PointCloud:
+def downsample_mesh(mesh: Welded) -> PointCloud:
     """The cloud of a welded mesh: one corner for every cube and side, with the normal of the patch about it.
 
     Both faces of a thin board stay apart where the mesh says which side is which.

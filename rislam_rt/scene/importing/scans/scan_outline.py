@@ -176,10 +176,10 @@ def _snapped(loop: Floats, number: int, planes: list[ScanPlane], trees: list[cKD
         corners.append(np.linalg.solve(system, np.array([before.offset, edge.offset])))
     moved = np.array(corners)
     far = cKDTree(loop).query(moved)[0].max() if len(moved) > 2 else np.inf
-    return _settled(moved if far < (SHORT + 1.0) * CELL else loop, number, planes, trees, frame)
+    return _converged(moved if far < (SHORT + 1.0) * CELL else loop, number, planes, trees, frame)
 
 
-def _settled(corners: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats) -> Floats:
+def _converged(corners: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats) -> Floats:
     """Corners that nearly lie on other planes put there: on two at most, the nearest first."""
     plane, moved = planes[number], corners.copy()
     for k, corner in enumerate(corners):

@@ -15,7 +15,7 @@ from rislam_rt.scene.importing.regions.surfaces import (
     off_planes,
     surface_area,
 )
-from rislam_rt.scene.importing.scans.scan import WIDTHS, ScanPlane, find_planes, thin_cloud
+from rislam_rt.scene.importing.scans.scan import WIDTHS, ScanPlane, downsample_mesh, find_planes
 from rislam_rt.scene.importing.scans.scan_outline import BRIDGE, CELL, Outline, outline_planes
 
 FLAT_SHARE = 0.3
@@ -38,7 +38,7 @@ def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[SortedSurfaces, lis
     Fault
         No plane is found.
     """
-    cloud = thin_cloud(mesh)
+    cloud = downsample_mesh(mesh)
     planes = find_planes(cloud)
     outlines = outline_planes(planes, cloud, options.fill)
     kept = [(plane, outline) for plane, outline in zip(planes, outlines, strict=True) if outline is not None]

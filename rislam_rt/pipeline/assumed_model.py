@@ -1,7 +1,7 @@
 """What the belief is told: the one place where anything crosses from the truth to filter, association and design.
 
-`tell_belief` makes the filter's and the design's inputs from the truth and the errors of `[told]`; `deceive` turns the
-true signals as an undeclared tilt or clock does. The quantities stand one by one in `docs/told.md`.
+`tell_belief` makes the filter's and the design's inputs from the truth and the errors of `[told]`; `perceived_paths`
+turns the true signals as an undeclared tilt or clock does. The quantities stand one by one in `docs/told.md`.
 """
 
 from dataclasses import fields, replace
@@ -12,12 +12,12 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Antennas, Body, DataSheet, Measurement, Paths, RadioConfig, RisSpec, RisSpecs, Trajectory
-from rislam_rt.pipeline.specification.mistold import ToldSection
+from rislam_rt.pipeline.specification.mismatch import AssumedSection
 from rislam_rt.pipeline.specification.spec import ESTIMATOR_SECTIONS, PipelineSpec, Settings, StartSection
 from rislam_rt.slam import StartPrior
 
 
-class Told(NamedTuple):
+class AssumedModel(NamedTuple):
     """All that estimators and designs get beside measurements and the code in force."""
 
     start: StartPrior
@@ -36,7 +36,7 @@ class Told(NamedTuple):
 def tell_belief(
     motion: Trajectory, body: Body, panel: DataSheet | None, spec: PipelineSpec, settings: Settings,
     *, start: np.random.Generator, compass: np.random.Generator,
-) -> Told:  # fmt: skip
+) -> AssumedModel:  # fmt: skip
     """What a run's belief is told of the truth.
 
     Parameters
@@ -53,7 +53,7 @@ def tell_belief(
     told = spec.told
     noise = np.radians(told.compass_noise_deg) * compass.standard_normal(len(motion))
     heading = motion.heading + np.radians(told.compass_bias_deg) + noise
-    return Told(
+    return AssumedModel(
         tell_start(motion, float(heading[0]), spec.start, told, settings, rng=start),
         replace(body, tx_offset=body.tx_offset + told.baseline_m * _outwards(body)),
         None if panel is None else tell_panel(panel, told),
@@ -64,7 +64,7 @@ def tell_belief(
 
 
 def tell_start(
-    motion: Trajectory, compass: float, start: StartSection, told: ToldSection, settings: Settings,
+    motion: Trajectory, compass: float, start: StartSection, told: AssumedSection, settings: Settings,
     *, rng: np.random.Generator,
 ) -> StartPrior:  # fmt: skip
     """The truth plus one draw of the prior's errors; a known height without them, a known heading by the compass."""
@@ -83,14 +83,14 @@ def tell_start(
     )
 
 
-def tell_panel(panel: DataSheet, told: ToldSection) -> DataSheet:
+def tell_panel(panel: DataSheet, told: AssumedSection) -> DataSheet:
     """The data sheet of the panel, or of each of them, its orientation included."""
     if isinstance(panel, RisSpecs):
         return RisSpecs(tuple(_tell_one(one, told) for one in panel.panels))
     return _tell_one(panel, told)
 
 
-def _tell_one(panel: RisSpec, told: ToldSection) -> RisSpec:
+def _tell_one(panel: RisSpec, told: AssumedSection) -> RisSpec:
     tilt, turn = np.radians(told.panel_tilt_deg), np.radians(told.panel_turn_deg)
     normal, up = panel.normal, panel.up
     if turn:
@@ -103,7 +103,7 @@ def _tell_one(panel: RisSpec, told: ToldSection) -> RisSpec:
     )  # fmt: skip
 
 
-def tell_settings(settings: Settings, told: ToldSection) -> Settings:
+def tell_settings(settings: Settings, told: AssumedSection) -> Settings:
     """Radio, process noise, and what is known of detection and of false components."""
     slam = replace(settings.slam, max_bounces=max(settings.slam.max_bounces - told.bounces_less, 0))
     radio = tell_radio(settings.radio, told)
@@ -119,7 +119,7 @@ def tell_settings(settings: Settings, told: ToldSection) -> Settings:
     )
 
 
-def tell_radio(radio: RadioConfig, told: ToldSection) -> RadioConfig:
+def tell_radio(radio: RadioConfig, told: AssumedSection) -> RadioConfig:
     """Carrier, band and array as they are; noise, gains and antennas."""
     return replace(
         radio,
@@ -129,7 +129,7 @@ def tell_radio(radio: RadioConfig, told: ToldSection) -> RadioConfig:
     )
 
 
-def tell_measurement(measurement: Measurement, told: ToldSection) -> Measurement:
+def tell_measurement(measurement: Measurement, told: AssumedSection) -> Measurement:
     """What the receiver reports, with the array's calibration and its own deviations as far off as is said."""
     if told.array_scale == 1.0 and told.array_bias == 0.0 and told.std_scale == 1.0:
         return measurement
@@ -142,7 +142,7 @@ def tell_measurement(measurement: Measurement, told: ToldSection) -> Measurement
     )
 
 
-def lean(motion: Trajectory, told: ToldSection) -> Trajectory:
+def tilted_motion(motion: Trajectory, told: AssumedSection) -> Trajectory:
     """The motion of a body that leans as `tilt_deg` says: its ends lie where they truly are."""
     if told.tilt_deg == 0.0:
         return motion
@@ -150,8 +150,8 @@ def lean(motion: Trajectory, told: ToldSection) -> Trajectory:
     return replace(motion, body=replace(body, tx_offset=tilt @ body.tx_offset, rx_offset=tilt @ body.rx_offset))
 
 
-def deceive(
-    paths: Paths, motion: Trajectory, told: ToldSection, *, rng: np.random.Generator, since: float | None = None
+def perceived_paths(
+    paths: Paths, motion: Trajectory, told: AssumedSection, *, rng: np.random.Generator, since: float | None = None
 ) -> Paths:
     """The paths as a leaning, swaying array with a clock of its own hears them.
 

@@ -13,7 +13,7 @@ from rislam_rt.model import Paths, SensorModel
 from rislam_rt.pipeline.specification.spec import Settings
 
 
-class Heard(NamedTuple):
+class DetectionForecast(NamedTuple):
     """L landmarks at one place under one code."""
 
     probability: Floats
@@ -24,7 +24,7 @@ class Heard(NamedTuple):
     """(L,) column of the stronger path that the landmark's strongest one comes out as; -1 if it comes out itself."""
 
 
-def hear(paths: Paths, cycle: int, heading: float, settings: Settings) -> Heard:
+def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Settings) -> DetectionForecast:
     """The landmarks of one cycle as the receiver of these settings reports them.
 
     The same steps as a run's receiver: what the array hears, the two captures of alternated codes, paths that cannot be
@@ -48,7 +48,7 @@ def hear(paths: Paths, cycle: int, heading: float, settings: Settings) -> Heard:
             if row >= 0 and snr[row] > strongest[landmark]:
                 strongest[landmark] = snr[row]
                 covered[landmark] = _cover(loud, int(capture.path[row]), parts, sensor)
-    return Heard(1.0 - missed, strongest, covered)
+    return DetectionForecast(1.0 - missed, strongest, covered)
 
 
 def _cover(loud: Received, path: int, parts: NoiselessComponents, sensor: SensorModel) -> int:

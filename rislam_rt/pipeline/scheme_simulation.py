@@ -1,6 +1,5 @@
 """One scheme on its way through the cycles of a run, led through all of them at once or slice by slice."""
 
-from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import replace
 
@@ -9,23 +8,22 @@ import numpy as np
 from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.measurement import FrontEnd
 from rislam_rt.model import Body, PathKind, Paths, Scene, SchemeResult
+from rislam_rt.pipeline.assumed_model import perceived_paths, tell_belief
 from rislam_rt.pipeline.code_policies import build_designer
 from rislam_rt.pipeline.control import open_link
-from rislam_rt.pipeline.cycle import Agent, Cycle, Means, Rng, Room, run_cycle
+from rislam_rt.pipeline.cycle import Agent, Cycle, CycleGenerators, GroundTruth, RunContext, run_cycle
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.record import gather, given_of
-from rislam_rt.pipeline.room.extras import heard_clutter
+from rislam_rt.pipeline.room.diffuse_clutter import received_clutter
 from rislam_rt.pipeline.room.front_end import prepare_front_end
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, child
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
-from rislam_rt.pipeline.told import deceive, tell_belief
+from rislam_rt.progress import Tell
 from rislam_rt.ris import draw_panel
 
-Tell = Callable[[str, int, int], None]
 
-
-class Walk:
+class SchemeSimulation:
     """Agent, generators and panel of one scheme between two slices; nothing in it grows with the cycles done.
 
     Cycle k draws from generators of its own, so that the numbers are the same however the run is cut.
@@ -47,7 +45,7 @@ class Walk:
             self.faults = draw_panel(panel, spec.panel.tolerance, rng=np.random.default_rng(seeds.panel))
             designer = build_designer(self.scheme, panel, spec, settings, told)
         estimator = estimator or ESTIMATORS[self.scheme.estimator]
-        self.means = Means(panel, designer, estimator, spec, settings, told)
+        self.means = RunContext(panel, designer, estimator, spec, settings, told)
         self.filter_rng, self.design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
         config = estimator.config(told.settings)
         state = estimator.init(
@@ -70,18 +68,18 @@ class Walk:
         shift = doppler_shift(paths, motion, self.means.settings.radio.wavelength)
         clutter, twin = None, deepcopy(self.sway)  # one array hears both
         if extras is not None:
-            extras = deceive(extras, motion, spec.told, rng=twin, since=float(self.motion.time[0]))
-            clutter = heard_clutter(extras, motion, self.means.settings.radio)
-        heard = deceive(paths, motion, spec.told, rng=self.sway, since=float(self.motion.time[0]))
+            extras = perceived_paths(extras, motion, spec.told, rng=twin, since=float(self.motion.time[0]))
+            clutter = received_clutter(extras, motion, self.means.settings.radio)
+        heard = perceived_paths(paths, motion, spec.told, rng=self.sway, since=float(self.motion.time[0]))
         if first == 0:
             build = np.random.default_rng(self.seeds.hardware)
             self.front_end = prepare_front_end(heard, motion, self.body, self.means.settings, rng=build)
-        room = Room(heard, self.motion, shift, self.faults, first, self.front_end, clutter)
+        room = GroundTruth(heard, self.motion, shift, self.faults, first, self.front_end, clutter)
         cycles: list[Cycle] = []
         tell(self.name, first, len(self.motion))
         for cycle in range(first, last):
             control, noise = (child(seed, cycle) for seed in (self.seeds.control, self.seeds.noise))
-            rng = Rng(self.design_rng, control, noise, self.filter_rng)
+            rng = CycleGenerators(self.design_rng, control, noise, self.filter_rng)
             self.agent, outcome = run_cycle(self.agent, room, cycle, self.means, rng=rng)
             cycles.append(outcome)
             tell(self.name, cycle + 1, len(self.motion))

@@ -5,25 +5,25 @@ from collections.abc import Iterator
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
-from rislam_rt.model import RadioConfig, Shade
+from rislam_rt.model import Occluder, RadioConfig
 from rislam_rt.scene.check.mesh_queries import crossings, winding
 from rislam_rt.scene.check.triangle_array import TriangleArray, without_area
 from rislam_rt.scene.findings import Finding
 
 
-def shade_face_errors(room: TriangleArray) -> Iterator[Finding]:
+def occluder_face_errors(room: TriangleArray) -> Iterator[Finding]:
     """Faces without area."""
-    for field, _, shade in _shades(room):
+    for field, _, shade in _occluders(room):
         bad = without_area(shade.triangles)
         if bad.any():
             message = f"{int(bad.sum())} faces without area, the first is face {int(np.argmax(bad))}"
             yield room.error(field, message, "remove degenerate faces from the mesh")
 
 
-def shade_errors(room: TriangleArray) -> Iterator[Finding]:
+def occluder_errors(room: TriangleArray) -> Iterator[Finding]:
     """A mesh that is not about its own scatterer, that encloses another landmark, or that the agent runs into."""
     marks, motion = room.scene.landmark_positions, room.scene.agent
-    for field, number, shade in _shades(room):
+    for field, number, shade in _occluders(room):
         inside = _inside(marks, shade)
         if number is not None and not inside[number]:
             message = f"it does not enclose the scatterer's position {marks[number].tolist()}"
@@ -56,21 +56,21 @@ def cylinder_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Findi
             )
 
 
-def _shades(room: TriangleArray) -> Iterator[tuple[str, int | None, Shade]]:
+def _occluders(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:
     """Field and shade of every scatterer that has one, with its number, and of those that stand alone."""
     for number, scatterer in enumerate(room.scene.scatterers):
         if scatterer.shade is not None:
             yield f"scatterer[{number}].mesh ({scatterer.name})", number, scatterer.shade
-    for number, shade in enumerate(room.scene.shades):
+    for number, shade in enumerate(room.scene.occluders):
         yield f"shade[{number}].mesh ({shade.name})", None, shade
 
 
-def _inside(points: Floats, shade: Shade) -> Booleans:
+def _inside(points: Floats, shade: Occluder) -> Booleans:
     """Which points (N, 3) a shade encloses."""
     return np.array([abs(winding(point, shade.triangles)) > 0.5 for point in points], dtype=np.bool_)
 
 
-def _enters(points: Floats, shade: Shade) -> int | None:
+def _enters(points: Floats, shade: Occluder) -> int | None:
     """The first cycle of a track (K, 3) that begins inside, or after which the track crosses the mesh."""
     if _inside(points[:1], shade)[0]:
         return 0

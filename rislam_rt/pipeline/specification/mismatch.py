@@ -9,7 +9,7 @@ from rislam_rt.pipeline.specification.section import Decibel, NotNegative, Posit
 Degrees = Annotated[float, Field(ge=-45.0, le=45.0)]
 
 
-class ToldSection(Section):
+class AssumedSection(Section):
     """By how much each quantity that the belief is told is off. By default nothing is: all are told exactly.
 
     `docs/told.md` lists the quantities, and what the belief makes of each.

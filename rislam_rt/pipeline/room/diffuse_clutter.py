@@ -6,10 +6,10 @@ from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement import Clutter
 from rislam_rt.model import Paths, RadioConfig, Scene, Trajectory
-from rislam_rt.pipeline.specification.extras import ExtrasSection
+from rislam_rt.pipeline.specification.diffuse import DiffuseSection
 
 
-def check_extras(scene: Scene, section: ExtrasSection, channel: str) -> None:
+def check_diffuse(scene: Scene, section: DiffuseSection, channel: str) -> None:
     """Refuse what nobody could trace.
 
     Raises
@@ -23,7 +23,9 @@ def check_extras(scene: Scene, section: ExtrasSection, channel: str) -> None:
         raise ConfigError("extras.diffuse: no wall scatters; give room.scattering, or a material's 'scattering'")
 
 
-def trace_clutter(scene: Scene, radio: RadioConfig, motion: Trajectory, section: ExtrasSection) -> Paths | None:
+def trace_diffuse_clutter(
+    scene: Scene, radio: RadioConfig, motion: Trajectory, section: DiffuseSection
+) -> Paths | None:
     """Scattered and diffracted paths along a motion, by cells of the receiver; None if none are wanted.
 
     Raises
@@ -43,6 +45,6 @@ def trace_clutter(scene: Scene, radio: RadioConfig, motion: Trajectory, section:
     return as_paths(trace_diffuse_paths(scene, radio, motion, config), motion, radio)
 
 
-def heard_clutter(paths: Paths, motion: Trajectory, radio: RadioConfig) -> Clutter:
+def received_clutter(paths: Paths, motion: Trajectory, radio: RadioConfig) -> Clutter:
     """Such paths with what they turn by within the slot."""
     return Clutter(paths, doppler_shift(paths, motion, radio.wavelength))

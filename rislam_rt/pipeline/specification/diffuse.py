@@ -7,7 +7,7 @@ from pydantic import Field
 from rislam_rt.pipeline.specification.section import Section
 
 
-class ExtrasSection(Section):
+class DiffuseSection(Section):
     """Paths that last for no two cycles, found by the tracer and heard with all else; the agent is told of none."""
 
     diffuse: bool = False

@@ -61,7 +61,7 @@ class PanelErrors:
         """What each element (N, M) does to its signal beside its commanded phase, for `rephase` and `panel_gain`."""
         return np.where(self.dead, 0.0, self.amplitude) * np.exp(-1j * self.phase)
 
-    def settle(self, code: RisCode) -> RisCode:
+    def applied(self, code: RisCode) -> RisCode:
         """The code (..., N, M) that the elements take on: stuck ones keep their level."""
         return RisCode(np.where(self.stuck == FREE, code.index, self.stuck), code.levels)
 
