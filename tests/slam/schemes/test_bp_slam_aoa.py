@@ -122,7 +122,7 @@ def test_one_gaussian_and_one_certain_component_are_a_kalman_filter(kind: int) -
     noise = np.array([[1e-4, 4e-4, 9e-4]])
     seen = sight.seen + np.array([[0.02, -0.01, 0.015]])
     scan = Scan(seen, np.sqrt(noise), np.array(sight.log_amplitude), np.full(1, 0.1), np.full(1, 1e-30))
-    pairs = Pairs(np.array([0]), np.array([0]), noise, np.zeros(1))
+    pairs = Pairs(np.array([0]), np.array([0]), noise, np.ones(1), np.zeros(1))
     view = View(sight, np.array([1.0 - 1e-15]), np.zeros((1, 3, 3)), pairs)
     fresh = np.full(1, 1e-30)
     found, _ = claims(features, view, likelihoods(view, spread_of(sight, course), scan), fresh)
@@ -147,7 +147,7 @@ def test_one_gaussian_and_one_certain_component_are_a_kalman_filter(kind: int) -
 def test_the_evidence_of_one_feature_is_the_sum_over_its_associations() -> None:
     """A tree, on which Bethe's evidence is exact: missed, or made one of three components, each else something new."""
     course, features = course_at(np.zeros(3)), one(POINT, np.array([1.5, 2.0, 1.8]))._replace(existence=np.array([0.6]))
-    view = View(look(features, course, ENDS, FREE), np.array([0.8]), np.zeros((1, 3, 3)), Pairs(*np.zeros((4, 3), int)))
+    view = View(look(features, course, ENDS, FREE), np.array([0.8]), np.zeros((1, 3, 3)), Pairs(*np.zeros((5, 3), int)))
     view = view._replace(pairs=view.pairs._replace(component=np.arange(3)))
     density, fresh = np.array([3.0, 0.2, 1.0]), np.array([0.5, 0.1, 2.0])
     found, log = claims(features, view, density, fresh)
@@ -210,7 +210,7 @@ def test_it_knows_what_it_knows_in_rooms_made_by_hand() -> None:
 
 
 def test_angles_and_amplitudes_are_what_makes_the_difference() -> None:
-    """The same components with cosines worth a thirtieth: less is known of the agent, though the delays are the same."""
+    """The same components with cosines worth a thirtieth: less is known of the agent by the same delays."""
     walk = build_walk(15, 3)
     blind = [
         Measurement(m.tau, m.cosines, m.amplitude, m.tau_std, np.full((len(m), 2), 0.3), m.amplitude_std)

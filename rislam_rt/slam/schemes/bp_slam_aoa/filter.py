@@ -9,7 +9,7 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.config import StartPrior
-from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, free_space, glance_of, is_los
+from rislam_rt.slam.filter import REMOVED, UNUSED, StepInfo, free_space, glance_of, is_los
 from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.schemes.bp_slam_aoa.birth import Scan, born, guess
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
@@ -19,16 +19,24 @@ from rislam_rt.slam.schemes.bp_slam_aoa.update import View, absorb, claims, expe
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import is_strong
 from rislam_rt.slam.schemes.shared.course import Course, Step, advance
-from rislam_rt.slam.schemes.shared.report import ahead_of
+from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of
 
 LIVELY_STRIDE = 5
 """The course's stride while steps are lively."""
 LEAST_FALSE = 1e-12
 """Density of false components that is reckoned with at least."""
+FAST = 4.0
+"""Acceleration of a fast step over that of a lively one."""
+CALM_ENDS = 0.1
+"""How often a calm stretch ends, over how often a lively one does."""
+CHANGE = 0.05
+"""Probability that a step which is not calm is followed by one that is not calm in another way."""
+UNSEEN = 0.7
+"""Share of what is expected and not yet seen that stays unseen in a cycle."""
+RARE = 1e-6
+"""Density of first sights while gaits are weighed: a surprise, but not an impossible one."""
 VERTICAL_STD = 0.003
 """White vertical acceleration of an agent on a level floor [m/s^2]."""
-NIS_LIMIT = 3.0
-"""Running mean of the NIS per degree of freedom above which the filter says that it has diverged."""
 STRAIN_RATE = 0.05
 """Share of the latest cycle in that mean."""
 
@@ -108,7 +116,7 @@ def step(
     features = prune(features, config.pruning_threshold, config.share_threshold, config.max_features)
     strain = state.strain + (STRAIN_RATE * (nis / dof - state.strain) if dof else 0.0)
     count = int((features.existence > config.detection_threshold).sum())
-    report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, count, _outcome(len(measurement), count, strain))
+    report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, count, outcome_of(len(measurement), count, strain))
     return state._replace(
         course=course, features=features, next_ident=state.next_ident + len(new), strain=strain, cycle=state.cycle + 1
     ), report
@@ -136,9 +144,19 @@ def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConf
 
 def _levels(config: BpSlamAoaConfig) -> Floats:
     """(4, 3) standard deviations of the acceleration of a calm, a lively, a fast and a climbing step [m/s^2]."""
-    calm, lively, fast = config.sigma_a, config.lively_std, 4.0 * config.lively_std
+    calm, lively, fast = config.sigma_a, config.lively_std, FAST * config.lively_std
     up = min(VERTICAL_STD, calm)
     return np.array([[calm, calm, up], [lively, lively, up], [fast, fast, up], [calm, calm, lively]])
+
+
+def _gaits(config: BpSlamAoaConfig) -> Floats:
+    """(4, 4) probabilities of the gait of a step after that of the step before."""
+    calm = config.calm_again
+    move = np.full((4, 4), CHANGE * (1.0 - calm))
+    move[0], move[:, 0] = CALM_ENDS * calm / 3.0, calm
+    np.fill_diagonal(move, 0.0)
+    np.fill_diagonal(move, 1.0 - move.sum(axis=1))
+    return move
 
 
 def _predict(
@@ -148,14 +166,7 @@ def _predict(
     turn = rotation_z(np.asarray(state.heading))
     upper = state.sensor.radio.array.pattern == "upper"
     ends = Ends(turn @ state.body.tx_offset, turn @ state.body.rx_offset, turn, upper)
-    levels, free = _levels(config), free_space(state.sensor.radio)
-    stay = np.array([0.1 * config.calm_again / 3.0] * 3)
-    move = np.full((4, 4), 0.0)
-    move[0] = [1.0 - stay.sum(), *stay]
-    move[1:, 0] = config.calm_again
-    move[1:, 1:] = 0.05 * (1.0 - config.calm_again)
-    move[range(1, 4), range(1, 4)] = 0.9 * (1.0 - config.calm_again)
-    prior = state.gait @ move
+    levels, free, prior = _levels(config), free_space(state.sensor.radio), state.gait @ _gaits(config)
 
     def ahead(level: int) -> tuple[BpSlamAoaState, View]:
         if dt == 0.0:
@@ -172,7 +183,7 @@ def _predict(
         return moved, expect_scan(moved.features, sight, scan, state.sensor, config)
 
     moved, view = ahead(0)
-    rare = scan.false + 1e-6
+    rare = scan.false + RARE
     scores = np.log(np.maximum(prior, 1e-30))
     if dt > 0.0 and len(moved.features.ident):
         spread = spread_of(view.sight, moved.course)
@@ -183,7 +194,7 @@ def _predict(
     best = int(np.argmax(gait))
     if best:
         moved, view = ahead(best)
-    unseen = config.birth_mean + (1.0 - config.birth_mean) * 0.7 * state.fresh if dt > 0.0 else state.fresh
+    unseen = config.birth_mean + (1.0 - config.birth_mean) * UNSEEN * state.fresh if dt > 0.0 else state.fresh
     return moved._replace(gait=gait / gait.sum(), fresh=unseen), view, ends
 
 
@@ -208,11 +219,3 @@ def _claimed(
         miss = scan.seen[shown] - view.sight.seen[best]
         nis += float(miss @ np.linalg.solve(spread, miss))
     return numbers, nis
-
-
-def _outcome(num_measurements: int, num_features: int, strain: float) -> Outcome:
-    if num_measurements == 0:
-        return Outcome.NO_MEASUREMENTS
-    if num_features == 0:
-        return Outcome.NO_LANDMARKS
-    return Outcome.DIVERGED if strain > NIS_LIMIT else Outcome.OK

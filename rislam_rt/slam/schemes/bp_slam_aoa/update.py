@@ -44,6 +44,8 @@ class Pairs(NamedTuple):
     """(N,)."""
     noise: Floats
     """(N, 3) variances of the component."""
+    loudness: Floats
+    """(N,) variance of its log amplitude about the feature's."""
     log_loudness: Floats
     """(N,) log density of its amplitude, times the detection probability."""
 
@@ -75,8 +77,9 @@ def expect_scan(features: Features, sight: Sight, scan: Scan, sensor: SensorMode
     near = np.abs(scan.seen[:, 0] - seen.seen[:, :1]) < SLACK + np.sqrt(GATE) * wide
     gaussian, component = near.nonzero()
     miss = scan.log_amplitude[component] - seen.log_amplitude[gaussian]
-    loudness = log_normal(miss, variance[gaussian] + scan.log_std[component] ** 2) + np.log(detection[gaussian])
-    pairs = Pairs(gaussian, component, noise[gaussian, None] * scan.std[component] ** 2, loudness)
+    loudness = config.fading**2 + scan.log_std[component] ** 2
+    log_loudness = log_normal(miss, features.strength_variance[gaussian] + loudness) + np.log(detection[gaussian])
+    pairs = Pairs(gaussian, component, noise[gaussian, None] * scan.std[component] ** 2, loudness, log_loudness)
     return View(seen, detection, disturbance, pairs)
 
 
@@ -105,7 +108,7 @@ def spread_of(sight: Sight, course: Course) -> Floats:
 
 def likelihoods(view: View, spread: Floats, scan: Scan, more: Floats | None = None) -> Floats:
     """Densities (N,) of the pairs times detection; `more` (3, 3) is added to the covariance of the agent's position."""
-    gaussian, component, noise, log_loudness = view.pairs
+    gaussian, component, noise, _, log_loudness = view.pairs
     total = (spread + view.disturbance)[gaussian]
     if more is not None:
         by_place = view.sight.by_place[gaussian]
@@ -223,7 +226,7 @@ class Learnt(NamedTuple):
 def learn(heard: Heard, seen: Floats, spread: Floats, features: Features) -> Learnt:
     """Moments over the components and "missed", for each Gaussian."""
     view, scan, part = heard.view, heard.scan, heard.part
-    gaussian, component, noise, log_loudness = (column[heard.pairs] for column in view.pairs)
+    gaussian, component, noise, loudness, log_loudness = (column[heard.pairs] for column in view.pairs)
     mine = gaussian - part.start
     wide = spread + view.disturbance[part]
     total = wide[mine] + noise[:, None] * np.eye(3)
@@ -241,8 +244,7 @@ def learn(heard: Heard, seen: Floats, spread: Floats, features: Features) -> Lea
     after = spread + _sum(mine, drop, count) - mean[:, :, None] * mean[:, None]
     strength, variance = features.strength[part].copy(), features.strength_variance[part].copy()
     off = scan.log_amplitude[component] - view.sight.log_amplitude[part][mine]
-    doubt = variance[mine] + 0.09 + scan.log_std[component] ** 2
-    gain = variance[mine] / doubt
+    gain = variance[mine] / (variance[mine] + loudness)
     strength += np.bincount(mine, belief * gain * off, minlength=count)
     variance *= 1.0 - np.bincount(mine, belief * gain, minlength=count)
     score = np.einsum("ni,ni,ni->n", pulled, noise, pulled) - np.einsum("nii,ni->n", inverse, noise)
