@@ -14,7 +14,7 @@ from rislam_rt.model import Measurement, SensorModel
 from rislam_rt.slam import Outcome, StartPrior
 from rislam_rt.slam.filter import REMOVED, free_space
 from rislam_rt.slam.schemes import bp_slam_aoa
-from rislam_rt.slam.schemes.bp_slam_aoa.birth import Scan, born, guess
+from rislam_rt.slam.schemes.bp_slam_aoa.birth import Scan, born, hypothesise
 from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, Ends, Features, look, prune, returns_of
 from rislam_rt.slam.schemes.bp_slam_aoa.update import Pairs, View, absorb, claims, likelihoods, spread_of
 from rislam_rt.slam.schemes.shared.course import Course
@@ -118,24 +118,24 @@ def test_returns_are_those_of_the_mirror_images() -> None:
 def test_one_gaussian_and_one_certain_component_are_a_kalman_filter(kind: int) -> None:
     """Known association, nothing else possible: the joint posterior of course and feature is Kalman's."""
     course, features = course_at(np.array([0.2, 0.1, 0.0])), one(kind, np.array([1.5, 2.0, 1.8]))
-    sight = look(features, course, ENDS, FREE)
+    predicted = look(features, course, ENDS, FREE)
     noise = np.array([[1e-4, 4e-4, 9e-4]])
-    seen = sight.seen + np.array([[0.02, -0.01, 0.015]])
-    scan = Scan(seen, np.sqrt(noise), np.array(sight.log_amplitude), np.full(1, 0.1), np.full(1, 1e-30))
+    seen = predicted.seen + np.array([[0.02, -0.01, 0.015]])
+    scan = Scan(seen, np.sqrt(noise), np.array(predicted.log_amplitude), np.full(1, 0.1), np.full(1, 1e-30))
     pairs = Pairs(np.array([0]), np.array([0]), noise, np.ones(1), np.zeros(1))
-    view = View(sight, np.array([1.0 - 1e-15]), np.zeros((1, 3, 3)), pairs)
+    view = View(predicted, np.array([1.0 - 1e-15]), np.zeros((1, 3, 3)), pairs)
     fresh = np.full(1, 1e-30)
-    found, _ = claims(features, view, likelihoods(view, spread_of(sight, course), scan), fresh)
+    found, _ = claims(features, view, likelihoods(view, spread_of(predicted, course), scan), fresh)
     after, moved = absorb(features, view, course, scan, found, fresh)
     slope = features.slope[0]
     joint = np.block([
         [course.covariance, course.covariance @ slope.T],
         [slope @ course.covariance, slope @ course.covariance @ slope.T + features.covariance[0]],
     ])  # fmt: skip
-    h = np.hstack([np.pad(sight.by_place[0], ((0, 0), (0, 3))), sight.by_mean[0]])
-    bend = sight.own[0] - sight.by_mean[0] @ features.covariance[0] @ sight.by_mean[0].T
+    h = np.hstack([np.pad(predicted.by_place[0], ((0, 0), (0, 3))), predicted.by_mean[0]])
+    bend = predicted.own[0] - predicted.by_mean[0] @ features.covariance[0] @ predicted.by_mean[0].T
     gain = joint @ h.T @ np.linalg.inv(h @ joint @ h.T + bend + np.diag(noise[0]))
-    mean, wanted = gain @ (seen - sight.seen)[0], joint - gain @ h @ joint
+    mean, wanted = gain @ (seen - predicted.seen)[0], joint - gain @ h @ joint
     assert np.allclose(moved.mean - course.mean, mean[:6], rtol=1e-5, atol=1e-9)
     assert np.allclose(moved.covariance, wanted[:6, :6], rtol=1e-5, atol=1e-9)
     total = after.covariance[0] + after.slope[0] @ moved.covariance @ after.slope[0].T
@@ -158,17 +158,17 @@ def test_the_evidence_of_one_feature_is_the_sum_over_its_associations() -> None:
 
 @pytest.mark.parametrize("row", range(8))
 def test_a_new_feature_is_where_its_component_came_from(row: int) -> None:
-    """Each guess predicts the component within the deviations that it says, and the true kind is among the likely."""
+    """Each hypothesis predicts the component within its deviations, and the true kind is among the likely ones."""
     agent = np.array([0.3, 0.2, 0.0])
     seen, loud = heard(agent + np.array([2.5, 2.0, 0.8]))
     scan = Scan(seen[row : row + 1], STD[None], loud[row : row + 1], np.full(1, 0.1), np.full(1, 1e-9))
     course = course_at(agent)
-    found = guess(scan, 0, TURN, FREE, 24.0, CONFIG)
+    found = hypothesise(scan, 0, TURN, FREE, 24.0, CONFIG)
     new = born([found], np.ones(1), course, ENDS, 0, CONFIG)
-    sight = look(new, course._replace(covariance=np.zeros((6, 6))), ENDS, FREE)
-    spread = np.sqrt(np.einsum("cii->ci", sight.own)) + STD
+    predicted = look(new, course._replace(covariance=np.zeros((6, 6))), ENDS, FREE)
+    spread = np.sqrt(np.einsum("cii->ci", predicted.own)) + STD
     likely = new.share > 1e-3
-    assert (np.abs(sight.seen - seen[row]) < 4.0 * spread)[likely].all()
+    assert (np.abs(predicted.seen - seen[row]) < 4.0 * spread)[likely].all()
     assert np.bincount(new.kind[likely], new.share[likely], minlength=3)[POINT if row < 3 else WALL] > 1e-3
 
 

@@ -36,7 +36,7 @@ class Scan(NamedTuple):
     """(M,) false components expected per metre, unit of each cosine and e-fold, where each lies."""
 
 
-class Guesses(NamedTuple):
+class Hypotheses(NamedTuple):
     """G Gaussians that one component may be the first sight of."""
 
     kind: Integers
@@ -72,7 +72,11 @@ def elevations(radial: float, std: float) -> tuple[Floats, Floats, Floats]:
     return middle, np.full(SLICES, 0.5 * top / SLICES), weight / radial
 
 
-def guess(scan: Scan, row: int, rotation: Floats, free: float, window: float, config: BpSlamAoaConfig) -> Guesses:
+def hypothesise(
+    scan: Scan, row: int, rotation: Floats, free: float, window: float, config: BpSlamAoaConfig
+) -> Hypotheses:
+    scan: Scan, row: int, rotation: Floats, free: float, window: float, config: BpSlamAoaConfig
+) -> Hypotheses:
     """All that component `row` may be of; `window` is the longest length that is reported [m]."""
     length, level = float(scan.seen[row, 0]), scan.seen[row, 1:]
     std, turn = float(scan.std[row, 1:].mean()), rotation[:2, :2] @ level
@@ -107,15 +111,15 @@ def guess(scan: Scan, row: int, rotation: Floats, free: float, window: float, co
     loud = np.exp(log_normal(strength - usual, usual_std**2 + noise))
     gain = usual_std**2 / (usual_std**2 + noise)
     after = usual + gain * (strength - usual)
-    return Guesses(kind, density * loud, polar, spread, after, np.sqrt(gain * noise))
+    return Hypotheses(kind, density * loud, polar, spread, after, np.sqrt(gain * noise))
 
 
 def born(
-    found: list[Guesses], existence: Floats, course: Course, ends: Ends, first: int, config: BpSlamAoaConfig
+    found: list[Hypotheses], existence: Floats, course: Course, ends: Ends, first: int, config: BpSlamAoaConfig
 ) -> Features:
-    """One new feature for each set of guesses."""
+    """One new feature for each set of hypotheses."""
     owner = np.repeat(np.arange(len(found)), [len(each.kind) for each in found])
-    parts = Guesses._make(np.concatenate(column) for column in zip(*found, strict=True))
+    parts = Hypotheses._make(np.concatenate(column) for column in zip(*found, strict=True))
     place, by_agent, by_polar = _placed(parts.kind, parts.polar, course.mean[:3], ends)
     root = by_polar * parts.std[:, None]
     covariance = root @ root.swapaxes(1, 2) + LEAST_VARIANCE * np.eye(3)

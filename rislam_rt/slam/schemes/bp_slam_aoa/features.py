@@ -63,7 +63,7 @@ class Features(NamedTuple):
     """(C,) logarithm of the mean square of its residuals in reported deviations."""
 
 
-class Sight(NamedTuple):
+class PredictedReturns(NamedTuple):
     """Returns that C Gaussians predict: length [m] and two cosines, to second order in the feature's place."""
 
     seen: Floats
@@ -118,7 +118,7 @@ def returns_of(kind: Integers, place: Floats, agent: Floats, ends: Ends) -> Floa
     return np.stack([length, arrival[..., 0], arrival[..., 1], arrival[..., 2], law], axis=-1)
 
 
-def look(features: Features, course: Course, ends: Ends, free: float) -> Sight:
+def look(features: Features, course: Course, ends: Ends, free: float) -> PredictedReturns:
     """Returns of all Gaussians from the present mean position; `free` is the log amplitude of 1 m in free space."""
     kind, mean, agent = features.kind, features.mean, course.mean[:3]
     spread = features.covariance + spread_over(features.slope, course)
@@ -136,7 +136,7 @@ def look(features: Features, course: Course, ends: Ends, free: float) -> Sight:
     own = by_mean @ features.covariance @ by_mean.swapaxes(1, 2) + 0.5 * bend @ bend.swapaxes(1, 2)
     in_view = np.where(far[0, :, 3] > -0.05, 1.0, 0.0) if ends.upper else np.ones(len(kind))
     seen = far[0, :, :3] + 0.5 * bend.sum(axis=2)
-    return Sight(seen, by_mean, by_place, by_course, own, far[0, :, 4] + free + features.strength, in_view)
+    return PredictedReturns(seen, by_mean, by_place, by_course, own, far[0, :, 4] + free + features.strength, in_view)
 
 
 def through(rows: Floats, matrix: Floats) -> Floats:

@@ -11,7 +11,7 @@ from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, 
 from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, StepInfo, free_space, glance_of, is_los
 from rislam_rt.slam.inputs import check_step
-from rislam_rt.slam.schemes.bp_slam_aoa.birth import Scan, born, guess
+from rislam_rt.slam.schemes.bp_slam_aoa.birth import Scan, born, hypothesise
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.features import Ends, Features, carry, join, look, no_features, prune
 from rislam_rt.slam.schemes.bp_slam_aoa.report import known_map, pose_moments
@@ -99,10 +99,10 @@ def step(
     state, view, ends = _predict(state._replace(heading=float(heading)), dt, scan, config)
     free = free_space(state.sensor.radio)
     window = SPEED_OF_LIGHT * state.sensor.window[1]
-    guesses = [guess(scan, row, ends.rotation, free, window, config) for row in range(len(rows))]
-    births = state.fresh * np.array([each.density.sum() for each in guesses])
+    hypotheses = [hypothesise(scan, row, ends.rotation, free, window, config) for row in range(len(rows))]
+    births = state.fresh * np.array([each.density.sum() for each in hypotheses])
     fresh = scan.false + births
-    density = likelihoods(view, spread_of(view.sight, state.course), scan)
+    density = likelihoods(view, spread_of(view.predicted, state.course), scan)
     found, _ = claims(state.features, view, density, fresh)
     landmark[rows], nis = _claimed(state, view, scan, found, config)
     dof = 3 * int((landmark >= 0).sum())
@@ -111,7 +111,7 @@ def step(
     new = np.flatnonzero(alive >= config.birth_threshold)
     if len(new):
         features = join(
-            features, born([guesses[row] for row in new], alive[new], course, ends, state.next_ident, config)
+            features, born([hypotheses[row] for row in new], alive[new], course, ends, state.next_ident, config)
         )
     features = prune(features, config.pruning_threshold, config.share_threshold, config.max_features)
     strain = state.strain + (STRAIN_RATE * (nis / dof - state.strain) if dof else 0.0)
@@ -179,14 +179,14 @@ def _predict(
             )
             course, carried = advance(state.course, dt, levels[level], keep)
             moved = state._replace(course=course, features=_survive(state.features, carried, config))
-        sight = look(moved.features, moved.course, ends, free)
-        return moved, expect_scan(moved.features, sight, scan, state.sensor, config)
+        predicted = look(moved.features, moved.course, ends, free)
+        return moved, expect_scan(moved.features, predicted, scan, state.sensor, config)
 
     moved, view = ahead(0)
     rare = scan.false + RARE
     scores = np.log(np.maximum(prior, 1e-30))
     if dt > 0.0 and len(moved.features.ident):
-        spread = spread_of(view.sight, moved.course)
+        spread = spread_of(view.predicted, moved.course)
         for level in range(4):
             more = np.diag((0.5 * dt**2 * levels[level]) ** 2 - (0.5 * dt**2 * levels[0]) ** 2)
             scores[level] += claims(moved.features, view, likelihoods(view, spread, scan, more), rare)[1]
@@ -213,9 +213,9 @@ def _claimed(
         own = np.flatnonzero(features.owner == row)
         best = own[np.argmax(features.share[own])]
         numbers[shown] = features.ident[row]
-        by_course = view.sight.by_course[best]
-        spread = view.sight.own[best] + view.disturbance[best] + by_course @ state.course.covariance @ by_course.T
+        by_course = view.predicted.by_course[best]
+        spread = view.predicted.own[best] + view.disturbance[best] + by_course @ state.course.covariance @ by_course.T
         spread = spread + np.diag(np.exp(features.log_scatter[best]) * scan.std[shown] ** 2)
-        miss = scan.seen[shown] - view.sight.seen[best]
+        miss = scan.seen[shown] - view.predicted.seen[best]
         nis += float(miss @ np.linalg.solve(spread, miss))
     return numbers, nis

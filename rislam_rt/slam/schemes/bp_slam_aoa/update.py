@@ -15,7 +15,7 @@ from rislam_rt.model import SensorModel
 from rislam_rt.model.sensor import merged_pull
 from rislam_rt.slam.schemes.bp_slam_aoa.birth import Scan, log_normal
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
-from rislam_rt.slam.schemes.bp_slam_aoa.features import Features, Sight, spread_over, through
+from rislam_rt.slam.schemes.bp_slam_aoa.features import Features, PredictedReturns, spread_over, through
 from rislam_rt.slam.schemes.shared.association import Association, associate
 from rislam_rt.slam.schemes.shared.course import Course
 
@@ -53,7 +53,7 @@ class Pairs(NamedTuple):
 class View(NamedTuple):
     """What is expected of a cycle before its components are assigned."""
 
-    sight: Sight
+    predicted: PredictedReturns
     detection: Floats
     """(C,) probability that a Gaussian's return is reported by itself."""
     disturbance: Floats
@@ -61,15 +61,17 @@ class View(NamedTuple):
     pairs: Pairs
 
 
-def expect_scan(features: Features, sight: Sight, scan: Scan, sensor: SensorModel, config: BpSlamAoaConfig) -> View:
+def expect_scan(
+    features: Features, predicted: PredictedReturns, scan: Scan, sensor: SensorModel, config: BpSlamAoaConfig
+) -> View:
     """Detection probabilities, pulls of neighbours, and the pairs worth weighing."""
     variance = features.strength_variance + config.fading**2
-    loud = sight.log_amplitude[:, None] + np.sqrt(variance)[:, None] * HERMITE[0]
+    loud = predicted.log_amplitude[:, None] + np.sqrt(variance)[:, None] * HERMITE[0]
     snr = sensor.radio.integrated_snr(np.exp(np.clip(loud, -60.0, 5.0)))
-    detection = config.visible * sight.in_view * (sensor.detection_probability(snr) @ HERMITE[1])
-    inside = np.where(sight.seen[:, 0] < sensor.window[1] * SPEED_OF_LIGHT, 1.0, 0.0)
-    hidden, pull, disturbance = _neighbours(features, sight, detection, sensor)
-    seen = sight._replace(seen=sight.seen + pull)
+    detection = config.visible * predicted.in_view * (sensor.detection_probability(snr) @ HERMITE[1])
+    inside = np.where(predicted.seen[:, 0] < sensor.window[1] * SPEED_OF_LIGHT, 1.0, 0.0)
+    hidden, pull, disturbance = _neighbours(features, predicted, detection, sensor)
+    seen = predicted._replace(seen=predicted.seen + pull)
     detection = np.clip(detection * inside * (1.0 - hidden), 1e-4, 1.0 - 1e-4)
     spread = seen.own[:, 0, 0] + disturbance[:, 0, 0]
     noise = np.exp(features.log_scatter)
@@ -83,15 +85,17 @@ def expect_scan(features: Features, sight: Sight, scan: Scan, sensor: SensorMode
     return View(seen, detection, disturbance, pairs)
 
 
-def _neighbours(features: Features, sight: Sight, detection: Floats, sensor: SensorModel) -> tuple[Floats, ...]:
+def _neighbours(
+    features: Features, predicted: PredictedReturns, detection: Floats, sensor: SensorModel
+) -> tuple[Floats, ...]:
     """Probability (C,) of coming out as part of a louder return; mean (C, 3) and covariance of the pull of others."""
     weight = features.existence[features.owner] * features.share * detection
     sure = np.flatnonzero(weight > 0.1)
     weight = weight[sure]
-    gap = sight.seen[sure] - sight.seen[:, None]
+    gap = predicted.seen[sure] - predicted.seen[:, None]
     close = sensor.may_merge(gap / np.array([SPEED_OF_LIGHT, 1.0, 1.0]))
     close &= features.owner[:, None] != features.owner[sure]
-    louder = sight.log_amplitude[sure] - sight.log_amplitude[:, None]
+    louder = predicted.log_amplitude[sure] - predicted.log_amplitude[:, None]
     held = np.where(close, weight, 0.0)
     hidden = 1.0 - np.prod(1.0 - np.where(louder > 0.0, held, 0.0), axis=1)
     mean, variance = merged_pull(np.exp(np.minimum(louder, 0.0)))
@@ -101,9 +105,9 @@ def _neighbours(features: Features, sight: Sight, detection: Floats, sensor: Sen
     return hidden, pull, np.einsum("co,coi,coj->cij", second, gap, gap)
 
 
-def spread_of(sight: Sight, course: Course) -> Floats:
+def spread_of(predicted: PredictedReturns, course: Course) -> Floats:
     """Covariance (C, 3, 3) of predicted returns."""
-    return sight.own + spread_over(sight.by_course, course)
+    return predicted.own + spread_over(predicted.by_course, course)
 
 
 def likelihoods(view: View, spread: Floats, scan: Scan, more: Floats | None = None) -> Floats:
@@ -111,11 +115,11 @@ def likelihoods(view: View, spread: Floats, scan: Scan, more: Floats | None = No
     gaussian, component, noise, _, log_loudness = view.pairs
     total = (spread + view.disturbance)[gaussian]
     if more is not None:
-        by_place = view.sight.by_place[gaussian]
+        by_place = view.predicted.by_place[gaussian]
         total = total + by_place @ more @ by_place.swapaxes(1, 2)
     total[:, range(3), range(3)] += noise
     precision = np.asarray(np.linalg.inv(total), dtype=np.float64)
-    return np.exp(_log_density(scan.seen[component] - view.sight.seen[gaussian], precision) + log_loudness)
+    return np.exp(_log_density(scan.seen[component] - view.predicted.seen[gaussian], precision) + log_loudness)
 
 
 def _log_density(miss: Floats, precision: Floats) -> Floats:
@@ -149,7 +153,7 @@ def absorb(
     features: Features, view: View, course: Course, scan: Scan, found: Association, fresh: Floats
 ) -> tuple[Features, Course]:
     """Features and course after the components, feature by feature, the surest first."""
-    ref, sight = course.mean.copy(), view.sight
+    ref, predicted = course.mean.copy(), view.predicted
     edges = np.searchsorted(features.owner, np.arange(len(features.ident) + 1))
     pair_edges = np.searchsorted(view.pairs.gaussian, np.arange(len(features.owner) + 1))
     existence = features.existence.copy()
@@ -166,10 +170,10 @@ def absorb(
             existence[row] = existence[row] * total / (existence[row] * total + 1.0 - existence[row])
             fields["share"][part], told[part] = share / total, NO_VARIANCE * np.eye(3)
             continue
-        by_course = sight.by_course[part]
+        by_course = predicted.by_course[part]
         gain = through(by_course, course.covariance)
-        spread = sight.own[part] + gain @ by_course.swapaxes(1, 2)
-        seen = sight.seen[part] + by_course @ (course.mean - ref)
+        spread = predicted.own[part] + gain @ by_course.swapaxes(1, 2)
+        seen = predicted.seen[part] + by_course @ (course.mean - ref)
         heard = Heard(view, scan, part, pairs, found.to_feature[row] / fresh)
         learnt = learn(heard, seen, spread, features)
         weight = fields["share"][part] * learnt.factor
@@ -180,11 +184,11 @@ def absorb(
             fields[name][part] = getattr(learnt, name)
         course = _mix(course, gain, spread, learnt, existence[row] * weight / total)
         # the same pull as seen from the mean that the features refer to
-        pull[part], told[part] = learnt.miss + seen - sight.seen[part], learnt.noise
-    inner = features.covariance @ sight.by_mean.swapaxes(1, 2)
-    own = sight.by_mean @ inner + told
+        pull[part], told[part] = learnt.miss + seen - predicted.seen[part], learnt.noise
+    inner = features.covariance @ predicted.by_mean.swapaxes(1, 2)
+    own = predicted.by_mean @ inner + told
     gain = inner @ np.linalg.inv(own)
-    slope = features.slope - gain @ sight.by_course
+    slope = features.slope - gain @ predicted.by_course
     change = course.mean - ref
     covariance = features.covariance - gain @ inner.swapaxes(1, 2)
     return features._replace(
@@ -243,7 +247,7 @@ def learn(heard: Heard, seen: Floats, spread: Floats, features: Features) -> Lea
     drop = belief[:, None, None] * (shift[:, :, None] * shift[:, None] - spread[mine] @ inverse @ spread[mine])
     after = spread + _sum(mine, drop, count) - mean[:, :, None] * mean[:, None]
     strength, variance = features.strength[part].copy(), features.strength_variance[part].copy()
-    off = scan.log_amplitude[component] - view.sight.log_amplitude[part][mine]
+    off = scan.log_amplitude[component] - view.predicted.log_amplitude[part][mine]
     gain = variance[mine] / (variance[mine] + loudness)
     strength += np.bincount(mine, belief * gain * off, minlength=count)
     variance *= 1.0 - np.bincount(mine, belief * gain, minlength=count)
