@@ -75,8 +75,6 @@ def elevations(radial: float, std: float) -> tuple[Floats, Floats, Floats]:
 def hypothesise(
     scan: Scan, row: int, rotation: Floats, free: float, window: float, config: BpSlamAoaConfig
 ) -> Hypotheses:
-    scan: Scan, row: int, rotation: Floats, free: float, window: float, config: BpSlamAoaConfig
-) -> Hypotheses:
     """All that component `row` may be of; `window` is the longest length that is reported [m]."""
     length, level = float(scan.seen[row, 0]), scan.seen[row, 1:]
     std, turn = float(scan.std[row, 1:].mean()), rotation[:2, :2] @ level
