@@ -14,9 +14,9 @@ from rislam_rt.model import Measurement, SensorModel
 from rislam_rt.slam import Outcome, StartPrior
 from rislam_rt.slam.filter import REMOVED, free_space
 from rislam_rt.slam.schemes import bp_slam_aoa
-from rislam_rt.slam.schemes.bp_slam_aoa.birth import Scan, born, hypothesise
-from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, Ends, Features, look, prune, returns_of
-from rislam_rt.slam.schemes.bp_slam_aoa.update import Pairs, View, absorb, claims, likelihoods, spread_of
+from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, born, hypothesise
+from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, Ends, GaussianFeatures, look, prune, returns_of
+from rislam_rt.slam.schemes.bp_slam_aoa.update import CandidatePairs, View, absorb, claims, likelihoods, spread_of
 from rislam_rt.slam.schemes.shared.course import Course
 
 CONFIG = bp_slam_aoa.BpSlamAoaConfig(sigma_a=0.01)
@@ -93,11 +93,11 @@ def course_at(place: Floats) -> Course:
     return Course(np.concatenate([place, np.zeros(3)]), root @ root.T, np.zeros(6), 3, np.eye(6), 0.0)
 
 
-def one(kind: int, mean: Floats) -> Features:
+def one(kind: int, mean: Floats) -> GaussianFeatures:
     """One feature of one Gaussian that leans on the course."""
     rng = np.random.default_rng(5)
     root = 0.05 * rng.standard_normal((3, 3))
-    return Features(
+    return GaussianFeatures(
         np.ones(1), np.array([7]), np.array([0]), np.array([kind]), np.ones(1), mean[None],
         0.3 * rng.standard_normal((1, 3, 6)), (root @ root.T)[None], np.zeros(1), np.ones(1), np.zeros(1),
     )  # fmt: skip
@@ -121,8 +121,8 @@ def test_one_gaussian_and_one_certain_component_are_a_kalman_filter(kind: int) -
     predicted = look(features, course, ENDS, FREE)
     noise = np.array([[1e-4, 4e-4, 9e-4]])
     seen = predicted.seen + np.array([[0.02, -0.01, 0.015]])
-    scan = Scan(seen, np.sqrt(noise), np.array(predicted.log_amplitude), np.full(1, 0.1), np.full(1, 1e-30))
-    pairs = Pairs(np.array([0]), np.array([0]), noise, np.ones(1), np.zeros(1))
+    scan = ComponentScan(seen, np.sqrt(noise), np.array(predicted.log_amplitude), np.full(1, 0.1), np.full(1, 1e-30))
+    pairs = CandidatePairs(np.array([0]), np.array([0]), noise, np.ones(1), np.zeros(1))
     view = View(predicted, np.array([1.0 - 1e-15]), np.zeros((1, 3, 3)), pairs)
     fresh = np.full(1, 1e-30)
     found, _ = claims(features, view, likelihoods(view, spread_of(predicted, course), scan), fresh)
@@ -147,7 +147,9 @@ def test_one_gaussian_and_one_certain_component_are_a_kalman_filter(kind: int) -
 def test_the_evidence_of_one_feature_is_the_sum_over_its_associations() -> None:
     """A tree, on which Bethe's evidence is exact: missed, or made one of three components, each else something new."""
     course, features = course_at(np.zeros(3)), one(POINT, np.array([1.5, 2.0, 1.8]))._replace(existence=np.array([0.6]))
-    view = View(look(features, course, ENDS, FREE), np.array([0.8]), np.zeros((1, 3, 3)), Pairs(*np.zeros((5, 3), int)))
+    view = View(
+        look(features, course, ENDS, FREE), np.array([0.8]), np.zeros((1, 3, 3)), CandidatePairs(*np.zeros((5, 3), int))
+    )
     view = view._replace(pairs=view.pairs._replace(component=np.arange(3)))
     density, fresh = np.array([3.0, 0.2, 1.0]), np.array([0.5, 0.1, 2.0])
     found, log = claims(features, view, density, fresh)
@@ -161,7 +163,7 @@ def test_a_new_feature_is_where_its_component_came_from(row: int) -> None:
     """Each hypothesis predicts the component within its deviations, and the true kind is among the likely ones."""
     agent = np.array([0.3, 0.2, 0.0])
     seen, loud = heard(agent + np.array([2.5, 2.0, 0.8]))
-    scan = Scan(seen[row : row + 1], STD[None], loud[row : row + 1], np.full(1, 0.1), np.full(1, 1e-9))
+    scan = ComponentScan(seen[row : row + 1], STD[None], loud[row : row + 1], np.full(1, 0.1), np.full(1, 1e-9))
     course = course_at(agent)
     found = hypothesise(scan, 0, TURN, FREE, 24.0, CONFIG)
     new = born([found], np.ones(1), course, ENDS, 0, CONFIG)
@@ -235,9 +237,9 @@ def test_wall_returns_may_be_set_aside() -> None:
 def test_pruning_keeps_what_is_likely() -> None:
     """The improbable feature goes, and the improbable Gaussian; shares sum to one."""
     rich = one(POINT, np.ones(3))
-    parts = {name: np.repeat(getattr(rich, name), 3, axis=0) for name in Features._fields}
+    parts = {name: np.repeat(getattr(rich, name), 3, axis=0) for name in GaussianFeatures._fields}
     parts |= {"existence": np.array([0.9, 1e-6]), "ident": np.array([4, 5]), "owner": np.array([0, 0, 1])}
-    left = prune(Features(**{**parts, "share": np.array([0.999, 1e-4, 1.0])}), 1e-4, 1e-3, 10)
+    left = prune(GaussianFeatures(**{**parts, "share": np.array([0.999, 1e-4, 1.0])}), 1e-4, 1e-3, 10)
     assert left.ident.tolist() == [4]
     assert left.share.tolist() == [1.0]
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
-from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, WANDERER, Ends, Features
+from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, WANDERER, Ends, GaussianFeatures
 from rislam_rt.slam.schemes.shared.course import Course
 
 NUDGE = 1e-6
@@ -21,7 +21,7 @@ OTHER_RATIO, OTHER_RATIO_STD = -2.5, 1.2
 """Log amplitude of a wanderer over that of free space of the same length, and its spread."""
 
 
-class Scan(NamedTuple):
+class ComponentScan(NamedTuple):
     """What the receiver reported in one cycle, without what is no path of the room."""
 
     seen: Floats
@@ -36,7 +36,7 @@ class Scan(NamedTuple):
     """(M,) false components expected per metre, unit of each cosine and e-fold, where each lies."""
 
 
-class Hypotheses(NamedTuple):
+class BirthHypotheses(NamedTuple):
     """G Gaussians that one component may be the first sight of."""
 
     kind: Integers
@@ -73,8 +73,8 @@ def elevations(radial: float, std: float) -> tuple[Floats, Floats, Floats]:
 
 
 def hypothesise(
-    scan: Scan, row: int, rotation: Floats, free: float, window: float, config: BpSlamAoaConfig
-) -> Hypotheses:
+    scan: ComponentScan, row: int, rotation: Floats, free: float, window: float, config: BpSlamAoaConfig
+) -> BirthHypotheses:
     """All that component `row` may be of; `window` is the longest length that is reported [m]."""
     length, level = float(scan.seen[row, 0]), scan.seen[row, 1:]
     std, turn = float(scan.std[row, 1:].mean()), rotation[:2, :2] @ level
@@ -109,15 +109,15 @@ def hypothesise(
     loud = np.exp(log_normal(strength - usual, usual_std**2 + noise))
     gain = usual_std**2 / (usual_std**2 + noise)
     after = usual + gain * (strength - usual)
-    return Hypotheses(kind, density * loud, polar, spread, after, np.sqrt(gain * noise))
+    return BirthHypotheses(kind, density * loud, polar, spread, after, np.sqrt(gain * noise))
 
 
 def born(
-    found: list[Hypotheses], existence: Floats, course: Course, ends: Ends, first: int, config: BpSlamAoaConfig
-) -> Features:
+    found: list[BirthHypotheses], existence: Floats, course: Course, ends: Ends, first: int, config: BpSlamAoaConfig
+) -> GaussianFeatures:
     """One new feature for each set of hypotheses."""
     owner = np.repeat(np.arange(len(found)), [len(each.kind) for each in found])
-    parts = Hypotheses._make(np.concatenate(column) for column in zip(*found, strict=True))
+    parts = BirthHypotheses._make(np.concatenate(column) for column in zip(*found, strict=True))
     place, by_agent, by_polar = _placed(parts.kind, parts.polar, course.mean[:3], ends)
     root = by_polar * parts.std[:, None]
     covariance = root @ root.swapaxes(1, 2) + LEAST_VARIANCE * np.eye(3)
@@ -126,7 +126,7 @@ def born(
     slope = np.zeros((len(owner), 3, len(course.mean)))
     slope[:, :, :3] = by_agent
     total = np.bincount(owner, parts.density)
-    return Features(
+    return GaussianFeatures(
         existence, first + np.arange(len(found)), owner, parts.kind, parts.density / total[owner], place, slope,
         covariance, parts.strength, parts.strength_std**2, np.full(len(owner), np.log(config.crowd)),
     )  # fmt: skip

@@ -36,7 +36,7 @@ class Ends(NamedTuple):
     """Whether the array hears the upper half space alone."""
 
 
-class Features(NamedTuple):
+class GaussianFeatures(NamedTuple):
     """C Gaussians of K potential features, those of one feature side by side; the course has n numbers."""
 
     existence: Floats
@@ -82,15 +82,15 @@ class PredictedReturns(NamedTuple):
     """(C,) 1 where it arrives from where the array hears, else 0."""
 
 
-def no_features(size: int) -> Features:
+def no_features(size: int) -> GaussianFeatures:
     """None yet, of a course of `size` numbers."""
     none, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
-    return Features(
+    return GaussianFeatures(
         none, whole, whole, whole, none, np.zeros((0, 3)), np.zeros((0, 3, size)), np.zeros((0, 3, 3)), none, none, none
     )
 
 
-def carry(features: Features, step: Step, drift: float) -> Features:
+def carry(features: GaussianFeatures, step: Step, drift: float) -> GaussianFeatures:
     """The same beliefs about a new course; wanderers widen by a standard deviation `drift` [m]."""
     missed = features.slope[:, :, : len(step.residual)]
     covariance = features.covariance + missed @ step.residual @ missed.swapaxes(1, 2)
@@ -118,7 +118,7 @@ def returns_of(kind: Integers, place: Floats, agent: Floats, ends: Ends) -> Floa
     return np.stack([length, arrival[..., 0], arrival[..., 1], arrival[..., 2], law], axis=-1)
 
 
-def look(features: Features, course: Course, ends: Ends, free: float) -> PredictedReturns:
+def look(features: GaussianFeatures, course: Course, ends: Ends, free: float) -> PredictedReturns:
     """Returns of all Gaussians from the present mean position; `free` is the log amplitude of 1 m in free space."""
     kind, mean, agent = features.kind, features.mean, course.mean[:3]
     spread = features.covariance + spread_over(features.slope, course)
@@ -149,13 +149,13 @@ def spread_over(rows: Floats, course: Course) -> Floats:
     return through(rows, course.covariance) @ rows.swapaxes(1, 2)
 
 
-def join(one: Features, other: Features) -> Features:
+def join(one: GaussianFeatures, other: GaussianFeatures) -> GaussianFeatures:
     """Both."""
     moved = other._replace(owner=other.owner + len(one.ident))
-    return Features._make(np.concatenate(pair) for pair in zip(one, moved, strict=True))
+    return GaussianFeatures._make(np.concatenate(pair) for pair in zip(one, moved, strict=True))
 
 
-def prune(features: Features, least_existence: float, least_share: float, most: int) -> Features:
+def prune(features: GaussianFeatures, least_existence: float, least_share: float, most: int) -> GaussianFeatures:
     """Without improbable features, and without Gaussians of small share; every feature keeps its best."""
     rank = np.argsort(np.argsort(-features.existence, kind="stable"), kind="stable")
     keep = (features.existence >= least_existence) & (rank < most)
@@ -165,7 +165,7 @@ def prune(features: Features, least_existence: float, least_share: float, most: 
     rows = keep[features.owner] & ((own >= least_share) | (own >= best[features.owner]))
     owner = (np.cumsum(keep) - 1)[features.owner[rows]]
     total = np.bincount(owner, own[rows], minlength=int(keep.sum()))
-    return Features(
+    return GaussianFeatures(
         features.existence[keep], features.ident[keep], owner, features.kind[rows], own[rows] / total[owner],
         features.mean[rows], features.slope[rows], features.covariance[rows], features.strength[rows],
         features.strength_variance[rows], features.log_scatter[rows],

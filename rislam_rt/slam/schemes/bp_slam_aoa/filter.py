@@ -11,9 +11,9 @@ from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, 
 from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, StepInfo, free_space, glance_of, is_los
 from rislam_rt.slam.inputs import check_step
-from rislam_rt.slam.schemes.bp_slam_aoa.birth import Scan, born, hypothesise
+from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, born, hypothesise
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
-from rislam_rt.slam.schemes.bp_slam_aoa.features import Ends, Features, carry, join, look, no_features, prune
+from rislam_rt.slam.schemes.bp_slam_aoa.features import Ends, GaussianFeatures, carry, join, look, no_features, prune
 from rislam_rt.slam.schemes.bp_slam_aoa.report import known_map, pose_moments
 from rislam_rt.slam.schemes.bp_slam_aoa.update import View, absorb, claims, expect_scan, likelihoods, spread_of
 from rislam_rt.slam.schemes.shared.association import Association
@@ -46,7 +46,7 @@ class BpSlamAoaState(NamedTuple):
 
     course: Course
     """Relative to the start [m]."""
-    features: Features
+    features: GaussianFeatures
     fresh: float
     """Share of the features that were expected at the start, and were never seen."""
     next_ident: int
@@ -129,7 +129,7 @@ def estimate(state: BpSlamAoaState, config: BpSlamAoaConfig) -> SlamEstimate:
     return SlamEstimate(position, velocity, state.heading, covariance, samples, state.body, known)
 
 
-def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConfig) -> tuple[Scan, Integers]:
+def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConfig) -> tuple[ComponentScan, Integers]:
     """The components without the direct path (and wall returns that are set aside), and their rows."""
     sensor = state.sensor
     glance = glance_of(measurement, sensor.radio)
@@ -139,7 +139,7 @@ def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConf
     snr = sensor.radio.integrated_snr(np.exp(glance.log_amplitude))
     false = sensor.false_alarm_density(glance.seen[:, 0] / SPEED_OF_LIGHT, glance.seen[:, 1:]) / SPEED_OF_LIGHT
     false = np.maximum(false * 2.0 * snr * sensor.false_alarm_snr_density(snr), LEAST_FALSE)
-    return Scan(glance.seen, glance.std, glance.log_amplitude, glance.log_amplitude_std, false), rows
+    return ComponentScan(glance.seen, glance.std, glance.log_amplitude, glance.log_amplitude_std, false), rows
 
 
 def _levels(config: BpSlamAoaConfig) -> Floats:
@@ -160,7 +160,7 @@ def _gaits(config: BpSlamAoaConfig) -> Floats:
 
 
 def _predict(
-    state: BpSlamAoaState, dt: float, scan: Scan, config: BpSlamAoaConfig
+    state: BpSlamAoaState, dt: float, scan: ComponentScan, config: BpSlamAoaConfig
 ) -> tuple[BpSlamAoaState, View, Ends]:  # fmt: skip
     """Agent and features carried to this cycle, by the gait that explains what is heard best."""
     turn = rotation_z(np.asarray(state.heading))
@@ -198,13 +198,13 @@ def _predict(
     return moved._replace(gait=gait / gait.sum(), fresh=unseen), view, ends
 
 
-def _survive(features: Features, carried: Step, config: BpSlamAoaConfig) -> Features:
+def _survive(features: GaussianFeatures, carried: Step, config: BpSlamAoaConfig) -> GaussianFeatures:
     moved = carry(features, carried, config.drift_std)
     return moved._replace(existence=config.survival_probability * moved.existence)
 
 
 def _claimed(
-    state: BpSlamAoaState, view: View, scan: Scan, found: Association, config: BpSlamAoaConfig
+    state: BpSlamAoaState, view: View, scan: ComponentScan, found: Association, config: BpSlamAoaConfig
 ) -> tuple[Integers, float]:
     """Feature number of each component (`UNUSED` for none), and the NIS of those claimed, by the likeliest Gaussian."""
     features, numbers, nis = state.features, np.full(len(scan.seen), UNUSED), 0.0

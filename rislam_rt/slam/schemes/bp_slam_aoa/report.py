@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import MapEstimate
 from rislam_rt.slam.config import StartPrior
-from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, Features, spread_over
+from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, GaussianFeatures, spread_over
 from rislam_rt.slam.schemes.shared.course import Course
 
 
@@ -26,8 +26,8 @@ def pose_moments(course: Course, start: StartPrior, count: int) -> tuple[Floats,
     return position, velocity, covariance, position + draws @ (vector * np.sqrt(np.maximum(value, 0.0))).T
 
 
-def known_map(features: Features, course: Course, start: StartPrior, threshold: float) -> MapEstimate:
-    """Features that exist, each by its likeliest Gaussian; wanderers have no place."""
+def known_map(features: GaussianFeatures, course: Course, start: StartPrior, threshold: float) -> MapEstimate:
+    """GaussianFeatures that exist, each by its likeliest Gaussian; wanderers have no place."""
     total = features.covariance + spread_over(features.slope, course)
     best = np.zeros(len(features.ident))
     np.maximum.at(best, features.owner, features.share)

@@ -13,9 +13,9 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import SensorModel
 from rislam_rt.model.sensor import merged_pull
-from rislam_rt.slam.schemes.bp_slam_aoa.birth import Scan, log_normal
+from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, log_normal
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
-from rislam_rt.slam.schemes.bp_slam_aoa.features import Features, PredictedReturns, spread_over, through
+from rislam_rt.slam.schemes.bp_slam_aoa.features import GaussianFeatures, PredictedReturns, spread_over, through
 from rislam_rt.slam.schemes.shared.association import Association, associate
 from rislam_rt.slam.schemes.shared.course import Course
 
@@ -35,7 +35,7 @@ HERMITE = np.array([-np.sqrt(3.0), 0.0, np.sqrt(3.0)]), np.array([1.0, 4.0, 1.0]
 """Gauss-Hermite nodes and weights of a standard normal."""
 
 
-class Pairs(NamedTuple):
+class CandidatePairs(NamedTuple):
     """N pairs of a Gaussian and a component that it may have made."""
 
     gaussian: Integers
@@ -58,11 +58,15 @@ class View(NamedTuple):
     """(C,) probability that a Gaussian's return is reported by itself."""
     disturbance: Floats
     """(C, 3, 3) covariance of the pull of returns that cannot be resolved from it."""
-    pairs: Pairs
+    pairs: CandidatePairs
 
 
 def expect_scan(
-    features: Features, predicted: PredictedReturns, scan: Scan, sensor: SensorModel, config: BpSlamAoaConfig
+    features: GaussianFeatures,
+    predicted: PredictedReturns,
+    scan: ComponentScan,
+    sensor: SensorModel,
+    config: BpSlamAoaConfig,
 ) -> View:
     """Detection probabilities, pulls of neighbours, and the pairs worth weighing."""
     variance = features.strength_variance + config.fading**2
@@ -81,12 +85,14 @@ def expect_scan(
     miss = scan.log_amplitude[component] - seen.log_amplitude[gaussian]
     loudness = config.fading**2 + scan.log_std[component] ** 2
     log_loudness = log_normal(miss, features.strength_variance[gaussian] + loudness) + np.log(detection[gaussian])
-    pairs = Pairs(gaussian, component, noise[gaussian, None] * scan.std[component] ** 2, loudness, log_loudness)
+    pairs = CandidatePairs(
+        gaussian, component, noise[gaussian, None] * scan.std[component] ** 2, loudness, log_loudness
+    )
     return View(seen, detection, disturbance, pairs)
 
 
 def _neighbours(
-    features: Features, predicted: PredictedReturns, detection: Floats, sensor: SensorModel
+    features: GaussianFeatures, predicted: PredictedReturns, detection: Floats, sensor: SensorModel
 ) -> tuple[Floats, ...]:
     """Probability (C,) of coming out as part of a louder return; mean (C, 3) and covariance of the pull of others."""
     weight = features.existence[features.owner] * features.share * detection
@@ -110,7 +116,7 @@ def spread_of(predicted: PredictedReturns, course: Course) -> Floats:
     return predicted.own + spread_over(predicted.by_course, course)
 
 
-def likelihoods(view: View, spread: Floats, scan: Scan, more: Floats | None = None) -> Floats:
+def likelihoods(view: View, spread: Floats, scan: ComponentScan, more: Floats | None = None) -> Floats:
     """Densities (N,) of the pairs times detection; `more` (3, 3) is added to the covariance of the agent's position."""
     gaussian, component, noise, _, log_loudness = view.pairs
     total = (spread + view.disturbance)[gaussian]
@@ -129,7 +135,7 @@ def _log_density(miss: Floats, precision: Floats) -> Floats:
     return np.asarray(np.where(square < GATE, log, -np.inf), dtype=np.float64)
 
 
-def claims(features: Features, view: View, density: Floats, fresh: Floats) -> tuple[Association, float]:
+def claims(features: GaussianFeatures, view: View, density: Floats, fresh: Floats) -> tuple[Association, float]:
     """Marginals of the association of K features and M components, and the log evidence (Bethe's) of the cycle.
 
     `fresh` (M,) is the density of false components and first sights where each lies.
@@ -150,9 +156,9 @@ def claims(features: Features, view: View, density: Floats, fresh: Floats) -> tu
 
 
 def absorb(
-    features: Features, view: View, course: Course, scan: Scan, found: Association, fresh: Floats
-) -> tuple[Features, Course]:
-    """Features and course after the components, feature by feature, the surest first."""
+    features: GaussianFeatures, view: View, course: Course, scan: ComponentScan, found: Association, fresh: Floats
+) -> tuple[GaussianFeatures, Course]:
+    """GaussianFeatures and course after the components, feature by feature, the surest first."""
     ref, predicted = course.mean.copy(), view.predicted
     edges = np.searchsorted(features.owner, np.arange(len(features.ident) + 1))
     pair_edges = np.searchsorted(view.pairs.gaussian, np.arange(len(features.owner) + 1))
@@ -204,7 +210,7 @@ class Heard(NamedTuple):
     """What one feature may have made."""
 
     view: View
-    scan: Scan
+    scan: ComponentScan
     part: slice
     """Its Gaussians."""
     pairs: slice
@@ -227,7 +233,7 @@ class Learnt(NamedTuple):
     log_scatter: Floats
 
 
-def learn(heard: Heard, seen: Floats, spread: Floats, features: Features) -> Learnt:
+def learn(heard: Heard, seen: Floats, spread: Floats, features: GaussianFeatures) -> Learnt:
     """Moments over the components and "missed", for each Gaussian."""
     view, scan, part = heard.view, heard.scan, heard.part
     gaussian, component, noise, loudness, log_loudness = (column[heard.pairs] for column in view.pairs)
