@@ -104,11 +104,11 @@ def _run(case: Case, estimator: Estimator | None) -> dict[str, Any]:
         "motion": {"sigma_a_m_s2": 0.01}, "start": {"velocity_std_m_s": 0.03}, "slam": case.settings,
     }  # fmt: skip
     spec = PipelineSpec.model_validate(content)
-    room, stage = find_setup(case.room, trace_key(spec))
+    room, setup = find_setup(case.room, trace_key(spec))
     name = scheme_here(case.scheme, room)
     recorder = Recorder(estimator or ESTIMATORS[SCHEMES[name].estimator])
-    result = run_scheme(name, stage, spec, lambda *_: None, recorder.estimator)
-    return score_run(build_truth(stage.scene, stage.paths, result, spec), recorder.inputs, recorder.answers)
+    result = run_scheme(name, setup, spec, lambda *_: None, recorder.estimator)
+    return score_run(build_truth(setup.scene, setup.paths, result, spec), recorder.inputs, recorder.answers)
 
 
 def deaf(estimator: Estimator) -> Estimator:
