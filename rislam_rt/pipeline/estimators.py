@@ -13,7 +13,7 @@ from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, 
 from rislam_rt.pipeline.own_methods import load_own, own_method_errors
 from rislam_rt.pipeline.specification.spec import Settings
 from rislam_rt.slam import StartPrior
-from rislam_rt.slam.schemes import bp_slam, channel_slam
+from rislam_rt.slam.schemes import bp_slam, bp_slam_aoa, channel_slam
 
 ROUNDING = 1e-6
 """Negative eigenvalues of a covariance over its largest one, that rounding in single precision may leave."""
@@ -105,6 +105,10 @@ ESTIMATORS = Estimators({
     "bp_slam": Estimator(
         bp_slam.init, bp_slam.predict, bp_slam.step, bp_slam.estimate, lambda settings: settings.bp_slam,
         angles=False, walls="images",
+    ),
+    "bp_slam_aoa": Estimator(
+        bp_slam_aoa.init, bp_slam_aoa.predict, bp_slam_aoa.step, bp_slam_aoa.estimate,
+        lambda settings: settings.bp_slam_aoa,
     ),
     "channel_slam": Estimator(
         channel_slam.init, channel_slam.predict, channel_slam.step, channel_slam.estimate,

@@ -13,7 +13,7 @@ from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.recordings.replay import Recorder
 from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, run_scheme
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.pipeline.specification.spec import ESTIMATOR_SECTIONS, PipelineSpec
 from rislam_rt.progress import tell_nobody
 from rislam_rt.scene.random_rooms import RandomRoom, draw_room
 from rislam_rt.studies.swept.cell import cell_spec
@@ -94,7 +94,7 @@ def scheme_here(asked: str, room: RandomRoom) -> str:
 
 def trace_key(spec: PipelineSpec) -> str:
     """The settings that decide true motion and paths, as text."""
-    content = spec.model_dump(mode="json", exclude={*SEEN_BY_TRACER_NOT, "bp_slam", "channel_slam"})
+    content = spec.model_dump(mode="json", exclude={*SEEN_BY_TRACER_NOT, *ESTIMATOR_SECTIONS})
     content["radio"] |= {"reference_snr_db": None, "noise_psd": None}
     return json.dumps(content, sort_keys=True)
 
