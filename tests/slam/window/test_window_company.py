@@ -15,7 +15,10 @@ LENGTHS = np.array([4.0, 7.0, 6.0, 9.0])
 SIDES = np.array([OTHER, OTHER, OTHER, PANEL])
 
 
-def _odds(points=np.zeros((0, 3)), rows=slice(None)):
+NOWHERE, ALL = np.zeros((0, 3)), slice(None)
+
+
+def _odds(points=NOWHERE, rows=ALL):
     """Of four tracks, the first two and the last from one direction; with points of the map (P, 3)."""
     rays = np.concatenate([RAYS, np.sqrt(1.0 - (RAYS**2).sum(axis=1))[:, None]], axis=1)
     cos, sin = np.cos(HEADING), np.sin(HEADING)

@@ -1,4 +1,4 @@
-"""What lively steps add to a calm filter's covariance, against the error covariance of a Kalman filter with a wrong model."""
+"""What lively steps add to a calm filter's covariance, against the error of a Kalman filter with a wrong model."""
 
 import numpy as np
 import pytest
