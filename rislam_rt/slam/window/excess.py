@@ -1,9 +1,9 @@
 """How much farther off the agent may be than its calm motion makes it, where nothing measures how lively it is.
 
 The window's estimate takes each step by its expected precision: that of the calmest gait that may be. It is the better
-estimate, but the covariance of its error hangs on the expected variance, that of the liveliest. What the second has over
-the first is carried along as a Kalman filter's error is: grown by each step, and taken in by what is measured
-(Jazwinski 1970, chapter 7.8: the error of a filter whose model is not the true one).
+estimate, but the covariance of its error hangs on the expected variance, that of the liveliest. What the second has
+over the first is carried along as the error of a Kalman filter with a wrong model is: grown by each step, and taken in
+by what is measured (Gelb 1974, chapter 7: suboptimal filter design and sensitivity analysis).
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from rislam_rt.slam.returns import AXES
 
 
 def grow(excess: Floats, dt: float, surplus: Floats) -> Floats:
-    """(6, 6) of position and velocity after a step of `dt` [s] whose accelerations (3,) have that much more variance."""
+    """(6, 6) of position and velocity after a step of `dt` [s], its accelerations (3,) having that much more variance."""
     move = np.eye(6)
     move[:3, 3:] = dt * AXES
     push = np.concatenate([0.5 * dt**2 * AXES, dt * AXES])
