@@ -13,7 +13,7 @@ from rislam_rt.slam.returns import AXES
 
 
 def grow(excess: Floats, dt: float, surplus: Floats) -> Floats:
-    """(6, 6) of position and velocity after a step of `dt` [s], its accelerations (3,) having that much more variance."""
+    """(6, 6) of position and velocity after a step of `dt` [s] whose accelerations (3,) have so much more variance."""
     move = np.eye(6)
     move[:3, 3:] = dt * AXES
     push = np.concatenate([0.5 * dt**2 * AXES, dt * AXES])
