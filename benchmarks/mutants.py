@@ -68,7 +68,7 @@ MUTANTS = (
         "        spread[:6, :6],\n", "        0.25 * spread[:6, :6],\n",
     ),
     Mutant(
-        "random codes for optimised ones", "pipeline/choose.py",
+        "random codes for optimised ones", "pipeline/code_policies.py",
         '        if method == "random":  # looks at no belief', "        if not is_own(method):",
     ),
     Mutant(
@@ -111,8 +111,8 @@ MUTANTS = (
     ),
     Mutant(
         "the receiver mirrors a cosine", "measurement/bound.py",
-        "into_disc(blind_axes(found.points[:, 1:], radio))",
-        "into_disc(blind_axes(found.points[:, 1:] * [1.0, -1.0], radio))",
+        "clip_to_unit_disc(blind_axes(found.points[:, 1:], radio))",
+        "clip_to_unit_disc(blind_axes(found.points[:, 1:] * [1.0, -1.0], radio))",
     ),
     Mutant(
         "a sweep's seed hangs on its order", "sweeps/axes.py",
@@ -129,7 +129,7 @@ MUTANTS = (
         '    if not content["checksum"]:',
     ),
     Mutant(
-        "another room is the same run", "pipeline/identity.py",
+        "another room is the same run", "pipeline/store/identity.py",
         '            "scene": {"name": scene.name, "sha256": scene.digest},',
         '            "scene": {"name": scene.name},',
     ),

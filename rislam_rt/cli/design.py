@@ -26,8 +26,8 @@ def command(
 
     from rislam_rt.cli.scenes import open_scene, parse_point
     from rislam_rt.pipeline.design_at import design_at, design_table
-    from rislam_rt.pipeline.read import load_radio
     from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.specification.read import load_radio
     from rislam_rt.report.tables import print_designs
 
     radio = load_radio(set_ or ())

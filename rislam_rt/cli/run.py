@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from rislam_rt.model import Scene
     from rislam_rt.pipeline import PipelineSpec
-    from rislam_rt.pipeline.identity import Identity
+    from rislam_rt.pipeline.store.identity import RunIdentity
 
 
 def command(
@@ -76,10 +76,10 @@ def command(
 def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
     """All schemes over all cycles of a room; a run that is there already is shown."""
     from rislam_rt.cli.scenes import open_scene, scene_of
-    from rislam_rt.pipeline.identity import run_identity
-    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import check_run, prepare_channel
-    from rislam_rt.pipeline.store import DONE, find_run
+    from rislam_rt.pipeline.specification.radio import build_radio
+    from rislam_rt.pipeline.store.identity import run_identity
+    from rislam_rt.pipeline.store.run_folder import DONE, find_run
 
     opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
     check_run(opened.scene, spec)
@@ -96,8 +96,8 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
 
 def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> None:
     """A completed run of these very settings, as it was written."""
-    from rislam_rt.pipeline.long import read_any
-    from rislam_rt.pipeline.store import hold_run, is_left_locked, read_summary
+    from rislam_rt.pipeline.long.run import read_any
+    from rislam_rt.pipeline.store.run_folder import hold_run, is_left_locked, read_summary
     from rislam_rt.report.page import PAGE, write_report
     from rislam_rt.report.tables import print_summary
 
@@ -116,7 +116,9 @@ def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> N
     write_json(given.json, summary)
 
 
-def compute_run(spec: "PipelineSpec", room: "Scene", identity: "Identity", folder: Path, given: StudyOptions) -> None:
+def compute_run(
+    spec: "PipelineSpec", room: "Scene", identity: "RunIdentity", folder: Path, given: StudyOptions
+) -> None:
     """Begin a run or go on with it, and report it."""
     import os
 
@@ -125,9 +127,9 @@ def compute_run(spec: "PipelineSpec", room: "Scene", identity: "Identity", folde
     from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.pipeline import run_slam
-    from rislam_rt.pipeline.long import LongRun, is_long, run_long
-    from rislam_rt.pipeline.store import open_run
-    from rislam_rt.pipeline.summary import summarise
+    from rislam_rt.pipeline.long.run import LongRun, is_long, run_long
+    from rislam_rt.pipeline.scores.summary import summarise
+    from rislam_rt.pipeline.store.run_folder import open_run
     from rislam_rt.report.tables import print_summary
 
     kept = 0

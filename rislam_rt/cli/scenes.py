@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
     from rislam_rt.model import RadioConfig, Scene
     from rislam_rt.pipeline import PipelineSpec
-    from rislam_rt.pipeline.spec import Settings
+    from rislam_rt.pipeline.specification.spec import Settings
     from rislam_rt.studies import Fig4aSpec
 
 
@@ -52,7 +52,7 @@ def settings_of(pipeline: Path, changed: "Sequence[str]") -> "Settings":
         The pipeline or a setting is unusable.
     """
     from rislam_rt.pipeline import load_spec
-    from rislam_rt.pipeline.spec import build_settings
+    from rislam_rt.pipeline.specification.spec import build_settings
 
     return build_settings(load_spec(pipeline, changed))
 

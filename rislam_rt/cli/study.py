@@ -31,8 +31,8 @@ def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.study import write_comparison
     from rislam_rt.report.tables import print_validation
     from rislam_rt.studies.compare import comparison_table, run_comparison
@@ -65,9 +65,9 @@ def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
 
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene, scene_of
-    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.report.fig4a import fig4a_table, verdict
+    from rislam_rt.pipeline.specification.radio import build_radio
+    from rislam_rt.report.fig4a import fig4a_table, findings_of
     from rislam_rt.report.study import write_fig4a
     from rislam_rt.scene.file_names import safe_name
     from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
@@ -84,7 +84,7 @@ def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
         found = run_fig4a(scene, spec, rng=np.random.default_rng(spec.seed), progress=progress)
     content = {**record, **fig4a_table(found)}
     for element in found.curves:
-        typer.echo("\n".join([*verdict(found, element), ""]))
+        typer.echo("\n".join([*findings_of(found, element), ""]))
     typer.echo(f"page: {write_fig4a(found, spec, scene.name, content, folder, figures=given.page)}")
     write_json(given.json, content)
 
@@ -97,7 +97,7 @@ def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
     from rislam_rt.report.swept import write_swept
     from rislam_rt.studies.swept import build_sweep
     from rislam_rt.studies.swept.record import swept_record
-    from rislam_rt.sweeps import Effort, build_cells, run_sweep
+    from rislam_rt.sweeps import SweepOptions, build_cells, run_sweep
     from rislam_rt.sweeps.store import check_folder
 
     sweep = build_sweep(spec, given.pipeline, given.scene)
@@ -111,7 +111,7 @@ def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
     def grow(rows: "Sequence[Row]") -> None:
         write_swept(rows, spec, record, folder, figures=given.page)
 
-    effort = Effort(given.jobs or os.cpu_count() or 1, None, spec.time_limit_s)
+    effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, spec.time_limit_s)
     try:
         with show_sweep() as tell:
             report = run_sweep(sweep, cells, effort, tell=tell, grow=grow)
@@ -157,7 +157,7 @@ def output_folder(out: Path | None, name: str, record: "Mapping[str, Any]") -> P
         There is a file of that name.
     """
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.identity import short_name
+    from rislam_rt.pipeline.store.identity import short_name
     from rislam_rt.storage.seal import checksum
 
     folder = out or Path("runs") / short_name(name, checksum(record))

@@ -23,8 +23,8 @@ def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.cli.study import output_folder
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.classifier import (
         classifier_page,
         classifier_table,

@@ -1,7 +1,6 @@
 """A run as a moving picture: the room from above, and beside it the agent in close-up, moment by moment."""
 
 import io
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from matplotlib.figure import Figure
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import SchemeResult, SlamResult
+from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.report.geometry import ellipse
 from rislam_rt.report.room import draw_plan
 from rislam_rt.report.style import TRUTH, scheme_colour, styled
@@ -33,12 +33,12 @@ HALVES = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 """[m] Half widths of the close-up: the least that holds all errors but the largest twentieth."""
 
 
-def gif_bytes(result: SlamResult, tell: Callable[[str, int, int], None] = lambda *_: None) -> bytes:
+def gif_bytes(result: SlamResult, tell: Tell = tell_nobody) -> bytes:
     """The content of a GIF file. `tell` is told of every frame."""
     rows = spread(len(result.scene.agent), FRAMES)
     pictures: list[Image] = []
     with styled():
-        figure, room, near = _stage(result)
+        figure, room, near = _empty_frame(result)
         canvas: Any = FigureCanvasAgg(figure)
         for number, cycle in enumerate(rows):
             moving = _draw_moment(room, near, result, int(cycle))
@@ -55,7 +55,7 @@ def gif_bytes(result: SlamResult, tell: Callable[[str, int, int], None] = lambda
     return target.getvalue()
 
 
-def _stage(result: SlamResult) -> tuple[Figure, Axes, Axes]:
+def _empty_frame(result: SlamResult) -> tuple[Figure, Axes, Axes]:
     """The figure with all that stands still, its layout settled."""
     low, high = result.scene.bounds
     aspect = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.35, 1.6))

@@ -7,7 +7,7 @@ from matplotlib.patches import Patch
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import position_errors
 from rislam_rt.model import PathKind, SchemeResult, SlamResult
-from rislam_rt.pipeline.summary import landmark_track
+from rislam_rt.pipeline.scores.summary import landmark_track
 from rislam_rt.report.style import KIND, scheme_colour, styled
 
 

@@ -5,16 +5,16 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from rislam_rt.model import Scene
-from rislam_rt.pipeline.radio import RadioSection
 from rislam_rt.pipeline.run import library_versions
-from rislam_rt.pipeline.section import Count, Name, Positive, Section
-from rislam_rt.pipeline.spec import DesignerSection
+from rislam_rt.pipeline.specification.radio import RadioSection
+from rislam_rt.pipeline.specification.section import Count, Name, Positive, Section
+from rislam_rt.pipeline.specification.spec import DesignerSection
 
 Depth = Annotated[int, Field(ge=0, le=4)]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
 
 
-class RoomSection(Section):
+class ComparedRoomSection(Section):
     """One room of a comparison."""
 
     scene: str
@@ -46,7 +46,7 @@ class CompareSpec(StudySpec):
     """Which study the file is."""
     poses: Annotated[int, Field(ge=1, le=100_000)] = 200
     """Random poses in each room."""
-    rooms: Annotated[list[RoomSection], Field(min_length=1)]
+    rooms: Annotated[list[ComparedRoomSection], Field(min_length=1)]
     """The rooms: `scene`, `depth`, `picture`."""
 
     @model_validator(mode="after")

@@ -3,21 +3,21 @@
 import numpy as np
 import pytest
 
-from rislam_rt.measurement import refine as refinement
-from rislam_rt.measurement.inner_products import waves_at
-from rislam_rt.measurement.positive_definite import inverse, solve
-from rislam_rt.measurement.refine import (
+from rislam_rt.measurement.estimation import refine as refinement
+from rislam_rt.measurement.estimation.inner_products import waves_at
+from rislam_rt.measurement.estimation.positive_definite import inverse, solve
+from rislam_rt.measurement.estimation.refine import (
     LeastSquaresFit,
     accuracy,
     contribution,
     fit_amplitudes,
-    part,
-    pick,
     refine,
     residual,
+    residual_fit,
+    subset_fit,
 )
+from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding
 from rislam_rt.measurement.signal import add_noise
-from rislam_rt.measurement.sounding import Sounding, build_sounding
 from rislam_rt.model import RadioConfig
 
 PLANE = build_sounding(128, RadioConfig())
@@ -46,9 +46,9 @@ def test_parts_of_a_fit_are_fits_of_parts(sounding: Sounding) -> None:
     places, samples = crowd(sounding, 12, rng)
     fit = fit_amplitudes(sounding, places, samples)
     keep = rng.uniform(size=12) < 0.6
-    same(pick(sounding, fit, keep, samples), fit_amplitudes(sounding, places[keep], samples))
+    same(subset_fit(sounding, fit, keep, samples), fit_amplitudes(sounding, places[keep], samples))
     rows = np.flatnonzero(keep)
-    some, local = part(sounding, fit, rows, samples)
+    some, local = residual_fit(sounding, fit, rows, samples)
     np.testing.assert_allclose(local, residual(fit, samples) + contribution(fit, rows, samples), atol=1e-9)
     same(some, fit_amplitudes(sounding, places[rows], local))
 

@@ -10,7 +10,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import check_run
-from rislam_rt.pipeline.walk import without_panel
+from rislam_rt.pipeline.scheme_simulation import without_panel
 
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
 
@@ -36,7 +36,7 @@ def test_a_scheme_does_not_depend_on_the_others(short_result, run_short):
 def test_gains_are_those_of_the_applied_code(room, short_result):
     from rislam_rt.channel.image_source import ImageSourceChannel
     from rislam_rt.model import RisCode
-    from rislam_rt.pipeline.spec import PipelineSpec, build_settings
+    from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 
     radio = build_settings(PipelineSpec.model_validate(short_result.config)).radio
     channel = ImageSourceChannel(replace(room, agent=room.agent[:8]), radio, 2)
@@ -65,7 +65,7 @@ def test_references_run(run_short):
 
 def test_completed_schemes_are_not_run_again(short_result, run_short):
     done, stages = {"random": short_result.schemes["random"]}, []
-    result = run_short(done=done, progress=lambda stage, at, total: stages.append(stage))
+    result = run_short(done=done, progress=lambda setup, at, total: stages.append(setup))
     assert set(stages) == {"trace", "optimized"}
     assert result.schemes["random"] is short_result.schemes["random"]
     assert list(done) == ["random", "optimized"]
@@ -115,3 +115,10 @@ def test_uneven_stamps_from_the_epoch_run_as_even_ones_do(room, run_short):
     first, second = even.schemes["random"].position - agent.position, uneven.schemes["random"].position - place
     assert np.abs(first - second).max() < 0.005
     np.testing.assert_allclose(uneven.scene.agent.elapsed, stamps, rtol=0, atol=3e-7)
+
+
+def test_two_processes_give_the_same_bits(run_short, short_result):
+    twice = run_short(jobs=2)
+    for name, scheme in short_result.schemes.items():
+        np.testing.assert_array_equal(twice.schemes[name].position, scheme.position)
+        np.testing.assert_array_equal(twice.schemes[name].applied, scheme.applied)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.pipeline import load_spec, run_slam
-from rislam_rt.pipeline.summary import summarise
+from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.report.conclusions import judge_run, panel_found_at, why_not
 from rislam_rt.report.page import build_page
 from rislam_rt.scene import load_scene

@@ -15,7 +15,7 @@ from rislam_rt.model import Body, Measurement, RadioConfig
 from rislam_rt.pipeline.dataset import read_dataset
 from rislam_rt.pipeline.recordings.inputs import Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.recordings.replay import Answers, replay
-from rislam_rt.pipeline.spec import PipelineSpec
+from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.slam import StartPrior
 
 COLUMNS: dict[str, tuple[str, str]] = {
@@ -93,7 +93,7 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
             what = "not a readable NetCDF file" if file.exists() else "no such file"
             raise ConfigError(f"{file}: {what}; give one as a run folder's measurements_<scheme>.nc") from None
         try:
-            return checked(dataset_to_inputs(data), str(file))
+            return check_inputs(dataset_to_inputs(data), str(file))
         except (KeyError, ValueError, TypeError) as error:
             raise ConfigError(
                 f"{file}: {type(error).__name__} {str(error)[:80]}; give one as a run folder's measurements_<scheme>.nc"
@@ -143,10 +143,10 @@ def inputs_of(
         start = replace(start, heading=float(heading[0]))
     nothing = (None,) * len(cycles)
     made = Inputs(start, body or Body(), None, cycles - cycles[0], heading, tuple(measurements), nothing)
-    return checked(made, place)
+    return check_inputs(made, place)
 
 
-def checked(inputs: Inputs, place: str) -> Inputs:
+def check_inputs(inputs: Inputs, place: str) -> Inputs:
     """The inputs, if units and ranges are such as a room has.
 
     Raises

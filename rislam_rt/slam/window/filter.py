@@ -22,12 +22,11 @@ from rislam_rt.slam.window.learn import Sights, learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.look import Look, echoes, look
+from rislam_rt.slam.window.numerics import DAMPING, REFRESH
 from rislam_rt.slam.window.retract import condemned, release
+from rislam_rt.slam.window.steps import TURN
 from rislam_rt.slam.window.suspect import weigh_tracks
 from rislam_rt.slam.window.tracks import Tracks
-
-REFRESH = 5
-"""Cycles between two re-linearisations of the whole window."""
 
 
 class WindowState(NamedTuple):
@@ -65,12 +64,12 @@ def init(
     """The start prior, and an empty map."""
     free = np.array([1.0, 1.0, float(config.height == "estimated")])
     doubt = start.heading_std if config.heading == "estimated" else 0.0
-    axes = np.arange(3) if config.heading == "known" else np.append(np.arange(3), gauss.TURN)
+    turns = config.heading != "known"
     std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [doubt]])
-    window = gauss.begin(start.position, start.velocity, axes, std)
+    window = gauss.begin(start.position, start.velocity, std, turns=turns)
     scene = Scene(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
-    lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if gauss.TURN in axes else ()))
+    lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if turns else ()))
     gait = np.stack([motion.first_gait(level) for level in lively])
     return WindowState(
         0, config, window, empty_book(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_sights(),
@@ -151,12 +150,11 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         return state._replace(heading=np.array([heading]))
     window, gait, headings, passed = state.window, state.gait, state.heading, state.passed
     while window.num_poses >= LEVELS.window:
-        gait = np.stack([smoothed[1][0] for smoothed in _liveliness(window, gait)])
+        gait = motion.forward(gait, _likelihoods(window, 1)[:, 0], LEVELS.stay)
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = gauss.slide(window), headings[1:]
     level = state.level @ motion.transition(LEVELS.stay)
-    columns = COLUMNS[: len(window.axes)]
-    window = gauss.extend(window, dt, np.array([motion.prior_precision(level[group], group == 2) for group in columns]))
+    window = gauss.extend(window, dt, _precisions(level))
     return state._replace(window=window, gait=gait, heading=np.append(headings, heading), passed=passed)
 
 
@@ -167,8 +165,6 @@ def smoothed(state: WindowState) -> Floats:
 
 START = ((3, 0.5), (10, 1.0))
 """Steps that may have been livelier than thought, and standard deviation [m/s^2] of their accelerations then."""
-LOG_START = np.log(0.01)
-"""Log probability of a manoeuvre that nothing announced."""
 MISSED, STRAINED = 1.5, 1.5
 """Standard deviations by which fewer returns show than should, and mean square of their innovations, from which on a
 manoeuvre is looked for."""
@@ -193,7 +189,7 @@ def _notice(
             precision[-steps:, lively] = np.minimum(precision[-steps:, lively], liveliness**-2.0)
             trial = gauss.solve(state.window._replace(precision=precision))
             view = view_of(trial)
-            if view.score + LOG_START > best.score:
+            if view.score + LEVELS.log_rare > best.score:
                 best, window = view, trial
     if not len(best.expected.seen) or not len(glance.seen):
         return state._replace(window=window), best
@@ -203,23 +199,30 @@ def _notice(
 
 LOST = 10.0
 """Log odds against the map from which on the agent is lost: some cycles that strangers explain better."""
-GROUPS = (np.array([0, 1]), np.array([2]), np.array([gauss.TURN]))
+GROUPS = (np.array([0, 1]), np.array([2]), np.array([TURN]))
 """Axes that are as lively as each other: an agent that turns does not climb."""
 COLUMNS = np.array([0, 0, 1, 2])
 """Group of each axis."""
 
 
-def _liveliness(window: Window, gait: Floats) -> list[tuple[Floats, Floats]]:
-    """Posterior and filtered probabilities (K - 1, L) of each group's levels."""
-    size, free = len(window.head), len(window.axes)
-    count = len(window.accel)
-    block = window.covariance[size:, size:].reshape(count, free, count, free)[np.arange(count), :, np.arange(count)]
-    found = []
-    for group, before in zip(GROUPS[: len(gait)], gait, strict=True):
-        inside = block[:, group[:, None], group]
-        like = motion.log_likelihood(window.accel[:, group], inside, window.precision[:, group[0]])
-        found.append(motion.smooth(before, like, LEVELS.stay))
-    return found
+def _likelihoods(window: Window, count: int) -> Floats:
+    """Log likelihoods (N, K, L) of the levels of the N groups' first K steps."""
+    size, free = len(window.head), window.accel.shape[1]
+    every = np.arange(count)
+    inside = window.covariance[size : size + count * free, size : size + count * free]
+    block = inside.reshape(count, free, count, free)[every, :, every]
+    return np.stack([
+        motion.log_likelihood(
+            window.accel[:count, group], block[:, group[:, None], group], window.precision[:count, group[0]]
+        )
+        for group in GROUPS[: free - 1]
+    ])  # fmt: skip
+
+
+def _precisions(levels: Floats) -> Floats:
+    """(..., A) prior precisions of accelerations whose groups have levels (N, ..., L)."""
+    each = [motion.prior_precision(level, group == 2) for group, level in enumerate(levels)]
+    return np.stack([each[group] for group in COLUMNS[: len(levels) + 1]], axis=-1)
 
 
 def _explain(
@@ -262,7 +265,7 @@ def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
     last = np.array([window.num_poses - 1])
     window, found = renew(window, log, book, body, state.heading, last, even=True)
     nis = float(np.sum(found.left**2))
-    window = gauss.solve(window)
+    window = gauss.solve(window, spread=False)
     slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else last
     window, left = renew(window, log, book, body, state.heading, slots)
     window = gauss.weigh_holds(gauss.solve(window))
@@ -274,17 +277,11 @@ def liven(state: WindowState) -> WindowState:
     window = state.window
     if not len(window.accel):
         return state
-    found = _liveliness(window, state.gait)
-    columns = COLUMNS[: len(window.axes)]
-    fresh = np.stack([motion.prior_precision(found[group][0], group == 2) for group in columns], axis=1)
+    posterior, level = motion.smooth(state.gait, _likelihoods(window, len(window.accel)), LEVELS.stay)
+    fresh = _precisions(posterior)
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
-    level = np.stack([filtered[-1] for _, filtered in found])
     return state._replace(window=window._replace(precision=precision), level=level)
-
-
-DAMPING = 0.3
-"""Share of the new in each step's log precision."""
 
 
 def _unexplained(state: WindowState, glance: Glance) -> float:

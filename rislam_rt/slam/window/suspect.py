@@ -3,20 +3,18 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.model import RisCode, Suspect
+from rislam_rt.model import PanelCandidate, RisCode
 from rislam_rt.slam.moments import even_draws
 from rislam_rt.slam.returns import Poses, reflect
 from rislam_rt.slam.suspect import DEEP, DISMISSAL, PATIENCE, places
 from rislam_rt.slam.tracks import OTHER
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.expect import Scene
-from rislam_rt.slam.window.gauss import HEAD
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.panel import DRAWS, Sight, gains, weigh
+from rislam_rt.slam.window.numerics import DRAWS
+from rislam_rt.slam.window.panel import Sight, gains, weigh
+from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.tracks import Tracks
-
-LOG_FEW = np.log(LEVELS.panels)
-"""What identities start from: the design asks what was measured, not how many panels there are."""
 
 
 def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: Scene, code: RisCode | None) -> Tracks:
@@ -37,7 +35,9 @@ def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: Scene, code: R
     return tracks._replace(**tracks.identity.put(rows, fresh)._asdict())
 
 
-def find_suspect(tracks: Tracks, book: Book, mean: Floats, cycle: int, poses: Poses, panel: int = 0) -> Suspect | None:
+def find_suspect(
+    tracks: Tracks, book: Book, mean: Floats, cycle: int, poses: Poses, panel: int = 0
+) -> PanelCandidate | None:
     """The point or track that is the likeliest to be a panel; None if nothing is likelier the panel than not.
 
     A track that seems to come from behind a wall may be the panel over that wall: aiming there would miss it.
@@ -46,7 +46,8 @@ def find_suspect(tracks: Tracks, book: Book, mean: Floats, cycle: int, poses: Po
     points = book.points[~np.isin(book.points, book.panels)]  # what is another panel is not this one
     patience = np.where(tracks.hits > 3, np.inf, np.minimum(tracks.hits - 1, PATIENCE))
     least = np.where(tracks.hits > 1, DISMISSAL, 0.0)
-    told = tracks.log_ris[:, panel] - LOG_FEW
+    few = np.log(LEVELS.panels)  # the design asks what was measured, not how many panels there are
+    told = tracks.log_ris[:, panel] - few
     rows = ((tracks.side != OTHER) & (cycle - tracks.last <= patience) & (told > least)).nonzero()[0]
     spots, _ = places(tracks.mean[rows, :, 0], poses)
     if len(walls) and len(rows):
@@ -55,10 +56,10 @@ def find_suspect(tracks: Tracks, book: Book, mean: Floats, cycle: int, poses: Po
         gap = np.linalg.norm(spots[:, None] - image, axis=-1) - np.linalg.norm(spots - mean[:3], axis=1)[:, None]
         shown = (gap > -DEEP).all(axis=1)
         rows, spots = rows[shown], spots[shown]
-    odds = np.concatenate([book.log_ris[points, panel] - LOG_FEW, told[rows]])
+    odds = np.concatenate([book.log_ris[points, panel] - few, told[rows]])
     if not len(odds) or odds.max() <= DISMISSAL:
         return None
     best = int(np.argmax(odds))
     if best < len(points):
-        return Suspect(features[points[best]], int(book.hits[points[best]]), panel)
-    return Suspect(spots[best - len(points)], int(tracks.hits[rows[best - len(points)]]), panel)
+        return PanelCandidate(features[points[best]], int(book.hits[points[best]]), panel)
+    return PanelCandidate(spots[best - len(points)], int(tracks.hits[rows[best - len(points)]]), panel)

@@ -7,11 +7,11 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Scene
-from rislam_rt.pipeline.run import Progress
+from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.slam.classify import Network
 from rislam_rt.studies.classifier.gather import Examples
 from rislam_rt.studies.classifier.score import (
-    Score,
+    ClassifierScore,
     f1,
     importance,
     mean_over_rooms,
@@ -31,7 +31,7 @@ class Training(NamedTuple):
 
     network: Network
     sets: Sets
-    scores: dict[str, dict[str, Score]]
+    scores: dict[str, dict[str, ClassifierScore]]
     """By named room (and `ALL`, `DRAWN`, `RANDOM`), by rule."""
     mean: dict[str, Floats]
     """Mean (3,) over the test rooms' F1 with its interval, by rule."""
@@ -42,7 +42,7 @@ class Training(NamedTuple):
     """Loss of F1 on all test rooms, feature by feature, several shuffles each."""
 
 
-def run_training(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Progress | None = None) -> Training:
+def run_training(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Tell = tell_nobody) -> Training:
     """Everything that a specification asks for; its seed decides all draws.
 
     Raises

@@ -13,10 +13,10 @@ from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.measurement import FrontEnd, measure
 from rislam_rt.model import PathKind, Paths, Trajectory
-from rislam_rt.pipeline.front_end import prepare_front_end
-from rislam_rt.pipeline.run import prepare_channel, set_stage
+from rislam_rt.pipeline.room.front_end import prepare_front_end
+from rislam_rt.pipeline.run import prepare_channel, prepare_setup
 from rislam_rt.pipeline.signals import panel_codes
-from rislam_rt.pipeline.spec import Settings, build_settings
+from rislam_rt.pipeline.specification.spec import Settings, build_settings
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.studies.swept.cell import cell_spec
@@ -33,16 +33,16 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     begin, spec = process_time(), cell_spec(settings)
     prepare_channel(spec.channel)
     scene = load_scene(Path(settings["beside"]) / str(settings["scene"]))
-    stage = set_stage(scene, spec, rng=np.random.default_rng(seed))
-    made, motion = build_settings(spec), stage.scene.agent
-    build = np.random.default_rng(stage.seeds.hardware)
-    front_end = prepare_front_end(stage.paths, motion, stage.body, made, rng=build)
-    codes = panel_codes(stage.scene, stage.paths, "focused", rng=np.random.default_rng(stage.seeds.design))
-    paths = stage.paths if codes is None else rephase(stage.paths, codes)
+    setup = prepare_setup(scene, spec, rng=np.random.default_rng(seed))
+    made, motion = build_settings(spec), setup.scene.agent
+    build = np.random.default_rng(setup.seeds.hardware)
+    front_end = prepare_front_end(setup.paths, motion, setup.body, made, rng=build)
+    codes = panel_codes(setup.scene, setup.paths, "focused", rng=np.random.default_rng(setup.seeds.design))
+    paths = setup.paths if codes is None else rephase(setup.paths, codes)
     places = np.linspace(len(motion) // 2, len(motion) - 1, int(settings["places"])).astype(int)
 
     def looks(front_end: FrontEnd | None) -> list[dict[str, Any]]:
-        noise = np.random.default_rng(stage.seeds.noise)
+        noise = np.random.default_rng(setup.seeds.noise)
         return [_look(paths, motion, int(cycle), made, front_end, rng=noise.spawn(1)[0]) for cycle in places]
 
     left = front_end.correction.left if front_end is not None and front_end.correction is not None else None
