@@ -134,7 +134,8 @@ def judge(
         shares[own_told] = np.exp(weight[1 + len(own) :] - total)
         best = int(np.argmax(weight[: 1 + len(own)]))
         same = _alike(table, fits, own, own[best - 1]) if best else np.zeros(0, dtype=np.bool_)
-        probability = float(np.exp(np.logaddexp.reduce(np.append(weight[best], weight[1 : 1 + len(own)][same])) - total))
+        weighed = np.append(weight[best], weight[1 : 1 + len(own)][same])
+        probability = float(np.exp(np.logaddexp.reduce(weighed) - total))
         if best == 0:
             verdicts.append(Verdict(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody))
             continue
@@ -164,8 +165,9 @@ def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:
 
 
 def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
-    """(H,) log prior density [1/m^3] of the places: points anywhere in a ball; walls at any distance up to its radius, in
-    any direction, their places being images of the agent's, `middle`; what two walls do, anywhere in twice the ball.
+    """(H,) log prior density [1/m^3] of the places: points anywhere in a ball, what two walls do in one twice as wide.
+
+    Walls at any distance up to the ball's radius, in any direction: their places are images of the agent's, `middle`.
     """
     reach = np.maximum(np.linalg.norm(place - middle, axis=1), 2.0 * LEVELS.depth)
     wall = -np.log(4.0 * np.pi * reach**2 * 2.0 * LEVELS.size)

@@ -28,10 +28,10 @@ def test_places_of_walls_and_points_have_densities_that_integrate_to_one():
         way = rng.standard_normal((len(reach), 3))
         place = middle + reach[:, None] * way / np.linalg.norm(way, axis=1)[:, None]
         density = np.exp(kinds.log_place(_table([kind] * len(reach)), place, middle))
-        total = radius * np.mean(density * 4.0 * np.pi * reach**2)
-        # a wall nearer than what is told from its surface is no likelier: two thirds of the share of that shell are missing
+        share = radius * density * 4.0 * np.pi * reach**2
+        # within the depth of a surface a wall is no likelier: two thirds of the share of that shell are missing
         missing = 2.0 / 3.0 * 2.0 * LEVELS.depth / radius if kind == WALL else 0.0
-        assert abs(total - (1.0 - missing)) < 5.0 * radius * np.std(density * 4.0 * np.pi * reach**2) / 20_000**0.5 + 1e-9
+        assert abs(share.mean() - (1.0 - missing)) < 5.0 * np.std(share) / len(reach) ** 0.5
 
 
 def test_a_wall_twice_as_far_is_as_likely_in_the_same_step_of_distance():
