@@ -307,7 +307,7 @@ def _follow(
     length = np.maximum(state.tracks.mean[:, 0, 0], 0.5) if len(state.tracks.ident) else np.ones(1)
     drift = np.array([2.0 * bend + speed**2, 0.1, 0.1]) if len(length) else np.zeros(3)
     found = tracks.advance(state.tracks, dt, turn, drift)
-    rows, picks = tracks.match(found, glance, free, state.cycle)
+    rows, picks = tracks.match(found, glance, free, state.cycle, state.config.new_density)
     found = tracks.extend(found, rows, glance, picks, state.cycle)
     spare = np.setdiff1d(free, picks)
     reach = np.maximum(glance.seen[spare, 0], 0.5)
