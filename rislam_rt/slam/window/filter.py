@@ -117,8 +117,7 @@ def step(
     raw = scatter[groups.leader[row]]
     raw[used] = _squares(left, log, len(log.cycle) - len(glance.seen) + pick[used])
 
-    taken = np.zeros(len(glance.seen), dtype=np.bool_)
-    taken[pick] = True
+    taken = np.isin(np.arange(len(glance.seen)), pick)
     turn += float(np.diff(gauss.poses(state.window)[-2:, 3]).sum())
     followed = _follow(state, mean, glance, (~taken).nonzero()[0], dt, turn, bend)
     state = state._replace(tracks=followed.tracks, log=followed.log)
@@ -133,18 +132,16 @@ def step(
     context = Context(
         state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle, state.sights, state.codes
     )  # fmt: skip
+    fresh = True
     if state.cycle % REFRESH == 0 and len(book.ident):
         gone = condemned(context.book, left, context.log, expected, gauss.now(context.window)[1])
         context, fresh = release(context, ~gone), not gone.any()
-    else:
-        fresh = True
     if fresh:
         context = births(context, expected, groups)
     state = state._replace(
         window=context.window, book=context.book, log=context.log, tracks=context.tracks, sights=context.sights
     )  # fmt: skip
-    after = gauss.now(state.window)[1]
-    state = state._replace(excess=take_in(state.excess, before[:6, :6], after[:6, :6]))
+    state = state._replace(excess=take_in(state.excess, before[:6, :6], gauss.now(state.window)[1][:6, :6]))
     outcome = _outcome(len(measurement), len(state.book.ident), state.doubt)
     info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome)
     return state._replace(cycle=state.cycle + 1), info
