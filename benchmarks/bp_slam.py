@@ -22,8 +22,8 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import normalised_squares
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.bound import scheme_bound
 from rislam_rt.pipeline.run import run_slam
+from rislam_rt.pipeline.scores.bound import scheme_bound
 from rislam_rt.scene import load_scene
 from rislam_rt.slam.schemes.bp_slam_static import BpSlamStaticConfig, run_static
 

@@ -18,15 +18,15 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.geometry.angles import unit
-from rislam_rt.information import MotionPrior, Rows, build_landmark_model, posterior_bound
-from rislam_rt.information.landmarks import LandmarkModel, mirror_chain
+from rislam_rt.information import LinearMeasurements, MotionPrior, build_landmark_model, posterior_bound
+from rislam_rt.information.landmark_model import LandmarkModel, mirror_chain
 from rislam_rt.information.position import range_information
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import PathKind, SlamResult
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.bound import SILENT, fewer_rows, heard_paths
 from rislam_rt.pipeline.run import run_slam
-from rislam_rt.pipeline.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.scores.bound import SILENT, fewer_rows, heard_paths
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[1]
@@ -49,7 +49,7 @@ class Columns:
                 self.std += [PLACE_STD] * (3 if model.tx_point[path] == model.rx_point[path] else 6)
 
 
-def rows_of(model: LandmarkModel, columns: Columns, least_snr: float, least_std: float) -> Iterator[Rows]:
+def rows_of(model: LandmarkModel, columns: Columns, least_snr: float, least_std: float) -> Iterator[LinearMeasurements]:
     """Ranges of each cycle."""
     for cycle in range(model.paths.num_cycles):
         snr = model.radio.integrated_snr(model.paths.gain[cycle])
@@ -59,7 +59,7 @@ def rows_of(model: LandmarkModel, columns: Columns, least_snr: float, least_std:
             agent[row], slope = one_range(model, cycle, int(path))
             unknown[row, columns.first[path] : columns.first[path] + len(slope)] = slope
         information = range_information(snr[heard], model.radio)
-        yield fewer_rows(Rows(agent, unknown, 1.0 / (1.0 / information + least_std**2)))
+        yield fewer_rows(LinearMeasurements(agent, unknown, 1.0 / (1.0 / information + least_std**2)))
 
 
 def one_range(model: LandmarkModel, cycle: int, path: int) -> tuple[Floats, Floats]:

@@ -205,9 +205,9 @@ def result_targets(folder: Path) -> Iterator[tuple[str, Target]]:
 def make_run(folder: Path) -> Path:
     """A completed run of a few cycles."""
     from rislam_rt.pipeline import load_spec, run_slam
-    from rislam_rt.pipeline.identity import run_identity
-    from rislam_rt.pipeline.store import open_run
-    from rislam_rt.pipeline.summary import summarise
+    from rislam_rt.pipeline.scores.summary import summarise
+    from rislam_rt.pipeline.store.identity import run_identity
+    from rislam_rt.pipeline.store.run_folder import open_run
     from rislam_rt.scene import load_scene
 
     settings = ["channel=image_source", "cycles=12", "depth=1", 'schemes=["random"]']
@@ -221,7 +221,7 @@ def make_run(folder: Path) -> Path:
 
 def run_reader(folder: Path, name: str) -> Callable[[bytes], object]:
     """Reads a whole run one of whose files is the content."""
-    from rislam_rt.pipeline.store import read_run
+    from rislam_rt.pipeline.store.run_folder import read_run
 
     sound = (folder / name).read_bytes()
 

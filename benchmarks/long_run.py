@@ -17,10 +17,10 @@ from time import process_time
 import numpy as np
 
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.identity import run_identity
-from rislam_rt.pipeline.long import run_long
-from rislam_rt.pipeline.slices import SLICE
-from rislam_rt.pipeline.store import open_run
+from rislam_rt.pipeline.long.run import run_long
+from rislam_rt.pipeline.long.slices import SLICE
+from rislam_rt.pipeline.store.identity import run_identity
+from rislam_rt.pipeline.store.run_folder import open_run
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[1]

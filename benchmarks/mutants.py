@@ -68,7 +68,7 @@ MUTANTS = (
         "        spread[:6, :6],\n", "        0.25 * spread[:6, :6],\n",
     ),
     Mutant(
-        "random codes for optimised ones", "pipeline/choose.py",
+        "random codes for optimised ones", "pipeline/code_policies.py",
         '        if method == "random":  # looks at no belief', "        if not is_own(method):",
     ),
     Mutant(
@@ -87,16 +87,16 @@ MUTANTS = (
         "        forms[0] = [-1, -1, -1, new, -1] if not verdict.is_wall else [new, -1, -1, -1, -1]\n",
     ),
     Mutant(
-        "half the bound", "information/recursion.py",
+        "half the bound", "information/posterior_crlb.py",
         "        agent[cycle] = spread[: 2 * axes] @ spread[: 2 * axes].T",
         "        agent[cycle] = 0.25 * spread[: 2 * axes] @ spread[: 2 * axes].T",
     ),
     Mutant(
-        "the bound knows the map", "information/recursion.py",
+        "the bound knows the map", "information/posterior_crlb.py",
         "        slope[:, 2 * axes :] = root * measured.unknown", "        slope[:, 2 * axes :] = 0.0",
     ),
     Mutant(
-        "the best code is turned by a level", "design/single.py",
+        "the best code is turned by a level", "design/single_path.py",
         "(passed < best[..., None]) - turn[..., None]) % levels",
         "(passed < best[..., None]) - turn[..., None] + (passed % 2)) % levels",
     ),
@@ -129,7 +129,7 @@ MUTANTS = (
         '    if not content["checksum"]:',
     ),
     Mutant(
-        "another room is the same run", "pipeline/identity.py",
+        "another room is the same run", "pipeline/store/identity.py",
         '            "scene": {"name": scene.name, "sha256": scene.digest},',
         '            "scene": {"name": scene.name},',
     ),

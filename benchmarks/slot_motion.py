@@ -17,7 +17,7 @@ from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.design import exact_code
 from rislam_rt.measurement import ReceiverConfig, measure, receive, with_reference_snr
-from rislam_rt.measurement.slot import split
+from rislam_rt.measurement.slot_motion import split
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene, Trajectory
 from rislam_rt.scene import load_scene
 

@@ -55,9 +55,9 @@ def sionna_scene(channel: TracedChannel, scene: Scene) -> Iterator[Any]:
     import sionna.rt as rt
     from sionna.rt.rcs import ConstantRCSSensingTarget
 
-    stage, size = channel.stage.scene, {"length": 1e-3, "width": 1e-3, "height": 1e-3}
+    stage, size = channel.tracer_scene.scene, {"length": 1e-3, "width": 1e-3, "height": 1e-3}
     stage.tx_array = stage.rx_array = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
-    points = scene.landmark_positions - channel.stage.origin
+    points = scene.landmark_positions - channel.tracer_scene.origin
     points[-1, 2] -= BELOW_CEILING
     for name, point in zip(scene.landmarks, points, strict=True):
         stage.add(ConstantRCSSensingTarget(name, 0.01, **size, position=point.tolist()))
@@ -97,7 +97,7 @@ def print_ratios(scene: Scene, positions: int) -> None:
     ours = cpu_seconds(lambda: channel.paths(trajectory), 5)
     single = [trajectory[int(k) : int(k) + 1] for k in some]
     with sionna_scene(channel, scene) as stage:
-        origin = channel.stage.origin
+        origin = channel.tracer_scene.origin
         counts = [solve_batch(stage, origin, one) for one in single]
         alone = cpu_seconds(lambda: [solve_batch(stage, origin, one) for one in single]) * cycles / positions
         pairs = trajectory[:BATCH]

@@ -51,21 +51,19 @@ _HOMES = {
     "rislam_rt.pipeline": (
         "load_spec",
         "run_slam",
+        "build_radio",
     ),
-    "rislam_rt.pipeline.spec": ("build_radio",),
-    "rislam_rt.pipeline.recordings.inputs": (
+    "rislam_rt.pipeline.recordings": (
         "Inputs",
         "dataset_to_inputs",
-    ),
-    "rislam_rt.pipeline.recordings.own_measurements": (
         "localise",
         "read_inputs",
         "inputs_of",
+        "replay",
+        "answers_from_arrays",
     ),
     "rislam_rt.studies.unseen": (
         "read_recording",
-        "replay",
-        "answers_from_arrays",
         "score_run",
     ),
     "rislam_rt.sweeps": (

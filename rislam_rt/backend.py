@@ -56,7 +56,7 @@ class BackendInfo:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class Diagnosis:
     """One row of the doctor's report."""
 
     name: str
@@ -125,19 +125,19 @@ def llvm_version(path: str) -> str:
     return version
 
 
-def diagnose() -> tuple[Finding, ...]:
+def diagnose() -> tuple[Diagnosis, ...]:
     """What the machine has, for the doctor. Raises nothing; a row that is not `ok` says what is missing."""
-    rows = [Finding("python", f"{platform.python_version()} ({sys.executable})")]
+    rows = [Diagnosis("python", f"{platform.python_version()} ({sys.executable})")]
     rows += [_package(name) for name in _PACKAGES]
     try:
         info = prepare_backend()
     except SetupError as error:
-        rows.append(Finding("backend", str(error), ok=False))
+        rows.append(Diagnosis("backend", str(error), ok=False))
     else:
-        rows.append(Finding("libLLVM", f"{info.llvm_version} ({info.llvm_path})" if info.llvm_path else "not used"))
-        rows += [Finding("variant", info.variant), Finding("threads", f"{info.threads} of {os.cpu_count()} cores")]
+        rows.append(Diagnosis("libLLVM", f"{info.llvm_version} ({info.llvm_path})" if info.llvm_path else "not used"))
+        rows += [Diagnosis("variant", info.variant), Diagnosis("threads", f"{info.threads} of {os.cpu_count()} cores")]
     gpus = count_gpus()
-    rows.append(Finding("GPU", f"{gpus} (RISLAM_RT_DEVICE=cuda uses it)" if gpus else "none (not needed)"))
+    rows.append(Diagnosis("GPU", f"{gpus} (RISLAM_RT_DEVICE=cuda uses it)" if gpus else "none (not needed)"))
     return tuple(rows)
 
 
@@ -225,10 +225,10 @@ def _load(path: str) -> ctypes.CDLL:
         raise SetupError(f"{path}: cannot be loaded ({error}); {_HOW_TO_GET}") from None
 
 
-def _package(name: str) -> Finding:
+def _package(name: str) -> Diagnosis:
     """A package's version; only the LLVM wheel may be missing."""
     try:
-        return Finding(name, metadata.version(name))
+        return Diagnosis(name, metadata.version(name))
     except metadata.PackageNotFoundError:
         needed = name != "karellen-llvm-core"
-        return Finding(name, "not installed" + ("; run 'make' again" if needed else ""), ok=not needed)
+        return Diagnosis(name, "not installed" + ("; run 'make' again" if needed else ""), ok=not needed)

@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.cross_section import cross_section
-from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisLegs, Scene
@@ -19,9 +19,9 @@ def compose_paths(
     radio: RadioConfig,
     walls: Walls,
     depth: int,
-    direct: Legs,
-    tx_legs: Sequence[Legs],
-    rx_legs: Sequence[Legs],
+    direct: SpecularLegs,
+    tx_legs: Sequence[SpecularLegs],
+    rx_legs: Sequence[SpecularLegs],
     source: str,
 ) -> Paths:
     """All paths of up to `depth` wall bounces, both legs together; identities that no cycle has are left out.
@@ -82,7 +82,7 @@ def compose_paths(
 _PER_PATH = ("kind", "landmark", "tx_walls", "rx_walls", "num_vertices", "tx_leg", "rx_leg")
 
 
-def _direct_block(direct: Legs, radio: RadioConfig, depth: int) -> dict[str, Any]:
+def _direct_block(direct: SpecularLegs, radio: RadioConfig, depth: int) -> dict[str, Any]:
     """LOS and VT columns."""
     keep = np.flatnonzero(direct.num_bounces <= depth)
     bounces = direct.num_bounces[keep]
@@ -104,7 +104,9 @@ def _direct_block(direct: Legs, radio: RadioConfig, depth: int) -> dict[str, Any
     }
 
 
-def _join_block(tx: Legs, rx: Legs, point: Floats, landmark: int, is_ris: bool, depth: int) -> dict[str, Any]:
+def _join_block(
+    tx: SpecularLegs, rx: SpecularLegs, point: Floats, landmark: int, is_ris: bool, depth: int
+) -> dict[str, Any]:
     """Columns of one landmark: every Tx leg with every Rx leg, up to `depth` bounces together."""
     i, j = np.nonzero(tx.num_bounces[:, None] + rx.num_bounces[None, :] <= depth)
     ever = np.logical_or.reduce(tx.valid)[i] & np.logical_or.reduce(rx.valid)[j]
@@ -128,7 +130,9 @@ def _join_block(tx: Legs, rx: Legs, point: Floats, landmark: int, is_ris: bool, 
     }
 
 
-def _panel_responses(scene: Scene, radio: RadioConfig, number: int, tx: Legs, rx: Legs) -> tuple[Complexes, Complexes]:
+def _panel_responses(
+    scene: Scene, radio: RadioConfig, number: int, tx: SpecularLegs, rx: SpecularLegs
+) -> tuple[Complexes, Complexes]:
     """Element responses (K, I, N, M) and (K, J, N, M) of the legs to a panel, from their mirrored devices."""
     assert scene.ris is not None
     spec, center = scene.panels[number].spec, scene.panels[number].center
@@ -162,7 +166,7 @@ def _reversed_rows(walls: Integers, bounces: Integers) -> Integers:
     return np.where(index >= 0, np.take_along_axis(walls, np.maximum(index, 0), axis=1), -1)
 
 
-def _joined_vertices(tx: Legs, rx: Legs, i: Integers, j: Integers, point: Floats, count: int) -> Floats:
+def _joined_vertices(tx: SpecularLegs, rx: SpecularLegs, i: Integers, j: Integers, point: Floats, count: int) -> Floats:
     """Tx leg's bounce points, the landmark, the Rx leg's bounce points in the order of travel: (K, P, count, 3)."""
     vertices = np.zeros((tx.valid.shape[0], len(i), count, 3))
     for path, (a, b) in enumerate(zip(i, j, strict=True)):

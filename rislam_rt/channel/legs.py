@@ -8,7 +8,7 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, freeze
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Legs:
+class SpecularLegs:
     """K cycles by S wall sequences, from a device to a far end. Where `valid` is False the rest means nothing.
 
     The gain of a leg is `coefficient * lambda / (4 pi length) * exp(-j 2 pi length / lambda)`.

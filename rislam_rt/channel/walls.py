@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.shades import Shades, build_shades
+from rislam_rt.channel.occluders import Occluders, build_occluders
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
-from rislam_rt.geometry.flat import flat_parts
+from rislam_rt.geometry.coplanar import stack_walls, tracer_gap
+from rislam_rt.geometry.plane_segmentation import planar_regions
 from rislam_rt.geometry.planes import signed_distance
-from rislam_rt.geometry.stack import stack_walls, tracer_gap
 from rislam_rt.model import Material, RisPanel, Scene
 
 
@@ -35,7 +35,7 @@ class Walls:
     """(W,) for each wall those that lie on it: where they are, they reflect and it does not."""
     hosts: tuple[int, ...]
     """The wall behind each panel, -1 where there is none."""
-    shades: Shades
+    shades: Occluders
     """What hides but is no wall: it never reflects."""
 
     def __len__(self) -> int:
@@ -52,7 +52,7 @@ def build_walls(scene: Scene) -> Walls:
     Walls that lie on each other share one plane, that of the largest, into which the others are moved. A panel's host
     wall is the plane of the reflector named `host` that lies nearest to the panel's centre.
     """
-    parts = [flat_parts(reflector.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for reflector in scene.reflectors]
+    parts = [planar_regions(reflector.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for reflector in scene.reflectors]
     counts = [len(part.offset) for part in parts]
     first = np.cumsum([0, *counts])
     triangles = np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in scene.reflectors)])
@@ -75,7 +75,7 @@ def build_walls(scene: Scene) -> Walls:
         stack.plane,
         stack.over,
         tuple(_host(panel, scene, np.repeat(np.arange(len(counts)), counts), normal, offset) for panel in scene.panels),
-        build_shades(scene),
+        build_occluders(scene),
     )
 
 

@@ -35,7 +35,7 @@ def _run(heard: list[int]) -> int:
 
     from rislam_rt.cli.app import app
     from rislam_rt.cli.interrupts import EXIT_CODE
-    from rislam_rt.cli.loudness import reset
+    from rislam_rt.cli.verbosity import reset
     from rislam_rt.errors import RislamError
 
     reset()
@@ -59,9 +59,9 @@ def _run(heard: list[int]) -> int:
 
 def _tell(error: "RislamError") -> int:
     """Every fault on a line of its own; returns the exit code."""
-    from rislam_rt.cli.loudness import loudness
+    from rislam_rt.cli.verbosity import verbosity
 
-    if loudness().verbose:
+    if verbosity().verbose:
         import traceback
 
         traceback.print_exception(error)

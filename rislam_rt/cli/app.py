@@ -18,7 +18,7 @@ from rislam_rt.cli import (
     sweep,
     trace,
 )
-from rislam_rt.cli.loudness import with_loudness
+from rislam_rt.cli.verbosity import with_verbosity
 
 app = typer.Typer(
     name="rislam-rt",
@@ -28,7 +28,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for _command in (run, sweep, slam, pipelines, config, new, check, export, show, trace, compare, design, report, doctor):
-    app.command(_command.__name__.rpartition(".")[2])(with_loudness(_command.command))
+    app.command(_command.__name__.rpartition(".")[2])(with_verbosity(_command.command))
 
 
 def _print_version(wanted: bool) -> None:

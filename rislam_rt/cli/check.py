@@ -8,7 +8,7 @@ import typer
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, SceneFolder, Settings, pipeline_file, write_json
 
 if TYPE_CHECKING:
-    from rislam_rt.pipeline.spec import Settings as Records
+    from rislam_rt.pipeline.specification.spec import Settings as Records
 
 SEED = 0
 """Of the random codes that a panel is tried under."""
@@ -71,8 +71,8 @@ def _advise(folder: Path, settings: "Records", picture: Path | None) -> dict[str
     """Print the adviser's word and draw the map; what was said, for the machine-readable copy."""
     import numpy as np
 
-    from rislam_rt.pipeline.advise.advice import advise
-    from rislam_rt.pipeline.advise.coverage import panel_coverage
+    from rislam_rt.adviser.advice import advise
+    from rislam_rt.adviser.coverage import panel_coverage
     from rislam_rt.report.advice import draw_coverage, print_advice
     from rislam_rt.scene.load import read_draft
 

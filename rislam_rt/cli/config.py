@@ -7,7 +7,7 @@ import typer
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, Settings, write_json
 
 if TYPE_CHECKING:
-    from rislam_rt.pipeline.settings import Setting
+    from rislam_rt.pipeline.specification.settings import Setting
 
 Value = dict[str, Any]
 
@@ -24,8 +24,8 @@ def command(
 
     Example: rislam-rt config trace_then_slam --explain slam.sigma_a
     """
-    from rislam_rt.pipeline.settings import explain as find
-    from rislam_rt.pipeline.settings import list_settings
+    from rislam_rt.pipeline.specification.settings import explain as find
+    from rislam_rt.pipeline.specification.settings import list_settings
     from rislam_rt.studies import load_any
 
     spec = load_any(pipeline, set_ or ())

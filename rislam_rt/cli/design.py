@@ -26,8 +26,8 @@ def command(
 
     from rislam_rt.cli.scenes import open_scene, parse_point
     from rislam_rt.pipeline.design_at import design_at, design_table
-    from rislam_rt.pipeline.read import load_radio
     from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.specification.read import load_radio
     from rislam_rt.report.tables import print_designs
 
     radio = load_radio(set_ or ())
@@ -46,7 +46,7 @@ def command(
             each = ", ".join(f"{panel} {gain:.2f} dB" for panel, gain in gains.items())
             typer.echo(f"{name}: {each}")
     if figure is not None:
-        from rislam_rt.report.code import draw_codes
+        from rislam_rt.report.code_pictures import draw_codes
 
         typer.echo(f"figure: {draw_codes(found.designs, figure, room.ris.spec if room.ris else None)}")
     write_json(json, {"scene": room.name, "at_m": point.tolist(), "seed": seed, **table})

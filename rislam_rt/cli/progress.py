@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
-from rislam_rt.cli.loudness import loudness
+from rislam_rt.cli.verbosity import verbosity
 
 if TYPE_CHECKING:
     from rich.progress import TaskID
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rislam_rt.sweeps import Cost, Told
 
 
-class Tell(Protocol):
+class ProgressReport(Protocol):
     """Takes news of the work."""
 
     def __call__(self, stage: str, at: int, total: int) -> None:
@@ -21,7 +21,7 @@ class Tell(Protocol):
 
 
 @contextmanager
-def show_progress() -> Iterator[Tell]:
+def show_progress() -> Iterator[ProgressReport]:
     """Show a bar for every stage that news comes of."""
     from rich.console import Console
     from rich.progress import (
@@ -41,7 +41,7 @@ def show_progress() -> Iterator[Tell]:
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), refresh_per_second=4, disable=loudness().quiet) as bars:
+    with Progress(*columns, console=Console(stderr=True), refresh_per_second=4, disable=verbosity().quiet) as bars:
         tasks: dict[str, TaskID] = {}
 
         def tell(stage: str, at: int, total: int) -> None:
@@ -59,11 +59,11 @@ def show_sweep() -> "Iterator[Callable[[Told], None]]":
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     columns = (TextColumn("cells"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[left]}"))
-    with Progress(*columns, console=Console(stderr=True), refresh_per_second=4, disable=loudness().quiet) as bar:
+    with Progress(*columns, console=Console(stderr=True), refresh_per_second=4, disable=verbosity().quiet) as bar:
         task = bar.add_task("cells", total=None, left="one cell goes first, to tell the cost")
 
         def tell(told: "Told") -> None:
-            if told.last is None and not loudness().quiet:
+            if told.last is None and not verbosity().quiet:
                 bar.console.print(describe_cost(told), markup=False, highlight=False)
             elif told.last is not None and told.last.failed:
                 cell = told.last.cell

@@ -25,8 +25,8 @@ def command(
     Example: rislam-rt report runs/demo-paper_room-7-0123abcd --rerun demo.rrd
     """
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.long import read_any
-    from rislam_rt.pipeline.store import hold_run
+    from rislam_rt.pipeline.long.run import read_any
+    from rislam_rt.pipeline.store.run_folder import hold_run
     from rislam_rt.report import write_report
     from rislam_rt.report.tables import print_summary
 
@@ -34,7 +34,7 @@ def command(
         raise ConfigError(f"--gif: '{gif}' received; give a name that ends in .gif")
     summary, result = read_any(run)
     if rerun is not None:
-        from rislam_rt.report.recording import recording_bytes
+        from rislam_rt.report.rerun_recording import recording_bytes
         from rislam_rt.storage.files import write_atomic
 
         write_atomic(rerun, recording_bytes(result, run.resolve().name))

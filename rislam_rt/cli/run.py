@@ -5,16 +5,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.loudness import warn
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, write_json
-from rislam_rt.cli.study import Given
+from rislam_rt.cli.study import StudyOptions
+from rislam_rt.cli.verbosity import warn
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rislam_rt.model import Scene
     from rislam_rt.pipeline import PipelineSpec
-    from rislam_rt.pipeline.identity import Identity
+    from rislam_rt.pipeline.store.identity import Identity
 
 
 def command(
@@ -52,7 +52,7 @@ def command(
     )
 
     spec = load_any(pipeline, set_ or ())
-    given = Given(pipeline, scene, out, jobs, json, page)
+    given = StudyOptions(pipeline, scene, out, jobs, json, page)
     if isinstance(spec, CompareSpec):
         run_compare_channels(spec, given)
     elif isinstance(spec, Fig4aSpec):
@@ -73,13 +73,13 @@ def command(
         run_main_job(spec, given)
 
 
-def run_main_job(spec: "PipelineSpec", given: Given) -> None:
+def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
     """All schemes over all cycles of a room; a run that is there already is shown."""
     from rislam_rt.cli.scenes import open_scene, scene_of
-    from rislam_rt.pipeline.identity import run_identity
-    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import check_run, prepare_channel
-    from rislam_rt.pipeline.store import DONE, find_run
+    from rislam_rt.pipeline.specification.radio import build_radio
+    from rislam_rt.pipeline.store.identity import run_identity
+    from rislam_rt.pipeline.store.run_folder import DONE, find_run
 
     opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
     check_run(opened.scene, spec)
@@ -94,10 +94,10 @@ def run_main_job(spec: "PipelineSpec", given: Given) -> None:
     compute_run(spec, opened.scene, identity, folder, given)
 
 
-def show_run(folder: Path, about: "Mapping[str, Any]", given: Given) -> None:
+def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> None:
     """A completed run of these very settings, as it was written."""
-    from rislam_rt.pipeline.long import read_any
-    from rislam_rt.pipeline.store import hold_run, is_left_locked, read_summary
+    from rislam_rt.pipeline.long.run import read_any
+    from rislam_rt.pipeline.store.run_folder import hold_run, is_left_locked, read_summary
     from rislam_rt.report.page import PAGE, write_report
     from rislam_rt.report.tables import print_summary
 
@@ -116,7 +116,7 @@ def show_run(folder: Path, about: "Mapping[str, Any]", given: Given) -> None:
     write_json(given.json, summary)
 
 
-def compute_run(spec: "PipelineSpec", room: "Scene", identity: "Identity", folder: Path, given: Given) -> None:
+def compute_run(spec: "PipelineSpec", room: "Scene", identity: "Identity", folder: Path, given: StudyOptions) -> None:
     """Begin a run or go on with it, and report it."""
     import os
 
@@ -125,9 +125,9 @@ def compute_run(spec: "PipelineSpec", room: "Scene", identity: "Identity", folde
     from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.pipeline import run_slam
-    from rislam_rt.pipeline.long import LongRun, is_long, run_long
-    from rislam_rt.pipeline.store import open_run
-    from rislam_rt.pipeline.summary import summarise
+    from rislam_rt.pipeline.long.run import LongRun, is_long, run_long
+    from rislam_rt.pipeline.scores.summary import summarise
+    from rislam_rt.pipeline.store.run_folder import open_run
     from rislam_rt.report.tables import print_summary
 
     kept = 0

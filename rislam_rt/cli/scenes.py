@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rislam_rt.cli.loudness import warn
+from rislam_rt.cli.verbosity import warn
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
     from rislam_rt.model import RadioConfig, Scene
     from rislam_rt.pipeline import PipelineSpec
-    from rislam_rt.pipeline.spec import Settings
+    from rislam_rt.pipeline.specification.spec import Settings
     from rislam_rt.studies import Fig4aSpec
 
 
-class Opened(NamedTuple):
+class OpenedScene(NamedTuple):
     """A scene that was read and checked, and what is odd about it."""
 
     scene: "Scene"
@@ -27,7 +27,7 @@ class Opened(NamedTuple):
             warn(line)
 
 
-def open_scene(path: Path, radio: "RadioConfig | None" = None) -> Opened:
+def open_scene(path: Path, radio: "RadioConfig | None" = None) -> OpenedScene:
     """Read and check a scene, its materials and its panel for a radio where one is given.
 
     Raises
@@ -40,7 +40,7 @@ def open_scene(path: Path, radio: "RadioConfig | None" = None) -> Opened:
 
     findings = check_scene(path, radio)
     raise_errors(findings)
-    return Opened(load_scene(path), tuple(f.line for f in findings if f.severity == "warning"))
+    return OpenedScene(load_scene(path), tuple(f.line for f in findings if f.severity == "warning"))
 
 
 def settings_of(pipeline: Path, changed: "Sequence[str]") -> "Settings":
@@ -52,7 +52,7 @@ def settings_of(pipeline: Path, changed: "Sequence[str]") -> "Settings":
         The pipeline or a setting is unusable.
     """
     from rislam_rt.pipeline import load_spec
-    from rislam_rt.pipeline.spec import build_settings
+    from rislam_rt.pipeline.specification.spec import build_settings
 
     return build_settings(load_spec(pipeline, changed))
 

@@ -9,7 +9,7 @@ from rislam_rt.cli.options import MAIN_JOB, Depth, SceneFolder, Settings, pipeli
 
 if TYPE_CHECKING:
     from rislam_rt.model import Scene
-    from rislam_rt.pipeline.spec import Settings as Records
+    from rislam_rt.pipeline.specification.spec import Settings as Records
 
 
 def command(
@@ -35,7 +35,7 @@ def command(
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene, settings_of
     from rislam_rt.report.tables import print_scene
-    from rislam_rt.scene.names import safe_name
+    from rislam_rt.scene.file_names import safe_name
 
     settings = settings_of(pipeline, set_ or ()) if html is not None else None
     if out is not None:
@@ -63,9 +63,9 @@ def _write_view(room: "Scene", settings: "Records", depth: int, file: Path) -> P
     """Find the paths of some poses, and write the page."""
     import numpy as np
 
+    from rislam_rt.adviser.budget import at_rows
     from rislam_rt.channel.image_source import ImageSourceChannel
     from rislam_rt.cli.progress import show_progress
-    from rislam_rt.pipeline.advise.budget import at_rows
     from rislam_rt.report.view.page import view_page
     from rislam_rt.report.view.paths_data import paths_data, poses_of
     from rislam_rt.storage.files import write_atomic

@@ -58,8 +58,8 @@ def command(
     import numpy as np
 
     from rislam_rt.pipeline import load_spec
-    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.recordings.own_measurements import localise, read_inputs, run_rng
+    from rislam_rt.pipeline.specification.radio import build_radio
 
     spec = load_spec(config, set_ or ())
     prior = None if start is None else _prior(start, velocity, spec.start.position_std_m, spec.start.velocity_std_m_s)
@@ -115,7 +115,7 @@ def _triple(option: str, text: str) -> "Floats":
 def _true_positions(file: Path, cycles: int) -> "Floats":
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene.findings import Fault
-    from rislam_rt.scene.recorded import parse_tum
+    from rislam_rt.scene.recorded_poses import parse_tum
 
     try:
         _, position, _ = parse_tum(file.read_bytes())

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rislam_rt.sweeps import Row
 
 
-class Given(NamedTuple):
+class StudyOptions(NamedTuple):
     """What the command line says beside the settings."""
 
     pipeline: Path
@@ -26,13 +26,13 @@ class Given(NamedTuple):
     page: bool
 
 
-def run_compare_channels(spec: "CompareSpec", given: Given) -> None:
+def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
     """Compare both channels in all rooms; exit code 1 if a difference is unexplained or beyond its limit."""
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.study import write_comparison
     from rislam_rt.report.tables import print_validation
     from rislam_rt.studies.compare import comparison_table, run_comparison
@@ -59,17 +59,17 @@ def run_compare_channels(spec: "CompareSpec", given: Given) -> None:
         raise typer.Exit(1)
 
 
-def run_gain_curves(spec: "Fig4aSpec", given: Given) -> None:
+def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
     """Fig. 4(a): gain against distance."""
     import numpy as np
 
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene, scene_of
-    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.fig4a import fig4a_table, verdict
     from rislam_rt.report.study import write_fig4a
-    from rislam_rt.scene.names import safe_name
+    from rislam_rt.scene.file_names import safe_name
     from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
     from rislam_rt.studies.spec import study_record
 
@@ -89,7 +89,7 @@ def run_gain_curves(spec: "Fig4aSpec", given: Given) -> None:
     write_json(given.json, content)
 
 
-def run_swept(spec: "SweptSpec", given: Given) -> None:
+def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
     """A study on the sweep engine; its page grows while it runs. Exit code 1 if a cell failed."""
     from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.cli.progress import show_sweep
@@ -124,7 +124,7 @@ def run_swept(spec: "SweptSpec", given: Given) -> None:
         raise typer.Exit(1)
 
 
-def run_claims(spec: "ClaimsSpec", given: Given) -> None:
+def run_claims(spec: "ClaimsSpec", given: StudyOptions) -> None:
     """The claims' table, from what other studies left behind."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.report.claims import write_claims
@@ -157,7 +157,7 @@ def output_folder(out: Path | None, name: str, record: "Mapping[str, Any]") -> P
         There is a file of that name.
     """
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.identity import short_name
+    from rislam_rt.pipeline.store.identity import short_name
     from rislam_rt.storage.seal import checksum
 
     folder = out or Path("runs") / short_name(name, checksum(record))

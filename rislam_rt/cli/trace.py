@@ -23,7 +23,7 @@ SignalSettings = Annotated[
 AT_REST = "at level 0"
 
 
-class Traced(NamedTuple):
+class TraceResult(NamedTuple):
     """What a trace leaves behind."""
 
     paths: "Paths"
@@ -62,12 +62,12 @@ def command(
     """
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.read import load_radio
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.signals import load_signals_spec, signal_settings
+    from rislam_rt.pipeline.specification.read import load_radio
     from rislam_rt.report.deepmimo import deepmimo_files
     from rislam_rt.report.tables import path_table, print_paths
-    from rislam_rt.scene.names import safe_name
+    from rislam_rt.scene.file_names import safe_name
     from rislam_rt.scene.write import write_files
 
     beyond = [word for word in set_ or () if not signals and not word.startswith("radio.")]
@@ -133,7 +133,7 @@ def thinned(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
     return replace(scene, agent=agent)
 
 
-def trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, file: Path | None) -> Traced:
+def trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, file: Path | None) -> TraceResult:
     """All paths with the panel at level 0, written to a file if one is given."""
     from time import perf_counter
 
@@ -144,14 +144,14 @@ def trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, 
     paths = build_channel(channel, scene, radio, depth).paths(scene.agent)
     seconds = perf_counter() - begin
     if file is None:
-        return Traced(paths, seconds, AT_REST, {})
+        return TraceResult(paths, seconds, AT_REST, {})
     write_dataset(paths_to_dataset(paths, scene.agent), file)
-    return Traced(paths, seconds, AT_REST, {"files": {"paths": str(file)}})
+    return TraceResult(paths, seconds, AT_REST, {"files": {"paths": str(file)}})
 
 
 def trace_signals(
     scene: "Scene", channel: str, depth: int, settings: Sequence[str], file: Path, warn: Callable[[], None]
-) -> Traced:
+) -> TraceResult:
     """All paths under the codes asked for, their samples, and what the receiver finds in them, written to a file."""
     from itertools import count
     from time import perf_counter
@@ -187,7 +187,7 @@ def trace_signals(
         )
     write_dataset(data, file)
     shape = {**size._asdict(), "file_bytes": file.stat().st_size, "mean_components": mean_components(data)}
-    return Traced(
+    return TraceResult(
         paths,
         seconds,
         AT_REST if spec.code == "zero" else spec.code,

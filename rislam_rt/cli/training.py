@@ -10,21 +10,21 @@ import typer
 from rislam_rt.cli.options import write_json
 
 if TYPE_CHECKING:
-    from rislam_rt.cli.study import Given
+    from rislam_rt.cli.study import StudyOptions
     from rislam_rt.studies.classifier.spec import ClassifierSpec
 
 PAGE, SCORES, IMPORTANCE = "classifier", "figures/classifier_scores.png", "figures/classifier_features.png"
 PANEL = "figures/classifier_panel.png"
 
 
-def run_classifier(spec: "ClassifierSpec", given: "Given") -> None:
+def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
     """Train the classifier of components and score it; weights, page, data and figures."""
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.cli.study import output_folder
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.radio import build_radio
     from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.classifier import (
         classifier_page,
         classifier_table,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from rislam_rt.cli.options import write_json
-from rislam_rt.cli.study import Given, output_folder
+from rislam_rt.cli.study import StudyOptions, output_folder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rislam_rt.sweeps import Row
 
 
-def run_unseen(spec: "UnseenSpec", given: Given) -> None:
+def run_unseen(spec: "UnseenSpec", given: StudyOptions) -> None:
     """Draw the rooms, run what the file asks for in each, print and write the score card; exit code 1 if one failed."""
     from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.cli.progress import show_sweep

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.design.beam_sweep import search_code
 from rislam_rt.design.designers import blind_design, designer
 from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.result import Design, DesignConfig
-from rislam_rt.design.search import search_code
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import mirror, mirror_direction, plane_between
 from rislam_rt.information import GradientMode, path_gradient, prior_from_covariance, range_information

@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.design.objective import Objective
 from rislam_rt.design.problem import DesignProblem
-from rislam_rt.design.single import exact_code
+from rislam_rt.design.single_path import exact_code
 
 LARGE = 100
 """Elements above which changes are first ranked by the objective's slope, before each is valued on its own."""

@@ -7,13 +7,13 @@ from types import MappingProxyType
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.design.bound import best_magnitudes, relaxation_bound
 from rislam_rt.design.coordinate import coordinate_search, exact_codes
 from rislam_rt.design.genetic import genetic_search
 from rislam_rt.design.objective import Objective, build_objective
 from rislam_rt.design.problem import DesignProblem
+from rislam_rt.design.relaxation import best_magnitudes, relaxation_bound
 from rislam_rt.design.result import Design, DesignConfig, Designer
-from rislam_rt.design.single import continuous_phases, nearest_code
+from rislam_rt.design.single_path import continuous_phases, nearest_code
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import Outcome
 from rislam_rt.model import RisCode

@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.design.problem import DesignProblem
-from rislam_rt.design.single import exact_code
+from rislam_rt.design.single_path import exact_code
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import range_information, vertex_gradient
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode

@@ -1,6 +1,15 @@
 """Floor 5: scores. Errors, distances between maps, consistency, confidence intervals, association."""
 
 from rislam_rt.evaluate.association import AssociationScore, association_fractions, association_score, label_switches
+from rislam_rt.evaluate.confidence_intervals import (
+    Interval,
+    bootstrap,
+    bootstrap_ratio,
+    mean_over_runs,
+    median_over_runs,
+    rms_over_runs,
+    share_interval,
+)
 from rislam_rt.evaluate.consistency import Consistency, chi_square_bounds, consistency, normalised_squares
 from rislam_rt.evaluate.errors import (
     TrajectoryError,
@@ -13,16 +22,7 @@ from rislam_rt.evaluate.errors import (
     trajectory_error,
     wall_errors,
 )
-from rislam_rt.evaluate.intervals import (
-    Interval,
-    bootstrap,
-    bootstrap_ratio,
-    mean_over_runs,
-    median_over_runs,
-    rms_over_runs,
-    share_interval,
-)
-from rislam_rt.evaluate.sets import Gospa, Ospa, gospa, match_points, ospa
+from rislam_rt.evaluate.set_distances import Gospa, Ospa, gospa, match_points, ospa
 
 __all__ = [
     "AssociationScore",

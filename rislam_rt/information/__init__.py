@@ -2,7 +2,7 @@
 
 from rislam_rt.information.accuracy import MeasurementStd, amplitude_std, cosine_information, measurement_std
 from rislam_rt.information.delay_gain import (
-    Equivalent,
+    EquivalentDelayInformation,
     delay_gain_information,
     delay_information,
     eliminate_gains,
@@ -10,7 +10,12 @@ from rislam_rt.information.delay_gain import (
     steering,
 )
 from rislam_rt.information.diffuse import DiffuseTail, diffuse_snr
-from rislam_rt.information.equivalent import EquivalentPosition, equivalent_information, uncertain_range_information
+from rislam_rt.information.dilution_maps import dilution, position_error_map
+from rislam_rt.information.equivalent_fim import (
+    EquivalentPosition,
+    equivalent_information,
+    uncertain_range_information,
+)
 from rislam_rt.information.gradient import (
     GradientMode,
     cosine_gradient,
@@ -19,35 +24,34 @@ from rislam_rt.information.gradient import (
     path_gradient,
     vertex_gradient,
 )
-from rislam_rt.information.landmarks import (
-    Chain,
+from rislam_rt.information.landmark_model import (
     LandmarkModel,
-    Rows,
+    LinearMeasurements,
+    MirrorChain,
     WallSpread,
     build_landmark_model,
     mirror_chain,
     plane_tangents,
 )
-from rislam_rt.information.maps import dilution, position_error_map
 from rislam_rt.information.outcome import Outcome
-from rislam_rt.information.position import Bound, position_bound, position_information, range_information
+from rislam_rt.information.position import PositionBound, position_bound, position_information, range_information
+from rislam_rt.information.posterior_crlb import MotionPrior, PosteriorBound, posterior_bound
 from rislam_rt.information.prior import prior_from_covariance, prior_from_particles
-from rislam_rt.information.recursion import MotionPrior, PosteriorBound, posterior_bound
 from rislam_rt.information.resolution import certainty_share, resolved_probability
 
 __all__ = [
-    "Bound",
-    "Chain",
     "DiffuseTail",
-    "Equivalent",
+    "EquivalentDelayInformation",
     "EquivalentPosition",
     "GradientMode",
     "LandmarkModel",
+    "LinearMeasurements",
     "MeasurementStd",
+    "MirrorChain",
     "MotionPrior",
     "Outcome",
+    "PositionBound",
     "PosteriorBound",
-    "Rows",
     "WallSpread",
     "amplitude_std",
     "build_landmark_model",

@@ -20,7 +20,7 @@ ILL_CONDITIONED = 1e-10
 """Smallest eigenvalue, of a matrix with unit diagonal, below which two paths' gains count as inseparable."""
 
 
-class Equivalent(NamedTuple):
+class EquivalentDelayInformation(NamedTuple):
     """Information on delays (and cosines) with the gains eliminated."""
 
     information: Floats
@@ -82,7 +82,7 @@ def delay_gain_information(
     return np.concatenate(rows, axis=-2)
 
 
-def eliminate_gains(information: Floats, num_paths: int) -> Equivalent:
+def eliminate_gains(information: Floats, num_paths: int) -> EquivalentDelayInformation:
     """Schur complement: what J(chi) says about delays (and cosines) when the complex gains are unknown."""
     kept = information.shape[-1] - 2 * num_paths
     nuisance = information[..., kept:, kept:]
@@ -93,12 +93,12 @@ def eliminate_gains(information: Floats, num_paths: int) -> Equivalent:
     cross = information[..., :kept, kept:] / scale[..., None, :]
     reduced = information[..., :kept, :kept] - cross @ np.linalg.solve(safe, np.swapaxes(cross, -1, -2))
     reduced = np.where(degenerate[..., None, None], 0.0, 0.5 * (reduced + np.swapaxes(reduced, -1, -2)))
-    return Equivalent(reduced, np.where(degenerate, int(Outcome.DEGENERATE), int(Outcome.OK)))
+    return EquivalentDelayInformation(reduced, np.where(degenerate, int(Outcome.DEGENERATE), int(Outcome.OK)))
 
 
 def delay_information(
     tau: Floats, gain: Complexes, radio: RadioConfig, *, antennas: Complexes | None = None
-) -> Equivalent:
+) -> EquivalentDelayInformation:
     """Equivalent information (..., P, P) [1/s^2] on the delays of paths that may overlap, gains unknown."""
     full = delay_gain_information(tau, gain, radio, antennas=antennas)
     return eliminate_gains(full, np.shape(tau)[-1])

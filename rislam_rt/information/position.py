@@ -13,7 +13,7 @@ SINGULAR = 1e-13
 """Ratio of smallest to largest eigenvalue below which float64 cannot tell an information matrix from a singular one."""
 
 
-class Bound(NamedTuple):
+class PositionBound(NamedTuple):
     """Cramer-Rao bound of a position."""
 
     variance: Floats
@@ -49,7 +49,7 @@ def position_information(gradient: Floats, snr: Floats, radio: RadioConfig) -> F
     return np.swapaxes(weighted, -1, -2) @ gradient
 
 
-def position_bound(information: Floats, prior: Floats | float = 0.0) -> Bound:
+def position_bound(information: Floats, prior: Floats | float = 0.0) -> PositionBound:
     """`tr((J + J_prior)^-1)` of information matrices (..., D, D) [1/m^2] with prior information likewise.
 
     Outcomes: `NO_PATHS` where there is no information at all, `UNOBSERVABLE` where it is singular.
@@ -60,4 +60,4 @@ def position_bound(information: Floats, prior: Floats | float = 0.0) -> Bound:
     outcome = np.where(largest > 0.0, outcome, int(Outcome.NO_PATHS))
     usable = (outcome == Outcome.OK)[..., None]
     variance = np.where(usable[..., 0], (1.0 / np.where(usable, value, 1.0)).sum(axis=-1), np.inf)
-    return Bound(variance, outcome)
+    return PositionBound(variance, outcome)

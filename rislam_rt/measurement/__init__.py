@@ -1,6 +1,7 @@
 """Floor 5: the receiver. What arrives, the noise, and multipath components with their standard deviations."""
 
 from rislam_rt.measurement.calibrate import calibrate
+from rislam_rt.measurement.components import path_std
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.dataset import NO_COMPONENT, load_signals, signals_dataset
 from rislam_rt.measurement.false_alarms import detection_threshold, expected_false_alarms
@@ -13,20 +14,19 @@ from rislam_rt.measurement.noise import (
     with_paper_snr,
     with_reference_snr,
 )
-from rislam_rt.measurement.parts import path_std
 from rislam_rt.measurement.received import Clutter, Received, receive, twin
-from rislam_rt.measurement.sensor import build_sensor
+from rislam_rt.measurement.sensor_model import build_sensor
 from rislam_rt.measurement.signal import num_tones, pulse_samples, to_samples, to_tones, tones
 from rislam_rt.measurement.tracking import TrackInfo, TrackingConfig, TrackState, init_tracks, step_tracks
-from rislam_rt.measurement.waveform import Capture, Components, capture, find_components
+from rislam_rt.measurement.waveform import Capture, DetectedComponents, capture, find_components
 from rislam_rt.model import detection_probability
 
 __all__ = [
     "NO_COMPONENT",
     "Capture",
     "Clutter",
-    "Components",
     "Correction",
+    "DetectedComponents",
     "FrontEnd",
     "HardwareConfig",
     "Received",

@@ -12,10 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
-from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.joint import joint_errors
-from rislam_rt.measurement.parts import (
-    Parts,
+from rislam_rt.measurement.components import (
+    NoiselessComponents,
     audible,
     blind_axes,
     capped,
@@ -24,17 +22,19 @@ from rislam_rt.measurement.parts import (
     merge,
     single,
 )
+from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.joint_bound import joint_errors
+from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
 from rislam_rt.measurement.received import Received
-from rislam_rt.measurement.sensor import build_sensor
-from rislam_rt.measurement.sides import Found, panel_probability
-from rislam_rt.measurement.slot import split
+from rislam_rt.measurement.sensor_model import build_sensor
+from rislam_rt.measurement.slot_motion import split
 from rislam_rt.model import Measurement, PathTruth, RadioConfig, SensorModel
 
 NEGLIGIBLE = 1e-3
 """Paths this far below the detection threshold are left out: they move an amplitude at the threshold by 3 %."""
 
 
-class Components(NamedTuple):
+class ReportedComponents(NamedTuple):
     """N components of one capture as the receiver reports them."""
 
     path: Integers
@@ -74,10 +74,10 @@ def measure_bound(
     rate = replace(sensor, false_alarms=sensor.false_alarms / len(captures))
     parts = [_capture(*one, rate, config, rng=rng) for one in zip(captures, draws, strict=True)]
     side = np.repeat(np.arange(len(parts)), [len(part.path) for part in parts])
-    found = Components._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
+    found = ReportedComponents._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
     order = np.argsort(found.points[:, 0])
-    found, side = Components._make(field[order] for field in found), side[order]
-    told = panel_probability(Found(*found[1:], side), radio, config) if config.alternation else ()
+    found, side = ReportedComponents._make(field[order] for field in found), side[order]
+    told = panel_probability(ComponentSides(*found[1:], side), radio, config) if config.alternation else ()
     measurement = Measurement(
         found.points[:, 0],
         into_disc(blind_axes(found.points[:, 1:], radio)),
@@ -92,7 +92,7 @@ def measure_bound(
 
 def _capture(
     received: Received, draws: Floats, sensor: SensorModel, config: ReceiverConfig, *, rng: np.random.Generator
-) -> Components:
+) -> ReportedComponents:
     """What is reported of the paths in one capture, and what is false."""
     radio, window = sensor.radio, sensor.window
     received = audible(received, radio.integrated_snr(received.gain) > NEGLIGIBLE * sensor.threshold)
@@ -108,11 +108,11 @@ def _capture(
     seen &= (points[:, 0] >= window[0]) & (points[:, 0] <= window[1])
     # Deviations go as one over the amplitude: this is the bound at the measured one.
     deviation = errors.deviation * (np.abs(parts.gain) / np.maximum(np.abs(gain), 1e-300))[:, None]
-    true = Components(parts.path[seen], points[seen], deviation[seen], gain[seen], errors.gain_std[seen])
-    return Components._make(np.concatenate(fields) for fields in zip(true, _clutter(sensor, rng), strict=True))
+    true = ReportedComponents(parts.path[seen], points[seen], deviation[seen], gain[seen], errors.gain_std[seen])
+    return ReportedComponents._make(np.concatenate(fields) for fields in zip(true, _clutter(sensor, rng), strict=True))
 
 
-def _clutter(sensor: SensorModel, rng: np.random.Generator) -> Components:
+def _clutter(sensor: SensorModel, rng: np.random.Generator) -> ReportedComponents:
     """Poisson many, even over the delay window and the disc of cosines; amplitudes as of noise above the threshold."""
     radio, count = sensor.radio, rng.poisson(sensor.false_alarms)
     tau = rng.uniform(*sensor.window, count)
@@ -121,6 +121,6 @@ def _clutter(sensor: SensorModel, rng: np.random.Generator) -> Components:
     snr = sensor.threshold + rng.exponential(size=count)
     phase = np.exp(2j * np.pi * rng.uniform(size=count))
     gain = phase * np.sqrt(snr * radio.noise_psd / (radio.array.num_antennas * radio.energy))
-    parts = Parts(np.full(count, -1), tau, cosines, gain)
+    parts = NoiselessComponents(np.full(count, -1), tau, cosines, gain)
     errors = lone_errors(parts, radio, np.zeros((count, 5)))
-    return Components(parts.path, np.column_stack([tau, cosines]), errors.deviation, gain, errors.gain_std)
+    return ReportedComponents(parts.path, np.column_stack([tau, cosines]), errors.deviation, gain, errors.gain_std)

@@ -15,13 +15,13 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.measurement.atoms import Sounding, build_sounding, tone_response
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.detect import Grid, build_grid
+from rislam_rt.measurement.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimate import estimate_paths
 from rislam_rt.measurement.hardware import Correction, mirrored
 from rislam_rt.measurement.refine import fit_amplitudes
 from rislam_rt.measurement.signal import num_tones
+from rislam_rt.measurement.sounding import Sounding, build_sounding, tone_response
 from rislam_rt.model import Body, RadioConfig
 
 FAINTEST = (0.3, 0.1, 0.03, 0.01, 0.003)
@@ -38,11 +38,11 @@ STRAY, LEAST_STRAY = 0.1, 1e-3
 between it is as found in the last round."""
 
 
-class Known(NamedTuple):
+class CalibrationReference(NamedTuple):
     """What calibration starts from."""
 
     sounding: Sounding
-    grid: Grid
+    grid: MatchedFilterGrid
     window: tuple[float, float]
     direct: Floats
     """(3,) delay of the direct path in cells, and its two cosines."""
@@ -88,13 +88,13 @@ def calibrate(
     return Correction(_inverse(matrix), residue, image, direct, loudness, left)
 
 
-def _known(body: Body, radio: RadioConfig, config: ReceiverConfig) -> Known:
+def _known(body: Body, radio: RadioConfig, config: ReceiverConfig) -> CalibrationReference:
     span = body.tx_offset - body.rx_offset
     length = float(np.linalg.norm(span))
     sounding = build_sounding(num_tones(radio, config), radio)
     window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
     direct = np.array([length / SPEED_OF_LIGHT * radio.bandwidth, *(span[:2] / length)])
-    return Known(sounding, build_grid(sounding, window), window, direct, radio.noise_psd)
+    return CalibrationReference(sounding, build_grid(sounding, window), window, direct, radio.noise_psd)
 
 
 def _chains(mean: Complexes, direct: Complexes) -> Complexes:
@@ -103,7 +103,7 @@ def _chains(mean: Complexes, direct: Complexes) -> Complexes:
     return np.asarray(chains / np.mean(chains))
 
 
-def _as_drawn(samples: Complexes, known: Known, faintest: float) -> Complexes:
+def _as_drawn(samples: Complexes, known: CalibrationReference, faintest: float) -> Complexes:
     """What an array as drawn would hear (L, M) of the strong paths in samples of a corrected one, ghosts left out."""
     scaled = samples / np.sqrt(known.noise)
     found = estimate_paths(known.sounding, known.grid, scaled, LOUD, known.window, MOST).fit

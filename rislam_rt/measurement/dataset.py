@@ -12,7 +12,7 @@ from rislam_rt.errors import StoreError
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.received import receive
 from rislam_rt.measurement.tracking import TrackingConfig, init_tracks, step_tracks
-from rislam_rt.measurement.waveform import Components, capture, find_components, to_measurement, true_paths
+from rislam_rt.measurement.waveform import DetectedComponents, capture, find_components, to_measurement, true_paths
 from rislam_rt.model import Paths, RadioConfig, Trajectory
 from rislam_rt.waveform import subcarrier_frequencies
 
@@ -93,7 +93,7 @@ def signals_dataset(
     }
     if config.alternation and config.panels > 1:
         values["found_which_panel"] = _padded(which, NO_COMPONENT)
-    for name in Components._fields[:-1]:
+    for name in DetectedComponents._fields[:-1]:
         values[f"found_{name}"] = _padded([getattr(one, name) for one in found], 0.0)
     return _dataset(values, radio, config)
 

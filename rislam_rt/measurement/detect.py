@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
-from rislam_rt.measurement.atoms import Sounding
+from rislam_rt.measurement.sounding import Sounding
 
 OVERSAMPLING = 2
 """Grid points per resolution cell of the delay."""
@@ -20,7 +20,7 @@ BATCH_RANGE = 10.0**-1.2
 """Peaks down to this share of the strongest are taken from the same residual; sidelobes of what is taken lie below."""
 
 
-class Grid(NamedTuple):
+class MatchedFilterGrid(NamedTuple):
     """Directions and delays at which the matched filter is evaluated."""
 
     cosines: Floats
@@ -36,7 +36,7 @@ class Grid(NamedTuple):
     """(3, n) of each: what `a^H y` is weighed with for its value and its first two derivatives."""
 
 
-def build_grid(sounding: Sounding, window: tuple[float, float]) -> Grid:
+def build_grid(sounding: Sounding, window: tuple[float, float]) -> MatchedFilterGrid:
     """Grid over the sky and over a window of delays, given in resolution cells."""
     u, v = np.meshgrid(_axis(sounding.row), _axis(sounding.col), indexing="ij")
     step = np.hypot(1.0 / len(_axis(sounding.row)), 1.0 / len(_axis(sounding.col)))
@@ -50,20 +50,25 @@ def build_grid(sounding: Sounding, window: tuple[float, float]) -> Grid:
     delays = np.unique(np.arange(first, last + 1, dtype=np.int64) % count)
     places = (-2.0 * np.pi * sounding.frequency, 2.0 * np.pi * sounding.row, 2.0 * np.pi * sounding.col)
     tones, row, col = (np.stack([np.ones(len(x)), -1j * x, -(x**2)]) for x in places)
-    return Grid(cosines, antennas, delays, count, places, (tones, row, col))
+    return MatchedFilterGrid(cosines, antennas, delays, count, places, (tones, row, col))
 
 
-def spectrum(grid: Grid, residual: Complexes) -> Complexes:
+def spectrum(grid: MatchedFilterGrid, residual: Complexes) -> Complexes:
     """Matched filter's output (G, T), up to a phase, for samples (L, M)."""
     return np.asarray(grid.antennas @ _delay_spectrum(grid, residual.astype(np.complex64)))
 
 
-def _delay_spectrum(grid: Grid, beams: Complexes) -> Complexes:
+def _delay_spectrum(grid: MatchedFilterGrid, beams: Complexes) -> Complexes:
     return np.fft.ifft(beams, n=grid.tones, axis=1, norm="forward")[:, grid.delays]
 
 
 def pick_peaks(
-    sounding: Sounding, grid: Grid, residual: Complexes, threshold: float, window: tuple[float, float], most: int
+    sounding: Sounding,
+    grid: MatchedFilterGrid,
+    residual: Complexes,
+    threshold: float,
+    window: tuple[float, float],
+    most: int,
 ) -> Floats:
     """Parameters (P, 3) of new paths whose measured SNR in the residual exceeds a linear threshold.
 
@@ -93,7 +98,7 @@ def pick_peaks(
 
 
 def _climb(
-    grid: Grid, start: Floats, residual: Complexes, window: tuple[float, float]
+    grid: MatchedFilterGrid, start: Floats, residual: Complexes, window: tuple[float, float]
 ) -> tuple[Floats, complex, Complexes, Complexes]:
     """The peak of the matched filter next to a grid point, by Newton steps along each parameter.
 
@@ -108,12 +113,12 @@ def _climb(
     return point, complex(antennas.conj() @ (residual @ tones.conj())), antennas, tones
 
 
-def _signals(grid: Grid, point: Floats) -> list[Complexes]:
+def _signals(grid: MatchedFilterGrid, point: Floats) -> list[Complexes]:
     """A signal's factors over tones, rows and columns."""
     return [np.exp(1j * value * place) for place, value in zip(grid.places, point, strict=True)]
 
 
-def _moments(grid: Grid, signal: list[Complexes], residual: Complexes) -> Complexes:
+def _moments(grid: MatchedFilterGrid, signal: list[Complexes], residual: Complexes) -> Complexes:
     """(3, 3) `a^H y` and its first two derivatives by each of (B tau, u, v)."""
     tones, row, col = (weight * factor.conj() for weight, factor in zip(grid.powers, signal, strict=True))
     field = residual @ tones.T
@@ -121,7 +126,7 @@ def _moments(grid: Grid, signal: list[Complexes], residual: Complexes) -> Comple
     return np.array([np.multiply.outer(row[0], col[0]).ravel() @ field, row @ (beam @ col[0]), col @ (row[0] @ beam)])
 
 
-def _newton_moves(moments: Complexes, grid: Grid) -> Floats:
+def _newton_moves(moments: Complexes, grid: MatchedFilterGrid) -> Floats:
     """Newton steps (3,) of |a^H y|^2, each parameter on its own; uphill where the curvature has the wrong sign."""
     value, first, second = moments.T
     power = value.real**2 + value.imag**2

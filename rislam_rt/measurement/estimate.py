@@ -11,11 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats
-from rislam_rt.measurement.atoms import Sounding
-from rislam_rt.measurement.detect import Grid, into_range, pick_peaks
+from rislam_rt.measurement.detect import MatchedFilterGrid, into_range, pick_peaks
 from rislam_rt.measurement.refine import (
     Accuracy,
-    Fit,
+    LeastSquaresFit,
     accuracy,
     fit_amplitudes,
     part,
@@ -25,6 +24,7 @@ from rislam_rt.measurement.refine import (
     residual,
     without_idle,
 )
+from rislam_rt.measurement.sounding import Sounding
 
 BATCH = 16
 """Most paths that are added between two refinements."""
@@ -51,13 +51,13 @@ NOTHING = np.zeros((0, 3))
 class Estimate(NamedTuple):
     """P paths found in one sounding, with the noise normalised to one."""
 
-    fit: Fit
+    fit: LeastSquaresFit
     accuracy: Accuracy
 
 
 def estimate_paths(
     sounding: Sounding,
-    grid: Grid,
+    grid: MatchedFilterGrid,
     samples: Complexes,
     threshold: float,
     window: tuple[float, float],
@@ -99,7 +99,7 @@ def estimate_paths(
 
 
 def _finish(
-    sounding: Sounding, fit: Fit, samples: Complexes, threshold: float, window: tuple[float, float]
+    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
 ) -> Estimate:
     """All paths refined to the end, those taken out that the others can stand in for."""
     fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
@@ -108,7 +108,7 @@ def _finish(
     return Estimate(final, bound if final is fit else accuracy(final))
 
 
-def _touched(fit: Fit, fresh: int, num_samples: int) -> Booleans:
+def _touched(fit: LeastSquaresFit, fresh: int, num_samples: int) -> Booleans:
     """(P,) the last so many paths, and those which would lose more than noise if they did not give way to them."""
     energy = np.abs(fit.amplitude[-fresh:]) ** 2 / num_samples
     touched = np.any(np.abs(fit.inner.signal[:, -fresh:]) ** 2 * energy > TOUCHED, axis=1)
@@ -116,14 +116,16 @@ def _touched(fit: Fit, fresh: int, num_samples: int) -> Booleans:
     return touched
 
 
-def _refine_some(sounding: Sounding, fit: Fit, samples: Complexes, chosen: Booleans) -> Fit:
+def _refine_some(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, chosen: Booleans) -> LeastSquaresFit:
     """Refine the chosen paths (P,) for the next search, the others held."""
     if chosen.all():
         return refine(sounding, fit, samples, steps=SEARCH_STEPS)
     return refine_some(sounding, fit, samples, np.flatnonzero(chosen), steps=SEARCH_STEPS)
 
 
-def drop(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float, window: tuple[float, float]) -> Fit:
+def drop(
+    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
+) -> LeastSquaresFit:
     """Without the paths that left the window or the sky, and those whose loss alone costs less than the threshold."""
     keep = _inside(fit.parameters, window)
     if not keep.all():
@@ -132,7 +134,9 @@ def drop(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float, win
     return fit if keep.all() else pick(sounding, fit, keep, samples)
 
 
-def prune(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float) -> tuple[Fit, Accuracy]:
+def prune(
+    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float
+) -> tuple[LeastSquaresFit, Accuracy]:
     """Without the paths that their neighbours, refined, can stand in for; and the bound of what is left.
 
     Noise alone lowers the cost by its highest peak when a path is added, so the threshold is the one of the search.
@@ -153,7 +157,9 @@ def prune(sounding: Sounding, fit: Fit, samples: Complexes, threshold: float) ->
             return fit, bound
 
 
-def _neighbours_instead(sounding: Sounding, fit: Fit, samples: Complexes, row: int, enough: float) -> Floats | None:
+def _neighbours_instead(
+    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, row: int, enough: float
+) -> Floats | None:
     """Parameters (P - 1, 3) without a path, its neighbours refined, if the cost stays below `enough`."""
     near = np.flatnonzero(np.abs(fit.inner.signal[row]) > COUPLED * sounding.num_samples)
     whole, local = part(sounding, fit, near, samples)

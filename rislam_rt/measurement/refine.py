@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
-from rislam_rt.measurement.atoms import Sounding
-from rislam_rt.measurement.inner import Inner, Waves, inner_of, waves_at
-from rislam_rt.measurement.positive import RIDGE, inverse, solve
-from rislam_rt.measurement.waves import correlate_waves, wave_signals
+from rislam_rt.measurement.inner_products import InnerProducts, PathSignals, inner_of, waves_at
+from rislam_rt.measurement.positive_definite import RIDGE, inverse, solve
+from rislam_rt.measurement.sounding import Sounding
+from rislam_rt.measurement.spherical_waves import correlate_waves, wave_signals
 
 PRIOR = np.array([0.0, 2.0, 2.0])
 """Half the information that lying in the unit disc gives on a cosine (standard deviation 0.5): it matters only along an
@@ -36,12 +36,12 @@ DAMPING, LEAST_DAMPING = 1e-3, 1e-6
 """Share of its diagonal that is added to a step's matrix: at first, and at least."""
 
 
-class Fit(NamedTuple):
+class LeastSquaresFit(NamedTuple):
     """P paths fitted to samples whose noise has unit variance."""
 
-    waves: Waves
+    waves: PathSignals
     """Their signals."""
-    inner: Inner
+    inner: InnerProducts
     """Inner products of those."""
     exact: Complexes | None
     """(L M, P) their signals without approximations, where the sounding asks for it."""
@@ -73,7 +73,7 @@ class Accuracy(NamedTuple):
     """(P,) standard deviation of the complex amplitude, the other paths' parameters unknown as well."""
 
 
-def fit_amplitudes(sounding: Sounding, parameters: Floats, samples: Complexes) -> Fit:
+def fit_amplitudes(sounding: Sounding, parameters: Floats, samples: Complexes) -> LeastSquaresFit:
     """The fit with these parameters (P, 3) and the amplitudes that suit them best, to samples (L, M)."""
     waves = waves_at(sounding, parameters)
     inner, energy = inner_of(sounding, waves), float(np.vdot(samples, samples).real)
@@ -82,17 +82,19 @@ def fit_amplitudes(sounding: Sounding, parameters: Floats, samples: Complexes) -
     return _fit(waves, inner, waves.correlate(sounding, samples), energy)
 
 
-def _fit(waves: Waves, inner: Inner, seen: Complexes, energy: float) -> Fit:
+def _fit(waves: PathSignals, inner: InnerProducts, seen: Complexes, energy: float) -> LeastSquaresFit:
     """From the products (4, P) of signals and derivatives with samples of this energy."""
     count, matched = len(waves.parameters), seen[0]
     covariance = inverse(inner.signal)
     amplitude = covariance @ matched
     cost = energy - np.vdot(amplitude, 2.0 * matched - inner.signal @ amplitude).real
     slopes = seen[1:] - (amplitude @ inner.mixed.reshape(count, 3 * count)).reshape(3, count)
-    return Fit(waves, inner, None, seen, covariance, amplitude, slopes, energy, float(cost))
+    return LeastSquaresFit(waves, inner, None, seen, covariance, amplitude, slopes, energy, float(cost))
 
 
-def _exact_fit(sounding: Sounding, waves: Waves, inner: Inner, samples: Complexes, energy: float) -> Fit:
+def _exact_fit(
+    sounding: Sounding, waves: PathSignals, inner: InnerProducts, samples: Complexes, energy: float
+) -> LeastSquaresFit:
     """Likewise with the signals of `waves.wave_signals`."""
     exact = wave_signals(sounding, waves.parameters)
     products = exact.conj().T @ exact + RIDGE * sounding.num_samples * np.eye(exact.shape[1])
@@ -100,17 +102,19 @@ def _exact_fit(sounding: Sounding, waves: Waves, inner: Inner, samples: Complexe
     rest = samples - (exact @ amplitude).reshape(samples.shape)
     matched, slopes = correlate_waves(sounding, exact, rest)
     cost, seen = float(np.vdot(rest, rest).real), np.asarray(np.concatenate([matched[None], slopes]))
-    return Fit(waves, inner, exact, seen, inverse(inner.signal), amplitude, slopes, energy, cost)
+    return LeastSquaresFit(waves, inner, exact, seen, inverse(inner.signal), amplitude, slopes, energy, cost)
 
 
-def pick(sounding: Sounding, fit: Fit, keep: Booleans, samples: Complexes) -> Fit:
+def pick(sounding: Sounding, fit: LeastSquaresFit, keep: Booleans, samples: Complexes) -> LeastSquaresFit:
     """The fit of some of the paths alone."""
     if fit.exact is not None:
         return fit_amplitudes(sounding, fit.parameters[keep], samples)
     return _fit(fit.waves.take(keep), fit.inner.take(keep), fit.seen[:, keep], fit.energy)
 
 
-def part(sounding: Sounding, fit: Fit, rows: Integers, samples: Complexes) -> tuple[Fit, Complexes]:
+def part(
+    sounding: Sounding, fit: LeastSquaresFit, rows: Integers, samples: Complexes
+) -> tuple[LeastSquaresFit, Complexes]:
     """The fit of some paths to the samples less all the others; and those (L, M)."""
     others = np.ones(len(fit.amplitude), dtype=bool)
     others[rows] = False
@@ -126,12 +130,12 @@ def part(sounding: Sounding, fit: Fit, rows: Integers, samples: Complexes) -> tu
     return _fit(fit.waves.take(rows), inner, seen, float(np.vdot(local, local).real)), local
 
 
-def residual(fit: Fit, samples: Complexes) -> Complexes:
+def residual(fit: LeastSquaresFit, samples: Complexes) -> Complexes:
     """Samples (L, M) less the fitted paths."""
     return samples - contribution(fit, np.arange(len(fit.amplitude)), samples)
 
 
-def contribution(fit: Fit, rows: Integers | Booleans, samples: Complexes) -> Complexes:
+def contribution(fit: LeastSquaresFit, rows: Integers | Booleans, samples: Complexes) -> Complexes:
     """What some of the fitted paths add to the samples (L, M)."""
     if fit.exact is not None:
         return np.asarray((fit.exact[:, rows] @ fit.amplitude[rows]).reshape(samples.shape))
@@ -140,13 +144,13 @@ def contribution(fit: Fit, rows: Integers | Booleans, samples: Complexes) -> Com
 
 def refine(
     sounding: Sounding,
-    fit: Fit,
+    fit: LeastSquaresFit,
     samples: Complexes,
     *,
     steps: int,
     tolerance: float = SEARCH_TOLERANCE,
     enough: float = 0.0,
-) -> Fit:
+) -> LeastSquaresFit:
     """Up to so many damped Gauss-Newton steps.
 
     They end when one promises less than `tolerance` of noise energy from every path; with `enough`, also when the cost
@@ -184,8 +188,14 @@ def refine(
 
 
 def refine_some(
-    sounding: Sounding, fit: Fit, samples: Complexes, rows: Integers, *, steps: int, tolerance: float = SEARCH_TOLERANCE
-) -> Fit:
+    sounding: Sounding,
+    fit: LeastSquaresFit,
+    samples: Complexes,
+    rows: Integers,
+    *,
+    steps: int,
+    tolerance: float = SEARCH_TOLERANCE,
+) -> LeastSquaresFit:
     """Refine some paths, the others held."""
     begun, local = part(sounding, fit, rows, samples)
     some = refine(sounding, begun, local, steps=steps, tolerance=tolerance)
@@ -194,19 +204,19 @@ def refine_some(
     return fit_amplitudes(sounding, parameters, samples)
 
 
-def _along(sounding: Sounding, fit: Fit, chosen: Booleans) -> Integers:
+def _along(sounding: Sounding, fit: LeastSquaresFit, chosen: Booleans) -> Integers:
     """Rows of the paths that overlap with chosen ones (P,), themselves among them."""
     return np.flatnonzero((np.abs(fit.inner.signal[:, chosen]) > OVERLAP * sounding.num_samples).any(axis=1))
 
 
-def accuracy(fit: Fit) -> Accuracy:
+def accuracy(fit: LeastSquaresFit) -> Accuracy:
     """Joint bound of parameters and amplitudes; enormous where paths cannot be told apart."""
     covariance, variance = joint_bound(fit.inner, fit.amplitude, fit.covariance)
     deviations = np.sqrt(np.maximum(np.diagonal(covariance), 0.0)).reshape(3, -1).T
     return Accuracy(deviations, np.sqrt(variance))
 
 
-def joint_bound(inner: Inner, amplitude: Complexes, known: Floats | None = None) -> tuple[Floats, Floats]:
+def joint_bound(inner: InnerProducts, amplitude: Complexes, known: Floats | None = None) -> tuple[Floats, Floats]:
     """Covariance (3P, 3P) of the parameters, parameter by parameter, and variance (P,) of the complex amplitudes.
 
     At unit noise, everything unknown; `known` is the amplitudes' covariance (P, P) at known parameters, if at hand.
@@ -220,7 +230,7 @@ def joint_bound(inner: Inner, amplitude: Complexes, known: Floats | None = None)
     return covariance, np.maximum(spread, 0.0)
 
 
-def without_idle(fit: Fit, threshold: float) -> Booleans:
+def without_idle(fit: LeastSquaresFit, threshold: float) -> Booleans:
     """(P,) which paths are left when those go, the most idle first, without which the cost grows by less than that.
 
     The others' amplitudes are fitted again after each, by a rank-one change of their covariance.
@@ -239,7 +249,7 @@ def without_idle(fit: Fit, threshold: float) -> Booleans:
     return keep
 
 
-def information_matrix(inner: Inner, covariance: Floats, amplitude: Complexes) -> Floats:
+def information_matrix(inner: InnerProducts, covariance: Floats, amplitude: Complexes) -> Floats:
     """Half the Fisher information (3P, 3P) on the parameters at unit noise, parameter by parameter, then path by path.
 
     With the amplitudes unknown; `covariance` (P, P) is theirs at known parameters.

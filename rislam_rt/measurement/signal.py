@@ -8,9 +8,9 @@ of M samples at rate B, scaled by 1 / sqrt(B), whose noise has the variance N0 B
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats
-from rislam_rt.measurement.atoms import tone_response
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.received import Received
+from rislam_rt.measurement.sounding import tone_response
 from rislam_rt.model import RadioConfig
 from rislam_rt.waveform import delay_response, flat_pulse, subcarrier_frequencies
 

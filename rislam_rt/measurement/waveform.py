@@ -7,20 +7,20 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import measurement_std
-from rislam_rt.measurement.atoms import Sounding, build_sounding
+from rislam_rt.measurement.components import capped, into_disc
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.detect import Grid, build_grid
-from rislam_rt.measurement.doubt import crowding, luck, mirror_variance, unmirrored
+from rislam_rt.measurement.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_swing, in_step
-from rislam_rt.measurement.identify import identify
-from rislam_rt.measurement.joint import LEAST_CERTAINTY
-from rislam_rt.measurement.parts import capped, into_disc
+from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
+from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
 from rislam_rt.measurement.received import Received
-from rislam_rt.measurement.sides import Found, panel_probability
 from rislam_rt.measurement.signal import num_tones, tones
-from rislam_rt.measurement.slot import codes_in_turn, split
+from rislam_rt.measurement.slot_motion import codes_in_turn, split
+from rislam_rt.measurement.sounding import Sounding, build_sounding
+from rislam_rt.measurement.true_identity import identify
+from rislam_rt.measurement.variance_inflation import crowding, mirror_variance, peak_bias, unmirrored
 from rislam_rt.model import Measurement, PathTruth, RadioConfig
 
 
@@ -36,7 +36,7 @@ class Capture(NamedTuple):
     turns within the slot."""
 
 
-class Components(NamedTuple):
+class DetectedComponents(NamedTuple):
     """N components found, in the order of their delays."""
 
     tau: Floats
@@ -107,16 +107,16 @@ def _signed_sum(parts: list[Complexes], signs: Floats) -> Complexes:
 
 def find_components(
     captures: list[Capture], radio: RadioConfig, config: ReceiverConfig, previous: Measurement | None = None
-) -> Components:
+) -> DetectedComponents:
     """All components in the captures of one cycle; the search begins with those of the previous one, if given."""
     return by_delay([_find(one, radio, config, _known(one, radio, previous)) for one in captures])
 
 
-def by_delay(parts: list[Components]) -> Components:
+def by_delay(parts: list[DetectedComponents]) -> DetectedComponents:
     """Components of several captures in the order of their delays."""
     joined = [np.concatenate(fields) for fields in zip(*parts, strict=True)]
     order = np.argsort(joined[0])
-    return Components._make(field[order] for field in joined)
+    return DetectedComponents._make(field[order] for field in joined)
 
 
 def measure_waveform(
@@ -135,7 +135,7 @@ def measure_waveform(
     return to_measurement(found, radio, config), PathTruth(true_paths(found, received, radio, config))
 
 
-def true_paths(found: Components, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
+def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
     """Column (N,) of the path that each component most likely is, by what its capture holds; -1 for none."""
     path = np.full(len(found.tau), -1)
     for number, heard in enumerate(split(received, config)):
@@ -144,14 +144,14 @@ def true_paths(found: Components, received: Received, radio: RadioConfig, config
     return path
 
 
-def to_measurement(found: Components, radio: RadioConfig, config: ReceiverConfig) -> Measurement:
+def to_measurement(found: DetectedComponents, radio: RadioConfig, config: ReceiverConfig) -> Measurement:
     """What the agent gets to see of the components."""
     told: tuple[Any, ...] = ()
     if config.alternation:
         points, deviation = (
             np.column_stack(pair) for pair in ((found.tau, found.cosines), (found.tau_std, found.cosines_std))
         )
-        seen = Found(points, deviation, found.gain, np.sqrt(2.0) * found.amplitude_std, found.capture)
+        seen = ComponentSides(points, deviation, found.gain, np.sqrt(2.0) * found.amplitude_std, found.capture)
         told = panel_probability(seen, radio, config)
     return Measurement(
         found.tau,
@@ -175,7 +175,7 @@ def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Fl
     return np.column_stack([previous.tau * radio.bandwidth, previous.cosines])[mine]
 
 
-def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Floats) -> Components:
+def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Floats) -> DetectedComponents:
     """Components of one capture: what is told apart, with deviations that count what cannot be seen."""
     window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
     sounding, grid = _searched(one.samples.shape[1], window, radio, config)
@@ -184,11 +184,11 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
     found = estimate_paths(sounding, grid, samples, threshold, window, config.max_components, known)
     parameters, gain, deviation, amplitude_std = _resolved(found, one.samples.size, radio)
     cosines = into_disc(unmirrored(parameters[:, 1:], radio))
-    variance = deviation**2 * luck(np.abs(gain) ** 2 * one.samples.size)[:, None]
+    variance = deviation**2 * peak_bias(np.abs(gain) ** 2 * one.samples.size)[:, None]
     variance *= crowding(parameters, threshold, radio)
     mirrored = mirror_variance(cosines, np.sqrt(variance[:, 1:]), radio)
     scale = np.sqrt(one.noise_psd * one.samples.shape[1] / radio.energy)
-    return Components(
+    return DetectedComponents(
         np.clip(parameters[:, 0], *window) / radio.bandwidth,
         cosines,
         scale * gain,
@@ -202,7 +202,7 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
 @lru_cache(maxsize=16)
 def _searched(
     count: int, window: tuple[float, float], radio: RadioConfig, config: ReceiverConfig
-) -> tuple[Sounding, Grid]:
+) -> tuple[Sounding, MatchedFilterGrid]:
     """Sounding of so many tones, and the grid that is searched in a window of delays, in cells."""
     sounding = build_sounding(count, radio, element_exact=config.element_exact)
     return sounding, build_grid(sounding, window)

@@ -9,7 +9,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, freeze
 from rislam_rt.model.estimate import MapEstimate
 from rislam_rt.model.paths import Paths
-from rislam_rt.model.picture import html_with
+from rislam_rt.model.plan_view import html_with
 from rislam_rt.model.scene import Scene
 
 STEPS = ("optimise", "communicate", "measure", "localise")

@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, freeze, show_point
 from rislam_rt.errors import SceneError
-from rislam_rt.model.picture import Plan, html_with, outline
+from rislam_rt.model.plan_view import PlanView, html_with, outline
 from rislam_rt.model.ris import RisPanel, RisPanels
 from rislam_rt.model.trajectory import Trajectory
 
@@ -209,10 +209,10 @@ class Scene:
     def _repr_html_(self) -> str:
         return html_with(repr(self), self.plan(("true way", self.agent.position)))
 
-    def plan(self, *ways: tuple[str, Floats]) -> Plan:
+    def plan(self, *ways: tuple[str, Floats]) -> PlanView:
         """The room from above, with named courses (K, 3) [m] in it."""
         edges = outline((reflector.vertices, reflector.faces) for reflector in self.reflectors)
-        return Plan(self.bounds, edges, list(zip(self.landmarks, self.landmark_positions, strict=True)), ways)
+        return PlanView(self.bounds, edges, list(zip(self.landmarks, self.landmark_positions, strict=True)), ways)
 
     @property
     def panels(self) -> tuple[RisPanel, ...]:

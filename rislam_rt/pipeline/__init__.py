@@ -7,13 +7,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rislam_rt.pipeline.read import load_spec
     from rislam_rt.pipeline.run import run_slam
-    from rislam_rt.pipeline.spec import PipelineSpec
+    from rislam_rt.pipeline.specification.radio import build_radio
+    from rislam_rt.pipeline.specification.read import load_spec
+    from rislam_rt.pipeline.specification.spec import PipelineSpec
 
-__all__ = ["PipelineSpec", "load_spec", "run_slam"]
+__all__ = ["PipelineSpec", "build_radio", "load_spec", "run_slam"]
 
-_HOME = {"load_spec": "read", "run_slam": "run", "PipelineSpec": "spec"}
+_HOME = {
+    "build_radio": "specification.radio",
+    "load_spec": "specification.read",
+    "run_slam": "run",
+    "PipelineSpec": "specification.spec",
+}
 
 
 def __getattr__(name: str) -> Any:

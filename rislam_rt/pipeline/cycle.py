@@ -16,7 +16,7 @@ from rislam_rt.measurement import Clutter, FrontEnd, measure
 from rislam_rt.model import DataSheet, Measurement, Paths, PathTruth, RisCode, SlamEstimate, Trajectory
 from rislam_rt.pipeline.control import Link, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
-from rislam_rt.pipeline.spec import PipelineSpec, Settings
+from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings
 from rislam_rt.pipeline.told import Told, tell_measurement
 from rislam_rt.ris import PanelErrors, rephase
 

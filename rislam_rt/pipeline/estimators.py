@@ -8,10 +8,10 @@ import numpy as np
 from rislam_rt import slam
 from rislam_rt.arrays import Integers
 from rislam_rt.errors import ConfigError, expect
-from rislam_rt.information.landmarks import Unknown
+from rislam_rt.information.landmark_model import Unknown
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.pipeline.own_methods import at_work, load_own
-from rislam_rt.pipeline.spec import Settings
+from rislam_rt.pipeline.specification.spec import Settings
 from rislam_rt.slam import StartPrior
 from rislam_rt.slam.schemes import bp_slam, channel_slam
 

@@ -13,24 +13,23 @@ from rislam_rt.backend import prepare_backend
 from rislam_rt.channel.protocol import Channel
 from rislam_rt.errors import ConfigError, RislamError, expect
 from rislam_rt.model import Body, Paths, RadioConfig, Scene, SchemeResult, SlamResult
-from rislam_rt.pipeline.change import change_room
 from rislam_rt.pipeline.control import check_control
 from rislam_rt.pipeline.cycle import usual_step
 from rislam_rt.pipeline.estimators import Estimator
-from rislam_rt.pipeline.extras import check_extras, trace_clutter
-from rislam_rt.pipeline.motion import draw_motion
 from rislam_rt.pipeline.own_methods import OwnChannel
-from rislam_rt.pipeline.radio import build_radio
+from rislam_rt.pipeline.room.extras import check_extras, trace_clutter
+from rislam_rt.pipeline.room.motion import draw_motion
+from rislam_rt.pipeline.room.scene_overrides import change_room
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
-from rislam_rt.pipeline.spec import PipelineSpec
+from rislam_rt.pipeline.specification.radio import build_radio
+from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.pipeline.told import lean
 from rislam_rt.pipeline.walk import Walk
 from rislam_rt.pipeline.workers import run_side_by_side
 from rislam_rt.ris import delay_spread_warnings
 from rislam_rt.scene.check import material_errors
 from rislam_rt.scene.findings import raise_errors
-from rislam_rt.slam.inputs import lone_panel
 
 Progress = Callable[[str, int, int], None]
 """Told the stage (`trace` or a scheme), how much of it is done, and how much there is."""
@@ -210,8 +209,6 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
             raise ConfigError(f"schemes: '{need[0]}' needs a panel and scene '{scene.name}' has none; give 'no_ris'")
         return
     check_control(scene.ris.spec, spec.control, spec.panel.bit_flip)
-    if spec.slam.filter == "window" and any(SCHEMES[n].panel and SCHEMES[n].estimator == "slam" for n in spec.schemes):
-        lone_panel(scene.ris.spec)
 
 
 def prepare_channel(kind: str) -> None:

@@ -13,11 +13,11 @@ from rislam_rt.errors import ConfigError, StoreError
 from rislam_rt.measurement import NO_COMPONENT, ReceiverConfig, num_tones, signals_dataset, twin
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene
 from rislam_rt.pipeline.dataset import paths_to_dataset
-from rislam_rt.pipeline.radio import RadioSection, build_radio
-from rislam_rt.pipeline.read import build_spec, settings_table
 from rislam_rt.pipeline.run import build_channel
-from rislam_rt.pipeline.section import Section
-from rislam_rt.pipeline.spec import ReceiverSection
+from rislam_rt.pipeline.specification.radio import RadioSection, build_radio
+from rislam_rt.pipeline.specification.read import build_spec, settings_table
+from rislam_rt.pipeline.specification.section import Section
+from rislam_rt.pipeline.specification.spec import ReceiverSection
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,8 +12,8 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Antennas, Body, DataSheet, Measurement, Paths, RadioConfig, RisSpec, RisSpecs, Trajectory
-from rislam_rt.pipeline.mistold import ToldSection
-from rislam_rt.pipeline.spec import ESTIMATOR_SECTIONS, PipelineSpec, Settings, StartSection
+from rislam_rt.pipeline.specification.mistold import ToldSection
+from rislam_rt.pipeline.specification.spec import ESTIMATOR_SECTIONS, PipelineSpec, Settings, StartSection
 from rislam_rt.slam import StartPrior
 
 

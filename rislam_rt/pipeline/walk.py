@@ -9,16 +9,16 @@ import numpy as np
 from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.measurement import FrontEnd
 from rislam_rt.model import Body, PathKind, Paths, Scene, SchemeResult
-from rislam_rt.pipeline.choose import build_designer
+from rislam_rt.pipeline.code_policies import build_designer
 from rislam_rt.pipeline.control import open_link
 from rislam_rt.pipeline.cycle import Agent, Cycle, Means, Rng, Room, run_cycle
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
-from rislam_rt.pipeline.extras import heard_clutter
-from rislam_rt.pipeline.front_end import prepare_front_end
 from rislam_rt.pipeline.record import gather, given_of
+from rislam_rt.pipeline.room.extras import heard_clutter
+from rislam_rt.pipeline.room.front_end import prepare_front_end
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, child
-from rislam_rt.pipeline.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.told import deceive, tell_belief
 from rislam_rt.ris import draw_panel
 

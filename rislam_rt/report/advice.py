@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
+from rislam_rt.adviser.advice import Advice
+from rislam_rt.adviser.budget import NOTHING_DB, Link
+from rislam_rt.adviser.cost import cost_words
+from rislam_rt.adviser.coverage import Coverage
+from rislam_rt.adviser.remedies import verdict
 from rislam_rt.model import Scene
-from rislam_rt.pipeline.advise.advice import Advice
-from rislam_rt.pipeline.advise.budget import NOTHING_DB, Link
-from rislam_rt.pipeline.advise.cost import cost_words
-from rislam_rt.pipeline.advise.coverage import Coverage
-from rislam_rt.pipeline.advise.remedies import verdict
 from rislam_rt.report.room import draw_plan
 from rislam_rt.report.style import save_figure, styled
 

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from rislam_rt.channel.compare import OneSided
+from rislam_rt.channel.compare import OneSidedPath
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import PathKind, Paths
 from rislam_rt.report.geometry import outline_edges
@@ -81,7 +81,7 @@ def _draw_alone(axis: Axes, certificate: Certificate) -> None:
     axis.text(0.0, -0.09, _proofs(one_sided), transform=axis.transAxes, va="top", fontsize=8.5)
 
 
-def _proofs(one_sided: Sequence[OneSided]) -> str:
+def _proofs(one_sided: Sequence[OneSidedPath]) -> str:
     """One line a path, the first few of them."""
     if not one_sided:
         return "nothing: both sides have the same paths"

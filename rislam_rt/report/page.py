@@ -10,14 +10,14 @@ import numpy as np
 
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import SlamResult
-from rislam_rt.pipeline.spec import PipelineSpec, build_settings
-from rislam_rt.report.code import draw_run_codes
-from rislam_rt.report.curves import draw_agent_error, draw_landmark_errors, draw_levels
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.report.code_pictures import draw_run_codes
+from rislam_rt.report.conclusions import judge_run
 from rislam_rt.report.room import draw_above, draw_paths
 from rislam_rt.report.style import to_png
 from rislam_rt.report.tables import summary_rows
+from rislam_rt.report.time_curves import draw_agent_error, draw_landmark_errors, draw_levels
 from rislam_rt.report.timing import draw_timing
-from rislam_rt.report.verdict import judge_run
 from rislam_rt.report.view.page import view_fragment, view_script, view_style
 from rislam_rt.report.view.run_data import run_data
 from rislam_rt.storage.files import write_atomic

@@ -13,7 +13,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import COPLANAR_OFFSET
 from rislam_rt.model import PathKind, Paths, Scene, SchemeResult, SlamResult
-from rislam_rt.pipeline.summary import landmark_track, match_walls
+from rislam_rt.pipeline.scores.summary import landmark_track, match_walls
 from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace, section
 from rislam_rt.report.style import KIND, TRUTH, WALL, save_figure, scheme_colour, styled
 

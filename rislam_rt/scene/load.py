@@ -13,9 +13,9 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade, join_panels
 from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
-from rislam_rt.scene.containers import too_many_faces
 from rislam_rt.scene.findings import Fault, Faults, Finding, panel_key, raise_errors
-from rislam_rt.scene.lying import UNITS, place_mesh
+from rislam_rt.scene.mesh_containers import too_many_faces
+from rislam_rt.scene.mesh_placement import UNITS, place_mesh
 from rislam_rt.scene.meshes import MAX_COORDINATE, MAX_MESH_BYTES, Mesh, MeshReader, read_inside
 from rislam_rt.scene.motion import build_motion
 from rislam_rt.scene.schema import (
@@ -37,7 +37,7 @@ from rislam_rt.toml import parse_toml
 SCENE_FILE = "scene.toml"
 
 
-class Draft(NamedTuple):
+class SceneDraft(NamedTuple):
     """A scene as far as it could be read."""
 
     file: str
@@ -95,15 +95,15 @@ def _plain_table(file: Path) -> dict[str, Any]:
         return {}
 
 
-def read_draft(path: str | Path) -> Draft:
+def read_draft(path: str | Path) -> SceneDraft:
     """Read a scene, collecting what is wrong with it instead of raising."""
     file = scene_file(path)
     try:
         spec, content = read_spec(file)
     except Faults as faults:
-        return Draft(str(file), None, [fault.at(str(file), "") for fault in faults.faults])
+        return SceneDraft(str(file), None, [fault.at(str(file), "") for fault in faults.faults])
     except Fault as fault:
-        return Draft(str(file), None, [fault.at(str(file), "")])
+        return SceneDraft(str(file), None, [fault.at(str(file), "")])
     return assemble(spec, file, content)
 
 
@@ -113,9 +113,9 @@ def scene_file(path: str | Path) -> Path:
     return path if path.suffix == ".toml" and not path.is_dir() else path / SCENE_FILE
 
 
-def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
+def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     """Read what a specification names and put the scene together."""
-    shelf, findings = Shelf(file.parent, spec.limits, spec.meshes), []
+    shelf, findings = MeshFiles(file.parent, spec.limits, spec.meshes), []
     reflectors = []
     for number, section in enumerate(spec.reflector):
         try:
@@ -145,11 +145,11 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> Draft:
     corners = np.concatenate([np.zeros((0, 3)), *(reflector.vertices for reflector in reflectors)])
     bounds = np.stack([corners.min(axis=0), corners.max(axis=0)]) if len(corners) else None
     if findings:
-        return Draft(str(file), None, findings, bounds)
+        return SceneDraft(str(file), None, findings, bounds)
     ris = join_panels(panels)
     digest = _digest(content, shelf.contents)
     scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(shades))
-    return Draft(str(file), scene, [], bounds)
+    return SceneDraft(str(file), scene, [], bounds)
 
 
 def _surfaces(reflectors: Sequence[Reflector], shades: Sequence[Shade]) -> Floats:
@@ -157,7 +157,7 @@ def _surfaces(reflectors: Sequence[Reflector], shades: Sequence[Shade]) -> Float
     return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in shades)])
 
 
-class Shelf:
+class MeshFiles:
     """The mesh files of a scene: each is read once and kept for the digest, and together they have so many faces."""
 
     def __init__(self, folder: Path, limits: LimitsSection, lying: MeshesSection) -> None:
@@ -182,7 +182,7 @@ class Shelf:
         return place_mesh(mesh, up, unit, np.array(origin))
 
 
-def _reflector(section: ReflectorSection, shelf: Shelf) -> Reflector:
+def _reflector(section: ReflectorSection, shelf: MeshFiles) -> Reflector:
     mesh = shelf.mesh(section.mesh, section)
     return Reflector(section.name, mesh.vertices, mesh.faces, _material(section.material))
 
@@ -201,7 +201,7 @@ def _material(section: MaterialSection) -> Material:
     )
 
 
-def _scatterer(section: ScattererSection, shelf: Shelf) -> Scatterer:
+def _scatterer(section: ScattererSection, shelf: MeshFiles) -> Scatterer:
     """The paper's sphere has the cross-section pi r^2, unless the file gives another one.
 
     A cylinder's nominal one, pi r h / 2, is the mean of its backscattering over all directions.

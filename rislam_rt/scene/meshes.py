@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.scene.containers import check_glb, too_many_faces, without_comments
 from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.scene.mesh_containers import check_glb, too_many_faces, without_comments
 
 FORMATS = (".ply", ".obj", ".stl", ".glb")
 MAX_MESH_BYTES = 200_000_000

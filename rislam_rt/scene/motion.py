@@ -11,9 +11,9 @@ from rislam_rt.model import Body, Trajectory
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.meshes import read_inside
 from rislam_rt.scene.random_walk import draw_walk
-from rislam_rt.scene.recorded import Recording, parse_csv, parse_tum
+from rislam_rt.scene.recorded_poses import RecordedPoses, parse_csv, parse_tum
 from rislam_rt.scene.schema import AgentSection
-from rislam_rt.scene.waypoints import Way, round_corners
+from rislam_rt.scene.waypoints import RoundedPath, round_corners
 
 MAX_TUM_BYTES = 100_000_000
 MAX_CYCLES = 1_000_000
@@ -66,7 +66,7 @@ def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body
     return Trajectory(time, position, np.tile(speed, (cycles, 1)), np.full(cycles, heading), body)
 
 
-def travel(way: Way, speed: float, cycle_s: float, cycles: int | None, body: Body) -> Trajectory:
+def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, body: Body) -> Trajectory:
     """Along a way at constant speed [m/s], heading along it; to its end, or for so many cycles.
 
     Raises
@@ -97,7 +97,7 @@ def along_heading(course: Floats) -> Floats:
     return np.asarray(np.arctan2(course[row, 1], course[row, 0]))
 
 
-def at_cycles(recording: Recording, cycle_s: float) -> Recording:
+def at_cycles(recording: RecordedPoses, cycle_s: float) -> RecordedPoses:
     """A recording at even times, from its first on: monotone cubics through the places, straight lines through angles.
 
     Raises
@@ -121,7 +121,7 @@ def at_cycles(recording: Recording, cycle_s: float) -> Recording:
     even = np.minimum(np.arange(count) * cycle_s, time[-1])
     position = PchipInterpolator(time, recording.position, axis=0)(even) if len(time) > 1 else recording.position
     heading = None if recording.heading is None else np.interp(even, time, np.unwrap(recording.heading))
-    return Recording(recording.time[0] + np.arange(count) * cycle_s, position, heading)
+    return RecordedPoses(recording.time[0] + np.arange(count) * cycle_s, position, heading)
 
 
 def _recorded_motion(agent: AgentSection, content: bytes, body: Body) -> Trajectory:
@@ -130,7 +130,7 @@ def _recorded_motion(agent: AgentSection, content: bytes, body: Body) -> Traject
     is_csv = agent.trajectory.lower().endswith(".csv")
     if named and not is_csv:
         raise Fault(f"'{agent.trajectory}' is no CSV file, and agent.columns is given", "leave agent.columns out")
-    found = parse_csv(content, named) if is_csv else Recording(*parse_tum(content))
+    found = parse_csv(content, named) if is_csv else RecordedPoses(*parse_tum(content))
     if agent.start is not None and np.linalg.norm(found.position[0] - agent.start) > 1e-3:
         raise Fault(f"first pose {found.position[0].tolist()} is not agent.start {agent.start}", "leave it out")
     if agent.cycle_s is not None and np.abs(np.diff(found.time) - agent.cycle_s).max(initial=0.0) > SAME_STEP:

@@ -4,9 +4,9 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.triangles import distance_to_triangles
-from rislam_rt.scene.check.probe import crossings
+from rislam_rt.scene.check.mesh_queries import crossings
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.waypoints import Way, round_corners
+from rislam_rt.scene.waypoints import RoundedPath, round_corners
 
 WIDEST_TURN = np.radians(110.0)
 """[rad] Largest turn at a corner."""
@@ -22,7 +22,7 @@ GIVE_UP = 400
 
 def draw_walk(
     start: Floats, length: float, radius: float, clearance: float, triangles: Floats, *, rng: np.random.Generator
-) -> Way:
+) -> RoundedPath:
     """A level way of at least `length` [m] from `start` (3,) with corners of `radius` [m], `clearance` [m] or more from
     all triangles (T, 3, 3).
 

@@ -38,13 +38,13 @@ ItuMaterial = Literal[
 Units = Literal["mm", "cm", "m", "in"]
 
 
-class Section(BaseModel):
+class SceneSection(BaseModel):
     """A table of the scene file: no conversions, no unknown keys."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
-class MaterialSection(Section):
+class MaterialSection(SceneSection):
     """One of `reflection` (the same at every angle), `reflection_te` with `reflection_tm` (one for each polarisation),
     `itu`, a slab of an ITU-R P.2040 material, and `permittivity` (relative, with `conductivity_s_m`), a slab of one's
     own. `scattering` takes a share from the mirrored ray.
@@ -76,7 +76,7 @@ class MaterialSection(Section):
         return self
 
 
-class ReflectorSection(Section):
+class ReflectorSection(SceneSection):
     """A smooth mesh. `mesh = "room.glb#node"` takes one named node of a GLB file, with its transform applied.
 
     `up_axis = "y"` turns a file whose y axis points up (as glTF's standard says) into the room's frame with z up,
@@ -91,7 +91,7 @@ class ReflectorSection(Section):
     origin: Vector | None = None
 
 
-class ShadeSection(Section):
+class ShadeSection(SceneSection):
     """A mesh that hides what lies behind it and reflects nothing: clutter too small or too round to be a mirror."""
 
     name: Name
@@ -101,7 +101,7 @@ class ShadeSection(Section):
     origin: Vector | None = None
 
 
-class MeshesSection(Section):
+class MeshesSection(SceneSection):
     """How the mesh files of the scene lie, unless a mesh says otherwise."""
 
     up: Literal["y", "z"] = "z"
@@ -112,7 +112,7 @@ class MeshesSection(Section):
     """[m] The point, z up, that becomes the room's zero."""
 
 
-class ScattererSection(Section):
+class ScattererSection(SceneSection):
     """A small object: a sphere by its `radius` (cross-section pi r^2, or by `mie` the exact series), a cylinder by
     `radius` and `height_m`, or a point by its `rcs_m2`.
 
@@ -148,7 +148,7 @@ class ScattererSection(Section):
         return self
 
 
-class RisSection(Section):
+class RisSection(SceneSection):
     """The panel. `normal` and `up` need not have length 1."""
 
     name: Name = "ris"
@@ -164,7 +164,7 @@ class RisSection(Section):
     host: Name | None = None
 
 
-class WalkSection(Section):
+class WalkSection(SceneSection):
     """A walk at random through the room, level, from the agent's start."""
 
     seed: Annotated[int, Field(ge=0, lt=2**63)]
@@ -172,7 +172,7 @@ class WalkSection(Section):
     """Least distance from every surface."""
 
 
-class AgentSection(Section):
+class AgentSection(SceneSection):
     """The agent's true motion, one of four: straight from `start` with `velocity`; recorded, `trajectory`, a TUM or CSV
     file; along `waypoints`; or a `random_walk`."""
 
@@ -219,7 +219,7 @@ MOTIONS = {
 """Keys of a motion, one of which is given, and what each needs beside it."""
 
 
-class LimitsSection(Section):
+class LimitsSection(SceneSection):
     """How large a room may be. The defaults keep check and trace within minutes; a file that knows better says so."""
 
     faces: Annotated[int, Field(ge=1, le=20_000_000)] = 50_000
@@ -235,7 +235,7 @@ def _listed(value: Any) -> Any:
     return [value] if isinstance(value, dict) else value
 
 
-class SceneSpec(Section):
+class SceneSpec(SceneSection):
     """A whole scene file."""
 
     name: Name

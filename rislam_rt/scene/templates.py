@@ -8,7 +8,7 @@ from textwrap import fill
 from rislam_rt.errors import SceneError
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
-from rislam_rt.scene.rooms import ROOMS, Room
+from rislam_rt.scene.rooms import ROOMS, RoomFiles
 from rislam_rt.scene.write import toml_bytes, write_files
 
 
@@ -36,7 +36,7 @@ def room_name(folder: Path, template: str) -> str:
     return name if name.strip("._-") else template
 
 
-def room_files(room: Room, origin: str = "") -> dict[str, bytes]:
+def room_files(room: RoomFiles, origin: str = "") -> dict[str, bytes]:
     """The files of a scene folder: relative name -> content. `origin`: where it comes from, if not from the build."""
     files = {f"meshes/{name}.ply": ply_bytes(mesh.vertices, mesh.faces) for name, mesh in room.meshes.items()}
     name = room.table["name"]

@@ -13,7 +13,7 @@ STRAIGHT = 1e-9
 """[rad] A smaller turn is none."""
 
 
-class Way(NamedTuple):
+class RoundedPath(NamedTuple):
     """Legs and arcs in turn, P pieces; a leg is an arc of no curvature."""
 
     start: Floats
@@ -45,7 +45,7 @@ class Way(NamedTuple):
         return self.start[piece] + straight + arc, np.cos(angle) * along + np.sin(angle) * inward
 
 
-def round_corners(waypoints: Floats, radius: float) -> Way:
+def round_corners(waypoints: Floats, radius: float) -> RoundedPath:
     """The way along waypoints (W, 3) [m], each but the first and the last cut by an arc of that radius [m].
 
     Raises
@@ -79,7 +79,7 @@ def round_corners(waypoints: Floats, radius: float) -> Way:
     return _pieces(waypoints, along, turn, cut, left, radius)
 
 
-def _pieces(waypoints: Floats, along: Floats, turn: Floats, cut: Floats, left: Floats, radius: float) -> Way:
+def _pieces(waypoints: Floats, along: Floats, turn: Floats, cut: Floats, left: Floats, radius: float) -> RoundedPath:
     """Leg, arc, leg, ..., leg."""
     count = 2 * len(along) - 1
     start, way, inward = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
@@ -91,4 +91,4 @@ def _pieces(waypoints: Floats, along: Floats, turn: Floats, cut: Floats, left: F
     inward[1::2] = np.where(bent[:, None], across / np.where(size > 0.0, size, 1.0), 0.0)
     length = np.zeros(count)
     length[::2], length[1::2] = left, np.where(bent, radius * turn, 0.0)
-    return Way(start, way, inward, np.where(inward.any(axis=1), radius, 1.0), length)
+    return RoundedPath(start, way, inward, np.where(inward.any(axis=1), radius, 1.0), length)

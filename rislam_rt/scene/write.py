@@ -14,9 +14,9 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError, StoreError
 from rislam_rt.model import Material, RisPanel, Scatterer, Scene, Trajectory
+from rislam_rt.scene.file_names import safe_name
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
-from rislam_rt.scene.names import safe_name
 from rislam_rt.scene.solids import solid_mesh
 
 TRAJECTORY_FILE = "path.tum"

@@ -1,8 +1,8 @@
 """Floor 5: localisation and mapping. The belief never reads truth: nothing here sees a channel or a scene."""
 
 from rislam_rt.slam.config import SlamConfig, StartPrior
-from rislam_rt.slam.estimator import estimate, init, predict, smoothed, step
-from rislam_rt.slam.filter import FilterState, Outcome, StepInfo, revisit
+from rislam_rt.slam.estimator import estimate, init, predict, revisit, smoothed, step
+from rislam_rt.slam.filter import FilterState, Outcome, StepInfo
 
 __all__ = [
     "FilterState",

@@ -10,7 +10,6 @@ from rislam_rt.slam import filter as cycle
 from rislam_rt.slam import mapping, window
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.filter import StepInfo
-from rislam_rt.slam.inputs import lone_panel
 
 
 def init(
@@ -19,7 +18,7 @@ def init(
 ) -> Any:  # fmt: skip
     """The start prior, and an empty map."""
     if config.filter == "window":
-        return window.init(start, body, lone_panel(ris), sensor, config, rng=rng)
+        return window.init(start, body, ris, sensor, config, rng=rng)
     return cycle.init(start, body, ris, sensor, config, rng=rng)
 
 
@@ -36,6 +35,15 @@ def predict(state: Any, dt: float, config: SlamConfig) -> SlamEstimate:
     """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent."""
     ahead = window.predict if isinstance(state, window.WindowState) else mapping.predict
     return ahead(state, dt, config)
+
+
+def revisit(state: Any, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> Any:
+    """Another run, or another agent's, on the map of an earlier one: landmarks, walls and who they are stay known.
+
+    The map keeps the covariance that it had; its frame is the earlier run's, and so must be the start's.
+    """
+    again = window.revisit if isinstance(state, window.WindowState) else cycle.revisit
+    return again(state, start, config, rng=rng)
 
 
 def smoothed(state: Any) -> Floats | None:

@@ -3,26 +3,10 @@
 import math
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.model import DataSheet, Measurement, RisCode, RisSpec, RisSpecs
+from rislam_rt.model import DataSheet, Measurement, RisCode, RisSpecs
 
 MAX_STEP = 1e6
 """[s] Twelve days; the squares of longer steps leave nothing of what was known."""
-
-
-def lone_panel(ris: DataSheet | None) -> RisSpec | None:
-    """The data sheet, for the window filter, which knows one panel.
-
-    Raises
-    ------
-    ConfigError
-        There are several panels.
-    """
-    if isinstance(ris, RisSpecs):
-        raise ConfigError(
-            f"slam.filter: 'window' received, which knows one panel, in a room of {len(ris.panels)}; "
-            "give 'rao_blackwellised'"
-        )
-    return ris
 
 
 def check_sides(measurement: Measurement, ris: DataSheet | None) -> None:

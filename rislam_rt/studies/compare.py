@@ -9,8 +9,8 @@ from rislam_rt.channel.compare import PathReport, Validation, compare_paths, val
 from rislam_rt.channel.compare.channels import room_rng, trace_both
 from rislam_rt.errors import RislamError
 from rislam_rt.model import Paths, RadioConfig, Scene
-from rislam_rt.pipeline.radio import build_radio
 from rislam_rt.pipeline.run import Progress
+from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.workers import Tell, run_side_by_side
 from rislam_rt.studies.spec import CompareSpec
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.design import DesignProblem, GainCurves, direct_only, gain_curves, problem_from_paths
-from rislam_rt.design.curves import Interval
+from rislam_rt.design.gain_curves import GainInterval
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Paths, RadioConfig, RisPanel, Scatterer, Scene, Trajectory
-from rislam_rt.pipeline.radio import build_radio
 from rislam_rt.pipeline.run import Progress, build_channel
-from rislam_rt.pipeline.spec import build_design
+from rislam_rt.pipeline.specification.radio import build_radio
+from rislam_rt.pipeline.specification.spec import build_design
 from rislam_rt.studies.spec import Fig4aSpec
 
 
@@ -150,7 +150,8 @@ def _check_seen(paths: Paths, landmark: int, motion: Trajectory) -> int:
 def _joined(parts: list[GainCurves]) -> GainCurves:
     """Curves of one place each, as curves over all places."""
     optimized, random = (
-        Interval(*np.concatenate([getattr(part, name) for part in parts], axis=1)) for name in ("optimized", "random")
+        GainInterval(*np.concatenate([getattr(part, name) for part in parts], axis=1))
+        for name in ("optimized", "random")
     )
     return GainCurves(
         optimized, random, np.concatenate([p.exact for p in parts]), np.concatenate([p.continuous for p in parts])

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.pipeline.radio import build_radio
-from rislam_rt.pipeline.read import build_spec, read_table
-from rislam_rt.pipeline.spec import PipelineSpec, build_design, build_settings
+from rislam_rt.pipeline.specification.radio import build_radio
+from rislam_rt.pipeline.specification.read import build_spec, read_table
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_design, build_settings
 from rislam_rt.studies.classifier.spec import ClassifierSpec, build_receiver
 from rislam_rt.studies.spec import ClaimsSpec, CompareSpec, Fig4aSpec
 from rislam_rt.studies.swept import SWEPT, SweptSpec, check_swept

@@ -13,11 +13,11 @@ from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.evaluate import bootstrap, rms_over_runs
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.own_methods import own_digests
-from rislam_rt.pipeline.read import Table, build_spec, make_way, read_table
 from rislam_rt.pipeline.run import check_run, library_versions, prepare_channel, run_slam
-from rislam_rt.pipeline.section import Positive, Section
-from rislam_rt.pipeline.spec import PipelineSpec, build_settings
-from rislam_rt.pipeline.summary import summarise
+from rislam_rt.pipeline.scores.summary import summarise
+from rislam_rt.pipeline.specification.read import Table, build_spec, make_way, read_table
+from rislam_rt.pipeline.specification.section import Positive, Section
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
 from rislam_rt.storage.files import write_atomic
 from rislam_rt.sweeps.axes import Axis, Scalar, Sweep, Value, parse_axis

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import GeometryError
 from rislam_rt.model import PathKind, RadioConfig, RisCode
@@ -116,10 +116,12 @@ def test_what_is_not_valid_is_zero(rooms):
 def test_legs_check_their_shapes_and_mask_their_gains():
     one = np.ones((1, 2))
     ray, valid = np.ones((1, 2, 3)), np.array([[True, False]])
-    legs = Legs(np.array([[-1], [0]]), valid, 2.0 * one, ray, ray, one, np.zeros((1, 2, 1, 3)))
+    legs = SpecularLegs(np.array([[-1], [0]]), valid, 2.0 * one, ray, ray, one, np.zeros((1, 2, 1, 3)))
     assert legs.num_bounces.tolist() == [0, 1]
     gain = legs.gain(0.03)
     assert gain[0, 0] == pytest.approx(0.03 / (8 * np.pi) * np.exp(-4j * np.pi / 0.03))
     assert gain[0, 1] == 0.0
-    with pytest.raises(GeometryError, match=r"Legs\.length"):
-        Legs(legs.walls, legs.valid, np.ones((2, 2)), legs.at_device, legs.at_far_end, legs.coefficient, legs.vertices)
+    with pytest.raises(GeometryError, match=r"SpecularLegs\.length"):
+        SpecularLegs(
+            legs.walls, legs.valid, np.ones((2, 2)), legs.at_device, legs.at_far_end, legs.coefficient, legs.vertices
+        )

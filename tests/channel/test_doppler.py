@@ -169,7 +169,7 @@ def sionna_shifts(channel, motion):
     import sionna.rt as rt
     from sionna.rt.rcs import ConstantRCSSensingTarget, RCSSolver
 
-    scene, origin, sphere = channel.stage.scene, channel.stage.origin, channel.scene.scatterers[0]
+    scene, origin, sphere = channel.tracer_scene.scene, channel.tracer_scene.origin, channel.scene.scatterers[0]
     scene.tx_array = scene.rx_array = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
     speed = motion.velocity[0].tolist()
     scene.add(rt.Transmitter("tx", (motion.tx[0] - origin).tolist(), velocity=speed))

@@ -9,7 +9,7 @@ from rislam_rt.channel.compare import compare_paths, random_poses
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.traced import TracedChannel
 from rislam_rt.channel.walls import build_walls
-from rislam_rt.geometry.stack import tracer_gap
+from rislam_rt.geometry.coplanar import tracer_gap
 from rislam_rt.model import Material, RadioConfig, Reflector
 
 RADIO = RadioConfig()

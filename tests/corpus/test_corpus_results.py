@@ -9,9 +9,9 @@ import pytest
 
 from rislam_rt.errors import RislamError
 from rislam_rt.pipeline import load_spec, run_slam
-from rislam_rt.pipeline.identity import run_identity
-from rislam_rt.pipeline.store import open_run, read_run
-from rislam_rt.pipeline.summary import summarise
+from rislam_rt.pipeline.scores.summary import summarise
+from rislam_rt.pipeline.store.identity import run_identity
+from rislam_rt.pipeline.store.run_folder import open_run, read_run
 from rislam_rt.scene import load_scene
 from rislam_rt.sweeps import Sweep, build_cells
 from rislam_rt.sweeps.store import DONE, MISSING, read_row, write_cell

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.design import DESIGNERS, build_objective, dual_bound
-from rislam_rt.design import dual as dual_module
+from rislam_rt.design import convex_dual as dual_module
 
 
 @pytest.mark.parametrize("levels", [2, 4])

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rislam_rt.design import design_code, designer, exact_code, problem_from_belief
+from rislam_rt.design.beam_sweep import search_code
 from rislam_rt.design.objective import build_objective
-from rislam_rt.design.search import search_code
 from rislam_rt.design.truth import problem_from_arrays
 from rislam_rt.model import RisCode, RisSpecs, Suspect
 from rislam_rt.ris import leg_response, panel_gain

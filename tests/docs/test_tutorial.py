@@ -52,7 +52,7 @@ def test_each_of_the_nine_questions_has_its_section() -> None:
 
 
 def test_the_page_knows_every_reason_of_the_report() -> None:
-    source = (ROOT / "rislam_rt" / "report" / "verdict.py").read_text(encoding="utf-8")
+    source = (ROOT / "rislam_rt" / "report" / "conclusions.py").read_text(encoding="utf-8")
     page = (ROOT / "docs" / "questions.md").read_text(encoding="utf-8")
     told = re.findall(r'return f?"([^"]+)"', source.partition("def why_not")[2].partition("\ndef ")[0])
     assert len(told) == 4

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET, RAY_OFFSET
-from rislam_rt.geometry.flat import fit_plane, flat_parts
-from rislam_rt.geometry.stack import overlap, stack_walls, tracer_gap
+from rislam_rt.geometry.coplanar import overlap, stack_walls, tracer_gap
+from rislam_rt.geometry.plane_segmentation import fit_plane, planar_regions
 
 LIMITS = COPLANAR_ANGLE, COPLANAR_OFFSET
 
@@ -32,7 +32,7 @@ def test_a_plate_of_small_triangles_is_one_plane(across):
     """Corners rounded by 2.4e-7 m turn triangles of 2 mm by 1e-4 rad and more; thousands of them average out."""
     frame = any_frame(3)
     triangles = plate((0.5, 0.4), across, frame, origin=(4.1, 5.2, 2.3))
-    parts = flat_parts(triangles, *LIMITS)
+    parts = planar_regions(triangles, *LIMITS)
     assert len(parts.offset) == 1
     tilt = np.linalg.norm(np.cross(parts.normal[0], frame[2]))
     assert tilt < 2.4e-7 / 0.4  # one corner off by its rounding over the plate's width
@@ -41,11 +41,11 @@ def test_a_plate_of_small_triangles_is_one_plane(across):
 
 def test_an_exact_plane_stays_as_it_is():
     triangles = np.array([[[0, 0, 1], [1, 0, 1], [1, 1, 1]], [[0, 0, 1], [0, 1, 1], [1, 1, 1]]], dtype=float)
-    parts = flat_parts(triangles, *LIMITS)
+    parts = planar_regions(triangles, *LIMITS)
     np.testing.assert_array_equal(parts.group, [0, 0])
     np.testing.assert_array_equal(parts.normal, [[0.0, 0.0, 1.0]])  # the side of the first triangle
     np.testing.assert_array_equal(parts.offset, [1.0])
-    assert len(flat_parts(triangles[:0], *LIMITS).offset) == 0
+    assert len(planar_regions(triangles[:0], *LIMITS).offset) == 0
 
 
 @given(st.integers(0, 10_000))
@@ -71,7 +71,7 @@ def test_a_round_body_keeps_its_facets():
         middle = 0.3 * np.array([np.cos(a), np.sin(a), 0.0])
         width = 2 * 0.3 * np.tan(np.pi / 60)
         sides.append(plate((width, 3 * width), width, (right, np.array([0, 0, 1.0])), middle - width / 2 * right))
-    parts = flat_parts(np.concatenate(sides), *LIMITS)
+    parts = planar_regions(np.concatenate(sides), *LIMITS)
     np.testing.assert_array_equal(parts.group, np.repeat(np.arange(60), 6))
     facing = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
     np.testing.assert_allclose(np.abs(np.sum(parts.normal * facing, axis=-1)), 1.0, atol=1e-9)
@@ -105,7 +105,7 @@ def test_overlap_against_points(seed, x, y):
 
 def stacked(*plates, gap=1e-5):
     """The stack of one-wall plates."""
-    parts = [flat_parts(t, *LIMITS) for t in plates]
+    parts = [planar_regions(t, *LIMITS) for t in plates]
     assert all(len(p.offset) == 1 for p in parts)
     owner = np.repeat(np.arange(len(plates)), [len(t) for t in plates])
     normal, offset = (np.concatenate([getattr(p, name) for p in parts]) for name in ("normal", "offset"))

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rislam_rt.geometry.flat import planar_groups
+from rislam_rt.geometry.plane_segmentation import planar_groups
 from rislam_rt.geometry.triangles import (
     distance_to_edges,
     distance_to_triangles,

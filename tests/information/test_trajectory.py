@@ -10,8 +10,8 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import (
+    LinearMeasurements,
     MotionPrior,
-    Rows,
     build_landmark_model,
     mirror_chain,
     plane_tangents,
@@ -132,7 +132,8 @@ def test_recursion_equals_the_inverse_of_the_whole_trajectory():
     cycles, unknowns, axes, dt = 5, 4, 2, 0.3
     motion = MotionPrior(acceleration=0.7, start_position=0.2, start_velocity=0.4, axes=axes)
     rows = [
-        Rows(rng.normal(size=(3, 3)), rng.normal(size=(3, unknowns)), rng.exponential(size=3)) for _ in range(cycles)
+        LinearMeasurements(rng.normal(size=(3, 3)), rng.normal(size=(3, unknowns)), rng.exponential(size=3))
+        for _ in range(cycles)
     ]
     unknown_std = np.array([1.0, 2.0, 0.5, 3.0])
     bound = posterior_bound(rows, dt * np.arange(cycles), motion, unknown_std)
@@ -156,7 +157,7 @@ def test_recursion_equals_the_inverse_of_the_whole_trajectory():
 
 
 def test_without_measurements_the_bound_is_the_motion_alone():
-    nothing = [Rows(np.zeros((0, 3)), np.zeros((0, 0)), np.zeros(0))] * 11
+    nothing = [LinearMeasurements(np.zeros((0, 3)), np.zeros((0, 0)), np.zeros(0))] * 11
     motion = MotionPrior(acceleration=0.0, start_position=0.01, start_velocity=0.02)
     bound = posterior_bound(nothing, np.arange(11.0), motion, np.zeros(0))
     np.testing.assert_allclose(bound.rms, np.sqrt(2) * np.hypot(0.01, 0.02 * np.arange(11)), rtol=1e-12)

@@ -9,7 +9,7 @@ import pytest
 from rislam_rt.measurement import ReceiverConfig, load_signals, measure, signals_dataset
 from rislam_rt.measurement.config import ORDERS
 from rislam_rt.measurement.received import receive
-from rislam_rt.measurement.slot import codes_in_turn, look_signs, slot_mean, split
+from rislam_rt.measurement.slot_motion import codes_in_turn, look_signs, slot_mean, split
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 
 RADIO = RadioConfig()

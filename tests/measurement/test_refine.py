@@ -4,11 +4,20 @@ import numpy as np
 import pytest
 
 from rislam_rt.measurement import refine as refinement
-from rislam_rt.measurement.atoms import Sounding, build_sounding
-from rislam_rt.measurement.inner import waves_at
-from rislam_rt.measurement.positive import inverse, solve
-from rislam_rt.measurement.refine import Fit, accuracy, contribution, fit_amplitudes, part, pick, refine, residual
+from rislam_rt.measurement.inner_products import waves_at
+from rislam_rt.measurement.positive_definite import inverse, solve
+from rislam_rt.measurement.refine import (
+    LeastSquaresFit,
+    accuracy,
+    contribution,
+    fit_amplitudes,
+    part,
+    pick,
+    refine,
+    residual,
+)
 from rislam_rt.measurement.signal import add_noise
+from rislam_rt.measurement.sounding import Sounding, build_sounding
 from rislam_rt.model import RadioConfig
 
 PLANE = build_sounding(128, RadioConfig())
@@ -23,7 +32,7 @@ def crowd(sounding: Sounding, count: int, rng: np.random.Generator) -> tuple[np.
     return places, add_noise(clean, 1.0, rng=rng)
 
 
-def same(found: Fit, wanted: Fit) -> None:
+def same(found: LeastSquaresFit, wanted: LeastSquaresFit) -> None:
     """To rounding: energies are up to 1e5."""
     np.testing.assert_allclose(found.amplitude, wanted.amplitude, atol=1e-8)
     np.testing.assert_allclose(found.slopes, wanted.slopes, atol=1e-5)

@@ -9,7 +9,7 @@ import pytest
 import rislam_rt
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Scene, SlamResult
-from rislam_rt.model.picture import outline
+from rislam_rt.model.plan_view import outline
 from rislam_rt.pipeline import load_spec
 from rislam_rt.shipped import find_pipeline
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from rislam_rt.pipeline.store import export_files
-from rislam_rt.pipeline.summary import summarise
+from rislam_rt.pipeline.scores.summary import summarise
+from rislam_rt.pipeline.store.run_folder import export_files
 
 
 def test_evo_ape_reads_a_run_and_agrees(short_result, tmp_path):

@@ -6,10 +6,10 @@ import pytest
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind, RisCode, RisSpec
 from rislam_rt.pipeline.control import check_control, open_link, send_code
-from rislam_rt.pipeline.identity import run_identity
-from rislam_rt.pipeline.spec import ControlSection
-from rislam_rt.pipeline.store import open_run, read_run
-from rislam_rt.pipeline.summary import summarise
+from rislam_rt.pipeline.scores.summary import summarise
+from rislam_rt.pipeline.specification.spec import ControlSection
+from rislam_rt.pipeline.store.identity import run_identity
+from rislam_rt.pipeline.store.run_folder import open_run, read_run
 
 SPEC = RisSpec(20, 30, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]), 4)
 RANDOM = 'schemes=["random"]'

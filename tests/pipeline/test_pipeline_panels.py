@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 
 import rislam_rt
-from rislam_rt.errors import ConfigError
 from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.dataset import dataset_to_paths, dataset_to_scheme, paths_to_dataset, scheme_to_dataset
 from rislam_rt.pipeline.design_at import design_at, design_table
-from rislam_rt.pipeline.join import join_schemes, thinned_scheme
+from rislam_rt.pipeline.long.join import join_schemes, thinned_scheme
 from rislam_rt.pipeline.recordings.inputs import dataset_to_inputs, inputs_to_dataset
-from rislam_rt.pipeline.summary import landmark_scores, landmark_track
-from rislam_rt.report.code import draw_run_codes
+from rislam_rt.pipeline.scores.summary import landmark_scores, landmark_track
+from rislam_rt.report.code_pictures import draw_run_codes
+from rislam_rt.report.conclusions import panel_found_at
 from rislam_rt.report.room import draw_above
-from rislam_rt.report.verdict import panel_found_at
 from rislam_rt.shipped import find_pipeline, find_room
 
 SET = [
@@ -25,6 +24,8 @@ SET = [
     "design.method=coordinate",
     "receiver.alternation=true",
     "receiver.estimator=bound",
+    "slam.filter=window",
+    "slam.use_vt=true",
 ]
 
 
@@ -88,11 +89,6 @@ def test_faults_of_every_element_reach_the_air():
     over = perfect.paths.panel >= 0
     assert np.abs(perfect.schemes["random"].gain[:, over]).max() > 0.0
     assert not dead.schemes["random"].gain[:, over].any()
-
-
-def test_the_window_filter_says_that_it_knows_one_panel():
-    with pytest.raises(ConfigError, match=r"window.*knows one panel.*room of 2"):
-        run(2, 'schemes=["random"]', "slam.filter=window", "slam.use_vt=true")
 
 
 def test_the_picture_of_the_room_says_which_is_held_for_which(result):

@@ -13,9 +13,9 @@ from rislam_rt import slam
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec, told
 from rislam_rt.pipeline.estimators import ESTIMATORS
-from rislam_rt.pipeline.mistold import ToldSection
 from rislam_rt.pipeline.run import set_stage
-from rislam_rt.pipeline.spec import build_settings
+from rislam_rt.pipeline.specification.mistold import ToldSection
+from rislam_rt.pipeline.specification.spec import build_settings
 
 ROOT = Path(__file__).parents[2]
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"

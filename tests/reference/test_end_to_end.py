@@ -7,9 +7,9 @@ import pytest
 
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec, run_slam
-from rislam_rt.pipeline.identity import run_identity
-from rislam_rt.pipeline.store import open_run, read_run
-from rislam_rt.pipeline.summary import summarise
+from rislam_rt.pipeline.scores.summary import summarise
+from rislam_rt.pipeline.store.identity import run_identity
+from rislam_rt.pipeline.store.run_folder import open_run, read_run
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[2]

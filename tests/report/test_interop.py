@@ -12,7 +12,7 @@ from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.report.deepmimo import deepmimo_files
-from rislam_rt.report.recording import recording_bytes
+from rislam_rt.report.rerun_recording import recording_bytes
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.write import write_files
 

@@ -10,12 +10,12 @@ import pytest
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec, run_slam
-from rislam_rt.pipeline.summary import summarise
+from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.report import draw_figures
-from rislam_rt.report.curves import strongest_db
 from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace, section
 from rislam_rt.report.page import build_page
 from rislam_rt.report.room import path_points
+from rislam_rt.report.time_curves import strongest_db
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[2]

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rislam_rt.pipeline.advise.advice import Advice
-from rislam_rt.pipeline.advise.budget import NOTHING_DB, Link
-from rislam_rt.pipeline.advise.cost import Cost
-from rislam_rt.pipeline.advise.coverage import Coverage
+from rislam_rt.adviser.advice import Advice
+from rislam_rt.adviser.budget import NOTHING_DB, Link
+from rislam_rt.adviser.cost import Cost
+from rislam_rt.adviser.coverage import Coverage
 from rislam_rt.report.advice import draw_coverage, print_advice
 from rislam_rt.scene import load_scene
 

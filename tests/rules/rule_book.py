@@ -18,7 +18,7 @@ FLOORS = {
     4: ("channel", "information"),
     5: ("measurement", "design", "slam", "evaluate"),
     6: ("pipeline", "sweeps"),
-    7: ("studies",),
+    7: ("studies", "adviser"),
     8: ("report",),
     9: ("cli",),
     10: ("__main__",),
@@ -41,7 +41,7 @@ ONLY_IN = {
     "random": (),
     "evo": (),
     "deepmimo": (),
-    "rerun": ("report/recording.py",),
+    "rerun": ("report/rerun_recording.py",),
 }
 """Where a foreign package may be imported inside the package: the tracer in one folder, evo (GPL) nowhere."""
 

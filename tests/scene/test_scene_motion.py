@@ -11,7 +11,7 @@ from rislam_rt.model import Body
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.meshes import parse_mesh, ply_bytes
 from rislam_rt.scene.motion import straight_motion
-from rislam_rt.scene.recorded import parse_tum
+from rislam_rt.scene.recorded_poses import parse_tum
 from rislam_rt.scene.rooms.paths import smooth_path
 from rislam_rt.scene.rooms.shapes import block
 from rislam_rt.scene.write import tum_bytes

@@ -9,8 +9,8 @@ import pytest
 from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.model import RisCode, RisSpec
 from rislam_rt.scene import load_scene, write_scene
+from rislam_rt.scene.file_names import safe_name
 from rislam_rt.scene.meshes import parse_mesh
-from rislam_rt.scene.names import safe_name
 from rislam_rt.slam.inputs import check_step
 
 ROOM = Path(__file__).parents[2] / "scenes" / "paper_room"

@@ -11,7 +11,7 @@ from rislam_rt.errors import SceneError
 from rislam_rt.model import RisPanel, Scene, join_panels
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.check.panel import panel_errors
-from rislam_rt.scene.check.soup import build_soup
+from rislam_rt.scene.check.triangle_array import build_triangle_array
 from rislam_rt.shipped import find_room
 
 Damage = Callable[[str, str], Path]
@@ -60,7 +60,7 @@ def test_panels_overlap_where_they_share_a_piece_of_plane() -> None:
         up = np.cos(turn) * one.spec.up + np.sin(turn) * one.spec.right
         spec = replace(one.spec, up=up)
         both: Scene = replace(scene, ris=join_panels((one, RisPanel(spec, one.center + shift, one.host, "other"))))
-        return any("covers a part" in finding.message for finding in panel_errors(build_soup(both, "file")))
+        return any("covers a part" in finding.message for finding in panel_errors(build_triangle_array(both, "file")))
 
     assert overlap(np.zeros(3))
     assert overlap((width - 0.01) * one.spec.right)

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rislam_rt.geometry.flat import planar_groups
+from rislam_rt.geometry.plane_segmentation import planar_groups
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.scene import check_scene, load_scene
 from rislam_rt.scene.build import main
-from rislam_rt.scene.check.probe import crossings
+from rislam_rt.scene.check.mesh_queries import crossings
 from rislam_rt.scene.meshes import parse_mesh
 from rislam_rt.scene.rooms import ROOMS
 from rislam_rt.scene.templates import room_files

@@ -13,7 +13,7 @@ from rislam_rt.scene import load_scene
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.motion import along_heading, at_cycles
 from rislam_rt.scene.random_walk import draw_walk
-from rislam_rt.scene.recorded import Recording, parse_csv
+from rislam_rt.scene.recorded_poses import RecordedPoses, parse_csv
 from rislam_rt.scene.waypoints import round_corners
 
 EPOCH = 1_700_000_000.0
@@ -81,7 +81,7 @@ def test_a_recording_of_another_clock_is_interpolated_to_the_cycle(since: float)
     time = np.sort(rng.uniform(0.0, 10.0, 400))
     time[0], time[-1] = 0.0, 10.0
     place = np.column_stack([np.cos(time), np.sin(time), np.full(400, 0.5)])
-    even = at_cycles(Recording(since + time, place, time + np.pi / 2), 0.1)
+    even = at_cycles(RecordedPoses(since + time, place, time + np.pi / 2), 0.1)
     assert len(even.time) == 101
     np.testing.assert_allclose(np.diff(even.time), 0.1, rtol=0, atol=5e-7 if since else 1e-12)  # float64 at the epoch
     t = 0.1 * np.arange(101)
@@ -94,11 +94,11 @@ def test_a_recording_of_another_clock_is_interpolated_to_the_cycle(since: float)
 
 def test_angles_are_interpolated_the_short_way_and_gaps_are_refused() -> None:
     poses = np.zeros((2, 3))
-    turn = at_cycles(Recording(np.array([0.0, 1.0]), poses, np.array([3.0, -3.0])), 0.5).heading
+    turn = at_cycles(RecordedPoses(np.array([0.0, 1.0]), poses, np.array([3.0, -3.0])), 0.5).heading
     assert turn is not None
     assert turn[1] == pytest.approx(np.pi)
     with pytest.raises(Fault, match=r"7 s without a pose after pose 1.*cut the file"):
-        at_cycles(Recording(np.array([0.0, 0.1, 7.1]), np.zeros((3, 3)), None), 0.1)
+        at_cycles(RecordedPoses(np.array([0.0, 0.1, 7.1]), np.zeros((3, 3)), None), 0.1)
 
 
 def test_steps_that_are_the_cycle_up_to_the_stamps_last_digit_are_kept(moved: Callable[..., Scene]) -> None:

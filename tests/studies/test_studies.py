@@ -13,7 +13,7 @@ from rislam_rt.cli import main
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.pipeline import PipelineSpec, load_spec
-from rislam_rt.pipeline.radio import build_radio
+from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.report.certificate import draw_certificate
 from rislam_rt.report.fig4a import claims, fig4a_csv, fig4a_page, verdict
 from rislam_rt.report.style import to_png
@@ -203,11 +203,11 @@ def test_compare_writes_the_page_of_its_functions(run, tmp_path):
 
 def test_an_unexplained_path_is_exit_1_and_still_written(run, tmp_path, monkeypatch):
     import rislam_rt.studies.compare as module
-    from rislam_rt.channel.compare import OneSided, Validation
+    from rislam_rt.channel.compare import OneSidedPath, Validation
 
     def broken(*arguments, **options):
         found = validate_rooms(*arguments, **options)
-        lost = OneSided(0, "LOS", "analytic", "", "all its conditions hold", 0.0)
+        lost = OneSidedPath(0, "LOS", "analytic", "", "all its conditions hold", 0.0)
         return [Validation(*row[:3], _with_one_sided(row.report, lost)) for row in found]
 
     monkeypatch.setattr(module, "validate_rooms", broken)

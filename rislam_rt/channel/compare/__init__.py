@@ -4,12 +4,12 @@ error judged by what precision explains."""
 from rislam_rt.channel.compare.channels import compare_channels, validate_rooms
 from rislam_rt.channel.compare.match import compare_paths
 from rislam_rt.channel.compare.poses import random_poses
-from rislam_rt.channel.compare.report import Breach, OneSided, PathReport
+from rislam_rt.channel.compare.report import LimitViolation, OneSidedPath, PathReport
 from rislam_rt.channel.compare.table import Validation, validation_page, validation_table
 
 __all__ = [
-    "Breach",
-    "OneSided",
+    "LimitViolation",
+    "OneSidedPath",
     "PathReport",
     "Validation",
     "compare_channels",

@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.image_source.facets import Facets, build_facets
-from rislam_rt.channel.shades import ALONE
+from rislam_rt.channel.image_source.facets import WallFacets, build_facets
+from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit
-from rislam_rt.geometry.flat import FLOAT32_ROUNDING
+from rislam_rt.geometry.plane_segmentation import FLOAT32_ROUNDING
 from rislam_rt.geometry.planes import mirror
 from rislam_rt.geometry.triangles import distance_to_edges, outline_edges
 from rislam_rt.model import PathKind, Scene, Trajectory
@@ -29,7 +29,7 @@ ROUNDINGS = 8.0
 """Float32 operations, each rounding to the last place, between the coordinates and a mirror image or a hit."""
 
 
-class Proof(NamedTuple):
+class Explanation(NamedTuple):
     """Reason (empty: none found), what was computed, and the length [m] on which it rests."""
 
     reason: str
@@ -37,7 +37,7 @@ class Proof(NamedTuple):
     size: float = 0.0
 
 
-class Condition(NamedTuple):
+class ExistenceCondition(NamedTuple):
     """One thing that a path needs: it holds where `margin` [m] is positive. `reason` names its failure.
 
     Where the margin is smaller than `reach` [m], float32 cannot tell.
@@ -49,7 +49,7 @@ class Condition(NamedTuple):
     reach: float
 
 
-class Leg(NamedTuple):
+class UnfoldedLeg(NamedTuple):
     """One leg drawn on unbounded planes."""
 
     points: Floats
@@ -66,7 +66,7 @@ class Leg(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Certifier:
+class DifferenceExplainer:
     """Scene, poses and the outlines of all walls."""
 
     scene: Scene
@@ -76,7 +76,7 @@ class Certifier:
     shortest: float
     """[m] Segments below this are lost by the tracer."""
     names: tuple[str, ...]
-    facets: Facets
+    facets: WallFacets
     edges: Floats
     """(E, 2, 3) [m] outline edges of all walls."""
     wall_of_edge: Integers
@@ -89,7 +89,7 @@ class Certifier:
     """The wall behind each panel, -1 without one."""
 
     @classmethod
-    def of(cls, scene: Scene, trajectory: Trajectory, depth: int, shortest: float) -> "Certifier":
+    def of(cls, scene: Scene, trajectory: Trajectory, depth: int, shortest: float) -> "DifferenceExplainer":
         """Prepare a scene and its poses."""
         walls = build_walls(scene)
         facets = build_facets(walls)
@@ -106,17 +106,17 @@ class Certifier:
         text = " ".join([PathKind(kind).name, *tx, *([landmark] if landmark else [])])
         return f"{text} | {' '.join(rx)}" if rx else text
 
-    def explain(self, identity: Identity, cycle: int, side: str) -> Proof:
+    def explain(self, identity: Identity, cycle: int, side: str) -> Explanation:
         """The proof for a path that only `side` has.
 
         A path exists where all its conditions hold. It is proved absent by an object that stands clearly in the way
-        of reflections in order, undecidable where a margin is below what float32 leaves open there (`Leg.shift`) and no
-        other condition clearly fails, and cut by the tracer where it exists with too short a segment. All else is no
-        proof.
+        of reflections in order, undecidable where a margin is below what float32 leaves open there
+        (`UnfoldedLeg.shift`) and no other condition clearly fails, and cut by the tracer where it exists with too short
+        a segment. All else is no proof.
         """
         bounces = len(identity[2]) + len(identity[3])
         if bounces > self.depth:
-            return Proof("beyond depth", f"{bounces} bounces, depth {self.depth}")
+            return Explanation("beyond depth", f"{bounces} bounces, depth {self.depth}")
         legs = self._legs(identity, cycle)
         conditions = [condition for leg in legs for condition in self._conditions(leg)]
         broken = [c for c in conditions if c.margin <= -c.reach]
@@ -124,16 +124,16 @@ class Certifier:
         shortest = min(float(np.linalg.norm(np.diff(leg.points, axis=0), axis=1).min()) for leg in legs)
         if broken:
             only_hidden = all(c.reason in HIDDEN for c in broken)
-            return Proof("occluded" if only_hidden else "", broken[0].text, -broken[0].margin)
+            return Explanation("occluded" if only_hidden else "", broken[0].text, -broken[0].margin)
         if side == "analytic" and shortest < self.shortest:
-            return Proof("short segment", f"segment of {1e3 * shortest:.4f} mm", shortest)
+            return Explanation("short segment", f"segment of {1e3 * shortest:.4f} mm", shortest)
         if close:
             closest = min(close, key=lambda c: abs(c.margin) / c.reach)
             text = f"{closest.text}; float32 leaves {closest.reach:.2e} m"
-            return Proof("edge" if closest.reason == "occluded" else closest.reason, text, abs(closest.margin))
-        return Proof("", f"all its conditions hold, shortest segment {1e3 * shortest:.4f} mm")
+            return Explanation("edge" if closest.reason == "occluded" else closest.reason, text, abs(closest.margin))
+        return Explanation("", f"all its conditions hold, shortest segment {1e3 * shortest:.4f} mm")
 
-    def _legs(self, identity: Identity, cycle: int) -> list[Leg]:
+    def _legs(self, identity: Identity, cycle: int) -> list[UnfoldedLeg]:
         """The path's legs on unbounded planes, each from its device to the far end."""
         _, landmark, tx_names, rx_names = identity
         tx_walls, rx_walls = ([self.names.index(n) for n in names] for names in (tx_names, rx_names))
@@ -144,7 +144,7 @@ class Certifier:
         point, panel = self.scene.landmark_positions[number], self.scene.panel_number(number)
         return [self._unfolded(tx_walls, tx, point, panel), self._unfolded(rx_walls[::-1], rx, point, panel)]
 
-    def _unfolded(self, walls: list[int], device: Floats, far: Floats, panel: int = -1) -> Leg:
+    def _unfolded(self, walls: list[int], device: Floats, far: Floats, panel: int = -1) -> UnfoldedLeg:
         """Draw a leg on unbounded planes by mirroring the far end."""
         facets, images = self.facets, [far]
         for wall in walls[::-1]:
@@ -158,7 +158,7 @@ class Certifier:
             points.append(points[-1] + fraction * (image - points[-1]))
         drawn = np.array([*points, far])
         shift = self._shifts(drawn, np.array(images[::-1]), walls)
-        return Leg(drawn, np.array(walls, dtype=np.int64), float(clearance), shift, panel)
+        return UnfoldedLeg(drawn, np.array(walls, dtype=np.int64), float(clearance), shift, panel)
 
     def _shifts(self, points: Floats, images: Floats, walls: list[int]) -> Floats:
         """How far beside each segment the tracer's ray may run: (d + 1,) [m].
@@ -181,10 +181,14 @@ class Certifier:
             shift[segment] = max(start, off)
         return shift
 
-    def _conditions(self, leg: Leg) -> list[Condition]:
+    def _conditions(self, leg: UnfoldedLeg) -> list[ExistenceCondition]:
         """All that a leg needs, with margins from the geometry."""
         reach = float(leg.shift.max())
-        found = [Condition("in a face", f"{abs(leg.clearance):.2e} m off the plane of a bounce", leg.clearance, reach)]
+        found = [
+            ExistenceCondition(
+                "in a face", f"{abs(leg.clearance):.2e} m off the plane of a bounce", leg.clearance, reach
+            )
+        ]
         for number in range(len(leg.walls)):
             found += self._on_wall(leg, number)
         for number in range(len(leg.points) - 1):
@@ -192,10 +196,12 @@ class Certifier:
         if leg.panel >= 0:
             panel = self.scene.panels[leg.panel]
             height = float((leg.points[-2] - leg.points[-1]) @ panel.spec.normal)
-            found.append(Condition("in a face", f"{height:.2e} m in front of the panel's plane", height, reach))
+            found.append(
+                ExistenceCondition("in a face", f"{height:.2e} m in front of the panel's plane", height, reach)
+            )
         return found
 
-    def _on_wall(self, leg: Leg, number: int) -> list[Condition]:
+    def _on_wall(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
         """Bounce `number` lies on its wall's triangles, not only in its plane, and not on what lies on them."""
         wall, bounce = int(leg.walls[number]), leg.points[number + 1]
         found = []
@@ -203,10 +209,10 @@ class Certifier:
             inside = self._inside(bounce, bounce - leg.points[number], surface)
             where = "inside" if inside > 0.0 else "outside"
             text = f"ray to the bounce {abs(inside):.2e} m {where} the outline of {self.names[surface]}"
-            found.append(Condition("edge", text, sign * inside, float(leg.shift[number])))
+            found.append(ExistenceCondition("edge", text, sign * inside, float(leg.shift[number])))
         return found
 
-    def _free(self, leg: Leg, number: int) -> list[Condition]:
+    def _free(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
         """No other wall stands across segment `number`: it would have to be crossed, and where it is solid.
 
         Walls that the segment bounces on, and those in one plane with them, do not stand in its way, nor does the host
@@ -230,12 +236,12 @@ class Certifier:
             text = f"{self.names[wall]} across a segment, {abs(solid):.2e} m {where} its outline"
             if solid >= reach and abs(crossed) < reach:
                 text = f"{self.names[wall]} {abs(crossed):.2e} m off a segment's end"
-                found.append(Condition("close surfaces", text, -crossed, reach))
+                found.append(ExistenceCondition("close surfaces", text, -crossed, reach))
             else:
-                found.append(Condition("occluded", text, -min(solid, crossed), reach))
+                found.append(ExistenceCondition("occluded", text, -min(solid, crossed), reach))
         return found + self._unshaded(leg, number)
 
-    def _unshaded(self, leg: Leg, number: int) -> list[Condition]:
+    def _unshaded(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
         """No shade stands across segment `number`; the far end's own does not hide it."""
         shades, found = self.facets.shades, []
         for shade, landmark in enumerate(shades.landmark):
@@ -244,7 +250,7 @@ class Certifier:
                 continue
             margin = shades.margin(leg.points[number], leg.points[number + 1], shade)
             text = f"shade of {shades.names[shade]}, {abs(margin):.2e} m {'in' if margin < 0 else 'out'}side"
-            found.append(Condition("occluded", text, margin, float(leg.shift[number])))
+            found.append(ExistenceCondition("occluded", text, margin, float(leg.shift[number])))
         return found
 
     def _inside(self, point: Floats, ray: Floats, wall: int) -> float:
@@ -260,7 +266,7 @@ class Certifier:
         return distance if inside else -distance
 
 
-def _tilts(facets: Facets, center: Floats) -> Floats:
+def _tilts(facets: WallFacets, center: Floats) -> Floats:
     """(W,) [rad] how far rounded corners can turn the normal of each wall's largest triangle."""
     corners = facets.corners - center
     sides = np.roll(corners, -1, axis=1) - corners

@@ -21,7 +21,7 @@ def compare_channels(
     By default the channel as its users get it, its numbers refined in float64 on the facets that the tracer named;
     without `refine` the tracer's own float32 numbers.
     """
-    from rislam_rt.channel.traced.limits import shortest_segment
+    from rislam_rt.channel.traced.float32_limits import shortest_segment
 
     traced, analytic, trajectory = trace_both(scene, radio, poses=poses, depth=depth, rng=rng, refine=refine)
     return compare_paths(traced, analytic, scene, trajectory, radio=radio, shortest_segment=shortest_segment(scene))

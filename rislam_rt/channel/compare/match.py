@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, Certifier, Identity
-from rislam_rt.channel.compare.limits import Limits, Precision, coherent_scale, with_mirrors
-from rislam_rt.channel.compare.report import OneSided, PathReport
+from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, DifferenceExplainer, Identity
+from rislam_rt.channel.compare.error_limits import ErrorLimits, RoomPrecision, coherent_scale, with_mirrors
+from rislam_rt.channel.compare.report import OneSidedPath, PathReport
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.image_source.antennas import peak_amplitude
 from rislam_rt.constants import SPEED_OF_LIGHT
@@ -17,7 +17,7 @@ from rislam_rt.geometry.angles import angle_between
 from rislam_rt.model import Antennas, Paths, RadioConfig, Scene, Trajectory
 
 
-class Columns(NamedTuple):
+class IdentityColumns(NamedTuple):
     """For every identity that either side knows: its column on each side, -1 where it is unknown there."""
 
     identity: list[Identity]
@@ -40,7 +40,7 @@ class Matched(NamedTuple):
     """(M,) column."""
     scale: Floats
     """(M,) coherent scale of the gain."""
-    limits: Limits
+    limits: ErrorLimits
 
 
 _RADIO = RadioConfig()
@@ -59,8 +59,8 @@ def compare_paths(
 
     Gains are compared as they are: give both sides the same code. Every path that one side lacks is looked up in the
     geometry (`certificate.py`); what has no proof there counts as unexplained. Errors of those that both have are
-    judged by limits that follow from precision and geometry (`limits.py`): float32 where `traced.source` says that the
-    numbers are the tracer's own.
+    judged by limits that follow from precision and geometry (`error_limits.py`): float32 where `traced.source` says
+    that the numbers are the tracer's own.
 
     Parameters
     ----------
@@ -79,13 +79,13 @@ def compare_paths(
     columns = _align(traced, analytic)
     in_traced, in_analytic = _valid(traced, columns.traced), _valid(analytic, columns.analytic)
     depth = min(traced.tx_walls.shape[1], analytic.tx_walls.shape[1])
-    certifier = Certifier.of(scene, trajectory, depth, shortest_segment)
+    certifier = DifferenceExplainer.of(scene, trajectory, depth, shortest_segment)
     one_sided = [
         _certify(certifier, columns.identity[path], int(cycle), bool(in_traced[cycle, path]))
         for cycle, path in np.argwhere(in_traced != in_analytic)
     ]
     cycle, path = np.nonzero(in_traced & in_analytic)
-    precision = Precision.of(scene, radio, single=is_single(traced.source))
+    precision = RoomPrecision.of(scene, radio, single=is_single(traced.source))
     scale = _scale(analytic, columns.identity, (cycle, columns.analytic[path], path), trajectory, precision)
     limits = precision.limits(analytic, cycle, columns.analytic[path], trajectory, scale)
     labels = tuple(certifier.label(identity) for identity in columns.identity)
@@ -98,7 +98,7 @@ def _scale(
     identity: list[Identity],
     matched: tuple[Integers, Integers, Integers],
     trajectory: Trajectory,
-    precision: Precision,
+    precision: RoomPrecision,
 ) -> Floats:
     """(M,) coherent scale of matched paths, given by cycle, analytic column and identity."""
     cycle, column, path = matched
@@ -112,12 +112,12 @@ def _scale(
     return peak_amplitude(antennas) * coherent_scale(unit, cycle, columns, trajectory, precision)
 
 
-def _align(traced: Paths, analytic: Paths) -> Columns:
+def _align(traced: Paths, analytic: Paths) -> IdentityColumns:
     """The union of both sides' identities."""
     sides = [{named_identity(paths, p): p for p in range(paths.num_paths)} for paths in (traced, analytic)]
     identity = sorted(sides[0].keys() | sides[1].keys())
     here = [np.array([side.get(i, -1) for i in identity], dtype=np.int64) for side in sides]
-    return Columns(identity, here[0], here[1])
+    return IdentityColumns(identity, here[0], here[1])
 
 
 def named_identity(paths: Paths, path: int) -> Identity:
@@ -135,18 +135,18 @@ def _valid(paths: Paths, column: Integers) -> Booleans:
     return valid
 
 
-def _certify(certifier: Certifier, identity: Identity, cycle: int, is_traced: bool) -> OneSided:
+def _certify(certifier: DifferenceExplainer, identity: Identity, cycle: int, is_traced: bool) -> OneSidedPath:
     """The record of one one-sided path."""
     side = "traced" if is_traced else "analytic"
     proof = certifier.explain(identity, cycle, side)
-    return OneSided(cycle, certifier.label(identity), side, proof.reason, proof.text, proof.size)
+    return OneSidedPath(cycle, certifier.label(identity), side, proof.reason, proof.text, proof.size)
 
 
 def _report(
     traced: Paths,
     analytic: Paths,
     matched: Matched,
-    one_sided: list[OneSided],
+    one_sided: list[OneSidedPath],
 ) -> PathReport:
     """Errors of the matched paths."""
     at_traced, at_analytic = (matched.cycle, matched.traced), (matched.cycle, matched.analytic)

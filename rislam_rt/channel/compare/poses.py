@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
-from rislam_rt.channel.image_source.facets import Facets, build_facets
+from rislam_rt.channel.image_source.facets import WallFacets, build_facets
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import distance_to_triangles
@@ -51,7 +51,7 @@ def _as_trajectory(position: Floats, baseline: float, rng: np.random.Generator) 
     )
 
 
-def _reachable(facets: Facets, start: Floats, points: Floats) -> Booleans:
+def _reachable(facets: WallFacets, start: Floats, points: Floats) -> Booleans:
     """Which points (N, 3) a chain of free straight lines joins to the start, other points as stations."""
     reached = np.zeros(len(points), dtype=np.bool_)
     walls = facets.possible_blockers(np.concatenate([start[None], points]))

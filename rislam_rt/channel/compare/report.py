@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers, freeze
-from rislam_rt.channel.compare.limits import Limits
+from rislam_rt.channel.compare.error_limits import ErrorLimits
 from rislam_rt.model import PathKind
 
 MOST_LISTED = 20
 """Breaches that are listed, the worst first; all are counted."""
 
 
-class OneSided(NamedTuple):
+class OneSidedPath(NamedTuple):
     """A path that only one side has, in one cycle."""
 
     cycle: int
@@ -30,7 +30,7 @@ class OneSided(NamedTuple):
     """[m] the length or distance on which the proof rests, 0 where it rests on none."""
 
 
-class Breach(NamedTuple):
+class LimitViolation(NamedTuple):
     """A matched path on which the two sides are farther apart than precision and geometry explain."""
 
     cycle: int
@@ -72,9 +72,9 @@ class PathReport:
     """(M,) [rad] angle between the directions of departure."""
     aoa_error: Floats
     """(M,) [rad] angle between the directions of arrival."""
-    limits: Limits
+    limits: ErrorLimits
     """Of `length_error`, `gain_error`, `phase_error`, `aod_error` and `aoa_error`."""
-    one_sided: tuple[OneSided, ...]
+    one_sided: tuple[OneSidedPath, ...]
     searched: dict[str, str]
     """By side: whose numbers, and among which wall sequences paths were looked for (`Paths.source`)."""
 
@@ -117,13 +117,15 @@ class PathReport:
         return sum(int(np.sum(~(error <= limit))) for error, limit in self.judged.values())
 
     @property
-    def breaches(self) -> list[Breach]:
+    def breaches(self) -> list[LimitViolation]:
         """The worst of them first, at most `MOST_LISTED`."""
         found = []
         for quantity, (error, limit) in self.judged.items():
             for row in np.flatnonzero(~(error <= limit)):
                 label = self.labels[self.path[row]]
-                found.append(Breach(int(self.cycle[row]), label, quantity, float(error[row]), float(limit[row])))
+                found.append(
+                    LimitViolation(int(self.cycle[row]), label, quantity, float(error[row]), float(limit[row]))
+                )
         return sorted(found, key=lambda b: -b.value / b.limit)[:MOST_LISTED]
 
     @property

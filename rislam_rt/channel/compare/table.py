@@ -25,7 +25,7 @@ landmark, walls in the order of travel. Written by `rislam-rt` from one run; do 
   rows are the tracer's own float32 numbers: the independent evidence, and the verdict. In *refined* rows the tracer
   decides which paths exist and what its materials do to the field; lengths and directions are recomputed in float64 on
   the walls it named, by formulas that image sources share, so that their errors say little beyond rounding.
-- every error is judged by a limit of its own path (`rislam_rt/channel/compare/limits.py`), which follows from the
+- every error is judged by a limit of its own path (`rislam_rt/channel/compare/error_limits.py`), which follows from the
   rounding of float32 (of float64 in refined rows), the room's size, the path's length, its bounces and the segments
   next to agent and landmark; none is fitted. *beyond limits* counts the errors that are larger: exit code 1.
 - *share of the limit*: the path that comes nearest to its own, for length, gain, phase, departure and arrival.

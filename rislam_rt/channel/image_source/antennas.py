@@ -14,7 +14,7 @@ BEAM, DEEPEST, PEAK = np.radians(65.0), 30.0, 8.0
 """3GPP TR 38.901, table 7.3-1: beam width in either plane, largest attenuation [dB], gain [dBi]."""
 
 
-class Terminals(NamedTuple):
+class LegEnds(NamedTuple):
     """What is at the two ends of legs."""
 
     device: tuple[str, str]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.image_source.clusters import Clusters
+from rislam_rt.channel.image_source.clusters import WallClusters
 from rislam_rt.channel.image_source.rectangles import Rectangles
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.geometry.planes import mirror
@@ -22,7 +22,7 @@ _BLOCK = 4_000_000
 """Numbers in the largest temporary array."""
 
 
-class Balls(NamedTuple):
+class BoundingBalls(NamedTuple):
     """B balls of positions: centre (B, 3) and radius (B,) [m]."""
 
     center: Floats
@@ -43,11 +43,11 @@ def group_positions(points: Floats, limit: float) -> list[Integers]:
     return groups
 
 
-def enclosing_balls(points: Floats, groups: list[Integers]) -> Balls:
+def enclosing_balls(points: Floats, groups: list[Integers]) -> BoundingBalls:
     """The balls about the middle of each group's bounds."""
     middle = np.array([(points[g].min(axis=0) + points[g].max(axis=0)) / 2.0 for g in groups]).reshape(-1, 3)
     radius = [np.linalg.norm(points[g] - m, axis=-1).max() for g, m in zip(groups, middle, strict=True)]
-    return Balls(middle, np.array(radius, dtype=np.float64))
+    return BoundingBalls(middle, np.array(radius, dtype=np.float64))
 
 
 class Beams(NamedTuple):
@@ -69,7 +69,7 @@ class Beams(NamedTuple):
         return Beams(self.ball[keep], self.walls[keep], self.image[keep], self.normal[keep], self.offset[keep])
 
 
-class Found(NamedTuple):
+class FoundSequences(NamedTuple):
     """Sequences (N, d) from device to far end that may exist for some device and far end of their balls (N,)."""
 
     device: Integers
@@ -78,8 +78,8 @@ class Found(NamedTuple):
 
 
 def search_beams(
-    clusters: Clusters, device: Balls, far: Balls, pairs: Integers, depth: int, barred: Booleans
-) -> Iterator[Found]:
+    clusters: WallClusters, device: BoundingBalls, far: BoundingBalls, pairs: Integers, depth: int, barred: Booleans
+) -> Iterator[FoundSequences]:
     """Sequences of 1 to `depth` walls, in blocks.
 
     Parameters
@@ -104,8 +104,8 @@ def search_beams(
 
 
 def _followed(
-    clusters: Clusters, beams: Beams, device: Balls, far: Balls, pairs: Integers, more: int
-) -> Iterator[Found]:
+    clusters: WallClusters, beams: Beams, device: BoundingBalls, far: BoundingBalls, pairs: Integers, more: int
+) -> Iterator[FoundSequences]:
     """The sequences of these beams, and of up to `more` walls put in front."""
     yield _reaching(beams, device, pairs)
     if more == 0:
@@ -197,7 +197,7 @@ def _half_spaces(
     return normal, np.einsum("nei,nei->ne", normal, points)
 
 
-def _reaching(beams: Beams, device: Balls, pairs: Integers) -> Found:
+def _reaching(beams: Beams, device: BoundingBalls, pairs: Integers) -> FoundSequences:
     """The beams that a device ball of their far ball reaches into."""
     order = np.argsort(pairs[:, 1], kind="stable")
     first = np.searchsorted(pairs[order, 1], beams.ball)
@@ -210,4 +210,4 @@ def _reaching(beams: Beams, device: Balls, pairs: Integers) -> Found:
         row, ball = row[keep], ball[keep]
         height = np.einsum("ni,ni->n", beams.normal[row, plane], device.center[ball]) - beams.offset[row, plane]
         keep = height >= -device.radius[ball] - SURFACE_TOLERANCE
-    return Found(ball[keep], beams.ball[row[keep]], beams.walls[row[keep]])
+    return FoundSequences(ball[keep], beams.ball[row[keep]], beams.walls[row[keep]])

@@ -6,9 +6,15 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.image_source.beams import Balls, Found, enclosing_balls, group_positions, search_beams
-from rislam_rt.channel.image_source.clusters import Clusters, build_clusters
-from rislam_rt.channel.image_source.facets import Facets
+from rislam_rt.channel.image_source.beams import (
+    BoundingBalls,
+    FoundSequences,
+    enclosing_balls,
+    group_positions,
+    search_beams,
+)
+from rislam_rt.channel.image_source.clusters import WallClusters, build_clusters
+from rislam_rt.channel.image_source.facets import WallFacets
 from rislam_rt.channel.image_source.sequences import wall_sequences
 
 FEW = 2000
@@ -23,11 +29,11 @@ _ROWS = 200_000
 SEARCHES = ("auto", "exhaustive", "beams")
 
 
-class Search(NamedTuple):
+class SequenceSearch(NamedTuple):
     """How sequences are looked for, and in which walls."""
 
-    facets: Facets
-    clusters: Clusters
+    facets: WallFacets
+    clusters: WallClusters
     exhaustive: bool
     near: float
     """[m] Largest radius of positions that share beams."""
@@ -38,16 +44,16 @@ class Search(NamedTuple):
         return "all wall sequences" if self.exhaustive else "mirrored beams"
 
 
-def build_search(facets: Facets, depth: int, how: str) -> Search:
+def build_search(facets: WallFacets, depth: int, how: str) -> SequenceSearch:
     """Choose by the number of sequences that W walls make, unless told."""
     count = sum(len(facets) * max(len(facets) - 1, 0) ** (bounces - 1) for bounces in range(1, depth + 1))
     diagonal = np.linalg.norm(facets.box[1].max(axis=0) - facets.box[0].min(axis=0)) if len(facets) else 0.0
     exhaustive = how == "exhaustive" or (how == "auto" and count <= FEW)
-    return Search(facets, build_clusters(facets), exhaustive, NEAR * float(diagonal))
+    return SequenceSearch(facets, build_clusters(facets), exhaustive, NEAR * float(diagonal))
 
 
 def candidate_rows(
-    search: Search, device: Floats, far: Floats, depth: int, host: int
+    search: SequenceSearch, device: Floats, far: Floats, depth: int, host: int
 ) -> Iterator[tuple[Integers, Integers]]:
     """Cycles (N,) and wall sequences (N, d) from device to far end, in blocks of one d each.
 
@@ -68,13 +74,13 @@ def candidate_rows(
     groups = group_positions(np.concatenate([device, far], axis=1) if len(far) > 1 else device, search.near)
     devices = enclosing_balls(device, groups)
     number = np.arange(len(groups))
-    far_balls = enclosing_balls(far, groups) if len(far) > 1 else Balls(far, np.zeros(1))
+    far_balls = enclosing_balls(far, groups) if len(far) > 1 else BoundingBalls(far, np.zeros(1))
     pairs = np.stack([number, number if len(far) > 1 else np.zeros_like(number)], axis=-1)
     for found in search_beams(search.clusters, devices, far_balls, pairs, depth, barred):
         yield from _rows(found, groups)
 
 
-def _rows(found: Found, groups: list[Integers]) -> Iterator[tuple[Integers, Integers]]:
+def _rows(found: FoundSequences, groups: list[Integers]) -> Iterator[tuple[Integers, Integers]]:
     """Every cycle of each device ball, in blocks."""
     if len(found.device) == 0:
         return

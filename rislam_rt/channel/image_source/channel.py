@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.compose import compose_paths
-from rislam_rt.channel.image_source.antennas import Terminals
-from rislam_rt.channel.image_source.candidates import SEARCHES, Search, build_search
-from rislam_rt.channel.image_source.facets import Facets, build_facets
+from rislam_rt.channel.image_source.antennas import LegEnds
+from rislam_rt.channel.image_source.candidates import SEARCHES, SequenceSearch, build_search
+from rislam_rt.channel.image_source.facets import WallFacets, build_facets
 from rislam_rt.channel.image_source.fresnel import Coatings, build_coatings
 from rislam_rt.channel.image_source.images import find_legs
-from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.errors import ConfigError, expect
 from rislam_rt.model import Antennas, Paths, RadioConfig, RisCode, Scene, Trajectory
@@ -39,9 +39,9 @@ class ImageSourceChannel:
     antennas: Antennas | None = None
     """Patterns and polarisation of the agent's antennas, if they are others than the radio's."""
     walls: Walls = field(init=False)
-    facets: Facets = field(init=False)
+    facets: WallFacets = field(init=False)
     coatings: Coatings = field(init=False)
-    looked: Search = field(init=False)
+    looked: SequenceSearch = field(init=False)
 
     def __post_init__(self) -> None:
         expect("scene", self.scene, Scene)
@@ -62,7 +62,7 @@ class ImageSourceChannel:
         tx, rx = trajectory.tx, trajectory.rx
         ends = self.antennas or self.radio.antennas
         at = {
-            end: None if ends.plain else Terminals(*pair, trajectory.heading)
+            end: None if ends.plain else LegEnds(*pair, trajectory.heading)
             for end, pair in (
                 ("direct", (ends.of_tx, ends.of_rx)),
                 ("tx", (ends.of_tx, ends.of_landmark)),
@@ -86,7 +86,7 @@ class ImageSourceChannel:
         """The same paths under another code."""
         return rephase(paths, code)
 
-    def _landmark_legs(self, device: Floats, number: int, terminals: Terminals | None) -> Legs:
+    def _landmark_legs(self, device: Floats, number: int, terminals: LegEnds | None) -> SpecularLegs:
         """Legs from device positions (K, 3) to a landmark; those to a panel arrive at its front."""
         panel = self.scene.panel_number(number)
         point = self.scene.landmark_positions[number : number + 1]

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.image_source.facets import Facets
+from rislam_rt.channel.image_source.facets import WallFacets
 from rislam_rt.channel.image_source.rectangles import Rectangles
 from rislam_rt.constants import SURFACE_TOLERANCE
 
@@ -13,7 +13,7 @@ CLUSTER = 48
 """Walls in a cluster, at most: about as many as a test of all of them costs no more than the glance that spares it."""
 
 
-class Clusters(NamedTuple):
+class WallClusters(NamedTuple):
     """Rectangles and the boxes of C clusters of them."""
 
     rectangles: Rectangles
@@ -47,7 +47,7 @@ class Clusters(NamedTuple):
         return np.concatenate(rows_found), np.concatenate(walls_found)
 
 
-def build_clusters(facets: Facets) -> Clusters:
+def build_clusters(facets: WallFacets) -> WallClusters:
     """Rectangles of all walls, parted into clusters by halving along the longer side of what they fill."""
     rectangles = facets.rectangles
     members: list[Integers] = []
@@ -62,4 +62,4 @@ def build_clusters(facets: Facets) -> Clusters:
         waiting += [order[: len(order) // 2], order[len(order) // 2 :]]
     low = np.array([facets.box[0, walls].min(axis=0) for walls in members]).reshape(-1, 3)
     high = np.array([facets.box[1, walls].max(axis=0) for walls in members]).reshape(-1, 3)
-    return Clusters(rectangles, members, (low + high) / 2.0, (high - low) / 2.0 + SURFACE_TOLERANCE)
+    return WallClusters(rectangles, members, (low + high) / 2.0, (high - low) / 2.0 + SURFACE_TOLERANCE)

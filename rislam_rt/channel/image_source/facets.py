@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.image_source.rectangles import Rectangles, bounding_rectangles
-from rislam_rt.channel.shades import Shades
+from rislam_rt.channel.occluders import Occluders
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.geometry.triangles import edge_planes
@@ -25,7 +25,7 @@ FRONT, BACK = 1, 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Facets:
+class WallFacets:
     """W walls, their T triangles sorted by wall."""
 
     normal: Floats
@@ -50,7 +50,7 @@ class Facets:
     """(W,) of `Walls.plane`."""
     over: tuple[Integers, ...]
     """(W,) of `Walls.over`."""
-    shades: Shades
+    shades: Occluders
     """What hides but is no wall."""
 
     def __len__(self) -> int:
@@ -155,7 +155,7 @@ class Facets:
         return bits
 
 
-def build_facets(walls: Walls) -> Facets:
+def build_facets(walls: Walls) -> WallFacets:
     """Sort the triangles by wall."""
     order = np.argsort(walls.wall_of_triangle, kind="stable")
     corners = walls.triangles[order]
@@ -168,7 +168,7 @@ def build_facets(walls: Walls) -> Facets:
         extent[:, rows] = distance.min(axis=1), distance.max(axis=1)
     starts = 3 * first[:-1]
     box = [op.reduceat(points, starts, axis=0) if len(points) else points for op in (np.minimum, np.maximum)]
-    return Facets(
+    return WallFacets(
         normal=walls.normal,
         offset=walls.offset,
         first=first,

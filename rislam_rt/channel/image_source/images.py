@@ -5,17 +5,17 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.image_source.antennas import Terminals
-from rislam_rt.channel.image_source.candidates import Search, candidate_rows
-from rislam_rt.channel.image_source.facets import SEAM, Facets
+from rislam_rt.channel.image_source.antennas import LegEnds
+from rislam_rt.channel.image_source.candidates import SequenceSearch, candidate_rows
+from rislam_rt.channel.image_source.facets import SEAM, WallFacets
 from rislam_rt.channel.image_source.fresnel import Coatings
-from rislam_rt.channel.legs import Legs
+from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import mirror, mirror_direction
 
 
-class Rays(NamedTuple):
+class ImageRays(NamedTuple):
     """N legs found, one row each: cycle (N,), walls (N, d), bounce points (N, d, 3) and the far end's image (N, 3)."""
 
     cycle: Integers
@@ -23,13 +23,13 @@ class Rays(NamedTuple):
     bounces: Floats
     image: Floats
 
-    def only(self, keep: Booleans) -> "Rays":
+    def only(self, keep: Booleans) -> "ImageRays":
         """The rows where `keep` (N,) holds."""
-        return Rays(self.cycle[keep], self.walls[keep], self.bounces[keep], self.image[keep])
+        return ImageRays(self.cycle[keep], self.walls[keep], self.bounces[keep], self.image[keep])
 
 
 def find_legs(
-    search: Search,
+    search: SequenceSearch,
     coatings: Coatings,
     device: Floats,
     far: Floats,
@@ -38,8 +38,8 @@ def find_legs(
     host: int = -1,
     front: Floats | None = None,
     landmark: int = -1,
-    terminals: Terminals | None = None,
-) -> Legs:
+    terminals: LegEnds | None = None,
+) -> SpecularLegs:
     """Every specular leg of up to `depth` bounces from device positions (K, 3) to far ends (K, 3) or (1, 3) [m].
 
     Parameters
@@ -63,19 +63,19 @@ def find_legs(
     return _legs(facets, coatings, [rays for rays in visible if len(rays.cycle)], device, far, depth, terminals)
 
 
-def _joined(parts: list[Rays]) -> Rays:
+def _joined(parts: list[ImageRays]) -> ImageRays:
     """All rays of one number of bounces."""
-    return Rays(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    return ImageRays(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def _direct_rays(device: Floats, far: Floats) -> Rays:
+def _direct_rays(device: Floats, far: Floats) -> ImageRays:
     """The legs without a bounce."""
     cycles = len(device)
     nothing = np.zeros((cycles, 0), dtype=np.int64)
-    return Rays(np.arange(cycles), nothing, np.zeros((cycles, 0, 3)), np.broadcast_to(far, device.shape))
+    return ImageRays(np.arange(cycles), nothing, np.zeros((cycles, 0, 3)), np.broadcast_to(far, device.shape))
 
 
-def _reflected_rays(facets: Facets, cycle: Integers, walls: Integers, device: Floats, far: Floats) -> Rays:
+def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device: Floats, far: Floats) -> ImageRays:
     """The legs of cycles (N,) over walls (N, d) whose every bounce lies on its wall; occlusion is not looked at."""
     images = [far[cycle if len(far) > 1 else np.zeros_like(cycle)]]
     for wall in walls.T[::-1]:
@@ -90,7 +90,7 @@ def _reflected_rays(facets: Facets, cycle: Integers, walls: Integers, device: Fl
         on_wall = facets.reflects(hit, wall[crosses])
         row, point = row[np.flatnonzero(crosses)[on_wall]], hit[on_wall]
         bounces[row, bounce] = point
-    return Rays(cycle[row], walls[row], bounces[row], images[0][row])
+    return ImageRays(cycle[row], walls[row], bounces[row], images[0][row])
 
 
 def _plane_crossing(
@@ -105,15 +105,15 @@ def _plane_crossing(
 
 
 def _visible(
-    facets: Facets,
-    rays: Rays,
+    facets: WallFacets,
+    rays: ImageRays,
     device: Floats,
     far: Floats,
     blockers: Integers,
     host: int,
     front: Floats | None,
     landmark: int,
-) -> Rays:
+) -> ImageRays:
     """The legs that nothing hides and that reach a panel at the far end from its front."""
     count, bounces = rays.walls.shape
     target = np.broadcast_to(far, device.shape)[rays.cycle]
@@ -133,18 +133,18 @@ def _visible(
 
 
 def _legs(
-    facets: Facets,
+    facets: WallFacets,
     coatings: Coatings,
-    found: list[Rays],
+    found: list[ImageRays],
     device: Floats,
     far: Floats,
     depth: int,
-    terminals: Terminals | None,
-) -> Legs:
+    terminals: LegEnds | None,
+) -> SpecularLegs:
     """Rays scattered into dense arrays, one column a sequence that some cycle has."""
     cycles = len(device)
     columns: list[Integers] = []
-    parts: list[tuple[Integers, Integers, Rays]] = []
+    parts: list[tuple[Integers, Integers, ImageRays]] = []
     for rays in found:
         unique, column = np.unique(rays.walls, axis=0, return_inverse=True)
         parts.append((rays.cycle, column.ravel() + sum(len(c) for c in columns), rays))
@@ -169,7 +169,7 @@ def _legs(
         else:
             coefficient[place] = terminals.coefficient(coatings, rays.walls, normals, unit(ray), cycle)
         vertices[cycle, column, : rays.walls.shape[1]] = rays.bounces
-    return Legs(walls, valid, length, at_device, at_far_end, coefficient, vertices)
+    return SpecularLegs(walls, valid, length, at_device, at_far_end, coefficient, vertices)
 
 
 def _followed(direction: Floats, normals: Floats) -> Floats:

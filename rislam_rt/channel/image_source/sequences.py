@@ -5,10 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.image_source.facets import Facets, blocks
+from rislam_rt.channel.image_source.facets import WallFacets, blocks
 
 
-def wall_sequences(facets: Facets, device: Floats, far: Floats, depth: int, host: int = -1) -> Iterator[Integers]:
+def wall_sequences(facets: WallFacets, device: Floats, far: Floats, depth: int, host: int = -1) -> Iterator[Integers]:
     """Candidate sequences in blocks (S, d), in the order from device to far end, for d = 1 .. depth.
 
     No wall comes twice in a row. At every bounce what comes before and what comes after (a wall, or the ends) must

@@ -10,21 +10,21 @@ How a trajectory of K cycles becomes few solves:
 - *tracing* is Sionna's: its image method (`visibility.py`) mirrors in the meshes' planes and sends rays back through
   the scene, which decides visibility and the primitives met; its radio materials and antenna patterns say what becomes
   of the field (`fields.py`), which is carried along the path's own directions: Sionna's basis fails near the vertical.
-- *refinement* (`course.py`) recomputes in float64, on the walls' planes, where the legs found run.
+- *refinement* (`path_geometry.py`) recomputes in float64, on the walls' planes, where the legs found run.
 """
 
 from rislam_rt.channel.traced.channel import TracedChannel
-from rislam_rt.channel.traced.extras import ExtraConfig, ExtraKind, ExtraPaths
-from rislam_rt.channel.traced.limits import shortest_segment
-from rislam_rt.channel.traced.proof import BoxProof, trace_small_box
+from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, DiffuseKind, DiffusePaths
+from rislam_rt.channel.traced.float32_limits import shortest_segment
+from rislam_rt.channel.traced.self_test import SelfTest, trace_small_box
 from rislam_rt.model import Antennas
 
 __all__ = [
     "Antennas",
-    "BoxProof",
-    "ExtraConfig",
-    "ExtraKind",
-    "ExtraPaths",
+    "DiffuseConfig",
+    "DiffuseKind",
+    "DiffusePaths",
+    "SelfTest",
     "TracedChannel",
     "shortest_segment",
     "trace_small_box",

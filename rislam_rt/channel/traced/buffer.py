@@ -7,28 +7,30 @@ import sionna.rt as rt
 from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.rows import Rows
+from rislam_rt.channel.traced.candidate_indices import CandidateIndices
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
-from rislam_rt.channel.traced.stage import Stage, as_points
+from rislam_rt.channel.traced.tracer_scene import TracerScene, as_points
 
 
-def fill_buffer(stage: Stage, sequences: Integers, rows: Rows, vertices: Floats | None = None) -> PathsBuffer:
+def fill_buffer(
+    tracer_scene: TracerScene, sequences: Integers, rows: CandidateIndices, vertices: Floats | None = None
+) -> PathsBuffer:
     """Paths from far ends (sources) to devices (targets) over `sequences` (N, D), which run the other way.
 
     `vertices` (N, D, 3) [m] are in the order from device to far end; without them any point of each wall's plane, which
-    the image method needs, from the stage's origin.
+    the image method needs, from the tracer scene's origin.
     """
     count, depth = sequences.shape
     buffer = PathsBuffer(count, max(depth, 1), False)  # at depth 0 the image method counts down from 0 without end
     walls = turned_round(sequences)
-    points = stage.corner[walls] if vertices is None else turned_vertices(vertices, sequences)
+    points = tracer_scene.corner[walls] if vertices is None else turned_vertices(vertices, sequences)
     for column, (wall, point) in enumerate(zip(walls.T, np.moveaxis(points, 1, 0), strict=True)):
         real = wall != NO_WALL
         event = np.where(real, rt.InteractionType.SPECULAR, rt.InteractionType.NONE)
         at, here = dr.full(mi.UInt, column + 1, count), mi.Bool(real)
         buffer.set_interaction_type(at, as_indices(event), mi.Bool(True))
-        buffer.set_shape(at, as_indices(stage.shape[wall]), here)
-        buffer.set_primitive(at, as_indices(stage.primitive[wall]), here)
+        buffer.set_shape(at, as_indices(tracer_scene.shape[wall]), here)
+        buffer.set_primitive(at, as_indices(tracer_scene.primitive[wall]), here)
         buffer.set_vertex(at, as_points(point), here)
         buffer.set_prob(at, mi.Float(1.0), here)
     buffer._src_indices = as_indices(rows.far)
@@ -36,10 +38,10 @@ def fill_buffer(stage: Stage, sequences: Integers, rows: Rows, vertices: Floats 
     return buffer
 
 
-def read_vertices(stage: Stage, buffer: PathsBuffer, keep: Integers, sequences: Integers) -> Floats:
+def read_vertices(tracer_scene: TracerScene, buffer: PathsBuffer, keep: Integers, sequences: Integers) -> Floats:
     """Bounce points (N, D, 3) [m] of the paths `keep`, from device to far end over `sequences` (N, D)."""
     columns = [np.array(getattr(buffer, f"vertices_{axis}"), dtype=np.float64) for axis in "xyz"]
-    return turned_vertices(np.stack(columns, axis=-1)[keep, : sequences.shape[1]] + stage.origin, sequences)
+    return turned_vertices(np.stack(columns, axis=-1)[keep, : sequences.shape[1]] + tracer_scene.origin, sequences)
 
 
 def as_indices(values: Integers) -> mi.UInt:

@@ -5,15 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from rislam_rt.channel.compose import compose_paths
-from rislam_rt.channel.legs import Legs
-from rislam_rt.channel.shades import ALONE
-from rislam_rt.channel.traced.course import refined_course, traced_course
-from rislam_rt.channel.traced.extras import ExtraConfig, ExtraPaths, trace_extras
-from rislam_rt.channel.traced.limits import room_center
-from rislam_rt.channel.traced.problem import Batch, Found, Problem, build_batch, join_found
-from rislam_rt.channel.traced.rows import Rows, in_blocks
+from rislam_rt.channel.legs import SpecularLegs
+from rislam_rt.channel.occluders import ALONE
+from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_blocks
+from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, DiffusePaths, trace_diffuse_paths
+from rislam_rt.channel.traced.float32_limits import room_center
+from rislam_rt.channel.traced.leg_query import FoundLegs, LegQuery, QueryBatch, build_batch, join_found
+from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
 from rislam_rt.channel.traced.sequences import wall_sides
-from rislam_rt.channel.traced.start import start_tracer
+from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError, expect
 from rislam_rt.model import Antennas, Paths, RadioConfig, RisCode, Scene, Trajectory
@@ -53,7 +53,7 @@ class TracedChannel:
         if depth < 0:
             raise ConfigError(f"depth: {depth} received; give the largest number of bounces, 0 or more")
         start_tracer()
-        from rislam_rt.channel.traced.stage import build_stage
+        from rislam_rt.channel.traced.tracer_scene import build_tracer_scene
 
         self.scene = scene
         self.radio = radio
@@ -65,20 +65,20 @@ class TracedChannel:
         shades = {n: s.shade.triangles for n, s in enumerate(scene.scatterers) if s.shade is not None}
         if scene.shades:
             shades[ALONE] = np.concatenate([shade.triangles for shade in scene.shades])
-        self.stage = build_stage(self.walls, radio.carrier, room_center(scene), shades)
+        self.tracer_scene = build_tracer_scene(self.walls, radio.carrier, room_center(scene), shades)
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Every path of every cycle, with the panel at level 0."""
         expect("trajectory", trajectory, Trajectory)
         tx, rx, heading = trajectory.tx, trajectory.rx, trajectory.heading
-        problems = [Problem(tx, rx, heading, to_rx=True)]
+        problems = [LegQuery(tx, rx, heading, to_rx=True)]
         for number, point in enumerate(self.scene.landmark_positions):
             panel, behind, front = self.scene.panel_number(number), -1, None
             if panel >= 0:
                 behind, front = self.walls.hosts[panel], self.scene.panels[panel].spec.normal
-            spared = number if number in self.stage.shades else -1
+            spared = number if number in self.tracer_scene.shades else -1
             for from_rx, device in ((False, tx), (True, rx)):
-                problems.append(Problem(device, point[None], heading, from_rx, False, behind, front, spared))
+                problems.append(LegQuery(device, point[None], heading, from_rx, False, behind, front, spared))
         (direct, *legs), complete = self._trace(problems)
         tx_legs, rx_legs = legs[0::2], legs[1::2]
         searched = "all wall sequences" if complete else "wall sequences in cones"
@@ -89,32 +89,34 @@ class TracedChannel:
         """The same paths under another code, without tracing again."""
         return rephase(paths, code)
 
-    def extra_paths(self, trajectory: Trajectory, config: ExtraConfig) -> ExtraPaths:
+    def extra_paths(self, trajectory: Trajectory, config: DiffuseConfig) -> DiffusePaths:
         """Diffuse scattering and diffraction, if switched on: paths without an analytic twin, apart from `paths`."""
-        return trace_extras(self.scene, self.radio, trajectory, config)
+        return trace_diffuse_paths(self.scene, self.radio, trajectory, config)
 
-    def _trace(self, problems: Sequence[Problem]) -> tuple[list[Legs], bool]:
+    def _trace(self, problems: Sequence[LegQuery]) -> tuple[list[SpecularLegs], bool]:
         """Solve problems of one view of the room together, block by block; also whether all sequences were asked."""
-        legs: dict[int, Legs] = {}
+        legs: dict[int, SpecularLegs] = {}
         complete = True
         for spared in dict.fromkeys(problem.spared for problem in problems):
             chosen = [number for number, problem in enumerate(problems) if problem.spared == spared]
             depth = self.depth if len(self.walls) else 0
-            batch = build_batch([problems[number] for number in chosen], self.stage, self._sides, depth)
+            batch = build_batch([problems[number] for number in chosen], self.tracer_scene, self._sides, depth)
             complete &= batch.complete
-            blocks = in_blocks(batch.candidates(self.stage), BLOCK_ROWS)
+            blocks = in_blocks(batch.candidates(self.tracer_scene), BLOCK_ROWS)
             found = join_found([self._solve(batch, rows, spared) for rows in blocks])
             legs |= dict(zip(chosen, batch.legs(found), strict=True))
         return [legs[number] for number in range(len(problems))], complete
 
-    def _solve(self, batch: Batch, candidates: Rows, spared: int) -> Found:
+    def _solve(self, batch: QueryBatch, candidates: CandidateIndices, spared: int) -> FoundLegs:
         """Ask the tracer which candidates exist, and what their walls do to the signal."""
         from rislam_rt.channel.traced.fields import leg_coefficients
         from rislam_rt.channel.traced.visibility import visible_rows
 
-        rows, vertices = visible_rows(self.stage, batch.all_sequences, batch.far, batch.device, candidates, spared)
+        rows, vertices = visible_rows(
+            self.tracer_scene, batch.all_sequences, batch.far, batch.device, candidates, spared
+        )
         sequences, ends = batch.all_sequences[rows.sequence], batch.ends(rows)
-        exact = refined_course(self.walls, sequences, ends.device, ends.far)
-        coefficient = leg_coefficients(self.stage, self.walls, sequences, ends, exact, self.antennas)
-        course = exact if self.refine else traced_course(sequences, ends.device, ends.far, vertices)
-        return Found(rows, course, coefficient)
+        exact = refined_geometry(self.walls, sequences, ends.device, ends.far)
+        coefficient = leg_coefficients(self.tracer_scene, self.walls, sequences, ends, exact, self.antennas)
+        geometry = exact if self.refine else traced_geometry(sequences, ends.device, ends.far, vertices)
+        return FoundLegs(rows, geometry, coefficient)

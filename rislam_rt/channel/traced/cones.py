@@ -15,13 +15,13 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.traced.buffer import as_indices
 
 if TYPE_CHECKING:
-    from rislam_rt.channel.traced.stage import Stage
+    from rislam_rt.channel.traced.tracer_scene import TracerScene
 
 NEAR = 0.02
 """Side of the cells that positions are gathered in, as a share of the room's longest side."""
 
 
-class Ball(NamedTuple):
+class PositionBall(NamedTuple):
     """A ball of positions in the tracer's frame."""
 
     center: tuple[float, float, float]
@@ -29,18 +29,18 @@ class Ball(NamedTuple):
 
 
 class Cones(NamedTuple):
-    """Where the ends of the sequences are, in the walls of a stage."""
+    """Where the ends of the sequences are, in the walls of a tracer scene."""
 
-    stage: "Stage"
-    far: list[Ball]
-    device: list[tuple[Ball, Ball]]
+    tracer_scene: "TracerScene"
+    far: list[PositionBall]
+    device: list[tuple[PositionBall, PositionBall]]
     """Each device ball with its far ball."""
 
     def lead_on(self, walls: Integers) -> Booleans:
         """Whether for any far ball the first of walls (N, d) reaches into the cones over the others."""
         keep = np.zeros(len(walls), dtype=np.bool_)
         columns = _columns(walls)
-        target, size = _wall_ball(self.stage, columns[0])
+        target, size = _wall_ball(self.tracer_scene, columns[0])
         for ball in self.far:
             keep |= np.array(self._in_cones(columns[1:], ball, target, size), dtype=np.bool_)
         return keep
@@ -54,43 +54,48 @@ class Cones(NamedTuple):
             keep |= np.array(self._in_cones(columns, ball, target, dr.opaque(mi.Float, device.radius)), dtype=np.bool_)
         return keep
 
-    def _in_cones(self, columns: list[Any], far: Ball, target: Any, size: Any) -> Any:
+    def _in_cones(self, columns: list[Any], far: PositionBall, target: Any, size: Any) -> Any:
         """Whether a target ball meets the cones from a far ball over all the walls, the last being the first met."""
-        sieve = self.stage.sieve
+        wall_boxes = self.tracer_scene.wall_boxes
         image: Any = mi.Point3f(*(dr.opaque(mi.Float, x) for x in far.center))
         radius = dr.opaque(mi.Float, far.radius)
         passed: list[tuple[Any, Any]] = []
         for wall in columns[::-1]:
-            normal, offset = dr.gather(mi.Vector3f, sieve.normal, wall), dr.gather(mi.Float, sieve.offset, wall)
+            normal, offset = (
+                dr.gather(mi.Vector3f, wall_boxes.normal, wall),
+                dr.gather(mi.Float, wall_boxes.offset, wall),
+            )
             passed = [(_mirrored(center, normal, offset), half) for center, half in passed]
-            passed.append(_wall_ball(self.stage, wall))
+            passed.append(_wall_ball(self.tracer_scene, wall))
             image = _mirrored(image, normal, offset)
         keep = dr.full(mi.Bool, True, dr.width(columns[0]))
         for center, half in passed:
-            keep &= _meets(target - image, center - image, size + sieve.margin, radius, half + sieve.margin)
+            keep &= _meets(target - image, center - image, size + wall_boxes.margin, radius, half + wall_boxes.margin)
         return keep
 
 
-def build_cones(stage: "Stage", device: Floats, far: Floats) -> Cones:
+def build_cones(tracer_scene: "TracerScene", device: Floats, far: Floats) -> Cones:
     """Gather positions (N, 3) and their far ends (N, 3), or the single one (1, 3), in balls."""
-    device, far = device - stage.origin, far - stage.origin
-    cell = NEAR * 2.0 * (stage.sieve.margin * 1e3 - 1.0)  # the margin is a thousandth of 1 m + half the longest side
+    device, far = device - tracer_scene.origin, far - tracer_scene.origin
+    cell = (
+        NEAR * 2.0 * (tracer_scene.wall_boxes.margin * 1e3 - 1.0)
+    )  # the margin is a thousandth of 1 m + half the longest side
     _, group = np.unique(np.floor(device / cell), axis=0, return_inverse=True)
     group = group.ravel()
     members = [np.flatnonzero(group == g) for g in range(group.max(initial=-1) + 1)]
     devices = [_ball(device[rows]) for rows in members]
     if len(far) == 1:
         only = _ball(far)
-        return Cones(stage, [only], [(ball, only) for ball in devices])
+        return Cones(tracer_scene, [only], [(ball, only) for ball in devices])
     fars = [_ball(far[rows]) for rows in members]
-    return Cones(stage, fars, list(zip(devices, fars, strict=True)))
+    return Cones(tracer_scene, fars, list(zip(devices, fars, strict=True)))
 
 
-def _ball(points: Floats) -> Ball:
+def _ball(points: Floats) -> PositionBall:
     """The ball about the middle of some points (N, 3)."""
     middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
     x, y, z = middle.tolist()
-    return Ball((x, y, z), float(np.linalg.norm(points - middle, axis=-1).max()))
+    return PositionBall((x, y, z), float(np.linalg.norm(points - middle, axis=-1).max()))
 
 
 def _columns(walls: Integers) -> list[Any]:
@@ -100,10 +105,10 @@ def _columns(walls: Integers) -> list[Any]:
     return columns
 
 
-def _wall_ball(stage: "Stage", wall: Any) -> tuple[Any, Any]:
+def _wall_ball(tracer_scene: "TracerScene", wall: Any) -> tuple[Any, Any]:
     """Centre and radius of a ball about walls (N,)."""
-    half = dr.gather(mi.Vector3f, stage.sieve.half, wall)
-    return dr.gather(mi.Point3f, stage.sieve.center, wall), dr.norm(half)
+    half = dr.gather(mi.Vector3f, tracer_scene.wall_boxes.half, wall)
+    return dr.gather(mi.Point3f, tracer_scene.wall_boxes.center, wall), dr.norm(half)
 
 
 def _mirrored(point: Any, normal: Any, offset: Any) -> Any:

@@ -1,4 +1,4 @@
-"""What walls and antennas do to the signal along given courses: Sionna's materials and patterns, fields in float64.
+"""What walls and antennas do to the signal along given geometries: Sionna's materials and patterns, fields in float64.
 
 Sionna carries a field in the (theta, phi) basis of the ray's direction, in float32. That basis turns over at the pole:
 within 1e-3 rad of the vertical Sionna takes another one, in which a bounce off floor or ceiling is a mirror image, and
@@ -16,11 +16,11 @@ from sionna.rt import antenna_pattern
 from sionna.rt.utils import spectrum_to_matrix_4f
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
-from rislam_rt.channel.traced.course import Course, segment_directions
+from rislam_rt.channel.traced.leg_query import LegEndpoints
 from rislam_rt.channel.traced.material import ConstantReflection
-from rislam_rt.channel.traced.problem import Ends
+from rislam_rt.channel.traced.path_geometry import PathGeometry, segment_directions
 from rislam_rt.channel.traced.sequences import NO_WALL
-from rislam_rt.channel.traced.stage import Stage
+from rislam_rt.channel.traced.tracer_scene import TracerScene
 from rislam_rt.channel.walls import Walls
 from rislam_rt.model import Antennas
 
@@ -30,7 +30,12 @@ is then 0, for all segments of a leg alike."""
 
 
 def leg_coefficients(
-    stage: Stage, walls: Walls, sequences: Integers, ends: Ends, course: Course, antennas: Antennas
+    tracer_scene: TracerScene,
+    walls: Walls,
+    sequences: Integers,
+    ends: LegEndpoints,
+    geometry: PathGeometry,
+    antennas: Antennas,
 ) -> Complexes:
     """Field (N,) of legs over `sequences` (N, D), without spreading loss and carrier phase.
 
@@ -40,11 +45,11 @@ def leg_coefficients(
     """
     if len(sequences) == 0:
         return np.zeros(0, dtype=np.complex128)
-    travel = segment_directions(walls, sequences, course.at_device)
+    travel = segment_directions(walls, sequences, geometry.at_device)
     field = _radiated(antennas, travel[:, 0], ends.heading, ends.from_rx, antennas.of_tx)
     for bounce, wall in enumerate(sequences.T):
-        for number, material in enumerate(stage.materials):
-            rows = np.flatnonzero((wall != NO_WALL) & (stage.material_of_wall[wall] == number))
+        for number, material in enumerate(tracer_scene.materials):
+            rows = np.flatnonzero((wall != NO_WALL) & (tracer_scene.material_of_wall[wall] == number))
             if len(rows):
                 normal = walls.normal[wall[rows]]
                 jones = _jones(material, travel[rows, bounce], travel[rows, bounce + 1], normal)

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.traced.candidate_indices import CandidateIndices
 from rislam_rt.channel.traced.channel import TracedChannel
-from rislam_rt.channel.traced.rows import Rows
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
 from rislam_rt.errors import TraceError
 from rislam_rt.model import Paths, Trajectory
@@ -46,7 +46,7 @@ def length_gradients(
         raise TraceError("path lengths: a gradient was asked for where there is no path; ask where `valid` holds")
     tx, rx = _tx_legs(channel, trajectory, paths, cycle, path), _rx_legs(channel, trajectory, paths, cycle, path)
     landmark = paths.landmark[path]
-    spared = np.where(np.isin(landmark, list(channel.stage.shades)), landmark, -1)
+    spared = np.where(np.isin(landmark, list(channel.tracer_scene.shades)), landmark, -1)
     gradient = np.zeros((len(path), 3))
     for shade in np.unique(spared):
         every, joined = np.flatnonzero(spared == shade), np.flatnonzero((spared == shade) & (landmark >= 0))
@@ -82,7 +82,7 @@ def _differentiate(channel: TracedChannel, legs: MovingLegs, spared: int) -> Flo
     import drjit as dr
     import mitsuba as mi
 
-    from rislam_rt.channel.traced.stage import as_points
+    from rislam_rt.channel.traced.tracer_scene import as_points
     from rislam_rt.channel.traced.visibility import attached_vertices
 
     count = len(legs.device)
@@ -90,11 +90,13 @@ def _differentiate(channel: TracedChannel, legs: MovingLegs, spared: int) -> Flo
         return np.zeros((0, 3))
     shift = dr.zeros(mi.Point3f, count)
     dr.enable_grad(shift)
-    origin = channel.stage.origin
+    origin = channel.tracer_scene.origin
     device = as_points(legs.device - origin) + shift
     far = as_points(legs.far - origin) + dr.select(mi.Bool(legs.far_moves), shift, mi.Point3f(0.0))
     index = np.arange(count)
-    points = attached_vertices(channel.stage, legs.sequences, far, device, Rows(index, index, index), spared)
+    points = attached_vertices(
+        channel.tracer_scene, legs.sequences, far, device, CandidateIndices(index, index, index), spared
+    )
     bounces = (legs.sequences != NO_WALL).sum(axis=1)
     length, last = mi.Float(0.0), far
     for number, point in enumerate(points):

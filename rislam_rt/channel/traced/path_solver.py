@@ -13,16 +13,16 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.channel.compose import compose_paths
-from rislam_rt.channel.legs import Legs
-from rislam_rt.channel.traced.course import traced_course
-from rislam_rt.channel.traced.start import start_tracer
+from rislam_rt.channel.legs import SpecularLegs
+from rislam_rt.channel.traced.path_geometry import traced_geometry
+from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import TraceError
 from rislam_rt.model import Paths, RadioConfig, Scene, Trajectory
 
 
-class Row(NamedTuple):
+class SolverLeg(NamedTuple):
     """One leg of one cycle as Sionna has it."""
 
     cycle: int
@@ -52,17 +52,17 @@ def solve_file(
     start_tracer()
     scene = replace(scene, ris=None)
     walls = build_walls(scene)
-    stage, number_of = _load(Path(file), scene, radio)
+    tracer_scene, number_of = _load(Path(file), scene, radio)
     points = scene.landmark_positions
     ends = {"tx": trajectory.tx, "rx": trajectory.rx}
-    rows: dict[tuple[str, int], list[Row]] = {(end, far): [] for end in ends for far in range(len(points) + 1)}
+    rows: dict[tuple[str, int], list[SolverLeg]] = {(end, far): [] for end in ends for far in range(len(points) + 1)}
     for n, point in enumerate([trajectory.rx[0], *points]):
-        stage.add(_receiver(f"far-{n}", point))
+        tracer_scene.add(_receiver(f"far-{n}", point))
     for cycle in range(len(trajectory)):
         for end, place in ends.items():
-            stage.get("device").position = place[cycle].tolist()
-            stage.get("far-0").position = trajectory.rx[cycle].tolist()
-            for far, row in _solve(stage, cycle, depth, samples, number_of, walls):
+            tracer_scene.get("device").position = place[cycle].tolist()
+            tracer_scene.get("far-0").position = trajectory.rx[cycle].tolist()
+            for far, row in _solve(tracer_scene, cycle, depth, samples, number_of, walls):
                 rows[end, far].append(row)
     direct = _legs(rows["tx", 0], trajectory.tx, trajectory.rx, depth, radio)
     legs = {
@@ -79,18 +79,20 @@ def _load(file: Path, scene: Scene, radio: RadioConfig) -> tuple[Any, dict[int, 
     """Sionna's scene, and the number of the first triangle of each reflector by its object's number."""
     import sionna.rt as rt
 
-    stage = rt.load_scene(str(file), merge_shapes=False)
-    stage.frequency = radio.carrier
-    stage.tx_array = stage.rx_array = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
+    tracer_scene = rt.load_scene(str(file), merge_shapes=False)
+    tracer_scene.frequency = radio.carrier
+    tracer_scene.tx_array = tracer_scene.rx_array = rt.PlanarArray(
+        num_rows=1, num_cols=1, pattern="iso", polarization="V"
+    )
     first, number_of = 0, {}
     for reflector in scene.reflectors:
-        thing = stage.objects.get(reflector.name)
+        thing = tracer_scene.objects.get(reflector.name)
         if thing is None or thing.mi_mesh.primitive_count() != len(reflector.faces):
             raise TraceError(f"{file}: no object '{reflector.name}' of {len(reflector.faces)} faces; export it again")
         number_of[int(thing.object_id)] = first
         first += len(reflector.faces)
-    stage.add(rt.Transmitter("device", [0.0, 0.0, 0.0]))
-    return stage, number_of
+    tracer_scene.add(rt.Transmitter("device", [0.0, 0.0, 0.0]))
+    return tracer_scene, number_of
 
 
 def _receiver(name: str, point: Floats) -> Any:
@@ -100,13 +102,13 @@ def _receiver(name: str, point: Floats) -> Any:
 
 
 def _solve(
-    stage: Any, cycle: int, depth: int, samples: int, number_of: dict[int, int], walls: Walls
-) -> list[tuple[int, Row]]:
+    tracer_scene: Any, cycle: int, depth: int, samples: int, number_of: dict[int, int], walls: Walls
+) -> list[tuple[int, SolverLeg]]:
     """(far end, leg) of all that Sionna finds from one place of a device."""
     import sionna.rt as rt
 
     paths = rt.PathSolver(deterministic=True)(
-        stage, max_depth=depth, samples_per_src=samples, max_num_paths_per_src=10 * samples, los=True,
+        tracer_scene, max_depth=depth, samples_per_src=samples, max_num_paths_per_src=10 * samples, los=True,
         specular_reflection=True, diffuse_reflection=False, refraction=False, diffraction=False,
     )  # fmt: skip
     tau = np.array(paths.tau, dtype=np.float64)[:, 0]
@@ -122,12 +124,12 @@ def _solve(
         met = [(int(objects[step, far, p]), int(primitives[step, far, p])) for step in steps]
         if all(thing in number_of for thing, _ in met):  # what only hides reflects nothing
             sequence = tuple(int(walls.wall_of_triangle[number_of[thing] + t]) for thing, t in met)
-            row = Row(cycle, sequence, float(tau[far, p]), complex(field[far, p]), vertices[:, far, p])
+            row = SolverLeg(cycle, sequence, float(tau[far, p]), complex(field[far, p]), vertices[:, far, p])
             found.append((int(far), row))
     return found
 
 
-def _legs(rows: list[Row], device: Floats, far: Floats, depth: int, radio: RadioConfig) -> Legs:
+def _legs(rows: list[SolverLeg], device: Floats, far: Floats, depth: int, radio: RadioConfig) -> SpecularLegs:
     """Legs (K, S) of all rows; of two with one identity in one cycle the first."""
     first = {(row.cycle, row.walls): row for row in reversed(rows)}
     columns = sorted({walls for _, walls in first}, key=lambda walls: (len(walls), walls))
@@ -140,7 +142,7 @@ def _legs(rows: list[Row], device: Floats, far: Floats, depth: int, radio: Radio
     field: Complexes = np.array([row.field for row in first.values()], dtype=np.complex128)
     vertices = np.array([row.vertices for row in first.values()]).reshape(-1, depth, 3)
     vertices = np.where((table[column] >= 0)[..., None], vertices, 0.0)
-    course = traced_course(table[column], device[cycle], far[cycle], vertices)
+    geometry = traced_geometry(table[column], device[cycle], far[cycle], vertices)
     place, shape = (cycle, column), (len(device), len(columns))
 
     def dense(part: Any) -> Any:
@@ -148,12 +150,12 @@ def _legs(rows: list[Row], device: Floats, far: Floats, depth: int, radio: Radio
         values[place] = part
         return values
 
-    return Legs(
+    return SpecularLegs(
         walls=table,
         valid=dense(np.ones(len(cycle), dtype=np.bool_)),
         length=dense(length),
-        at_device=dense(course.at_device),
-        at_far_end=dense(course.at_far_end),
+        at_device=dense(geometry.at_device),
+        at_far_end=dense(geometry.at_far_end),
         coefficient=dense(field * 4.0 * np.pi * length / radio.wavelength),
-        vertices=dense(course.vertices),
+        vertices=dense(geometry.vertices),
     )

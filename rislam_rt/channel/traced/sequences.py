@@ -96,28 +96,28 @@ def possible_sequences(
     last = np.flatnonzero((far > 0) if barred is None else (far > 0) & ~barred)
     level, onward = last[:, None], far[last]
     found = [np.full((1, depth), NO_WALL)]
-    sieve: Narrowing | None = None
+    pruning: Narrowing | None = None
     for bounces in range(1, depth + 1):
         blocks = [(level, onward)]
         if bounces > 1:
             count = _growth(level, onward, sides)
             _check(count, MOST_LOOKS, sides, depth, "allow")
-            if sieve is None and count > MANY and narrowing is not None:
-                sieve = narrowing()
+            if pruning is None and count > MANY and narrowing is not None:
+                pruning = narrowing()
             blocks = _with_wall_before(level, onward, sides)  # type: ignore[assignment]
         levels = [(np.zeros((0, bounces), dtype=np.int64), np.zeros(0, dtype=np.int64))]
         for longer, ahead in blocks:
-            if sieve is not None:
-                keep = sieve.lead_on(longer)
+            if pruning is not None:
+                keep = pruning.lead_on(longer)
                 longer, ahead = longer[keep], ahead[keep]
             if bounces < depth:
                 levels.append((longer, ahead))
             complete = longer[(device[longer[:, 0]] & ahead) > 0]
-            complete = complete[sieve.reach(complete)] if sieve is not None and len(complete) else complete
+            complete = complete[pruning.reach(complete)] if pruning is not None and len(complete) else complete
             found.append(np.pad(complete, ((0, 0), (0, depth - bounces)), constant_values=NO_WALL))
             _check(sum(map(len, found)), MOST_SEQUENCES, sides, depth, "leave")
         level, onward = (np.concatenate(part) for part in zip(*levels, strict=True))
-    return np.concatenate(found), sieve is None
+    return np.concatenate(found), pruning is None
 
 
 def _growth(level: Integers, onward: Integers, sides: Integers) -> int:

@@ -20,10 +20,10 @@ from sionna.rt.utils import spawn_ray_to
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.traced.buffer import fill_buffer, read_vertices, turned_vertices
-from rislam_rt.channel.traced.limits import SEGMENT_LIMIT
-from rislam_rt.channel.traced.rows import Rows
+from rislam_rt.channel.traced.candidate_indices import CandidateIndices
+from rislam_rt.channel.traced.float32_limits import SEGMENT_LIMIT
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
-from rislam_rt.channel.traced.stage import NO_SHADE, Stage, as_points
+from rislam_rt.channel.traced.tracer_scene import NO_SHADE, TracerScene, as_points
 from rislam_rt.errors import TraceError
 
 
@@ -46,8 +46,13 @@ class SingleRays:
 
 
 def visible_rows(
-    stage: Stage, sequences: Integers, far: Floats, device: Floats, rows: Rows, spared: int = NO_SHADE
-) -> tuple[Rows, Floats]:
+    tracer_scene: TracerScene,
+    sequences: Integers,
+    far: Floats,
+    device: Floats,
+    rows: CandidateIndices,
+    spared: int = NO_SHADE,
+) -> tuple[CandidateIndices, Floats]:
     """The candidates that exist, and their bounce points (N, D, 3) [m] from device to far end.
 
     Parameters
@@ -63,32 +68,39 @@ def visible_rows(
     if len(rows.far) == 0:
         return rows, np.zeros((0, sequences.shape[1], 3))
     candidates = sequences[rows.sequence]
-    sources, targets = as_points(far - stage.origin), as_points(device - stage.origin)
-    traced = _trace(stage, candidates, sources, targets, rows, ImageMethod(), spared)
+    sources, targets = as_points(far - tracer_scene.origin), as_points(device - tracer_scene.origin)
+    traced = _trace(tracer_scene, candidates, sources, targets, rows, ImageMethod(), spared)
     traced.schedule()  # one pass through the scene for all that is read below
     dr.eval()
-    keep = _confirmed(stage, candidates, traced)
-    rows, vertices = rows.only(keep), read_vertices(stage, traced, keep, candidates[keep])
+    keep = _confirmed(tracer_scene, candidates, traced)
+    rows, vertices = rows.only(keep), read_vertices(tracer_scene, traced, keep, candidates[keep])
     if spared == NO_SHADE:
         return rows, vertices
-    clear = _clear_of_shade(stage, spared, candidates[keep], device[rows.device], vertices)
+    clear = _clear_of_shade(tracer_scene, spared, candidates[keep], device[rows.device], vertices)
     return rows.only(clear), vertices[clear]
 
 
-def _clear_of_shade(stage: Stage, spared: int, sequences: Integers, device: Floats, vertices: Floats) -> Integers:
+def _clear_of_shade(
+    tracer_scene: TracerScene, spared: int, sequences: Integers, device: Floats, vertices: Floats
+) -> Integers:
     """Legs whose segments up to the last bounce miss a scatterer's shade."""
     clear = np.ones(len(device), dtype=np.bool_)
     last = device
     for bounce, wall in enumerate(sequences.T):
         point = np.where((wall != NO_WALL)[:, None], vertices[:, bounce], last)
-        ray = spawn_ray_to(as_points(last - stage.origin), as_points(point - stage.origin))
-        clear &= ~np.array(stage.shades[spared].ray_test(ray), dtype=np.bool_)
+        ray = spawn_ray_to(as_points(last - tracer_scene.origin), as_points(point - tracer_scene.origin))
+        clear &= ~np.array(tracer_scene.shades[spared].ray_test(ray), dtype=np.bool_)
         last = point
     return np.flatnonzero(clear)
 
 
 def attached_vertices(
-    stage: Stage, sequences: Integers, far: mi.Point3f, device: mi.Point3f, rows: Rows, spared: int
+    tracer_scene: TracerScene,
+    sequences: Integers,
+    far: mi.Point3f,
+    device: mi.Point3f,
+    rows: CandidateIndices,
+    spared: int,
 ) -> list[mi.Point3f]:
     """Bounce points from far end to device, bounce by bounce, that keep their dependence on the ends' positions.
 
@@ -100,8 +112,8 @@ def attached_vertices(
     method = ImageMethod()
     method.loop_mode = "evaluated"
     candidates = sequences[rows.sequence]
-    traced = _trace(stage, candidates, far, device, rows, method, spared)
-    if len(_confirmed(stage, candidates, traced)) < len(candidates):
+    traced = _trace(tracer_scene, candidates, far, device, rows, method, spared)
+    if len(_confirmed(tracer_scene, candidates, traced)) < len(candidates):
         raise TraceError("legs: one that was found before is denied now; were paths and channel made for one scene?")
     depth = traced.depth_dim_size
     index = dr.arange(mi.UInt, len(candidates)) * depth
@@ -110,19 +122,19 @@ def attached_vertices(
 
 
 def _trace(
-    stage: Stage,
+    tracer_scene: TracerScene,
     candidates: Integers,
     far: mi.Point3f,
     device: mi.Point3f,
-    rows: Rows,
+    rows: CandidateIndices,
     method: ImageMethod,
     spared: int,
 ) -> PathsBuffer:
     """Run the image method on candidates (N, D), a shade taken out of the room."""
     with _short_segments():
         return method(
-            scene=SingleRays(stage.views[spared]),
-            paths=fill_buffer(stage, candidates, rows),
+            scene=SingleRays(tracer_scene.views[spared]),
+            paths=fill_buffer(tracer_scene, candidates, rows),
             diffraction=False,
             diffraction_lit_region=False,
             src_positions=far,
@@ -130,8 +142,8 @@ def _trace(
         )
 
 
-def _confirmed(stage: Stage, sequences: Integers, traced: PathsBuffer) -> Integers:
-    """Rows that the tracer found visible with every bounce on the wall asked for.
+def _confirmed(tracer_scene: TracerScene, sequences: Integers, traced: PathsBuffer) -> Integers:
+    """Candidates that the tracer found visible with every bounce on the wall asked for.
 
     The image method also accepts a hit on another wall in the same plane; that is another path's business. Where walls
     lie on each other the ray meets any of them, and the one on top reflects.
@@ -140,13 +152,13 @@ def _confirmed(stage: Stage, sequences: Integers, traced: PathsBuffer) -> Intege
     wanted = turned_round(sequences)
     depth = wanted.shape[1]
     shape, primitive = (np.array(t, dtype=np.int64)[:, :depth] for t in (traced.shapes, traced.primitives))
-    hit = stage.wall_hit(shape, primitive)
+    hit = tracer_scene.wall_hit(shape, primitive)
     met = (hit == wanted) | (wanted == NO_WALL)
-    rows = np.flatnonzero(valid & stage.is_stacked(wanted).any(axis=1))
+    rows = np.flatnonzero(valid & tracer_scene.is_stacked(wanted).any(axis=1))
     if len(rows):
-        points = turned_vertices(read_vertices(stage, traced, rows, sequences[rows]), sequences[rows])
-        met[rows] |= stage.share_plane(hit[rows], wanted[rows])
-        met[rows] &= stage.on_top(wanted[rows], points)
+        points = turned_vertices(read_vertices(tracer_scene, traced, rows, sequences[rows]), sequences[rows])
+        met[rows] |= tracer_scene.share_plane(hit[rows], wanted[rows])
+        met[rows] &= tracer_scene.on_top(wanted[rows], points)
     return np.flatnonzero(valid & met.all(axis=1))
 
 

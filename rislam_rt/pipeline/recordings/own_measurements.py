@@ -15,7 +15,7 @@ from rislam_rt.model import Body, Measurement, RadioConfig
 from rislam_rt.pipeline.dataset import read_dataset
 from rislam_rt.pipeline.recordings.inputs import Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.recordings.replay import Answers, replay
-from rislam_rt.pipeline.spec import PipelineSpec
+from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.slam import StartPrior
 
 COLUMNS: dict[str, tuple[str, str]] = {

@@ -11,7 +11,7 @@ from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, 
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.told import tell_settings
 from rislam_rt.slam import StartPrior
 from rislam_rt.toml import put_dotted

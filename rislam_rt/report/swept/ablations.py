@@ -18,7 +18,7 @@ from rislam_rt.report.swept.entries import (
     table_lines,
     trouble,
 )
-from rislam_rt.report.swept.lines import mark_metres
+from rislam_rt.report.swept.error_curves import mark_metres
 from rislam_rt.studies.swept import AblationsSpec, Group, paired_gain
 
 WORSE, BETTER, SAME = "#D55E00", "#0072B2", "#8c8c8c"

@@ -21,7 +21,7 @@ from rislam_rt.report.swept.entries import (
     trouble,
     what_limits,
 )
-from rislam_rt.report.swept.lines import draw_schemes, explain_lines
+from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines
 from rislam_rt.studies.swept import Fig4bSpec, Group, paired_difference, paired_gain
 from rislam_rt.studies.swept.sweep import SNR
 

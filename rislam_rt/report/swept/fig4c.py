@@ -20,7 +20,7 @@ from rislam_rt.report.swept.entries import (
     trouble,
     what_limits,
 )
-from rislam_rt.report.swept.lines import draw_schemes, explain_lines, label_ends, mark_metres
+from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines, label_ends, mark_metres
 from rislam_rt.studies.swept import Group, paired_gain, spread
 
 

@@ -30,7 +30,7 @@ from rislam_rt.sweeps import Row
 from rislam_rt.sweeps.record import json_bytes, plain_result
 
 
-class Shape(NamedTuple):
+class StudyLayout(NamedTuple):
     """How a study is told."""
 
     content: dict[str, Any]
@@ -62,26 +62,30 @@ def write_swept(
     return page
 
 
-def shape_of(groups: Sequence[Group], spec: SweptSpec) -> Shape:
+def shape_of(groups: Sequence[Group], spec: SweptSpec) -> StudyLayout:
     """Content, figure and page of a study of any kind."""
     if isinstance(spec, Fig4bSpec):
         content = fig4b_content(groups, spec)
-        return Shape(content, lambda: draw_fig4b(content, spec), lambda a, f: fig4b_page(content, groups, spec, a, f))
+        return StudyLayout(
+            content, lambda: draw_fig4b(content, spec), lambda a, f: fig4b_page(content, groups, spec, a, f)
+        )
     if isinstance(spec, Fig4cSpec):
         content = fig4c_content(groups)
-        return Shape(content, lambda: draw_fig4c(content), lambda a, f: fig4c_page(content, groups, a, f))
+        return StudyLayout(content, lambda: draw_fig4c(content), lambda a, f: fig4c_page(content, groups, a, f))
     if isinstance(spec, AblationsSpec):
         content = ablations_content(groups, spec)
-        return Shape(content, lambda: draw_ablations(content), lambda a, f: ablations_page(content, groups, a, f))
+        return StudyLayout(content, lambda: draw_ablations(content), lambda a, f: ablations_page(content, groups, a, f))
     if isinstance(spec, HardwareSpec):
         content = hardware_content(groups, spec)
-        return Shape(content, lambda: draw_hardware(content), lambda a, f: hardware_page(content, groups, a, f))
+        return StudyLayout(content, lambda: draw_hardware(content), lambda a, f: hardware_page(content, groups, a, f))
     if isinstance(spec, RobustnessSpec):
         content = robustness_content(groups, spec)
-        return Shape(content, lambda: draw_robustness(content), lambda a, f: robustness_page(content, groups, a, f))
+        return StudyLayout(
+            content, lambda: draw_robustness(content), lambda a, f: robustness_page(content, groups, a, f)
+        )
     assert isinstance(spec, RoomsSpec)
     content = rooms_content(groups)
-    return Shape(content, lambda: draw_rooms(content), lambda a, f: rooms_page(content, groups, a, f))
+    return StudyLayout(content, lambda: draw_rooms(content), lambda a, f: rooms_page(content, groups, a, f))
 
 
 def _of_receiver(spec: SweptSpec) -> bool:

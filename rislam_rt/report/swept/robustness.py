@@ -19,7 +19,7 @@ from rislam_rt.report.swept.entries import (
     table_lines,
     trouble,
 )
-from rislam_rt.report.swept.lines import mark_metres
+from rislam_rt.report.swept.error_curves import mark_metres
 from rislam_rt.studies.swept import Group, RobustnessSpec, paired_gain
 
 WORST = 3

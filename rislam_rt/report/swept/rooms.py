@@ -18,7 +18,7 @@ from rislam_rt.report.swept.entries import (
     trouble,
     what_limits,
 )
-from rislam_rt.report.swept.lines import mark_metres
+from rislam_rt.report.swept.error_curves import mark_metres
 from rislam_rt.studies.swept import Group
 
 AIMS: dict[str, float] = {

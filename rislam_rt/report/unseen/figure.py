@@ -8,15 +8,15 @@ from matplotlib.figure import Figure
 
 from rislam_rt.arrays import Floats
 from rislam_rt.report.style import TRUTH, styled
-from rislam_rt.report.swept.lines import mark_metres
-from rislam_rt.report.unseen.cards import CLASSES, Run, column
+from rislam_rt.report.swept.error_curves import mark_metres
+from rislam_rt.report.unseen.score_cards import CLASSES, SchemeRun, column
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 SCORE, BOUND = "relative_rmse_m", "relative_bound_m"
 DIVISIONS = ("motion", "plan", "size", "reflection")
 
 
-def draw_unseen(runs: Mapping[str, Sequence[Run]]) -> Figure:
+def draw_unseen(runs: Mapping[str, Sequence[SchemeRun]]) -> Figure:
     """Relative RMSE of every run, crosses where it was lost, bars at the medians and at those of the bounds."""
     with styled():
         figure = Figure(figsize=(12.0, 8.0))
@@ -38,7 +38,7 @@ def draw_unseen(runs: Mapping[str, Sequence[Run]]) -> Figure:
     return figure
 
 
-def _draw_division(axis: Axes, division: str, runs: Mapping[str, Sequence[Run]]) -> None:
+def _draw_division(axis: Axes, division: str, runs: Mapping[str, Sequence[SchemeRun]]) -> None:
     of = CLASSES[division]
     names = {of(run.traits) for members in runs.values() for run in members if run.scores}
     order = sorted(names, key=lambda name: (not name.startswith("below"), name.startswith("from"), name))

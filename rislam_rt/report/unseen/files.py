@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.report.style import to_png
-from rislam_rt.report.unseen.cards import Run, by_series, card, class_cards, cycle_times, read_runs
 from rislam_rt.report.unseen.figure import draw_unseen
 from rislam_rt.report.unseen.page import SHOWN, about_lines, unseen_page
+from rislam_rt.report.unseen.score_cards import SchemeRun, by_series, card, class_cards, cycle_times, read_runs
 from rislam_rt.storage.files import write_atomic
 from rislam_rt.studies.unseen.spec import UnseenSpec
 from rislam_rt.sweeps import Row
@@ -51,7 +51,7 @@ def write_unseen(
     return page
 
 
-def unseen_content(runs: Mapping[str, Sequence[Run]], timings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def unseen_content(runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Plain data: a card a series, and one a class of it."""
     times = cycle_times(runs, timings)
     cards = {name: {**card(members), "cycle_ms": times[name]} for name, members in runs.items()}
@@ -65,7 +65,7 @@ def _brief(entry: Mapping[str, Any]) -> dict[str, Any]:
     return {name: float(_six(value)) if isinstance(value, float) else value for name, value in kept.items()}
 
 
-def run_entries(runs: Mapping[str, Sequence[Run]]) -> list[dict[str, Any]]:
+def run_entries(runs: Mapping[str, Sequence[SchemeRun]]) -> list[dict[str, Any]]:
     """One row a run: series, room, its classes, its scores with six digits."""
     good = [run for members in runs.values() for run in members if run.scores]
     names = list(dict.fromkeys(name for run in good for name in run.scores))

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rislam_rt.report.swept.entries import NOTHING, paragraph, table_lines
-from rislam_rt.report.unseen.cards import Run
+from rislam_rt.report.unseen.score_cards import SchemeRun
 from rislam_rt.studies.unseen.score import (
     FAR_OVER,
     GOOD_ANGLE,
@@ -24,7 +24,7 @@ WORST = 12
 
 
 def unseen_page(
-    content: Mapping[str, Any], runs: Mapping[str, Sequence[Run]], spec: UnseenSpec, about: Sequence[str],
+    content: Mapping[str, Any], runs: Mapping[str, Sequence[SchemeRun]], spec: UnseenSpec, about: Sequence[str],
     figure: str | None,
 ) -> str:  # fmt: skip
     """Markdown."""
@@ -99,7 +99,7 @@ def _toml(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else f"{value!r}"
 
 
-def _worst(runs: Mapping[str, Sequence[Run]]) -> list[str]:
+def _worst(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
     """The runs farthest off, of all series."""
     found = [(name, run) for name, members in runs.items() for run in members if run.scores]
     found.sort(key=lambda item: -item[1].scores["relative_rmse_m"])
@@ -116,7 +116,7 @@ def _worst(runs: Mapping[str, Sequence[Run]]) -> list[str]:
     return table_lines(head, rows)
 
 
-def _failures(runs: Mapping[str, Sequence[Run]]) -> list[str]:
+def _failures(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
     found = [(name, run) for name, members in runs.items() for run in members if run.failed]
     if not found:
         return ["None."]

@@ -7,9 +7,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from rislam_rt.report.unseen.cards import by_series, read_runs
 from rislam_rt.report.unseen.files import unseen_content
 from rislam_rt.report.unseen.page import ROWS
+from rislam_rt.report.unseen.score_cards import by_series, read_runs
 from rislam_rt.sweeps import Row
 
 

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from rislam_rt.adviser.codes import aimed_codes, under
 from rislam_rt.arrays import Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import PathKind, Paths, Scene, Trajectory
-from rislam_rt.pipeline.advise.codes import aimed_codes, under
-from rislam_rt.pipeline.spec import Settings
+from rislam_rt.pipeline.specification.spec import Settings
 from rislam_rt.report.room import path_points
 from rislam_rt.report.style import KIND
 from rislam_rt.report.view.room_data import room_data, rounded, spread

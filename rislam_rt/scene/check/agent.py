@@ -6,8 +6,8 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import RadioConfig
-from rislam_rt.scene.check.probe import components, crossings, ray_hits, sphere_directions, touching, winding
-from rislam_rt.scene.check.soup import MIN_CLEARANCE, Soup
+from rislam_rt.scene.check.mesh_queries import components, crossings, ray_hits, sphere_directions, touching, winding
+from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 
 NUM_PROBES = 400
@@ -17,85 +17,85 @@ MAX_SPEED = 10.0
 """[m/s] Indoors, more is a wrong unit."""
 
 
-def agent_errors(soup: Soup) -> Iterator[Finding]:
+def agent_errors(room: TriangleArray) -> Iterator[Finding]:
     """Start or path outside the meshes' bounds, on a surface, inside an object, or through a wall."""
-    motion = soup.scene.agent
+    motion = room.scene.agent
     places = {"agent": motion.position, "Tx": motion.tx, "Rx": motion.rx}
     for part, points in places.items():
-        outside = soup.outside(points)
+        outside = room.outside(points)
         if len(outside):
-            low, high = np.round(soup.bounds, 3).tolist()
+            low, high = np.round(room.bounds, 3).tolist()
             message = f"{_where(part, int(outside[0]), points)} lies outside the meshes' bounds {low} to {high}"
-            yield soup.error(_field(int(outside[0])), message, "move the start or change the motion")
+            yield room.error(_field(int(outside[0])), message, "move the start or change the motion")
             return
-    yield from _on_surface(soup, places)
-    yield from _through_wall(soup)
-    yield from _inside_object(soup)
+    yield from _on_surface(room, places)
+    yield from _through_wall(room)
+    yield from _inside_object(room)
 
 
-def agent_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
+def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
     """An open room, a speed in wrong units, scatterers inside objects or below an array that looks up."""
-    motion = soup.scene.agent
+    motion = room.scene.agent
     directions = sphere_directions(NUM_PROBES)
-    lost = ray_hits(motion.position[0], directions, soup.triangles) < 0
+    lost = ray_hits(motion.position[0], directions, room.triangles) < 0
     if lost.any():
         mean = np.round(directions[lost].mean(axis=0), 2) + 0.0
         message = f"{lost.mean():.1%} of rays from the start leave the room, towards {mean.tolist()} in the mean"
-        yield soup.warning("reflector", message, "close the room, if it is not meant to be open")
+        yield room.warning("reflector", message, "close the room, if it is not meant to be open")
     speed = float(np.linalg.norm(np.diff(motion.position, axis=0), axis=-1).max(initial=0.0))
     step = float(np.diff(motion.time).min(initial=np.inf))
     if speed > MAX_SPEED * step:
-        yield soup.warning("agent", f"it moves at up to {speed / step:.3g} m/s", "give metres and seconds")
-    for number, scatterer in enumerate(soup.scene.scatterers):
+        yield room.warning("agent", f"it moves at up to {speed / step:.3g} m/s", "give metres and seconds")
+    for number, scatterer in enumerate(room.scene.scatterers):
         field = f"scatterer[{number}].position ({scatterer.name})"
         if radio.array.pattern == "upper" and (motion.rx[:, 2] >= scatterer.position[2]).all():
-            yield soup.warning(
+            yield room.warning(
                 field, "it lies below the array, which hears from above only", "raise it above the agent"
             )
-        name = _enclosing(soup, scatterer.position, holding=motion.position[:1])
+        name = _enclosing(room, scatterer.position, holding=motion.position[:1])
         if name:
-            yield soup.warning(field, f"it lies inside '{name}', where no ray reaches it", "move it out")
+            yield room.warning(field, f"it lies inside '{name}', where no ray reaches it", "move it out")
 
 
-def _on_surface(soup: Soup, places: dict[str, Floats]) -> Iterator[Finding]:
+def _on_surface(room: TriangleArray, places: dict[str, Floats]) -> Iterator[Finding]:
     for part, points in places.items():
-        cycles, near = touching(points, soup.triangles, MIN_CLEARANCE)
+        cycles, near = touching(points, room.triangles, MIN_CLEARANCE)
         if len(cycles):
-            message = f"{_where(part, int(cycles[0]), points)} lies on '{soup.name(int(near[0]))}'"
-            yield soup.error(_field(int(cycles[0])), message, f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces")
+            message = f"{_where(part, int(cycles[0]), points)} lies on '{room.name(int(near[0]))}'"
+            yield room.error(_field(int(cycles[0])), message, f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces")
             return
 
 
-def _through_wall(soup: Soup) -> Iterator[Finding]:
-    motion = soup.scene.agent
-    cycles, walls = crossings(motion.position[:-1], motion.position[1:], soup.triangles)
+def _through_wall(room: TriangleArray) -> Iterator[Finding]:
+    motion = room.scene.agent
+    cycles, walls = crossings(motion.position[:-1], motion.position[1:], room.triangles)
     if len(cycles):
-        message = f"the path goes through '{soup.name(int(walls[0]))}' after cycle {int(cycles[0])}"
-        yield soup.error("agent.trajectory", message, "lead it around the object")
+        message = f"the path goes through '{room.name(int(walls[0]))}' after cycle {int(cycles[0])}"
+        yield room.error("agent.trajectory", message, "lead it around the object")
         return
-    cycles, walls = crossings(motion.tx, motion.rx, soup.triangles)
+    cycles, walls = crossings(motion.tx, motion.rx, room.triangles)
     if len(cycles):
-        message = f"'{soup.name(int(walls[0]))}' stands between Tx and Rx at cycle {int(cycles[0])}"
-        yield soup.error(_field(int(cycles[0])), message, "keep further away from it")
+        message = f"'{room.name(int(walls[0]))}' stands between Tx and Rx at cycle {int(cycles[0])}"
+        yield room.error(_field(int(cycles[0])), message, "keep further away from it")
 
 
-def _inside_object(soup: Soup) -> Iterator[Finding]:
+def _inside_object(room: TriangleArray) -> Iterator[Finding]:
     """The start only: the path crosses no surface, or that was found before."""
-    start = soup.scene.agent.position[0]
-    name = _enclosing(soup, start, holding=soup.scene.landmark_positions)
+    start = room.scene.agent.position[0]
+    name = _enclosing(room, start, holding=room.scene.landmark_positions)
     if name:
-        yield soup.error("agent.start", f"{start.tolist()} lies inside the object '{name}'", "move the start out of it")
+        yield room.error("agent.start", f"{start.tolist()} lies inside the object '{name}'", "move the start out of it")
 
 
-def _enclosing(soup: Soup, point: Floats, holding: Floats) -> str:
+def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
     """Name of an object around a point, if any.
 
     An object is a connected piece that takes up less than a tenth of the scene's box and, so that a room of a larger
     building is none, has none of the points `holding` (H, 3) in it.
     """
-    scene_box = np.prod(soup.bounds[1] - soup.bounds[0])
-    for number, reflector in enumerate(soup.scene.reflectors):
-        mine = soup.triangles[soup.owner == number]
+    scene_box = np.prod(room.bounds[1] - room.bounds[0])
+    for number, reflector in enumerate(room.scene.reflectors):
+        mine = room.triangles[room.owner == number]
         low, high = mine.min(axis=(0, 1)), mine.max(axis=(0, 1))
         if (point < low).any() or (point > high).any():
             continue

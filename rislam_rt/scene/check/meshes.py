@@ -5,74 +5,74 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rislam_rt.scene.check.probe import touching
-from rislam_rt.scene.check.soup import MIN_CLEARANCE, Soup, without_area
+from rislam_rt.scene.check.mesh_queries import touching
+from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray, without_area
 from rislam_rt.scene.findings import Finding
 
 
-def name_errors(soup: Soup) -> Iterator[Finding]:
+def name_errors(room: TriangleArray) -> Iterator[Finding]:
     """Two parts of one name."""
-    names = [r.name for r in soup.scene.reflectors] + list(soup.scene.landmarks)
-    names += [shade.name for shade in soup.scene.shades]
+    names = [r.name for r in room.scene.reflectors] + list(room.scene.landmarks)
+    names += [shade.name for shade in room.scene.shades]
     for name, count in Counter(names).items():
         if count > 1:
-            yield soup.error("name", f"{count} parts are called '{name}'", "give every part a name of its own")
+            yield room.error("name", f"{count} parts are called '{name}'", "give every part a name of its own")
 
 
-def face_errors(soup: Soup) -> Iterator[Finding]:
+def face_errors(room: TriangleArray) -> Iterator[Finding]:
     """Faces without area."""
-    bad = without_area(soup.triangles)
-    for number in np.unique(soup.owner[bad]):
-        name, mine = soup.scene.reflectors[number].name, bad[soup.owner == number]
+    bad = without_area(room.triangles)
+    for number in np.unique(room.owner[bad]):
+        name, mine = room.scene.reflectors[number].name, bad[room.owner == number]
         message = f"{int(mine.sum())} faces without area, the first is face {int(np.argmax(mine))}"
-        yield soup.error(f"reflector[{number}].mesh ({name})", message, "remove degenerate faces from the mesh")
+        yield room.error(f"reflector[{number}].mesh ({name})", message, "remove degenerate faces from the mesh")
 
 
-def scatterer_errors(soup: Soup) -> Iterator[Finding]:
+def scatterer_errors(room: TriangleArray) -> Iterator[Finding]:
     """Outside the meshes' bounds, on a surface, or larger than the room."""
-    diagonal = float(np.linalg.norm(soup.bounds[1] - soup.bounds[0]))
-    for number, scatterer in enumerate(soup.scene.scatterers):
+    diagonal = float(np.linalg.norm(room.bounds[1] - room.bounds[0]))
+    for number, scatterer in enumerate(room.scene.scatterers):
         field, at = f"scatterer[{number}].position ({scatterer.name})", scatterer.position
         if scatterer.radius is not None and scatterer.radius > diagonal:
             message = f"{scatterer.radius:g} m, and the room measures {diagonal:.3g} m across"
-            yield soup.error(f"scatterer[{number}].radius ({scatterer.name})", message, "give its radius in metres")
+            yield room.error(f"scatterer[{number}].radius ({scatterer.name})", message, "give its radius in metres")
             continue
-        if len(soup.outside(at[None])):
-            yield soup.error(field, f"{at.tolist()} lies outside the meshes' bounds {_box(soup)}", "move it inside")
+        if len(room.outside(at[None])):
+            yield room.error(field, f"{at.tolist()} lies outside the meshes' bounds {_box(room)}", "move it inside")
             continue
-        _, near = touching(at[None], soup.triangles, MIN_CLEARANCE)
+        _, near = touching(at[None], room.triangles, MIN_CLEARANCE)
         if len(near):
-            message = f"{at.tolist()} lies on '{soup.name(int(near[0]))}'"
-            yield soup.error(field, message, f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces")
+            message = f"{at.tolist()} lies on '{room.name(int(near[0]))}'"
+            yield room.error(field, message, f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces")
 
 
-def mesh_warnings(soup: Soup) -> Iterator[Finding]:
+def mesh_warnings(room: TriangleArray) -> Iterator[Finding]:
     """A size in wrong units, doubled faces."""
-    yield from _size(soup)
-    yield from _coincident(soup)
+    yield from _size(room)
+    yield from _coincident(room)
 
 
-def _size(soup: Soup) -> Iterator[Finding]:
-    diagonal = float(np.linalg.norm(soup.bounds[1] - soup.bounds[0]))
+def _size(room: TriangleArray) -> Iterator[Finding]:
+    diagonal = float(np.linalg.norm(room.bounds[1] - room.bounds[0]))
     if diagonal > 200.0 or diagonal < 0.2:
         guess = "millimetres" if diagonal > 200.0 else "kilometres"
-        yield soup.warning(
+        yield room.warning(
             "reflector", f"the room measures {diagonal:.3g} m across", f"metres wanted: is it in {guess}?"
         )
 
 
-def _coincident(soup: Soup) -> Iterator[Finding]:
+def _coincident(room: TriangleArray) -> Iterator[Finding]:
     """Doubled faces of one mesh; those of two meshes are for the check of walls."""
-    corners = np.round(soup.triangles, 6) + 0.0
+    corners = np.round(room.triangles, 6) + 0.0
     order = np.lexsort(np.moveaxis(corners, -1, 0)[::-1], axis=-1)
     keys = np.take_along_axis(corners, order[..., None], axis=1).reshape(len(corners), 9)
-    _, first, count = np.unique(np.column_stack([keys, soup.owner]), axis=0, return_index=True, return_counts=True)
+    _, first, count = np.unique(np.column_stack([keys, room.owner]), axis=0, return_index=True, return_counts=True)
     if (count > 1).any():
-        name = soup.name(int(first[np.argmax(count > 1)]))
+        name = room.name(int(first[np.argmax(count > 1)]))
         message = f"{int((count - 1).sum())} faces lie exactly on others of their mesh, the first in '{name}'"
-        yield soup.warning("reflector", message, "leave the doubles out")
+        yield room.warning("reflector", message, "leave the doubles out")
 
 
-def _box(soup: Soup) -> str:
-    low, high = np.round(soup.bounds, 3).tolist()
+def _box(room: TriangleArray) -> str:
+    low, high = np.round(room.bounds, 3).tolist()
     return f"{low} to {high}"

@@ -8,52 +8,52 @@ import numpy as np
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.model import RadioConfig, RisPanel
-from rislam_rt.scene.check.probe import ray_hits, touching
-from rislam_rt.scene.check.soup import MIN_CLEARANCE, Soup
+from rislam_rt.scene.check.mesh_queries import ray_hits, touching
+from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding, panel_key
 
 MAX_TURN = 1e-2
 """[rad] Largest angle between panel and host."""
 
 
-def panel_errors(soup: Soup) -> Iterator[Finding]:
+def panel_errors(room: TriangleArray) -> Iterator[Finding]:
     """Outside the bounds, off its host, facing out of the room, or over another panel."""
-    for panel, key in _keyed(soup):
+    for panel, key in _keyed(room):
         at = panel.center
-        tolerant = soup._replace(bounds=soup.bounds + MIN_CLEARANCE * np.array([[-1.0], [1.0]]))
+        tolerant = room._replace(bounds=room.bounds + MIN_CLEARANCE * np.array([[-1.0], [1.0]]))
         if len(tolerant.outside(at[None])):
-            low, high = np.round(soup.bounds, 3).tolist()
+            low, high = np.round(room.bounds, 3).tolist()
             message = f"{at.tolist()} lies outside the meshes' bounds {low} to {high}"
-            yield soup.error(f"{key}.center", message, "move the panel onto its host")
+            yield room.error(f"{key}.center", message, "move the panel onto its host")
             continue
-        findings = list(_on_host(soup, panel, key))
+        findings = list(_on_host(room, panel, key))
         yield from findings
         if not findings:
-            yield from _facing(soup, panel, key)
-    for (one, _), (other, key) in combinations(_keyed(soup), 2):
+            yield from _facing(room, panel, key)
+    for (one, _), (other, key) in combinations(_keyed(room), 2):
         if _overlap(one, other):
             message = f"'{other.name}' covers a part of '{one.name}'"
-            yield soup.error(f"{key}.center", message, "move the panels apart")
+            yield room.error(f"{key}.center", message, "move the panels apart")
 
 
-def panel_warnings(soup: Soup, radio: RadioConfig) -> Iterator[Finding]:
+def panel_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
     """Never seen from the front; reflecting more than a plate; ambiguous; delay spread above 1 / B."""
-    for panel, key in _keyed(soup):
-        spec, motion = panel.spec, soup.scene.agent
+    for panel, key in _keyed(room):
+        spec, motion = panel.spec, room.scene.agent
         if ((motion.position - panel.center) @ spec.normal <= 0.0).all():
-            yield soup.warning(
+            yield room.warning(
                 f"{key}.normal", "the agent is never in front of the panel", "turn the panel or the path"
             )
-        yield from _implausible(soup, panel, key, radio)
-        spread = _delay_spread(soup, panel)
+        yield from _implausible(room, panel, key, radio)
+        spread = _delay_spread(room, panel)
         if spread * radio.bandwidth > 1.0:
             message = f"delays over the panel spread by up to {spread * 1e9:.2f} ns, more than 1/B"
-            yield soup.warning(f"{key}.rows", message, "take a smaller panel or a smaller bandwidth")
+            yield room.warning(f"{key}.rows", message, "take a smaller panel or a smaller bandwidth")
 
 
-def _keyed(soup: Soup) -> list[tuple[RisPanel, str]]:
+def _keyed(room: TriangleArray) -> list[tuple[RisPanel, str]]:
     """The panels, each with its key in the scene file."""
-    panels = soup.scene.panels
+    panels = room.scene.panels
     return [(panel, panel_key(number, len(panels))) for number, panel in enumerate(panels)]
 
 
@@ -70,76 +70,76 @@ def _overlap(one: RisPanel, other: RisPanel) -> bool:
     return all(abs(gap @ axis) < sum(np.abs(axis @ half).sum() for half in halves) - MIN_CLEARANCE for axis in axes)
 
 
-def _implausible(soup: Soup, panel: RisPanel, key: str, radio: RadioConfig) -> Iterator[Finding]:
+def _implausible(room: TriangleArray, panel: RisPanel, key: str, radio: RadioConfig) -> Iterator[Finding]:
     """Reflecting more than a plate; elements so far apart that their beams are ambiguous."""
     spec = panel.spec
     area = float(spec.spacing[0] * spec.spacing[1])
     excess = 10.0 * np.log10(2.0 * radio.wavelength**2 / (np.pi * area))
     if spec.element == "tang" and excess > 0.5:
         message = f"at {radio.carrier / 1e9:g} GHz 'tang' elements reflect {excess:.2f} dB more than a perfect plate"
-        yield soup.warning(f"{key}.element", message, "take 'energy', unless the paper's model is wanted")
+        yield room.warning(f"{key}.element", message, "take 'energy', unless the paper's model is wanted")
     widest = max((float(d) for d, n in zip(spec.spacing, (spec.cols, spec.rows), strict=True) if n > 1), default=0.0)
     if widest >= radio.wavelength:
         message = (
             f"elements {widest:g} m apart, a wavelength or more ({radio.wavelength:.4g} m at "
             f"{radio.carrier / 1e9:g} GHz): whatever the code, another direction is met as strongly"
         )
-        yield soup.warning(f"{key}.spacing_m", message, "take half a wavelength or less")
+        yield room.warning(f"{key}.spacing_m", message, "take half a wavelength or less")
 
 
-def _on_host(soup: Soup, panel: RisPanel, key: str) -> Iterator[Finding]:
-    names = [r.name for r in soup.scene.reflectors]
-    _, near = touching(panel.center[None], soup.triangles, MIN_CLEARANCE)
-    behind = sorted({soup.name(int(t)) for t in near})
+def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
+    names = [r.name for r in room.scene.reflectors]
+    _, near = touching(panel.center[None], room.triangles, MIN_CLEARANCE)
+    behind = sorted({room.name(int(t)) for t in near})
     if panel.host is None:
         if behind:
-            yield soup.error(
+            yield room.error(
                 f"{key}.host", f"missing, and the panel lies on '{behind[0]}'", f'add host = "{behind[0]}"'
             )
         return
     if panel.host not in names:
-        yield soup.error(f"{key}.host", f"'{panel.host}' is no reflector", f"give one of {', '.join(names[:12])}")
+        yield room.error(f"{key}.host", f"'{panel.host}' is no reflector", f"give one of {', '.join(names[:12])}")
         return
     if panel.host not in behind:
-        gap = _gap(soup, panel)
+        gap = _gap(room, panel)
         message = f"{panel.center.tolist()} is {gap * 1e3:.3g} mm off '{panel.host}'" if gap > MIN_CLEARANCE else (
             f"{panel.center.tolist()} lies beside '{panel.host}', in its plane"
         )  # fmt: skip
-        yield soup.error(f"{key}.center", message, "move the panel onto its host")
+        yield room.error(f"{key}.center", message, "move the panel onto its host")
         return
-    normal, _ = triangle_planes(soup.triangles[[t for t in near if soup.name(int(t)) == panel.host]])
+    normal, _ = triangle_planes(room.triangles[[t for t in near if room.name(int(t)) == panel.host]])
     turn = np.linalg.norm(np.cross(normal, panel.spec.normal), axis=-1).min()
     if turn > MAX_TURN:
         angle = np.degrees(np.arcsin(min(turn, 1.0)))
-        yield soup.error(
+        yield room.error(
             f"{key}.normal", f"{angle:.2f} degrees from the normal of '{panel.host}'", "lay it flat on its host"
         )
 
 
-def _gap(soup: Soup, panel: RisPanel) -> float:
+def _gap(room: TriangleArray, panel: RisPanel) -> float:
     """Distance [m] from the nearest plane of the host."""
-    host = [r.name for r in soup.scene.reflectors].index(panel.host or "")
-    normal, offset = triangle_planes(soup.triangles[soup.owner == host])
+    host = [r.name for r in room.scene.reflectors].index(panel.host or "")
+    normal, offset = triangle_planes(room.triangles[room.owner == host])
     return float(np.abs(normal @ panel.center - offset).min())
 
 
-def _facing(soup: Soup, panel: RisPanel, key: str) -> Iterator[Finding]:
+def _facing(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
     """The room is where rays hit something: a panel with nothing before and something behind it looks out; unless the
     agent is before it, in a room that is open there (a street).
     """
     ahead, behind = (
         ray_hits(panel.center + side * 2.0 * MIN_CLEARANCE * panel.spec.normal, np.array([side * panel.spec.normal]),
-                 soup.triangles)[0] >= 0
+                 room.triangles)[0] >= 0
         for side in (1.0, -1.0)
     )  # fmt: skip
-    before = ((soup.scene.agent.position - panel.center) @ panel.spec.normal > 0.0).any()
+    before = ((room.scene.agent.position - panel.center) @ panel.spec.normal > 0.0).any()
     if behind and not ahead and not before:
-        yield soup.error(f"{key}.normal", f"{panel.spec.normal.tolist()} points out of the room", "reverse it")
+        yield room.error(f"{key}.normal", f"{panel.spec.normal.tolist()} points out of the room", "reverse it")
 
 
-def _delay_spread(soup: Soup, panel: RisPanel) -> float:
+def _delay_spread(room: TriangleArray, panel: RisPanel) -> float:
     """Largest difference [s] over elements of the delay Tx, element, Rx, at 50 cycles of the motion."""
-    motion = soup.scene.agent
+    motion = room.scene.agent
     cycles = np.unique(np.linspace(0, len(motion) - 1, 50).astype(np.int64))
     corners = panel.spec.offsets()[:: max(panel.spec.rows - 1, 1), :: max(panel.spec.cols - 1, 1)].reshape(-1, 3)
     elements = panel.center + np.concatenate([corners, np.zeros((1, 3))])

@@ -7,21 +7,21 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
-from rislam_rt.geometry.flat import FlatParts, flat_parts
-from rislam_rt.geometry.stack import Lying, stack_walls, tracer_gap
+from rislam_rt.geometry.coplanar import CoplanarPair, stack_walls, tracer_gap
+from rislam_rt.geometry.plane_segmentation import PlanarRegions, planar_regions
 from rislam_rt.geometry.triangles import triangle_planes
-from rislam_rt.scene.check.probe import winding
-from rislam_rt.scene.check.soup import MIN_CLEARANCE, Soup
+from rislam_rt.scene.check.mesh_queries import winding
+from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 
 NEARLY_FLAT = 1e-2
 """[rad] Neighbours in one mesh that meet at less than this: half a degree looks flat to whoever made it."""
 
 
-class Parts(NamedTuple):
+class WallParts(NamedTuple):
     """The walls of a scene, reflector by reflector."""
 
-    flat: list[FlatParts]
+    flat: list[PlanarRegions]
     first: Integers
     """(R + 1,) walls of reflector r are first[r] : first[r + 1]."""
     owner: Integers
@@ -32,61 +32,61 @@ class Parts(NamedTuple):
         return int(np.searchsorted(self.first, wall, side="right")) - 1
 
 
-def build_parts(soup: Soup) -> Parts:
+def build_parts(room: TriangleArray) -> WallParts:
     """Part every mesh into walls, as the channels do."""
-    flat = [flat_parts(r.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for r in soup.scene.reflectors]
+    flat = [planar_regions(r.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for r in room.scene.reflectors]
     first = np.cumsum([0, *(len(part.offset) for part in flat)])
     owner = np.concatenate([part.group + start for part, start in zip(flat, first, strict=False)])
-    return Parts(flat, first, owner)
+    return WallParts(flat, first, owner)
 
 
-def wall_findings(soup: Soup) -> Iterator[Finding]:
+def wall_findings(room: TriangleArray) -> Iterator[Finding]:
     """Meshes that lie on each other, meshes that are nearly flat, and how many walls a mesh has."""
-    parts = build_parts(soup)
-    yield from _stacked(soup, parts)
+    parts = build_parts(room)
+    yield from _stacked(room, parts)
     for number, part in enumerate(parts.flat):
-        count, name = len(part.offset), soup.scene.reflectors[number].name
+        count, name = len(part.offset), room.scene.reflectors[number].name
         if count < 2:
             continue
         field = f"reflector[{number}].mesh ({name})"
-        yield soup.note(field, f"the mesh has {count} planes", f"its walls are {name}#0 to {name}#{count - 1}")
-        angle = _flattest(soup.triangles[soup.owner == number], part)
+        yield room.note(field, f"the mesh has {count} planes", f"its walls are {name}#0 to {name}#{count - 1}")
+        angle = _flattest(room.triangles[room.owner == number], part)
         if angle < NEARLY_FLAT:
             message = f"splits into {count} walls, of which neighbours meet at only {angle:.1e} rad"
-            yield soup.warning(
+            yield room.warning(
                 field, message, f"if that is one wall, make it flat to {COPLANAR_OFFSET} m and {COPLANAR_ANGLE} rad"
             )
 
 
-def _stacked(soup: Soup, parts: Parts) -> Iterator[Finding]:
+def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
     """One finding for each pair of meshes, with the largest gap of their walls; a note where nobody sees it."""
     normal = np.concatenate([part.normal for part in parts.flat])
     offset = np.concatenate([part.offset for part in parts.flat])
-    limit = tracer_gap(soup.bounds)
-    worst: dict[tuple[int, int, bool], Lying] = {}
-    for pair in stack_walls(soup.triangles, parts.owner, normal, offset, limit).pairs:
+    limit = tracer_gap(room.bounds)
+    worst: dict[tuple[int, int, bool], CoplanarPair] = {}
+    for pair in stack_walls(room.triangles, parts.owner, normal, offset, limit).pairs:
         upper, lower = parts.reflector(pair.upper), parts.reflector(pair.lower)
-        key = upper, lower, _is_seen(soup, soup.triangles[parts.owner == pair.upper], upper)
+        key = upper, lower, _is_seen(room, room.triangles[parts.owner == pair.upper], upper)
         if key not in worst or worst[key].gap < pair.gap:
             worst[key] = pair
     for (upper, lower, seen), pair in worst.items():
-        names = soup.scene.reflectors[upper].name, soup.scene.reflectors[lower].name
+        names = room.scene.reflectors[upper].name, room.scene.reflectors[lower].name
         message = f"'{names[0]}' lies in the plane of '{names[1]}', {pair.gap:.1e} m apart"
         mend = f"where they overlap '{names[0]}' reflects; leave one out, or part them by more than {limit:.1e} m"
-        yield (soup.warning if seen else soup.note)(f"reflector[{upper}].mesh ({names[0]})", message, mend)
+        yield (room.warning if seen else room.note)(f"reflector[{upper}].mesh ({names[0]})", message, mend)
 
 
-def _is_seen(soup: Soup, wall: Floats, reflector: int) -> bool:
+def _is_seen(room: TriangleArray, wall: Floats, reflector: int) -> bool:
     """Whether a wall (T, 3, 3) has a side in the room; the foot of a crate has its inside above and nothing below."""
     normal, _ = triangle_planes(wall)
     middle = wall.mean(axis=1)
     sides = np.concatenate([middle + MIN_CLEARANCE * normal, middle - MIN_CLEARANCE * normal])
-    inside = np.delete(sides, soup.outside(sides), axis=0)
-    own = soup.triangles[soup.owner == reflector]
+    inside = np.delete(sides, room.outside(sides), axis=0)
+    own = room.triangles[room.owner == reflector]
     return any(abs(winding(point, own)) < 0.5 for point in inside[:: max(1, len(inside) // 8)])
 
 
-def _flattest(triangles: Floats, part: FlatParts) -> float:
+def _flattest(triangles: Floats, part: PlanarRegions) -> float:
     """Smallest angle [rad] at which two walls of a mesh meet in an edge, infinite where none do."""
     _, corner = np.unique(np.round(triangles.reshape(-1, 3), 6) + 0.0, axis=0, return_inverse=True)
     corner = corner.reshape(-1, 3)

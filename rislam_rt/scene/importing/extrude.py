@@ -7,13 +7,13 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.importing.draft import RoomDraft
-from rislam_rt.scene.importing.materials import Palette
+from rislam_rt.scene.importing.floor_plan import FloorPlan, Opening
+from rislam_rt.scene.importing.materials import MaterialAssignment
+from rislam_rt.scene.importing.mesh_simplification import as_mesh
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.pieces import numbered, plain_name
-from rislam_rt.scene.importing.plan import Opening, Plan
 from rislam_rt.scene.importing.polygons import inside_loop, triangulate
-from rislam_rt.scene.importing.thinning import as_mesh
+from rislam_rt.scene.importing.region_groups import numbered, plain_name
+from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.rooms.shapes import joined, quad
 
@@ -58,7 +58,7 @@ class Line(NamedTuple):
         return np.asarray((points - self.start) @ self.across)
 
 
-def extrude(plan: Plan, height: float, options: ImportOptions) -> RoomDraft:
+def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft:
     """The room of a plan.
 
     Raises
@@ -93,8 +93,8 @@ def extrude(plan: Plan, height: float, options: ImportOptions) -> RoomDraft:
     return _named([*levels, *walls, *entries], plan, options)
 
 
-def _named(entries: list[Entry], plan: Plan, options: ImportOptions) -> RoomDraft:
-    palette = Palette(options.materials, options.rest)
+def _named(entries: list[Entry], plan: FloorPlan, options: ImportOptions) -> RoomDraft:
+    palette = MaterialAssignment(options.materials, options.rest)
     names = numbered([plain_name(name) or "wall" for name, _, _ in entries])
     reflectors = {}
     for name, (_, mesh, own) in zip(names, entries, strict=True):
@@ -110,7 +110,7 @@ def _named(entries: list[Entry], plan: Plan, options: ImportOptions) -> RoomDraf
     return RoomDraft(reflectors, {}, remarks + palette.remarks())
 
 
-def _wall_lines(plan: Plan) -> list[Line]:
+def _wall_lines(plan: FloorPlan) -> list[Line]:
     """Walls along one line, joined; those drawn by themselves come before the edges of rooms, which yield to them."""
     drawn = [(line, material, name) for line, material, name in plan.walls]
     edges = [np.stack([a, b]) for room in plan.rooms for a, b in zip(room, np.roll(room, -1, axis=0), strict=True)]
@@ -242,7 +242,7 @@ def _frame(opening: Opening, lines: list[Line], thresholds: dict[float, list[Mes
     return found
 
 
-def _floor_triangles(plan: Plan, lines: list[Line]) -> Floats:
+def _floor_triangles(plan: FloorPlan, lines: list[Line]) -> Floats:
     """(T, 3, 2) [m] of all rooms; of the rectangle about all walls where no room is drawn."""
     found = []
     for room in plan.rooms:
@@ -263,7 +263,7 @@ def _at_height(triangles: Floats, height: float) -> Mesh:
     return as_mesh(np.concatenate([triangles, np.full((*triangles.shape[:2], 1), height)], axis=-1))
 
 
-def _line_name(line: Line, plan: Plan) -> str:
+def _line_name(line: Line, plan: FloorPlan) -> str:
     """`wall_north` where a room lies on one side only, `partition` between two; the drawn name if there is one."""
     if line.name:
         return line.name

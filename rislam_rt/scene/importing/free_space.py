@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import distance_to_triangles, triangle_planes
-from rislam_rt.scene.check.probe import crossings, ray_hits, sphere_directions
+from rislam_rt.scene.check.mesh_queries import crossings, ray_hits, sphere_directions
 
 HEIGHTS = (1.0, 1.4, 0.6)
 """[m] Heights above the floor that are tried: that of a trolley or a hand, then higher, then lower."""
@@ -22,7 +22,7 @@ ENOUGH = 3
 _GRID, _RAYS, _STATIONS = 14, 100, 40
 
 
-class Free(NamedTuple):
+class FreeSpace(NamedTuple):
     """Free places of a room."""
 
     stations: Floats
@@ -35,7 +35,7 @@ class Free(NamedTuple):
     """Share of rays from the start that meet something."""
 
 
-def find_free(triangles: Floats, floor: float) -> Free | None:
+def find_free(triangles: Floats, floor: float) -> FreeSpace | None:
     """Places in a room (T, 3, 3) [m] above its floor [m]; None where nothing is free.
 
     Of all places of a grid those count from which the fewest rays escape: they are inside. Of these, the longest
@@ -54,7 +54,7 @@ def find_free(triangles: Floats, floor: float) -> Free | None:
     return None
 
 
-def _free_at(points: Floats, triangles: Floats, clearance: float) -> Free | None:
+def _free_at(points: Floats, triangles: Floats, clearance: float) -> FreeSpace | None:
     gap = distance_to_triangles(points, triangles)
     points, gap = points[gap >= clearance], gap[gap >= clearance]
     if len(points) < 2:
@@ -69,7 +69,7 @@ def _free_at(points: Floats, triangles: Floats, clearance: float) -> Free | None
     if way is None:
         return None
     order = np.argsort(np.linalg.norm(stations - way[0], axis=1), kind="stable")
-    return Free(stations[order], way, clearance, float(share[best]))
+    return FreeSpace(stations[order], way, clearance, float(share[best]))
 
 
 def reachable(start: Floats, points: Floats, triangles: Floats) -> Booleans:

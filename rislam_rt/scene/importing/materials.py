@@ -75,7 +75,7 @@ def parse_choices(texts: list[str]) -> dict[str, dict[str, Any]]:
     return choices
 
 
-class Palette:
+class MaterialAssignment:
     """Answers which material a wall has, and keeps account of what it had to assume."""
 
     def __init__(self, choices: dict[str, dict[str, Any]], rest: dict[str, Any]) -> None:

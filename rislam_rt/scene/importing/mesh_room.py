@@ -7,19 +7,19 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.importing.account import account
-from rislam_rt.scene.importing.draft import RoomDraft
-from rislam_rt.scene.importing.facets import Facets, find_facets, weld
+from rislam_rt.scene.importing.flat_regions import FlatRegions, find_facets, weld
 from rislam_rt.scene.importing.free_space import find_free, is_seen
-from rislam_rt.scene.importing.materials import Palette, itu_by_word
+from rislam_rt.scene.importing.import_report import account
+from rislam_rt.scene.importing.materials import MaterialAssignment, itu_by_word
+from rislam_rt.scene.importing.mesh_simplification import as_mesh
+from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.pieces import Piece, find_pieces, numbered, place_free_name, wall_name
-from rislam_rt.scene.importing.rounded import find_round
+from rislam_rt.scene.importing.placement import place_parts
+from rislam_rt.scene.importing.region_groups import RegionGroup, find_pieces, numbered, place_free_name, wall_name
+from rislam_rt.scene.importing.room_draft import RoomDraft
+from rislam_rt.scene.importing.round_surfaces import find_round
 from rislam_rt.scene.importing.scan_room import looks_scanned, sort_scan
-from rislam_rt.scene.importing.size import place_parts
-from rislam_rt.scene.importing.source import Part, read_source
-from rislam_rt.scene.importing.surfaces import Sorted, Surface, sort_regions
-from rislam_rt.scene.importing.thinning import as_mesh
+from rislam_rt.scene.importing.surfaces import SortedSurfaces, Surface, sort_regions
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.rooms.shapes import joined
 
@@ -42,11 +42,11 @@ def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
     return build_draft(facets, parts, [*notes, *more], options)
 
 
-def build_draft(facets: Facets, parts: list[Part], notes: list[str], options: ImportOptions) -> RoomDraft:
+def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], options: ImportOptions) -> RoomDraft:
     """Walls, things and clutter, of flat regions or of the planes of a scan."""
     if options.scan or (options.scan is None and looks_scanned(facets, options)):
         found, about = sort_scan(facets.mesh, options)
-        pieces = [Piece("", "", np.zeros(0, dtype=np.int64), True)]
+        pieces = [RegionGroup("", "", np.zeros(0, dtype=np.int64), True)]
     else:
         pieces, about = find_pieces(facets, [part.node for part in parts]), []
         found = sort_regions(facets, pieces, find_round(facets), options)
@@ -55,7 +55,7 @@ def build_draft(facets: Facets, parts: list[Part], notes: list[str], options: Im
             f"nothing in it is flat and wider than {100 * found.narrow:.2g} cm", "check --units, or lower --detail"
         )
     surfaces, unseen = _seen(found)
-    palette = Palette(options.materials, options.rest)
+    palette = MaterialAssignment(options.materials, options.rest)
     reflectors = _reflectors(surfaces, pieces, parts, palette)
     shades = _shades(found, pieces, list(reflectors))
     if palette.unused():
@@ -66,7 +66,7 @@ def build_draft(facets: Facets, parts: list[Part], notes: list[str], options: Im
     return RoomDraft(reflectors, shades, remarks + palette.remarks())
 
 
-def _seen(found: Sorted) -> tuple[list[Surface], float]:
+def _seen(found: SortedSurfaces) -> tuple[list[Surface], float]:
     """The surfaces that an agent inside can see, and the area [m^2] of the others: outer skins, insides of boards."""
     triangles = np.concatenate([
         *(s.mesh.vertices[s.mesh.faces] for s in found.surfaces), *(c.triangles for c in found.clutter)
@@ -81,7 +81,7 @@ def _seen(found: Sorted) -> tuple[list[Surface], float]:
 
 
 def _reflectors(
-    surfaces: list[Surface], pieces: list[Piece], parts: list[Part], palette: Palette
+    surfaces: list[Surface], pieces: list[RegionGroup], parts: list[MeshPart], palette: MaterialAssignment
 ) -> dict[str, tuple[Mesh, dict[str, Any]]]:
     """Named meshes with their materials: each wall of the shell by itself, each thing as one."""
     shell = sorted((s for s in surfaces if s.piece == 0), key=lambda s: -s.area)
@@ -107,7 +107,7 @@ def _reflectors(
     return found
 
 
-def _shades(found: Sorted, pieces: list[Piece], taken: list[str]) -> dict[str, Mesh]:
+def _shades(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str]) -> dict[str, Mesh]:
     """Clutter by the piece that it belongs to."""
     by_piece: dict[int, list[Floats]] = {}
     for clutter in found.clutter:

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
-from rislam_rt.scene.importing.facets import Welded, connected
+from rislam_rt.scene.importing.flat_regions import Welded, connected
 
 SPACING = 0.04
 """[m] One point of the mesh is looked at in every cube of this size."""
@@ -34,7 +34,7 @@ MAX_PLANES = 60
 _SEEDS, _SCORED = 200, 6000
 
 
-class Cloud(NamedTuple):
+class PointCloud(NamedTuple):
     """N points of a mesh, thinned."""
 
     points: Floats
@@ -60,7 +60,7 @@ class ScanPlane(NamedTuple):
     """[m] Short side of the rectangle with the same second moments."""
 
 
-def thin_cloud(mesh: Welded) -> Cloud:
+def thin_cloud(mesh: Welded) -> PointCloud:
     """The cloud of a welded mesh: one corner for every cube and side, with the normal of the patch about it.
 
     Both faces of a thin board stay apart where the mesh says which side is which.
@@ -81,7 +81,7 @@ def thin_cloud(mesh: Welded) -> Cloud:
     normal *= np.where(np.einsum("ni,ni->n", normal, facing) < 0.0, -1.0, 1.0)[:, None]
     # three of the patch's degrees of freedom went into its own plane
     noise = np.sqrt(np.maximum(values[:, 0], 0.0) * count / max(count - 3, 1))
-    return Cloud(points, normal, area, float(np.median(noise)))
+    return PointCloud(points, normal, area, float(np.median(noise)))
 
 
 def _facing(mesh: Welded) -> tuple[Floats, Floats]:
@@ -101,7 +101,7 @@ def _facing(mesh: Welded) -> tuple[Floats, Floats]:
     return facing, share
 
 
-def find_planes(cloud: Cloud) -> list[ScanPlane]:
+def find_planes(cloud: PointCloud) -> list[ScanPlane]:
     """Planes of a cloud, the largest first.
 
     In every round planes through some patches are scored by the area that lies on them (RANSAC with the normals that
@@ -121,7 +121,7 @@ def find_planes(cloud: Cloud) -> list[ScanPlane]:
     return sorted(found, key=lambda plane: -plane.area)
 
 
-def _best_plane(cloud: Cloud, free: Booleans, reach: float) -> ScanPlane | None:
+def _best_plane(cloud: PointCloud, free: Booleans, reach: float) -> ScanPlane | None:
     rows = np.flatnonzero(free)
     if cloud.area[rows].sum() < LEAST_AREA:
         return None
@@ -153,7 +153,7 @@ def _best_plane(cloud: Cloud, free: Booleans, reach: float) -> ScanPlane | None:
     return ScanPlane(plane, offset, members, residual, float(weight.sum()), float(np.sqrt(12.0 * max(spread[1], 0.0))))
 
 
-def _hanging_together(cloud: Cloud, rows: Integers) -> list[Integers]:
+def _hanging_together(cloud: PointCloud, rows: Integers) -> list[Integers]:
     """Groups of points over gaps of up to `GAP`: the largest first, then others of at least `LEAST_AREA`."""
     cells, box = np.unique(np.floor(cloud.points[rows] / (0.5 * GAP)).astype(np.int64), axis=0, return_inverse=True)
     near = cKDTree(cells).query_pairs(1.8, output_type="ndarray")
@@ -163,7 +163,7 @@ def _hanging_together(cloud: Cloud, rows: Integers) -> list[Integers]:
     return [rows[label == k] for k in order if size[k] >= LEAST_AREA or k == order[0]]
 
 
-def _fits(cloud: Cloud, rows: Integers, plane: Floats, offset: float) -> bool:
+def _fits(cloud: PointCloud, rows: Integers, plane: Floats, offset: float) -> bool:
     """Whether points apart from those that a plane was fitted to lie on it too, with no lean or step of their own."""
     height = cloud.points[rows] @ plane - offset
     own, _ = _fit(cloud.points[rows], cloud.area[rows], plane)

@@ -8,8 +8,8 @@ from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
-from rislam_rt.scene.importing.rounded import across
-from rislam_rt.scene.importing.scan import Cloud, ScanPlane
+from rislam_rt.scene.importing.round_surfaces import across
+from rislam_rt.scene.importing.scan import PointCloud, ScanPlane
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.rooms.shapes import joined
 
@@ -44,13 +44,15 @@ class _Edge(NamedTuple):
     met: bool
 
 
-def outline_planes(planes: list[ScanPlane], cloud: Cloud, fill: float) -> list[Outline | None]:
+def outline_planes(planes: list[ScanPlane], cloud: PointCloud, fill: float) -> list[Outline | None]:
     """A clean mesh for every plane; holes up to `fill` [m^2] are closed. None where nothing large enough is left."""
     trees = [cKDTree(cloud.points[plane.members]) for plane in planes]
     return [_outline(number, planes, trees, cloud, fill) for number in range(len(planes))]
 
 
-def _outline(number: int, planes: list[ScanPlane], trees: list[cKDTree], cloud: Cloud, fill: float) -> Outline | None:
+def _outline(
+    number: int, planes: list[ScanPlane], trees: list[cKDTree], cloud: PointCloud, fill: float
+) -> Outline | None:
     plane = planes[number]
     frame = np.stack(across(plane.normal), axis=-1)
     flat = cloud.points[plane.members] @ frame

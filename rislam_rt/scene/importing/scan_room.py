@@ -5,11 +5,11 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.importing.facets import Facets, Welded
+from rislam_rt.scene.importing.flat_regions import FlatRegions, Welded
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.scan import WIDTHS, ScanPlane, find_planes, thin_cloud
 from rislam_rt.scene.importing.scan_outline import BRIDGE, CELL, Outline, outline_planes
-from rislam_rt.scene.importing.surfaces import Clutter, Sorted, Surface, in_cells, off_planes, surface_area
+from rislam_rt.scene.importing.surfaces import ClutterMesh, SortedSurfaces, Surface, in_cells, off_planes, surface_area
 
 FLAT_SHARE = 0.3
 """Of a mesh's area: where less of it is in wide flat regions, it is a scan."""
@@ -17,13 +17,13 @@ CLOSE = 0.05
 """[m] What lies this near a plane is explained by it, whatever the noise: skirting boards, frames, sockets."""
 
 
-def looks_scanned(facets: Facets, options: ImportOptions) -> bool:
+def looks_scanned(facets: FlatRegions, options: ImportOptions) -> bool:
     """Whether a mesh has the noise of a scan: hardly any of it is flat."""
     flat = facets.area[(facets.width >= options.narrow) & (facets.residual < 1e-3)].sum()
     return bool(flat < FLAT_SHARE * facets.area.sum())
 
 
-def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[Sorted, list[str]]:
+def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[SortedSurfaces, list[str]]:
     """What of a scan reflects and what shades, and remarks on noise and holes.
 
     Raises
@@ -46,9 +46,9 @@ def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[Sorted, list[str]]:
     rest = _unexplained(mesh, surfaces, max(CLOSE, 2.0 * WIDTHS * cloud.noise))
     triangles = mesh.vertices[mesh.faces[rest]]
     walls = [(s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in surfaces]
-    clutter, error, cell = in_cells([Clutter(0, triangles)] if len(triangles) else [], 2.0 * options.wavelength)
-    clutter = [Clutter(0, off_planes(c.triangles, walls)) for c in clutter]
-    found = Sorted(
+    clutter, error, cell = in_cells([ClutterMesh(0, triangles)] if len(triangles) else [], 2.0 * options.wavelength)
+    clutter = [ClutterMesh(0, off_planes(c.triangles, walls)) for c in clutter]
+    found = SortedSurfaces(
         surfaces,
         [c for c in clutter if len(c.triangles)],
         error,

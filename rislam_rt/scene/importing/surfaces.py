@@ -7,11 +7,11 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
 from rislam_rt.geometry.triangles import distance_to_triangles
-from rislam_rt.scene.importing.facets import FLAT_ANGLE, Facets
+from rislam_rt.scene.importing.flat_regions import FLAT_ANGLE, FlatRegions
+from rislam_rt.scene.importing.mesh_simplification import clustered, corners_kept, has_area, region_mesh
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.pieces import Piece
-from rislam_rt.scene.importing.rounded import Round, prism
-from rislam_rt.scene.importing.thinning import clustered, corners_kept, has_area, region_mesh
+from rislam_rt.scene.importing.region_groups import RegionGroup
+from rislam_rt.scene.importing.round_surfaces import RoundPatch, prism
 from rislam_rt.scene.meshes import Mesh
 
 RESTING = 5e-3
@@ -37,18 +37,18 @@ class Surface(NamedTuple):
     """[m]."""
 
 
-class Clutter(NamedTuple):
+class ClutterMesh(NamedTuple):
     """Triangles (T, 3, 3) [m] of a piece that shade."""
 
     piece: int
     triangles: Floats
 
 
-class Sorted(NamedTuple):
+class SortedSurfaces(NamedTuple):
     """A mesh as what reflects and what shades."""
 
     surfaces: list[Surface]
-    clutter: list[Clutter]
+    clutter: list[ClutterMesh]
     shade_error: float
     """[m]."""
     cell: float
@@ -63,7 +63,9 @@ class Sorted(NamedTuple):
     """Radius [m], flat sides and error [m] of each."""
 
 
-def sort_regions(facets: Facets, pieces: list[Piece], rounds: list[Round], options: ImportOptions) -> Sorted:
+def sort_regions(
+    facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], options: ImportOptions
+) -> SortedSurfaces:
     """Decide for every region whether it reflects, shades or goes."""
     owner = np.zeros(len(facets.area), dtype=np.int64)
     for number, piece in enumerate(pieces):
@@ -93,7 +95,7 @@ def sort_regions(facets: Facets, pieces: list[Piece], rounds: list[Round], optio
     return _with_clutter(facets, pieces, rounds, surfaces, mirror, resting, narrow, options)
 
 
-def _mirrors(facets: Facets, rounded: Booleans, options: ImportOptions) -> tuple[Booleans, float]:
+def _mirrors(facets: FlatRegions, rounded: Booleans, options: ImportOptions) -> tuple[Booleans, float]:
     """Which regions reflect like planes, and the width [m] from which on they do."""
     flat = ~rounded & (facets.residual <= OUTLINE * options.wavelength)
     width = np.minimum(facets.width, np.sqrt(facets.area))
@@ -104,7 +106,7 @@ def _mirrors(facets: Facets, rounded: Booleans, options: ImportOptions) -> tuple
     return flat & (width >= narrow), narrow
 
 
-def _resting(facets: Facets, pieces: list[Piece], mirror: Booleans) -> Booleans:
+def _resting(facets: FlatRegions, pieces: list[RegionGroup], mirror: Booleans) -> Booleans:
     """Regions of things that lie on walls of the shell, their thing rising from there."""
     resting = np.zeros(len(mirror), dtype=np.bool_)
     walls = pieces[0].regions[mirror[pieces[0].regions]]
@@ -125,7 +127,7 @@ def _resting(facets: Facets, pieces: list[Piece], mirror: Booleans) -> Booleans:
     return resting
 
 
-def _coplanar(facets: Facets, shell: Integers, mirror: Booleans, part: Integers) -> Integers:
+def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Integers) -> Integers:
     """Number (R,) of the wall each region belongs to: those of the shell in one plane and of one part are one."""
     group = np.arange(len(mirror))
     rows = shell[mirror[shell]]
@@ -145,9 +147,9 @@ def _coplanar(facets: Facets, shell: Integers, mirror: Booleans, part: Integers)
 
 
 def _with_clutter(
-    facets: Facets, pieces: list[Piece], rounds: list[Round], surfaces: list[Surface], mirror: Booleans,
+    facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], surfaces: list[Surface], mirror: Booleans,
     resting: Booleans, narrow: float, options: ImportOptions,
-) -> Sorted:  # fmt: skip
+) -> SortedSurfaces:  # fmt: skip
     """Cylinders as prisms and all else that does not reflect in cells."""
     wavelength, cylinders, prisms = options.wavelength, [], []
     rest = ~mirror & ~resting
@@ -167,25 +169,25 @@ def _with_clutter(
             area = float(facets.area[found.regions].sum())
             surfaces.append(Surface(thing, int(part[first]), facets.normal[first], mesh, area, error))
         else:
-            prisms.append(Clutter(thing, mesh.vertices[mesh.faces]))
+            prisms.append(ClutterMesh(thing, mesh.vertices[mesh.faces]))
     gone = float(facets.area[resting].sum())
     raw, planes = [], _shell_planes(surfaces)
     for number, piece in enumerate(pieces):
         regions = piece.regions[rest[piece.regions]]
         triangles = off_planes(facets.mesh.vertices[facets.faces_of(regions)], planes)
         if len(triangles) and np.ptp(triangles.reshape(-1, 3), axis=0).max() >= narrow:
-            raw.append(Clutter(number, triangles))
+            raw.append(ClutterMesh(number, triangles))
         else:
             gone += float(facets.area[regions].sum())
             rest[regions] = False
     thin, error, cell = in_cells(raw, wavelength)
     shading = float(facets.area[rest].sum()) + sum(surface_area(clutter.triangles) for clutter in prisms)
-    thin = [Clutter(c.piece, off_planes(c.triangles, planes)) for c in (*prisms, *thin)]
+    thin = [ClutterMesh(c.piece, off_planes(c.triangles, planes)) for c in (*prisms, *thin)]
     thin = [clutter for clutter in thin if len(clutter.triangles)]
-    return Sorted(surfaces, thin, error, cell, narrow, shading, gone, cylinders)
+    return SortedSurfaces(surfaces, thin, error, cell, narrow, shading, gone, cylinders)
 
 
-def in_cells(raw: list[Clutter], cell: float) -> tuple[list[Clutter], float, float]:
+def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], float, float]:
     """Clutter thinned in cells of one size, the smallest with which it is few enough."""
     while True:
         found = [(clutter.piece, *clustered(clutter.triangles, cell)) for clutter in raw]
@@ -193,7 +195,7 @@ def in_cells(raw: list[Clutter], cell: float) -> tuple[list[Clutter], float, flo
             break
         cell *= np.sqrt(2.0)
     error = max((moved for _, triangles, moved in found if len(triangles)), default=0.0)
-    return [Clutter(piece, triangles) for piece, triangles, _ in found], error, cell
+    return [ClutterMesh(piece, triangles) for piece, triangles, _ in found], error, cell
 
 
 def _shell_planes(surfaces: list[Surface]) -> list[tuple[Floats, float]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault, one_line
-from rislam_rt.scene.importing.plan import Shape
+from rislam_rt.scene.importing.floor_plan import PlanShape
 
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _STEP = re.compile(r"([A-Za-z])([^A-Za-z]*(?:[eE][-+]?\d[^A-Za-z]*)*)")
@@ -32,7 +32,7 @@ _HIDDEN = re.compile(r"display\s*:\s*none")
 _DEEPEST = 200
 
 
-def parse_svg(content: bytes) -> list[Shape]:
+def parse_svg(content: bytes) -> list[PlanShape]:
     """Shapes of an SVG drawing, y turned up, its lower left corner at zero.
 
     A shape is a room, wall, door or window by the words in its `class`, `id`, label or `data-kind`, or those of the
@@ -60,7 +60,7 @@ def parse_svg(content: bytes) -> list[Shape]:
     return [shape._replace(points=(shape.points - [left, bottom]) * [1.0, -1.0]) for shape in shapes]
 
 
-def _walk(element: Tree.Element, matrix: Floats, inherited: str, depth: int) -> Iterator[Shape]:
+def _walk(element: Tree.Element, matrix: Floats, inherited: str, depth: int) -> Iterator[PlanShape]:
     if depth > _DEEPEST:
         raise Fault(f"groups {_DEEPEST} deep", "save it as plain SVG")
     tag = str(element.tag).rpartition("}")[2]
@@ -75,7 +75,7 @@ def _walk(element: Tree.Element, matrix: Floats, inherited: str, depth: int) -> 
     if tag in _SHAPES:
         for points, closed in _outline(tag, element):
             ends = np.column_stack([points, np.ones(len(points))]) @ matrix.T
-            yield Shape(kind or ("room" if closed else "wall"), ends[:, :2], closed, _about(element))
+            yield PlanShape(kind or ("room" if closed else "wall"), ends[:, :2], closed, _about(element))
     for child in element:
         yield from _walk(child, matrix, kind, depth + 1)
 

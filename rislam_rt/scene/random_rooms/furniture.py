@@ -26,7 +26,7 @@ HEADROOM = 0.4
 _TRIES = 40
 
 
-class Piece(NamedTuple):
+class FurniturePiece(NamedTuple):
     """A box on the floor, or a table top."""
 
     kind: str
@@ -72,7 +72,7 @@ class Piece(NamedTuple):
         return Mesh(vertices, solid.faces)
 
 
-class Ground(NamedTuple):
+class PlacementLimits(NamedTuple):
     """What a new piece must fit into."""
 
     outline: Floats
@@ -81,9 +81,9 @@ class Ground(NamedTuple):
     """(K, 3) [m]."""
 
 
-def draw_pieces(ground: Ground, count: int, *, rng: np.random.Generator) -> list[Piece]:
+def draw_pieces(ground: PlacementLimits, count: int, *, rng: np.random.Generator) -> list[FurniturePiece]:
     """Up to `count` pieces: fewer where there is no room."""
-    pieces: list[Piece] = []
+    pieces: list[FurniturePiece] = []
     low, high = ground.outline.min(axis=0), ground.outline.max(axis=0)
     for _ in range(count):
         kind = str(rng.choice(sorted(KINDS)))
@@ -95,14 +95,14 @@ def draw_pieces(ground: Ground, count: int, *, rng: np.random.Generator) -> list
     return pieces
 
 
-def draw_piece(kind: str, center: Floats, yaw: float, *, rng: np.random.Generator) -> Piece:
+def draw_piece(kind: str, center: Floats, yaw: float, *, rng: np.random.Generator) -> FurniturePiece:
     """A piece of random size at a place."""
     length, width, height = (float(rng.uniform(*limits)) for limits in KINDS[kind])
     bottom = height - TABLE_TOP if kind == "table" else 0.0
-    return Piece(kind, center, np.array([0.5 * length, 0.5 * width]), yaw, bottom, height)
+    return FurniturePiece(kind, center, np.array([0.5 * length, 0.5 * width]), yaw, bottom, height)
 
 
-def fits(piece: Piece, ground: Ground, others: list[Piece]) -> bool:
+def fits(piece: FurniturePiece, ground: PlacementLimits, others: list[FurniturePiece]) -> bool:
     """Whether a piece stands inside the plan, below the ceiling, off the way and off all others."""
     rim = piece.rim()
     if depth_inside(ground.outline, rim).min() < OFF_WALLS or ground.roof.height(rim).min() < piece.top + HEADROOM:

@@ -7,8 +7,8 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import RisPanel, RisSpec, Scatterer
-from rislam_rt.scene.check.probe import crossings
-from rislam_rt.scene.random_rooms.furniture import Ground, Piece, draw_piece, fits
+from rislam_rt.scene.check.mesh_queries import crossings
+from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_piece, fits
 from rislam_rt.scene.random_rooms.plan import depth_inside
 from rislam_rt.scene.random_rooms.shell import ceiling_normal, wall_normal
 
@@ -41,16 +41,16 @@ ABOVE = 0.3
 _TRIES = 60
 
 
-class Found(NamedTuple):
+class ScattererPlacement(NamedTuple):
     """A scatterer's place, and the screen that hides it, if any."""
 
     position: Floats
-    screen: Piece | None = None
+    screen: FurniturePiece | None = None
 
 
 def draw_scatterer(
-    place: str, ground: Ground, pieces: list[Piece], landmarks: Floats, *, rng: np.random.Generator
-) -> Found | None:
+    place: str, ground: PlacementLimits, pieces: list[FurniturePiece], landmarks: Floats, *, rng: np.random.Generator
+) -> ScattererPlacement | None:
     """A place of one of `PLACES` for a scatterer; None where the room has none."""
     low, high = ground.outline.min(axis=0), ground.outline.max(axis=0)
     lowest = float(ground.way[:, 2].min())
@@ -66,15 +66,15 @@ def draw_scatterer(
         if not _is_free(point, ground, pieces, landmarks):
             continue
         if place != "hidden":
-            return Found(point)
+            return ScattererPlacement(point)
         screen = _screen_before(point, ground, rng)
         clear = not any(screen.holds(mark, OFF_SURFACES) for mark in [*landmarks, point])
         if clear and fits(screen, ground, pieces) and hidden_share(point, ground.way, [*pieces, screen]) >= MOST:
-            return Found(point, screen)
+            return ScattererPlacement(point, screen)
     return None
 
 
-def hidden_share(point: Floats, way: Floats, pieces: list[Piece]) -> float:
+def hidden_share(point: Floats, way: Floats, pieces: list[FurniturePiece]) -> float:
     """Share of a way (K, 3), every tenth of it looked at, from which pieces hide a point (3,)."""
     seen_from = way[::10]
     triangles = [mesh.vertices[mesh.faces] for mesh in (piece.mesh() for piece in pieces)]
@@ -91,7 +91,7 @@ def make_scatterer(number: int, position: Floats, *, rng: np.random.Generator) -
 
 
 def draw_panel(
-    side: str, ground: Ground, pieces: list[Piece], landmarks: Floats, *, rng: np.random.Generator
+    side: str, ground: PlacementLimits, pieces: list[FurniturePiece], landmarks: Floats, *, rng: np.random.Generator
 ) -> RisPanel | None:
     """A panel on a `wall` or in the `ceiling`; None where there is no room for its centre."""
     for _ in range(_TRIES):
@@ -113,7 +113,7 @@ def _data_sheet(normal: Floats, up: Floats, rng: np.random.Generator) -> RisSpec
     return RisSpec(int(rows), int(cols), np.array([SPACING, SPACING]), normal, up, levels, element)
 
 
-def _on_wall(ground: Ground, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
+def _on_wall(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
     """Host, centre, normal and up: a wall, longer ones more often, above the start and below its upper edge."""
     outline = ground.outline
     along = np.roll(outline, -1, axis=0) - outline
@@ -130,7 +130,7 @@ def _on_wall(ground: Ground, rng: np.random.Generator) -> tuple[str, Floats, Flo
     return f"wall_{number}", np.array([*foot, rng.uniform(low, high)]), wall_normal(outline, number), np.eye(3)[2]
 
 
-def _in_ceiling(ground: Ground, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
+def _in_ceiling(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
     outline, roof = ground.outline, ground.roof
     flat = rng.uniform(outline.min(axis=0), outline.max(axis=0))
     ridge = (flat - roof.point) @ roof.axis
@@ -144,7 +144,7 @@ def _in_ceiling(ground: Ground, rng: np.random.Generator) -> tuple[str, Floats, 
     return host, np.array([*flat, roof.height(flat)]), normal, unit(up - (up @ normal) * normal)
 
 
-def _screen_before(point: Floats, ground: Ground, rng: np.random.Generator) -> Piece:
+def _screen_before(point: Floats, ground: PlacementLimits, rng: np.random.Generator) -> FurniturePiece:
     """A screen across the line from a point to the middle of the way."""
     toward = unit(ground.way[len(ground.way) // 2, :2] - point[:2])
     center = point[:2] + rng.uniform(*BEHIND) * toward
@@ -152,7 +152,7 @@ def _screen_before(point: Floats, ground: Ground, rng: np.random.Generator) -> P
     return screen._replace(top=max(screen.top, float(point[2]) + TALLER))
 
 
-def _is_free(point: Floats, ground: Ground, pieces: list[Piece], landmarks: Floats) -> bool:
+def _is_free(point: Floats, ground: PlacementLimits, pieces: list[FurniturePiece], landmarks: Floats) -> bool:
     if float(depth_inside(ground.outline, point[:2])) < OFF_SURFACES:
         return False
     if any(piece.holds(point, OFF_SURFACES) for piece in pieces):

@@ -32,7 +32,7 @@ SPIN = (1.0, 3.0)
 _STARTS, _SLOWER = 64, 0.8
 
 
-class Course(NamedTuple):
+class MotionProfile(NamedTuple):
     """A motion about its start: shares of the speed, rates of turn [rad/s] and of climb [m/s], (K,) each."""
 
     pace: Floats
@@ -40,23 +40,23 @@ class Course(NamedTuple):
     climb: Floats
 
 
-def draw_course(kind: str, *, rng: np.random.Generator) -> Course:
+def draw_motion_profile(kind: str, *, rng: np.random.Generator) -> MotionProfile:
     """A course of one of `MOTIONS`."""
     time = _times()
     still, steady = np.zeros(CYCLES), np.ones(CYCLES)
     if kind == "straight":
-        return Course(steady, still, still)
+        return MotionProfile(steady, still, still)
     if kind == "corner":
-        return Course(steady, _corners(time, rng), still)
+        return MotionProfile(steady, _corners(time, rng), still)
     if kind in ("stop", "turn"):
         pace, stops = _stop_and_go(time, rng)
         turn = 0.5 * _wander(time, rng)
-        return Course(pace, _spins(time, stops, rng) if kind == "turn" else turn * pace, still)
+        return MotionProfile(pace, _spins(time, stops, rng) if kind == "turn" else turn * pace, still)
     wander = _wander(time, rng)
-    return Course(steady, wander, _climb(time, rng) if kind == "climb" else still)
+    return MotionProfile(steady, wander, _climb(time, rng) if kind == "climb" else still)
 
 
-def draw_motion(outline: Floats, roof: Roof, course: Course, *, rng: np.random.Generator) -> Trajectory:
+def draw_motion(outline: Floats, roof: Roof, course: MotionProfile, *, rng: np.random.Generator) -> Trajectory:
     """A course laid into a plan from a random start at a random speed, heading along the motion.
 
     Raises

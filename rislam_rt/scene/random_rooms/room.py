@@ -10,7 +10,7 @@ from rislam_rt.errors import SceneError
 from rislam_rt.model import Material, Reflector, RisPanel, Scatterer, Scene, Trajectory
 from rislam_rt.scene.check import find_errors
 from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.random_rooms.furniture import Ground, Piece, draw_pieces
+from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_pieces
 from rislam_rt.scene.random_rooms.landmarks import (
     MOST,
     PLACES,
@@ -20,7 +20,7 @@ from rislam_rt.scene.random_rooms.landmarks import (
     hidden_share,
     make_scatterer,
 )
-from rislam_rt.scene.random_rooms.motion import MOTIONS, draw_course, draw_motion
+from rislam_rt.scene.random_rooms.motion import MOTIONS, draw_motion, draw_motion_profile
 from rislam_rt.scene.random_rooms.plan import SHAPES, area, draw_plan, extent
 from rislam_rt.scene.random_rooms.shell import CEILINGS, build_shell, draw_roof
 
@@ -93,8 +93,8 @@ def draw_room(seed: int) -> RandomRoom:
 def _attempt(seed: int, shape: str, ceiling: str, motion: str, panel: str, *, rng: np.random.Generator) -> RandomRoom:
     outline = draw_plan(shape, rng=rng)
     roof = draw_roof(outline, ceiling, rng=rng)
-    agent = draw_motion(outline, roof, draw_course(motion, rng=rng), rng=rng)
-    ground = Ground(outline, roof, agent.position)
+    agent = draw_motion(outline, roof, draw_motion_profile(motion, rng=rng), rng=rng)
+    ground = PlacementLimits(outline, roof, agent.position)
     most = min(MAX_PIECES, int(area(outline) / PER_PIECE))
     pieces = draw_pieces(ground, int(rng.integers(0, most + 1)), rng=rng)
     landmarks, ris = _landmarks(ground, pieces, panel, rng)
@@ -123,7 +123,7 @@ def _attempt(seed: int, shape: str, ceiling: str, motion: str, panel: str, *, rn
 
 
 def _landmarks(
-    ground: Ground, pieces: list[Piece], panel: str, rng: np.random.Generator
+    ground: PlacementLimits, pieces: list[FurniturePiece], panel: str, rng: np.random.Generator
 ) -> tuple[list[Scatterer], RisPanel | None]:
     """Scatterers, as many as fit, and the panel; screens that hide something join the pieces."""
     positions = np.zeros((0, 3))
@@ -138,7 +138,9 @@ def _landmarks(
     return scatterers, ris
 
 
-def _reflectors(shell: dict[str, Mesh], pieces: list[Piece], rng: np.random.Generator) -> tuple[Reflector, ...]:
+def _reflectors(
+    shell: dict[str, Mesh], pieces: list[FurniturePiece], rng: np.random.Generator
+) -> tuple[Reflector, ...]:
     """Walls and furniture with their materials."""
     common = float(rng.uniform(*REFLECTION))
     own = rng.uniform(*REFLECTION, size=len(shell))

@@ -6,10 +6,10 @@ from rislam_rt.scene.rooms.angled import l_room, tilted_room
 from rislam_rt.scene.rooms.furnished import imported_glb, office
 from rislam_rt.scene.rooms.hall import large_hall
 from rislam_rt.scene.rooms.plain import empty_box, itu_room, paper_room, two_panels, two_scatterers
-from rislam_rt.scene.rooms.room import Room
+from rislam_rt.scene.rooms.room import RoomFiles
 from rislam_rt.scene.rooms.shaded import shaded_room
 
-ROOMS: dict[str, Callable[[], Room]] = {
+ROOMS: dict[str, Callable[[], RoomFiles]] = {
     room.__name__: room
     for room in (
         paper_room,
@@ -27,4 +27,4 @@ ROOMS: dict[str, Callable[[], Room]] = {
 }
 """Name of the template -> its builder."""
 
-__all__ = ["ROOMS", "Room"]
+__all__ = ["ROOMS", "RoomFiles"]

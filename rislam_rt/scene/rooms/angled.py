@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.rooms.paths import curved_agent
-from rislam_rt.scene.rooms.room import Room, panel, reflector, sphere
+from rislam_rt.scene.rooms.room import RoomFiles, panel, reflector, sphere
 from rislam_rt.scene.rooms.shapes import hexahedron, quad
 
 TILTED_PLANES: dict[str, tuple[list[float], list[float]]] = {
@@ -20,7 +20,7 @@ TILTED_PLANES: dict[str, tuple[list[float], list[float]]] = {
 """Inward direction and a point of each face: no two parallel, none along an axis."""
 
 
-def l_room() -> Room:
+def l_room() -> RoomFiles:
     """An L-shaped room; the panel hangs at the bend, the scatterer in one arm."""
     outline = [[0.0, 0.0], [7.0, 0.0], [7.0, 3.0], [3.0, 3.0], [3.0, 6.0], [0.0, 6.0]]
     names = ["wall_y0", "wall_x7", "wall_y3", "wall_x3", "wall_y6", "wall_x0"]
@@ -47,10 +47,10 @@ def l_room() -> Room:
         "An L of 7 x 6 m with arms 3 m wide, 2.8 m high: not convex, so walls hide walls. The panel hangs over the "
         "bend. The agent walks from the arm with the sphere into the other one, where it sees the sphere no more."
     )
-    return Room(table, meshes, readme, files)
+    return RoomFiles(table, meshes, readme, files)
 
 
-def tilted_room() -> Room:
+def tilted_room() -> RoomFiles:
     """Six faces, no two parallel and none along an axis; the panel lies in the tilted ceiling."""
     meshes = hexahedron(_corners())
     normal, point = (np.array(value) for value in TILTED_PLANES["ceiling"])
@@ -72,7 +72,7 @@ def tilted_room() -> Room:
         "About 6 x 5 x 3 m; floor, ceiling and walls are tilted by 2 to 9 degrees, no two of them parallel and "
         "none along an axis. The panel lies in the ceiling, turned against the walls."
     )
-    return Room(table, meshes, readme, files)
+    return RoomFiles(table, meshes, readme, files)
 
 
 def _corners() -> Floats:

@@ -8,13 +8,13 @@ from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.rooms.paths import curved_agent
-from rislam_rt.scene.rooms.room import Room, panel, reflector, sphere
+from rislam_rt.scene.rooms.room import RoomFiles, panel, reflector, sphere
 from rislam_rt.scene.rooms.shapes import block, box_walls, joined, quad
 
 GLB_FILE = "room.glb"
 
 
-def office() -> Room:
+def office() -> RoomFiles:
     """Two rooms with a doorway between them, desks, a cabinet and a screen."""
     height = 2.8
     meshes = box_walls(10.0, 7.0, height)
@@ -45,10 +45,10 @@ def office() -> Room:
         "doorway and loses it. Desks and screen are boxes whose faces are walls of their own (`desk_a#0` to "
         "`desk_a#5`); what stands on the floor has no bottom face, so that no two faces coincide."
     )
-    return Room(table, meshes, readme, files)
+    return RoomFiles(table, meshes, readme, files)
 
 
-def imported_glb() -> Room:
+def imported_glb() -> RoomFiles:
     """A room whose meshes are the named nodes of one GLB file, y axis up as the format wants it."""
     walls = box_walls(5.0, 6.0, 3.0)
     nodes = {"Floor": "floor", "Ceiling": "ceiling", "West": "wall_x0", "East": "wall_x5"}
@@ -71,7 +71,7 @@ def imported_glb() -> Room:
         "own transform (the table is turned by 25 degrees, the shelf hangs on a parent node), y axis up. A "
         'reflector takes a node by `mesh = "room.glb#Table"`; `up_axis = "y"` turns it into the frame with z up.'
     )
-    return Room(table, {}, readme, files | {GLB_FILE: _glb(walls, nodes)})
+    return RoomFiles(table, {}, readme, files | {GLB_FILE: _glb(walls, nodes)})
 
 
 def _partition(x: float, width: float, height: float, door: tuple[float, float, float]) -> Mesh:

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.rooms.paths import curved_agent
-from rislam_rt.scene.rooms.room import Room, panel, reflector, sphere
+from rislam_rt.scene.rooms.room import RoomFiles, panel, reflector, sphere
 from rislam_rt.scene.rooms.shapes import block, grid, joined, refined
 
 LENGTH, WIDTH, EAVES, RIDGE = 40.0, 25.0, 6.0, 8.0
@@ -19,7 +19,7 @@ CRATES = [[4, 4], [5, 9], [5, 15], [7, 20], [12, 3], [14, 21], [25, 4], [26, 20]
 PILLAR_RADIUS, PILLAR_SIDES = 0.4, 16
 
 
-def large_hall() -> Room:
+def large_hall() -> RoomFiles:
     """40 x 25 x 8 m: subdivided floor and walls, a barrel vault, round pillars, crates."""
     arch = _arch()
     meshes = {
@@ -52,7 +52,7 @@ def large_hall() -> Room:
         "pillars of 16 sides and a dozen crates: 4296 triangles in 186 planes. The 10 x 10 panel lies "
         "in a tilted strip."
     )
-    return Room(table, meshes, readme, files)
+    return RoomFiles(table, meshes, readme, files)
 
 
 def _arch() -> Floats:

@@ -1,13 +1,13 @@
 """Box-shaped rooms: the paper's, and its variants."""
 
 from rislam_rt.scene.rooms.paths import curved_agent
-from rislam_rt.scene.rooms.room import BASELINE, CYCLES, Room, panel, reflector, sphere
+from rislam_rt.scene.rooms.room import BASELINE, CYCLES, RoomFiles, panel, reflector, sphere
 from rislam_rt.scene.rooms.shapes import box_walls
 
 DOWN, NORTH = [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]
 
 
-def paper_room() -> Room:
+def paper_room() -> RoomFiles:
     """The paper's room: 6 x 6 x 3 m, a panel amid the ceiling, a sphere of 5 cm, the agent on a straight line."""
     meshes = box_walls(6.0, 6.0, 3.0)
     table = {
@@ -23,10 +23,10 @@ def paper_room() -> Room:
         "once; its baseline is turned 0.5 rad against its heading, because a parallel one makes paths hit edges "
         "exactly."
     )
-    return Room(table, meshes, readme)
+    return RoomFiles(table, meshes, readme)
 
 
-def empty_box() -> Room:
+def empty_box() -> RoomFiles:
     """Four walls, floor and ceiling, nothing to find: leakage and wall returns only."""
     meshes = box_walls(5.0, 4.0, 2.8)
     table = {
@@ -35,10 +35,10 @@ def empty_box() -> Room:
         "agent": {"start": [0.8, 0.9, 1.1], "velocity": [0.05, 0.035, 0.0]} | CYCLES | BASELINE,
     }
     readme = "A box of 5 x 4 x 2.8 m with neither scatterer nor panel: leakage (LOS) and wall returns (VT) only."
-    return Room(table, meshes, readme)
+    return RoomFiles(table, meshes, readme)
 
 
-def two_scatterers() -> Room:
+def two_scatterers() -> RoomFiles:
     """A box with two spheres of different size and a panel off the middle; the agent walks a bow."""
     meshes = box_walls(7.0, 5.0, 3.0)
     agent, files = curved_agent([[1.0, 0.9, 0.6], [3.1, 1.2, 0.6], [5.3, 2.1, 0.6], [5.2, 3.6, 0.6], [3.5, 4.1, 0.6]])
@@ -53,10 +53,10 @@ def two_scatterers() -> Room:
         "A box of 7 x 5 x 3 m with two spheres (5 and 8 cm) and a panel off the middle of the ceiling. The agent "
         "walks a bow around the panel, so that every landmark is seen from several sides."
     )
-    return Room(table, meshes, readme, files)
+    return RoomFiles(table, meshes, readme, files)
 
 
-def two_panels() -> Room:
+def two_panels() -> RoomFiles:
     """A box with a panel on the ceiling, a larger one on a wall, and a sphere; the agent walks a bow."""
     meshes = box_walls(7.0, 5.0, 3.0)
     agent, files = curved_agent([[1.2, 1.0, 0.6], [3.0, 1.3, 0.6], [4.9, 2.0, 0.6], [5.0, 3.4, 0.6], [3.6, 4.0, 0.6]])
@@ -74,10 +74,10 @@ def two_panels() -> Room:
         "wall_x7 (`beside`), and a sphere of 8 cm. The agent walks a bow under the one and past the other. One "
         "controller sets both panels with one code; what the agent has to find out is which landmark is which of them."
     )
-    return Room(table, meshes, readme, files)
+    return RoomFiles(table, meshes, readme, files)
 
 
-def itu_room() -> Room:
+def itu_room() -> RoomFiles:
     """A box of real materials, whose reflection depends on angle and polarisation."""
     meshes = box_walls(6.0, 5.0, 3.0)
     concrete = {"itu": "concrete", "thickness_m": 0.2}
@@ -99,4 +99,4 @@ def itu_room() -> Room:
         "(wall_x0; 1 cm), metal (wall_x6) and wood (wall_y0; 4 cm). Reflection depends on angle and polarisation "
         "(Fresnel slabs)."
     )
-    return Room(table, meshes, readme, files)
+    return RoomFiles(table, meshes, readme, files)

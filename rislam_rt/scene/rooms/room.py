@@ -14,7 +14,7 @@ CYCLES = {"cycles": 600, "cycle_s": 0.1}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Room:
+class RoomFiles:
     """A scene as files: the table of `scene.toml`, meshes by file name, other files, and what its README says."""
 
     table: dict[str, Any]

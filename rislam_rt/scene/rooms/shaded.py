@@ -1,11 +1,11 @@
 """A room with round objects that hide things."""
 
 from rislam_rt.scene.rooms.paths import curved_agent
-from rislam_rt.scene.rooms.room import Room, panel, reflector, sphere
+from rislam_rt.scene.rooms.room import RoomFiles, panel, reflector, sphere
 from rislam_rt.scene.rooms.shapes import box_walls
 
 
-def shaded_room() -> Room:
+def shaded_room() -> RoomFiles:
     """A box with a ball and a column that shade, and a rod whose cross-section depends on directions."""
     meshes = box_walls(7.0, 5.0, 3.0)
     agent, files = curved_agent([[1.0, 0.9, 0.6], [3.1, 0.8, 0.6], [5.5, 1.2, 0.6], [6.1, 2.8, 0.6], [4.9, 4.2, 0.6]])
@@ -27,4 +27,4 @@ def shaded_room() -> Room:
         "them and reflect nothing: the agent loses the ball behind the column and finds it again, and its wall returns "
         "come and go."
     )
-    return Room(table, meshes, readme, files)
+    return RoomFiles(table, meshes, readme, files)

@@ -17,7 +17,7 @@ LEFT_OUT = ("xpd_coefficient", "alpha_r", "alpha_i", "lambda_")
 """Properties of a Sionna material that are not carried over: all of diffuse scattering alone."""
 
 
-class Coat(NamedTuple):
+class XmlMaterial(NamedTuple):
     """A material as read."""
 
     material: Material | None
@@ -26,7 +26,7 @@ class Coat(NamedTuple):
     """What could not be carried over."""
 
 
-def read_material(bsdf: Element) -> Coat:
+def read_material(bsdf: Element) -> XmlMaterial:
     """The material of a `<bsdf>` element: Sionna's `itu-radio-material` and `radio-material`, or any whose name says
     `itu_...`, as Sionna itself takes them.
 
@@ -40,18 +40,18 @@ def read_material(bsdf: Element) -> Coat:
     values = {e.get("name", ""): e for e in children(bsdf, "float", "integer", "string")}
     notes = tuple(f"bsdf '{one_line(name)[:40]}': {key} is not carried over" for key in LEFT_OUT if key in values)
     if kind == ABSORBER or (kind == "radio-material" and _is_air(values)):
-        return Coat(None, ())
+        return XmlMaterial(None, ())
     rough = _number(values, "scattering_coefficient", 0.0)
     thickness = _number(values, "thickness", DEFAULT_THICKNESS)
     if kind == "itu-radio-material" or plain.startswith(("itu_", "itu-")):
         given = values["type"].get("value", "") if "type" in values else plain[4:]
         if given not in ITU_MATERIALS:
             raise Fault(f"an ITU material '{one_line(given)[:40]}'", f"take one of {', '.join(ITU_MATERIALS)}")
-        return Coat(_made(itu=given, thickness=thickness, scattering=rough), notes)
+        return XmlMaterial(_made(itu=given, thickness=thickness, scattering=rough), notes)
     if kind == "radio-material":
         permittivity, conductivity = _number(values, "relative_permittivity", 1.0), _number(values, "conductivity", 0.0)
         own = {"permittivity": permittivity, "conductivity": conductivity}
-        return Coat(_made(**own, thickness=thickness, scattering=rough), notes)
+        return XmlMaterial(_made(**own, thickness=thickness, scattering=rough), notes)
     raise Fault(
         f"a material of type '{one_line(kind)[:40]}' says nothing of radio",
         "call it itu_concrete (or itu_ and another name of ITU-R P.2040), or make it an itu-radio-material",

@@ -12,11 +12,11 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError
 from rislam_rt.model import Material
-from rislam_rt.scene.check.soup import without_area
+from rislam_rt.scene.check.triangle_array import without_area
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.meshes import MAX_FACES, Mesh
 from rislam_rt.scene.xml.clip import clip_mesh
-from rislam_rt.scene.xml.materials import Coat, read_material
+from rislam_rt.scene.xml.materials import XmlMaterial, read_material
 from rislam_rt.scene.xml.parse import MAX_XML_BYTES, children, parse_xml
 from rislam_rt.scene.xml.shapes import shape_mesh
 
@@ -119,7 +119,7 @@ class _Coats:
     def __init__(self, root: Element) -> None:
         self._elements = {bsdf.get("id", ""): bsdf for bsdf in children(root, "bsdf")}
         self._alias = {e.get("as", ""): e.get("id", "") for e in children(root, "alias")}
-        self._read: dict[str, Coat] = {}
+        self._read: dict[str, XmlMaterial] = {}
         self.notes: list[str] = []
 
     def of(self, shape: Element) -> Material | None:
@@ -136,7 +136,7 @@ class _Coats:
             raise Fault(f"it refers to '{one_line(name)[:40]}', which the file does not define", "add that <bsdf>")
         raise Fault("it has no material", "add <ref id=...> to a <bsdf>, e.g. of type itu-radio-material")
 
-    def _noted(self, coat: Coat) -> Coat:
+    def _noted(self, coat: XmlMaterial) -> XmlMaterial:
         self.notes += coat.notes
         return coat
 

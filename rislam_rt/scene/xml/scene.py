@@ -11,13 +11,13 @@ from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.model import Body, Material, Reflector, RisPanel, Scene, Shade, Trajectory
 from rislam_rt.scene.check import find_errors
 from rislam_rt.scene.findings import Fault, raise_errors
-from rislam_rt.scene.importing.draft import RoomDraft, propose_panel
-from rislam_rt.scene.importing.free_space import Free
+from rislam_rt.scene.importing.free_space import FreeSpace
+from rislam_rt.scene.importing.room_draft import RoomDraft, propose_panel
 from rislam_rt.scene.load import SCENE_FILE, build_panel, load_scene
 from rislam_rt.scene.meshes import MAX_FACES, Mesh
 from rislam_rt.scene.motion import straight_motion
-from rislam_rt.scene.placing import suggest_agent
 from rislam_rt.scene.schema import RisSection
+from rislam_rt.scene.suggested_motion import suggest_agent
 from rislam_rt.scene.templates import room_name
 from rislam_rt.scene.write import write_scene
 from rislam_rt.scene.xml.materials import material_element, read_material
@@ -112,7 +112,7 @@ def _panel(reflectors: Sequence[Reflector], shades: Sequence[Shade], agent: Traj
         {s.name: Mesh(s.vertices, s.faces) for s in shades},
     )
     way = agent.position[[0, -1]]
-    table, about = propose_panel(draft, Free(way, way, 0.0, 0.0))
+    table, about = propose_panel(draft, FreeSpace(way, way, 0.0, 0.0))
     return (build_panel(RisSection(**table)) if table else None), about
 
 

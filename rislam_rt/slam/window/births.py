@@ -40,9 +40,10 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.book, mean[:3])
     histories = digest(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
     told = explanations(context, rows, histories, expected, groups, mean, covariance)
-    panel = context.book.panel
+    panels = context.book.panels
     lonely = _missing_legs(context, histories, mean)
-    over = [(row, value, 0 <= panel == int(forms[0, 0])) for row, value, forms in told]
+    over = [(row, value, panels.index(base) if (base := int(forms[0, 0])) >= 0 and base in panels else -1)
+            for row, value, forms in told]  # fmt: skip
     verdicts, shares = judge(context, ats, histories, known, over, lonely)
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked, returns = context.tracks.looked.copy(), context.scene.use_vt

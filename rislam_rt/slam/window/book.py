@@ -30,9 +30,9 @@ class Book(NamedTuple):
     log_grid: Floats
     """(F, G) log posterior of a point's strength (see `identity`)."""
     log_ris: Floats
-    """(F,) log odds of panel against scatterer; of no meaning for walls."""
+    """(F, Q) log odds of each of Q panels against scatterer; of no meaning for walls."""
     hidden: Floats
-    """(F, 2) probability that something stands in its way, were it the panel, and a scatterer."""
+    """(F, Q + 1) probability that something stands in its way, were it each of the panels, and a scatterer."""
     next_ident: int
 
     @property
@@ -47,8 +47,8 @@ class Book(NamedTuple):
 
     @property
     def ris_probability(self) -> Floats:
-        """(F,) 0 for walls."""
-        probability, points = np.zeros(len(self.ident)), self.points
+        """(F, Q) of being each panel; 0 for walls."""
+        probability, points = np.zeros(self.log_ris.shape), self.points
         probability[points] = panel_probabilities(self.log_ris[points])
         return probability
 
@@ -58,10 +58,13 @@ class Book(NamedTuple):
         return Identity(self.log_grid, self.log_ris, self.hidden)
 
     @property
-    def panel(self) -> int:
-        """Row of the point held for the panel, -1 without one."""
+    def panels(self) -> tuple[int, ...]:
+        """(Q,) row of the point held for each panel, -1 without one."""
         probability = self.ris_probability
-        return int(np.argmax(probability)) if len(probability) and probability.max() > 0.5 else -1
+        if not len(probability):
+            return (-1,) * probability.shape[1]
+        rows = np.argmax(probability, axis=0)
+        return tuple(int(row) if probability[row, panel] > 0.5 else -1 for panel, row in enumerate(rows))
 
     @property
     def log_strength(self) -> tuple[Floats, Floats]:
@@ -74,12 +77,12 @@ class Book(NamedTuple):
         return np.where(idents < 0, idents, place)
 
 
-def empty_book() -> Book:
-    """Nothing known."""
+def empty_book(panels: int = 1) -> Book:
+    """Nothing known, in a room of so many panels."""
     none, count = np.zeros(0), np.zeros(0, dtype=np.int64)
     return Book(
         count, np.zeros(0, dtype=np.bool_), np.zeros((0, 3)), count, none, none, none,
-        np.zeros((0, len(STRENGTHS))), none, np.zeros((0, 2)), 0,
+        np.zeros((0, len(STRENGTHS))), np.zeros((0, panels)), np.zeros((0, panels + 1)), 0,
     )  # fmt: skip
 
 

@@ -79,7 +79,7 @@ def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: 
     crowd = max(LEVELS.crowd, float(np.mean(np.minimum(scatter, 10.0) ** 2)))
     number = np.array([len(at) for at in rows])[:, None]
     # the difference of two alternated codes holds the panel's paths and nothing of the others
-    pure = np.array([bool((log.side[at] == PANEL).all()) for at in rows])[:, None]
+    pure = np.array([bool((log.side[at] >= PANEL).all()) for at in rows])[:, None]
     around = np.where(pure, 1.0, crowd)
     scatter = np.sqrt((4.0 * around + number * scatter**2) / (4.0 + number))
     count = len(rows)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec
+from rislam_rt.model import Body, DataSheet, RadioConfig, RisCode, RisSpec
 from rislam_rt.model.sensor import SensorModel
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.slam.identity import point_amplitude
@@ -29,9 +29,14 @@ class Scene(NamedTuple):
     body: Body
     radio: RadioConfig
     sensor: SensorModel
-    ris: RisSpec | None
+    ris: DataSheet | None
     max_bounces: int
     use_vt: bool
+
+    @property
+    def num_panels(self) -> int:
+        """Q: panels that points may be; one, that none is, where there is no panel."""
+        return 1 if self.ris is None else len(self.ris.panels)
 
 
 class Expected(NamedTuple):
@@ -97,19 +102,22 @@ def amplitudes(
     unit = point_amplitude(np.ones(()), np.maximum(tx_length, 1e-3), rx_length, radio)
     level = np.where(moving, free, np.log(unit) + ratio + strength[point])
     spread = np.sqrt(np.where(moving, 0.0, strength_std[point] ** 2) + variance + (0.3 * LEVELS.fading) ** 2)
-    panel = book.panel
-    if panel >= 0 and scene.ris is not None and code is not None:
-        rows = (point == panel).nonzero()[0]
-        gain = panel_gains(compact(returns, rows), features, book, poses, scene, code)
-        level[rows] = np.log(np.maximum(gain, 1e-30)) + ratio[rows]
-        spread[rows] = np.sqrt(PANEL_STD**2 + variance[rows])
+    if scene.ris is None or code is None:
+        return level, spread
+    for panel, spec, part in zip(book.panels, scene.ris.panels, scene.ris.parts(code), strict=True):
+        if panel >= 0:
+            rows = (point == panel).nonzero()[0]
+            gain = panel_gains(compact(returns, rows), features, book, poses, radio, spec, part)
+            level[rows] = np.log(np.maximum(gain, 1e-30)) + ratio[rows]
+            spread[rows] = np.sqrt(PANEL_STD**2 + variance[rows])
     return level, spread
 
 
-def panel_gains(returns: Returns, features: Floats, book: Book, poses: Poses, scene: Scene, code: RisCode) -> Floats:
-    """|gain| (R,) of the panel's returns with perfect walls."""
-    assert scene.ris is not None
-    radio, legs, center = scene.radio, returns.legs, features[returns.legs[:, 0]]
+def panel_gains(
+    returns: Returns, features: Floats, book: Book, poses: Poses, radio: RadioConfig, spec: RisSpec, code: RisCode
+) -> Floats:
+    """|gain| (R,) of a panel's returns with perfect walls."""
+    legs, center = returns.legs, features[returns.legs[:, 0]]
     ends = []
     for device, gain in ((poses.tx, radio.tx_gain), (poses.rx, radio.rx_gain)):
         end = np.tile(device, (len(legs), 1))
@@ -117,7 +125,7 @@ def panel_gains(returns: Returns, features: Floats, book: Book, poses: Poses, sc
             rows = (legs[:, column] != NONE).nonzero()[0]
             walls = legs[rows, column]
             end[rows] = reflect(end[rows], features[walls], book.anchor[walls])
-        ends.append(leg_response(scene.ris, center, end, np.sqrt(gain), radio.wavelength))
+        ends.append(leg_response(spec, center, end, np.sqrt(gain), radio.wavelength))
     return np.abs(panel_gain(ends[0][returns.tx], ends[1][returns.rx], code))
 
 

@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.model import Body, Measurement, RisCode, RisSpec, SensorModel
+from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los, stranger_density
+from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.returns import TX
 from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window import gauss, motion, tracks
@@ -57,7 +58,7 @@ class WindowState(NamedTuple):
 
 
 def init(
-    start: StartPrior, body: Body, ris: RisSpec | None, sensor: SensorModel, config: SlamConfig,
+    start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> WindowState:  # fmt: skip
     """The start prior, and an empty map."""
@@ -71,7 +72,8 @@ def init(
     lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if gauss.TURN in axes else ()))
     gait = np.stack([motion.first_gait(level) for level in lively])
     return WindowState(
-        0, config, window, empty_book(), empty_log(), tracks.no_tracks(), no_sights(), gait, gait,
+        0, config, window, empty_book(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_sights(),
+        gait, gait,
         np.array([start.heading]), start.position_std * free, scene, 0.0, (None,), np.zeros((0, 3)),
     )  # fmt: skip
 
@@ -81,6 +83,8 @@ def step(
     *, rng: np.random.Generator,
 ) -> tuple[WindowState, StepInfo]:  # fmt: skip
     """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied."""
+    check_step(dt, heading, code, state.scene.ris)
+    check_sides(measurement, state.scene.ris)
     if config.heading != "known":
         heading = float(state.heading[-1])
     turn = heading - float(state.heading[-1])
@@ -114,7 +118,7 @@ def step(
     turn += float(np.diff(gauss.poses(state.window)[-2:, 3]).sum())
     followed = _follow(state, mean, glance, (~taken).nonzero()[0], dt, turn, bend)
     state = state._replace(tracks=followed.tracks, log=followed.log)
-    if book.panel < 0:  # once it is known, no track needs to be it
+    if min(book.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, poses, scene, code))
     sights, book = learn(
         state.sights, book, state.window, expected, groups, shows, row, pick, raw, glance, poses, scene, code

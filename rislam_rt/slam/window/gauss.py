@@ -120,6 +120,20 @@ def begin(position: Floats, velocity: Floats, axes: Integers, std: Floats) -> Wi
     )
 
 
+def begin_with(
+    position: Floats, velocity: Floats, axes: Integers, std: Floats, features: Floats, covariance: Floats
+) -> Window:
+    """One pose, and features (3F,) known beforehand, with a covariance (3F, 3F)."""
+    alone, count = begin(position, velocity, axes, std), len(features)
+    spread = scipy.linalg.block_diag(alone.covariance, covariance)
+    information = scipy.linalg.block_diag(alone.prior.hessian, inverse(covariance))
+    head, size = np.concatenate([alone.head, features]), POSE + count
+    pose = np.concatenate([alone.slots.middle[0], features])
+    slots = Quadratic(np.zeros((1, size, size)), np.zeros((1, size)), pose[None])
+    prior = Quadratic(information, np.zeros(len(head)), head)
+    return alone._replace(head=head, prior=prior, slots=slots, covariance=spread)
+
+
 def pose_design(step: Floats, axes: Integers) -> Floats:
     """(K, 4, 7 + (K - 1) A): poses as a linear function of the head's first seven numbers and the accelerations."""
     count, free = len(step) + 1, len(axes)

@@ -1,4 +1,4 @@
-"""Points that tracks may be: each as a scatterer and as the panel, by amplitudes and silence over the whole history."""
+"""Points that tracks may be: each as a scatterer and as a panel, by amplitudes and silence over the whole history."""
 
 from typing import NamedTuple
 
@@ -27,18 +27,19 @@ class Identified(NamedTuple):
     identity: Identity
     """(H,) who each is then."""
     elsewhere: Floats
-    """(T,) log odds that a track runs over the panel by a way that is none of these, against none over the panel."""
+    """(T, Q) log odds that a track runs over each panel by a way that is none of these, against none over it."""
 
 
 def identify(context: Context, ats: list[Integers], table: Hypotheses, fits: Fits, evidence: Floats) -> Identified:
-    """The tracks whose components are the log's rows `ats`: what comes of its being the panel that throws them."""
-    found = Identified(np.zeros(len(evidence)), unknown(len(evidence)), np.full(len(ats), -CERTAIN))
-    scene, book = context.scene, context.book
+    """The tracks whose components are the log's rows `ats`: what comes of its being a panel that throws them."""
+    scene, book, panels = context.scene, context.book, context.scene.num_panels
+    elsewhere = np.full((len(ats), panels), -CERTAIN)
+    found = Identified(np.zeros(len(evidence)), unknown(len(evidence), panels), elsewhere)
     if scene.ris is None:
         found.identity.log_ris[:] = -np.inf
         return found
     point = np.isin(table.kind, (POINT, OVER_RX, OVER_TX, OVER_SAME))
-    taken = -np.logaddexp.reduce(np.append(book.log_ris[book.points], 0.0))  # there is but one panel
+    taken = -np.logaddexp.reduce(np.append(book.log_ris[book.points], np.zeros((1, panels)), axis=0), axis=0)  # but one
     for track, at in enumerate(ats):
         rows = (point & (table.trials.track == track)).nonzero()[0]
         if (context.log.side[at] == OTHER).all():
@@ -47,7 +48,8 @@ def identify(context: Context, ats: list[Integers], table: Hypotheses, fits: Fit
         near = rows[evidence[rows] > evidence[rows].max() - ASIDE]
         fresh = _history(context, at, table, fits, np.append(near, rows[0]))
         fresh.log_ris[:-1] += taken
-        found.gain[near] = np.logaddexp(0.0, fresh.log_ris[:-1]) - np.log1p(LEVELS.panels)
+        found.gain[near] = np.logaddexp.reduce(np.pad(fresh.log_ris[:-1], ((0, 0), (1, 0))), axis=1)
+        found.gain[near] -= np.log1p(panels * LEVELS.panels)
         found.elsewhere[track] = fresh.log_ris[-1]
         found = found._replace(identity=found.identity.put(near, fresh.take(np.arange(len(near)))))
     # what is heard over walls alone may well be hidden straight ahead: silence there tells nothing
@@ -69,7 +71,7 @@ def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows
     anywhere = np.exp(level.mean() + max(float(level.std()), LEVELS.fading) * even_draws(spots.shape[1], 1)[:, 0])
     first = context.cycle - window.num_poses + 1
     heard = {int(log.cycle[row] - first): row for row in at}
-    found = unknown(count)
+    found = unknown(count, scene.num_panels)
     for slot in range(min(heard), window.num_poses):
         row = heard.get(slot, -1)
         amplitude, side = (np.exp(log.log_amplitude[row]), log.side[row]) if row >= 0 else (1.0, UNTOLD)
@@ -79,7 +81,7 @@ def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows
         )  # fmt: skip
         gain = gains(sight, scene.ris, context.codes[slot], scene.radio)
         if gain is not None:
-            gain[-1] = anywhere
+            gain[:, -1] = anywhere
         found = weigh(found, sight, gain, scene.sensor)
     return found
 

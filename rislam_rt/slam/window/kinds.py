@@ -36,7 +36,7 @@ LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 
 LOG_NONE = np.log(0.05)
 """Of a path of no kind here: over walls that the map lacks."""
 OVER_PANEL = 0.2
-"""Share of such paths that run over the panel, where there is one."""
+"""Share of such paths that run over panels, where there are any."""
 LOG_VOLUME = float(np.log(4.0 / 3.0 * np.pi * LEVELS.size**3))
 BEHIND = -4.0
 """Log probability of a thing behind a wall that stands between it and the agent, or of a wall that stands before known
@@ -97,12 +97,12 @@ _TEMPLATES = (
 
 
 def judge(
-    context: Context, ats: list[Integers], digest: Digest, known: Known, told: list[tuple[int, float, bool]],
+    context: Context, ats: list[Integers], digest: Digest, known: Known, told: list[tuple[int, float, int]],
     lonely: Floats,
 ) -> tuple[list[Verdict], Floats]:  # fmt: skip
     """Verdicts of T tracks, and the posterior (E,) of each of the explanations by the map.
 
-    Of these `told` gives track, log evidence, and whether they run over the panel.
+    Of these `told` gives track, log evidence, and the number of the panel that they run over, -1 for none.
 
     `ats` are the tracks' rows of the log; `lonely` (T,) is the log probability that two walls throw so few single
     returns beside it.
@@ -121,16 +121,18 @@ def judge(
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
     over = identify(context, ats, table, fits, evidence)
     evidence += over.gain
-    if (panel := book.panel) >= 0:
-        evidence += np.where((table.kind == IMAGE) & (table.known == panel), over.elsewhere[track], 0.0)
+    for number, panel in enumerate(book.panels):
+        if panel >= 0:
+            evidence += np.where((table.kind == IMAGE) & (table.known == panel), over.elsewhere[track, number], 0.0)
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
     none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LOG_VOLUME + LOG_NONE
-    none += np.logaddexp(np.log(1.0 - OVER_PANEL), np.log(OVER_PANEL) + over.elsewhere)
-    explained = [(row, value + over.elsewhere[row] * panel) for row, value, panel in told]
+    over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
+    none += np.logaddexp(np.log(1.0 - OVER_PANEL), np.log(OVER_PANEL) + over_panels)
+    explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
     evidence += _shared(table, fits, evidence, none, explained)
-    verdicts, shares = [], np.zeros(len(explained))
+    verdicts, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
     for row in range(len(digest.seen)):
         own = (track == row).nonzero()[0]
         own_told = [i for i, (which, _) in enumerate(explained) if which == row]
@@ -140,7 +142,7 @@ def judge(
         best = int(np.argmax(weight[: 1 + len(own)]))
         probability = float(np.exp(weight[best] - total))
         if best == 0:
-            verdicts.append(Verdict(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, unknown(1)))
+            verdicts.append(Verdict(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody))
             continue
         at = own[best - 1]
         count = int((digest.weight[row, :, 0] > 0.0).sum())
@@ -258,7 +260,7 @@ def _image_amplitudes(table: Hypotheses, rows: Integers, digest: Digest, book: B
     unit = point_amplitude(np.ones(len(rows)), first, np.maximum(digest.mean[0][track, 0] - first, 0.05), scene.radio)
     strength, doubt = (field[point] for field in book.log_strength)
     mean, variance = np.log(unit) + strength + LEVELS.wall_ratio, doubt**2 + LEVELS.wall_ratio_std**2 + LEVELS.fading**2
-    off = np.where(point == book.panel, 0.0, digest.log_amplitude[track] - mean)
+    off = np.where(np.isin(point, book.panels), 0.0, digest.log_amplitude[track] - mean)
     return np.asarray(-0.5 * off**2 / variance - 0.5 * np.log(variance))
 
 

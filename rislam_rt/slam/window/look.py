@@ -9,7 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.slam.associate import Candidates, pair_costs, squared_distance
 from rislam_rt.slam.moments import poses_of
-from rislam_rt.slam.returns import Poses
+from rislam_rt.slam.returns import TX, Poses
 from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance
 from rislam_rt.slam.window import gauss
 from rislam_rt.slam.window.book import Book
@@ -70,9 +70,9 @@ def look(
     mean, covariance = gauss.now(window)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
     expected = expect(mean[HEAD:].reshape(-1, 3), book, poses, mean[:3], scene, code)
-    sides = _sides(expected, book) if glance.side is not None else None
+    sides = return_sides(expected.forms, book) if glance.side is not None else None
     clear, scatter = recall(sights, expected, book)
-    groups = cluster(expected, scene.sensor.cell_length, clear, sides)
+    groups = cluster(expected, scene.sensor.cell_length, clear, None if sides is None else np.maximum(sides, OTHER))
     shows = visible(expected, groups, clear)
     row, pick, gain, strain = _associate(expected, groups, shows, scatter, covariance, glance, sides, strangers)
     alone = groups.by_itself == 1.0
@@ -82,10 +82,15 @@ def look(
     return Look(mean, poses, expected, groups, shows, scatter, row, pick, gain + miss, float(surprise), strain)
 
 
-def _sides(expected: Expected, book: Book) -> Integers:
-    """(R,) which returns run over the panel."""
-    panel = book.panel
-    return np.where(expected.forms[:, 0] == panel, PANEL, OTHER) if panel >= 0 else np.full(len(expected.seen), UNTOLD)
+def return_sides(forms: Integers, book: Book) -> Integers:
+    """(R,) which of the forms (R, 5) run over a panel; what does not is known for that once all panels are."""
+    held = [panel for panel in enumerate(book.panels) if panel[1] >= 0]
+    if not held:
+        return np.full(len(forms), UNTOLD)
+    sides = np.where((len(held) == len(book.panels)) | (forms[:, 0] == TX), OTHER, UNTOLD)
+    for number, row in held:
+        sides[forms[:, 0] == row] = PANEL + number
+    return sides
 
 
 def _associate(

@@ -6,12 +6,13 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
-from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.mapping import MAX_LEAN, images_in, wall_planes
 from rislam_rt.slam.moments import even_draws, poses_of, square_root
+from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window import gauss
 from rislam_rt.slam.window.book import Book, image_ident
-from rislam_rt.slam.window.filter import WindowState
+from rislam_rt.slam.window.filter import WindowState, init
 from rislam_rt.slam.window.gauss import HEAD
 from rislam_rt.slam.window.suspect import find_suspect
 
@@ -19,12 +20,13 @@ from rislam_rt.slam.window.suspect import find_suspect
 def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
     """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent; with the suspect."""
     ahead = estimate(state, config, dt)
-    if state.scene.ris is None or ahead.map.ris >= 0:
+    unknown = [panel for panel, row in enumerate(state.book.panels) if row < 0]
+    if state.scene.ris is None or not unknown:
         return ahead
     mean, _ = gauss.now(state.window)
     poses = poses_of(mean[:3], np.asarray(state.heading[-1] + mean[6]), state.scene.body)
-    suspect = find_suspect(state.tracks, state.book, mean, state.cycle - 1, poses)
-    return replace(ahead, suspects=() if suspect is None else (suspect,))
+    found = [find_suspect(state.tracks, state.book, mean, state.cycle - 1, poses, panel) for panel in unknown]
+    return replace(ahead, suspects=tuple(suspect for suspect in found if suspect is not None))
 
 
 def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> SlamEstimate:
@@ -45,11 +47,42 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
     )
 
 
+def shift_covariance(features: Floats, book: Book, shift: Floats) -> Floats:
+    """(3F, 3F) of features (F, 3) that all move with the start's error, of standard deviation `shift` (3,).
+
+    A wall's three numbers, the image of an anchor that stays, move by `2 n n^T` of what the wall itself does.
+    """
+    span = features - book.anchor
+    normal = span / np.maximum(np.linalg.norm(span, axis=1), 1e-9)[:, None]
+    by_shift = np.where(book.is_wall[:, None, None], 2.0 * normal[:, :, None] * normal[:, None, :], AXES)
+    rows = by_shift.reshape(-1, 3) * shift
+    return np.asarray(rows @ rows.T)
+
+
+def revisit(
+    state: WindowState, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator
+) -> WindowState:  # fmt: skip
+    """Another run, or another agent's, on the map of an earlier one: features and who they are stay known.
+
+    The map keeps its covariance, the earlier start's error included; its frame is the earlier run's, and so must be
+    the start's. What is measured tells of the start then, so that its error stands within the Gaussian.
+    """
+    scene = state.scene
+    fresh = init(start, scene.body, scene.ris, scene.sensor, config, rng=rng)
+    mean, covariance = gauss.now(state.window)
+    features = mean[HEAD:].reshape(-1, 3)
+    spread = covariance[HEAD:, HEAD:] + shift_covariance(features, state.book, state.shift)
+    std = np.concatenate([np.maximum(fresh.shift, 1e-5), np.sqrt(np.diag(fresh.window.covariance))[3:HEAD]])
+    window = gauss.begin_with(start.position, start.velocity, fresh.window.axes, std, mean[HEAD:], spread)
+    book = state.book._replace(hidden=np.zeros(state.book.hidden.shape))
+    return fresh._replace(window=window, book=book, shift=np.zeros(3))
+
+
 def build_map(features: Floats, covariance: Floats, book: Book, shift: Floats) -> MapEstimate:
     """Points, their images in each wall, and the walls; the start's error moves all of it together."""
     if not len(book.ident):
         return empty_map()
-    covariance = covariance + np.tile(np.diag(shift**2), (len(features), len(features)))
+    covariance = covariance + shift_covariance(features, book, shift)
     points, walls = book.points, book.walls
     parent, wall = np.repeat(points, len(walls)), np.tile(walls, len(points))
     place, spread = images_in(features, covariance, book.anchor, parent, wall)
@@ -57,14 +90,16 @@ def build_map(features: Floats, covariance: Floats, book: Book, shift: Floats) -
     normal, offset, std = wall_planes(features, covariance, book.anchor, walls)
     known = np.sqrt(2.0) * std[:, 0] < MAX_LEAN
     strength, ratio = np.exp(book.log_strength[0][points]), np.exp(book.ratio[wall])
+    probability = np.concatenate([book.ris_probability[points], np.zeros((len(place), book.log_ris.shape[1]))])
     return MapEstimate(
         np.concatenate([book.ident[points], image_ident(book.ident[parent], book.ident[wall])]),
         np.concatenate([features[points], place]),
         np.concatenate([covariance[columns[:, :, None], columns[:, None, :]], spread]),
         np.concatenate([np.full(len(points), -1), np.searchsorted(points, parent)]),
-        np.concatenate([book.ris_probability[points], np.zeros(len(place))]),
+        probability.max(axis=1),
         np.concatenate([strength, ratio]),
         normal[known],
         offset[known],
         std[known],
+        None if probability.shape[1] == 1 else np.argmax(probability, axis=1),
     )

@@ -1,4 +1,4 @@
-"""Which point is the panel? Bayes from amplitudes under the codes applied, and from silence; for features and tracks.
+"""Which point is which panel? Bayes from amplitudes under the codes applied, and from silence; for features and tracks.
 
 "Is the panel" predicts the amplitude with no free parameter; "is a scatterer" has one unknown cross-section for all
 cycles, integrated out. Silence under a code that would have made it loud speaks against the panel; what is blocked is
@@ -12,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import amplitude_std
-from rislam_rt.model import RadioConfig, RisCode, RisSpec, SensorModel
+from rislam_rt.model import DataSheet, RadioConfig, RisCode, SensorModel
 from rislam_rt.slam.identity import (
     DOUBT,
     STRENGTHS,
@@ -25,7 +25,7 @@ from rislam_rt.slam.identity import (
     weigh_silence,
 )
 from rislam_rt.slam.moments import even_draws, square_root
-from rislam_rt.slam.tracks import OTHER, PANEL
+from rislam_rt.slam.tracks import PANEL, UNTOLD
 from rislam_rt.slam.window.levels import LEVELS
 
 DRAWS = 12
@@ -40,9 +40,9 @@ class Identity(NamedTuple):
     log_grid: Floats
     """(N, G) log posterior of their strength, were they scatterers (see `identity`)."""
     log_ris: Floats
-    """(N,) log odds of panel against scatterer."""
+    """(N, Q) log odds of each of Q panels against scatterer."""
     hidden: Floats
-    """(N, 2) probability that something stands in the way, were it the panel, and a scatterer."""
+    """(N, Q + 1) probability that something stands in the way, were it each of the panels, and a scatterer."""
 
     def take(self, rows: Integers | Booleans) -> "Identity":
         """Only some of the points."""
@@ -73,10 +73,11 @@ STRENGTH_PRIOR = _strength_prior()
 """(G,) log probability of a point's strength beforehand."""
 
 
-def unknown(count: int) -> Identity:
+def unknown(count: int, panels: int = 1) -> Identity:
     """Points of which nothing is known but that panels are fewer than scatterers."""
     return Identity(
-        np.tile(STRENGTH_PRIOR, (count, 1)), np.full(count, np.log(LEVELS.panels)), np.zeros((count, 2)),
+        np.tile(STRENGTH_PRIOR, (count, 1)), np.full((count, panels), np.log(LEVELS.panels)),
+        np.zeros((count, panels + 1)),
     )  # fmt: skip
 
 
@@ -108,16 +109,17 @@ def spread_places(mean: Floats, covariance: Floats) -> Floats:
     return np.array(draws).reshape(len(mean), -1, 3)
 
 
-def gains(sight: Sight, spec: RisSpec | None, code: RisCode | None, radio: RadioConfig) -> Complexes | None:
-    """Gains (N, S) of the panel, were it at each of the places; None without a panel."""
-    if spec is None or code is None:
+def gains(sight: Sight, ris: DataSheet | None, code: RisCode | None, radio: RadioConfig) -> Complexes | None:
+    """Gains (Q, N, S) of each panel, were it at each of the places; None without a panel."""
+    if ris is None or code is None:
         return None
-    ends = sight.tx[:, None], sight.rx[:, None]
-    return predicted_panel_gain(spec, code, sight.place, *ends, sight.ratio[:, None], radio)
+    ends, ratio = (sight.tx[:, None], sight.rx[:, None]), sight.ratio[:, None]
+    parts = zip(ris.panels, ris.parts(code), strict=True)
+    return np.stack([predicted_panel_gain(spec, part, sight.place, *ends, ratio, radio) for spec, part in parts])
 
 
 def weigh(before: Identity, sight: Sight, gain: Complexes | None, sensor: SensorModel) -> Identity:
-    """The identities (N,) after one more cycle, in which the panel has one of the gains (N, S)."""
+    """The identities (N,) after one more cycle, in which the panels have one of the gains (Q, N, S)."""
     radio, count = sensor.radio, len(sight.place)
     if not count:
         return before
@@ -129,19 +131,21 @@ def weigh(before: Identity, sight: Sight, gain: Complexes | None, sensor: Sensor
     log_grid, log_ris, hidden = before.log_grid.copy(), before.log_ris.copy(), before.hidden.copy()
     at, silent = sight.seen.nonzero()[0], (~sight.seen).nonzero()[0]
     if len(at):
-        amplitude = sight.amplitude[at]
-        panel = np.full(len(at), -np.inf)
+        amplitude, own = sight.amplitude[at], sight.side[at, None] == PANEL + np.arange(log_ris.shape[1])
+        panel = np.full(own.shape, -np.inf)
         if gain is not None:
-            panel = np.where(sight.side[at] == OTHER, -np.inf, log_panel(amplitude, std[at], gain[at]))
+            each = np.stack([log_panel(amplitude, std[at], of_panel[at]) for of_panel in gain], axis=1)
+            panel = np.where(own | (sight.side[at, None] == UNTOLD), each, -np.inf)
         scatterer = log_scatterer(amplitude, std[at], first[at], second[at], radio)
         log_grid[at], log_ris[at] = add_evidence(log_grid[at], log_ris[at], scatterer, panel)
-        log_ris[at] += np.where(sight.side[at] == PANEL, DOUBT, 0.0)
+        log_ris[at] += np.where(own, DOUBT, 0.0)
         hidden[at] = 0.0
     if len(silent) and gain is not None:
         each = log_scatterer_missed(std[silent], first[silent], second[silent], radio, threshold)
         grid = log_grid[silent] - np.logaddexp.reduce(log_grid[silent], axis=1, keepdims=True)
         scatterer = np.logaddexp.reduce(grid + each, axis=1)
-        missed = np.stack([log_panel_missed(std[silent], gain[silent], threshold), scatterer], axis=1)
+        panels = [log_panel_missed(std[silent], of_panel[silent], threshold) for of_panel in gain]
+        missed = np.stack([*panels, scatterer], axis=1)
         hidden[silent], surplus = weigh_silence(hidden[silent], np.exp(missed))
-        log_ris[silent] += surplus[:, 0]
+        log_ris[silent] += surplus
     return Identity(log_grid, log_ris, hidden)

@@ -1,4 +1,4 @@
-"""What may be the panel while the map holds none: tracks are weighed as points are; the design aims at the best."""
+"""What may be a panel that the map does not hold: tracks are weighed as points are; the design aims at the best."""
 
 import numpy as np
 
@@ -20,7 +20,7 @@ LOG_FEW = np.log(LEVELS.panels)
 
 
 def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: Scene, code: RisCode | None) -> Tracks:
-    """The tracks after what this cycle tells of each, were it a point: is it the panel?"""
+    """The tracks after what this cycle tells of each, were it a point: is it a panel?"""
     rows = (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
         return tracks
@@ -37,15 +37,16 @@ def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: Scene, code: R
     return tracks._replace(**tracks.identity.put(rows, fresh)._asdict())
 
 
-def find_suspect(tracks: Tracks, book: Book, mean: Floats, cycle: int, poses: Poses) -> Suspect | None:
-    """The point or track that is the likeliest to be the panel; None if nothing is likelier the panel than not.
+def find_suspect(tracks: Tracks, book: Book, mean: Floats, cycle: int, poses: Poses, panel: int = 0) -> Suspect | None:
+    """The point or track that is the likeliest to be a panel; None if nothing is likelier the panel than not.
 
     A track that seems to come from behind a wall may be the panel over that wall: aiming there would miss it.
     """
-    features, points, walls = mean[HEAD:].reshape(-1, 3), book.points, book.walls
+    features, walls = mean[HEAD:].reshape(-1, 3), book.walls
+    points = book.points[~np.isin(book.points, book.panels)]  # what is another panel is not this one
     patience = np.where(tracks.hits > 3, np.inf, np.minimum(tracks.hits - 1, PATIENCE))
     least = np.where(tracks.hits > 1, DISMISSAL, 0.0)
-    told = tracks.log_ris - LOG_FEW
+    told = tracks.log_ris[:, panel] - LOG_FEW
     rows = ((tracks.side != OTHER) & (cycle - tracks.last <= patience) & (told > least)).nonzero()[0]
     spots, _ = places(tracks.mean[rows, :, 0], poses)
     if len(walls) and len(rows):
@@ -54,10 +55,10 @@ def find_suspect(tracks: Tracks, book: Book, mean: Floats, cycle: int, poses: Po
         gap = np.linalg.norm(spots[:, None] - image, axis=-1) - np.linalg.norm(spots - mean[:3], axis=1)[:, None]
         shown = (gap > -DEEP).all(axis=1)
         rows, spots = rows[shown], spots[shown]
-    odds = np.concatenate([book.log_ris[points] - LOG_FEW, told[rows]])
+    odds = np.concatenate([book.log_ris[points, panel] - LOG_FEW, told[rows]])
     if not len(odds) or odds.max() <= DISMISSAL:
         return None
     best = int(np.argmax(odds))
     if best < len(points):
-        return Suspect(features[points[best]], int(book.hits[points[best]]))
-    return Suspect(spots[best - len(points)], int(tracks.hits[rows[best - len(points)]]))
+        return Suspect(features[points[best]], int(book.hits[points[best]]), panel)
+    return Suspect(spots[best - len(points)], int(tracks.hits[rows[best - len(points)]]), panel)

@@ -39,9 +39,9 @@ class Tracks(NamedTuple):
     log_grid: Floats
     """(T, G) log posterior of its strength, were it a scatterer that it comes straight from (see `panel`)."""
     log_ris: Floats
-    """(T,) log odds of panel against scatterer."""
+    """(T, Q) log odds of each of Q panels against scatterer."""
     hidden: Floats
-    """(T, 2) probability that something stands in its way, were it the panel, and a scatterer."""
+    """(T, Q + 1) probability that something stands in its way, were it each of the panels, and a scatterer."""
     next_ident: int
 
     @property
@@ -54,12 +54,13 @@ class Tracks(NamedTuple):
         return Tracks._make([*(field[rows] for field in self[:-1]), self.next_ident])
 
 
-def no_tracks() -> Tracks:
-    """Nothing seen yet."""
+def no_tracks(panels: int = 1) -> Tracks:
+    """Nothing seen yet, in a room of so many panels."""
     none = np.zeros(0, dtype=np.int64)
     return Tracks(
-        none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none, *unknown(0), 0
-    )
+        none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none,
+        *unknown(0, panels), 0,
+    )  # fmt: skip
 
 
 def advance(tracks: Tracks, dt: float, turn: float, bend: Floats) -> Tracks:
@@ -112,7 +113,7 @@ def start(tracks: Tracks, glance: Glance, picks: Integers, rate: Floats, cycle: 
     fresh = (
         ident, np.stack([glance.seen[picks], np.zeros((count, 3))], axis=-1), covariance, glance.log_amplitude[picks],
         glance.sides[picks], np.full(count, cycle), np.full(count, cycle), np.ones(count, dtype=np.int64),
-        np.zeros(count, dtype=np.int64), *unknown(count),
+        np.zeros(count, dtype=np.int64), *unknown(count, tracks.log_ris.shape[1]),
     )  # fmt: skip
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))
     return Tracks._make([*joined, tracks.next_ident + count]), ident
@@ -125,7 +126,7 @@ def alive(tracks: Tracks, cycle: int) -> Booleans:
     """
     share = (tracks.hits + 1.0) / (tracks.last - tracks.born + 3.0)
     patience = np.where(tracks.hits >= 4, np.log(0.01) / np.log(np.clip(1.0 - share, 1e-6, 0.999)), 3.0)
-    patience = np.where((tracks.log_ris > 0.0) & (tracks.hits >= 2), LEVELS.window, patience)
+    patience = np.where((tracks.log_ris > 0.0).any(axis=1) & (tracks.hits >= 2), LEVELS.window, patience)
     return np.asarray(cycle - tracks.last <= np.clip(patience, 3.0, LEVELS.window))
 
 

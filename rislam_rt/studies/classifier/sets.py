@@ -10,8 +10,8 @@ import numpy as np
 from rislam_rt.errors import SceneError
 from rislam_rt.measurement import with_reference_snr
 from rislam_rt.model import RadioConfig, Scene, Trajectory
-from rislam_rt.pipeline.radio import build_radio
 from rislam_rt.pipeline.run import Progress, build_channel
+from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.studies.classifier.codes import AIMED, POLICIES, set_codes
 from rislam_rt.studies.classifier.gather import Examples, gather_walk, join

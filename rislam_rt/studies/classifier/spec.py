@@ -5,9 +5,9 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rislam_rt.measurement import ReceiverConfig
-from rislam_rt.pipeline.radio import RadioSection
-from rislam_rt.pipeline.section import Count, Positive, Section
-from rislam_rt.pipeline.spec import ReceiverSection
+from rislam_rt.pipeline.specification.radio import RadioSection
+from rislam_rt.pipeline.specification.section import Count, Positive, Section
+from rislam_rt.pipeline.specification.spec import ReceiverSection
 from rislam_rt.scene.random_rooms import CYCLES
 from rislam_rt.studies.spec import RoomSection, StudySpec
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from rislam_rt.measurement import paper_snr_db
 from rislam_rt.model import SlamResult
-from rislam_rt.pipeline.read import Table, build_spec
 from rislam_rt.pipeline.run import Stage, prepare_channel, result_of, run_scheme, set_stage
-from rislam_rt.pipeline.spec import PipelineSpec, build_settings
-from rislam_rt.pipeline.summary import summarise_scheme
+from rislam_rt.pipeline.scores.summary import summarise_scheme
+from rislam_rt.pipeline.specification.read import Table, build_spec
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
 from rislam_rt.sweeps.work import one_line
 from rislam_rt.toml import put_dotted

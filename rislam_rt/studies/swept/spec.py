@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from rislam_rt.pipeline.section import Decibel, Name, Positive, Section
+from rislam_rt.pipeline.specification.section import Decibel, Name, Positive, Section
 from rislam_rt.studies.spec import Seed
 
 

@@ -13,7 +13,7 @@ from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.recordings.replay import Recorder
 from rislam_rt.pipeline.run import Stage, prepare_channel, run_scheme, set_stage
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.spec import PipelineSpec
+from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.scene.random_rooms import RandomRoom, draw_room
 from rislam_rt.studies.swept.cell import cell_spec
 from rislam_rt.studies.unseen.file import Recording

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from rislam_rt.pipeline.identity import code_digest
 from rislam_rt.pipeline.run import library_versions
+from rislam_rt.pipeline.store.identity import code_digest
 from rislam_rt.studies.swept.cell import cell_spec
 from rislam_rt.studies.unseen.spec import UnseenSpec
 

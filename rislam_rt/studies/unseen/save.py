@@ -10,7 +10,7 @@ from rislam_rt.model import RisCode, Scene, SchemeResult
 from rislam_rt.pipeline.dataset import write_dataset
 from rislam_rt.pipeline.run import Stage
 from rislam_rt.pipeline.signals import SignalsSpec, build_signals
-from rislam_rt.pipeline.spec import PipelineSpec
+from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.pipeline.walk import without_panel
 from rislam_rt.ris import rephase
 from rislam_rt.scene import write_scene

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from rislam_rt.pipeline.section import Count, Decibel
+from rislam_rt.pipeline.specification.section import Count, Decibel
 from rislam_rt.studies.swept.spec import SweptSpec, VariantSection, check_names
 
 TEST = 10_000

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from rislam_rt.errors import RislamError, StoreError
-from rislam_rt.pipeline.identity import code_digest
 from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions
+from rislam_rt.pipeline.store.identity import code_digest
 from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.storage.files import write_atomic
 from rislam_rt.studies.swept.cell import cell_spec

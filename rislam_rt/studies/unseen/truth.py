@@ -10,8 +10,8 @@ from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.information import posterior_bound
 from rislam_rt.model import PathKind, Paths, Scene, SchemeResult
-from rislam_rt.pipeline.bound import bound_problem, position_rms, wall_surface
-from rislam_rt.pipeline.spec import PipelineSpec, Settings, build_settings
+from rislam_rt.pipeline.scores.bound import bound_problem, position_rms, wall_surface
+from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings, build_settings
 
 
 class Truth(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.compare import Validation, compare_paths, random_poses, validation_page, validation_table
-from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, Certifier
+from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, DifferenceExplainer
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import distance_to_triangles
@@ -121,7 +121,7 @@ def test_an_edge_is_a_proof_only_where_float32_leaves_it_open(rooms, depth):
         corners = [(place, 2, 0), (place, 4, 0), (place, 4, 1 - gap), (place, 2, 1 - gap)]
         return rooms.scene([board, rooms.polygon("screen", corners)])
 
-    certifier = Certifier.of(room(0.0), trajectory, depth, 0.0)
+    certifier = DifferenceExplainer.of(room(0.0), trajectory, depth, 0.0)
     limit = certifier._unfolded([0] * depth, trajectory.tx[0], trajectory.rx[0]).shift[0]
     # float32: 6e-8 of some metres, eight times over; a moved image 6e-6 of some metres
     assert (1e-7, 1e-6)[depth] < limit < (1e-5, 1e-4)[depth]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.compare import compare_paths
-from rislam_rt.channel.compare.limits import DOUBLE, SINGLE, Precision, field_error
+from rislam_rt.channel.compare.error_limits import DOUBLE, SINGLE, RoomPrecision, field_error
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.image_source.fresnel import relative_permittivity, slab_coefficients
 from rislam_rt.constants import SPEED_OF_LIGHT
@@ -113,7 +113,7 @@ def test_limits_scale_with_precision_and_room(rooms, both):
     cycle, path = np.nonzero(analytic.valid)
     scale = np.abs(analytic.gain[cycle, path])
     single, double = (
-        Precision.of(scene, RADIO, single=flag).limits(analytic, cycle, path, trajectory, scale)
+        RoomPrecision.of(scene, RADIO, single=flag).limits(analytic, cycle, path, trajectory, scale)
         for flag in (True, False)
     )
     bounced = analytic.num_vertices[path] > (analytic.landmark[path] >= 0)
@@ -122,7 +122,7 @@ def test_limits_scale_with_precision_and_room(rooms, both):
     large = rooms.scene(rooms.box((0, 0, 0), (60, 60, 30)), ris=rooms.panel(center=(30.0, 30.0, 30.0)))
     large = replace(large, scatterers=(replace(large.scatterers[0], position=np.array([20.0, 10.0, 10.0])),))
     there = rooms.at(10.0 * np.array(POSES), tx=(-0.4, -0.3, 0.1), rx=(0.4, 0.3, -0.1))
-    tenfold = Precision.of(large, RADIO, single=True).limits(
+    tenfold = RoomPrecision.of(large, RADIO, single=True).limits(
         ImageSourceChannel(large, RADIO, 2).paths(there), cycle, path, there, scale
     )
     # the rays' offsets have a constant part, 1 m, which counts to the second order where segments are short
@@ -146,7 +146,7 @@ def test_float32_slabs_are_within_their_limit(rooms):
 
     cosine = np.linspace(2e-3, 1.0, 3001)
     assert len(materials) >= 30
-    for material, theirs in zip(materials, channel.stage.materials, strict=True):
+    for material, theirs in zip(materials, channel.tracer_scene.materials, strict=True):
         found = incidence_jones(theirs, cosine)
         permittivity = np.array(relative_permittivity(material.itu, RADIO.carrier))
         te, tm = slab_coefficients(cosine, permittivity, np.array(material.thickness), RADIO.carrier)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.traced import TracedChannel
-from rislam_rt.channel.traced.start import start_tracer
+from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import PathKind, RadioConfig
 
@@ -26,7 +26,7 @@ def devices(traced):
     import sionna.rt as rt
 
     channel, trajectory, _ = traced
-    scene, origin = channel.stage.scene, channel.stage.origin
+    scene, origin = channel.tracer_scene.scene, channel.tracer_scene.origin
     scene.tx_array = scene.rx_array = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
     ends = [
         rt.Transmitter("tx", (trajectory.tx[0] - origin).tolist()),

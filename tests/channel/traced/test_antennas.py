@@ -55,7 +55,7 @@ def test_against_sionna_with_turned_sectors_and_slabs(rooms, polarization):
     trajectory = replace(rooms.at([4.05, 4.0, 0.9], tx=(-0.05, 0.01, -0.02), rx=(0.05, -0.03, 0.02)), heading=[0.7])
     channel = TracedChannel(scene, RADIO, 1, antennas=Antennas("tr38901", "dipole", polarization))
     paths = channel.paths(trajectory)
-    stage, origin = channel.stage.scene, channel.stage.origin
+    stage, origin = channel.tracer_scene.scene, channel.tracer_scene.origin
     array = {"num_rows": 1, "num_cols": 1, "polarization": polarization}
     stage.tx_array, stage.rx_array = (
         rt.PlanarArray(**array, pattern="tr38901"),

@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from rislam_rt.channel.traced.cells import as_paths
-from rislam_rt.channel.traced.extras import ExtraPaths
+from rislam_rt.channel.traced.diffuse_paths import DiffusePaths
+from rislam_rt.channel.traced.resolution_cells import as_paths
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Body, RadioConfig, Trajectory
 
 RADIO = RadioConfig()
 
 
-def drawn(cycles: int, count: int, spread: float) -> tuple[ExtraPaths, Trajectory]:
+def drawn(cycles: int, count: int, spread: float) -> tuple[DiffusePaths, Trajectory]:
     """Rays at random about one place of delay and sky each cycle, and poses that head anywhere."""
     rng = np.random.default_rng(4)
     cycle = np.sort(rng.integers(cycles, size=count))
@@ -21,7 +21,7 @@ def drawn(cycles: int, count: int, spread: float) -> tuple[ExtraPaths, Trajector
     departure = unit(rng.normal(size=(count, 3)))
     tau = 2e-8 + spread * 1e-9 * rng.normal(size=count)
     gain = rng.normal(size=count) + 1j * rng.normal(size=count)
-    extras = ExtraPaths(cycle, np.zeros(count, int), tau, departure, arrival, gain, rng.normal(size=(count, 1, 3)))
+    extras = DiffusePaths(cycle, np.zeros(count, int), tau, departure, arrival, gain, rng.normal(size=(count, 1, 3)))
     place = np.zeros((cycles, 3))
     return extras, Trajectory(np.arange(float(cycles)), place, place, rng.uniform(-3, 3, cycles), Body())
 
@@ -56,6 +56,6 @@ def test_a_lone_ray_stays_as_it_is():
 
 def test_no_ray_is_no_path():
     extras, poses = drawn(2, 4, 0.1)
-    empty = ExtraPaths(*(getattr(extras, name)[:0] for name in ExtraPaths.__slots__[:-1]))
+    empty = DiffusePaths(*(getattr(extras, name)[:0] for name in DiffusePaths.__slots__[:-1]))
     paths = as_paths(empty, poses, RADIO)
     assert (paths.num_cycles, paths.num_paths) == (2, 0)

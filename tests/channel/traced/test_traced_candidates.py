@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.traced import TracedChannel, sequences
-from rislam_rt.channel.traced.rows import Rows, in_blocks
+from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_blocks
 from rislam_rt.channel.traced.sequences import (
     BACK,
     FRONT,
@@ -56,7 +56,7 @@ def test_nothing_that_the_tracer_would_confirm_is_left_out(rooms, room, paired):
     """Ask the tracer about every sequence of two walls at every pose, and compare with what survives the sieve."""
     scene = getattr(rooms, room)()
     channel = TracedChannel(scene, RadioConfig(), 2)
-    from rislam_rt.channel.traced.sift import sift_rows
+    from rislam_rt.channel.traced.culling import cull_candidates
     from rislam_rt.channel.traced.visibility import visible_rows
 
     rng = np.random.default_rng(8)
@@ -66,8 +66,8 @@ def test_nothing_that_the_tracer_would_confirm_is_left_out(rooms, room, paired):
     everything = np.array([(a, b) for a, b in itertools.product(range(count), repeat=2) if a != b])
     everything = np.concatenate([np.full((1, 2), NO_WALL), [[a, NO_WALL] for a in range(count)], everything])
     row, column = (index.ravel() for index in np.indices((len(device), len(everything))))
-    rows = Rows(row if paired else np.zeros_like(row), row, column)
-    confirmed, _ = visible_rows(channel.stage, everything, far, device, rows)
+    rows = CandidateIndices(row if paired else np.zeros_like(row), row, column)
+    confirmed, _ = visible_rows(channel.tracer_scene, everything, far, device, rows)
     exists = {(int(d), tuple(everything[s])) for d, s in zip(confirmed.device, confirmed.sequence, strict=True)}
     assert len(exists) > 150
 
@@ -75,7 +75,7 @@ def test_nothing_that_the_tracer_would_confirm_is_left_out(rooms, room, paired):
     table, _ = possible_sequences(wall_sides(channel.walls), *ends, 2)
     asked = {
         (int(d), tuple(table[s]))
-        for devices, chosen in sift_rows(channel.stage, table, device, far)
+        for devices, chosen in cull_candidates(channel.tracer_scene, table, device, far)
         for d, s in zip(devices, chosen, strict=True)
     }
     assert exists <= asked
@@ -86,12 +86,12 @@ def test_sieve_in_blocks(rooms, monkeypatch):
     channel = TracedChannel(rooms.paper(), RadioConfig(), 2)
     trajectory = rooms.at([[1.3, 2.1, 0.8], [4.4, 0.9, 2.2]])
     whole = channel.paths(trajectory)
-    monkeypatch.setattr("rislam_rt.channel.traced.sift.BLOCK", 11)
+    monkeypatch.setattr("rislam_rt.channel.traced.culling.BLOCK", 11)
     np.testing.assert_array_equal(whole.gain, channel.paths(trajectory).gain)
 
 
 def test_rows_in_blocks():
-    parts = [Rows(*(np.arange(a, b) for _ in range(3))) for a, b in ((0, 5), (5, 5), (5, 7), (7, 20))]
+    parts = [CandidateIndices(*(np.arange(a, b) for _ in range(3))) for a, b in ((0, 5), (5, 5), (5, 7), (7, 20))]
     blocks = list(in_blocks(parts, 6))
     assert [len(block.far) for block in blocks] == [6, 6, 6, 2]
     np.testing.assert_array_equal(np.concatenate([block.device for block in blocks]), np.arange(20))

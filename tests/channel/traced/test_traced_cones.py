@@ -31,7 +31,7 @@ def with_ball(scene):
 @pytest.mark.parametrize("seed", range(10))
 def test_a_ray_through_two_balls_meets_what_lies_on_it(seed):
     """Points of a ball about any point of a ray from the one through the other, beyond it, are never ruled out."""
-    from rislam_rt.channel.traced.start import start_tracer
+    from rislam_rt.channel.traced.tracer_startup import start_tracer
 
     start_tracer()
     import mitsuba as mi

@@ -7,7 +7,7 @@ from rislam_rt.channel.compare import compare_paths
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.traced import TracedChannel, shortest_segment, trace_small_box
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.design.single import exact_code
+from rislam_rt.design.single_path import exact_code
 from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.model import Material, PathKind, RadioConfig, RisCode
 

@@ -89,7 +89,7 @@ def test_sionnas_own_solver_on_our_walls(rooms):
     import sionna.rt as rt
 
     channel = TracedChannel(build(rooms, SIZES["room"], MATERIALS["constant"]), RADIO, 1)
-    scene = channel.stage.scene
+    scene = channel.tracer_scene.scene
     scene.tx_array = scene.rx_array = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
     for azimuth in (0.3, 0.8, 1.6, 2.9):
         half = 5e-4 * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rislam_rt.adviser.budget import at_rows
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.model import Scene, SlamResult
 from rislam_rt.pipeline import load_spec, run_slam
-from rislam_rt.pipeline.advise.budget import at_rows
-from rislam_rt.pipeline.spec import build_settings
-from rislam_rt.pipeline.summary import summarise
+from rislam_rt.pipeline.scores.summary import summarise
+from rislam_rt.pipeline.specification.spec import build_settings
 from rislam_rt.report.animation import gif_bytes
 from rislam_rt.report.page import build_page
 from rislam_rt.report.view.page import SCRIPTS, view_fragment, view_page, view_script

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from rislam_rt.scene.check.probe import crossings
-from rislam_rt.scene.importing.facets import find_facets, weld
+from rislam_rt.scene.check.mesh_queries import crossings
+from rislam_rt.scene.importing.flat_regions import find_facets, weld
 from rislam_rt.scene.importing.free_space import find_free, is_seen
+from rislam_rt.scene.importing.mesh_simplification import clustered
 from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
-from rislam_rt.scene.importing.rounded import find_round, prism, sides_for
-from rislam_rt.scene.importing.thinning import clustered
+from rislam_rt.scene.importing.round_surfaces import find_round, prism, sides_for
 from rislam_rt.scene.rooms.shapes import block, box_walls, joined
 
 

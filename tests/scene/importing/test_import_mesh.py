@@ -11,7 +11,7 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import RislamError, SceneError
 from rislam_rt.model import Scene
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.check.probe import winding
+from rislam_rt.scene.check.mesh_queries import winding
 from rislam_rt.scene.importing import ImportOptions, import_room
 from rislam_rt.scene.importing.materials import THICKNESS, itu_by_word, parse_choices, parse_material
 from rislam_rt.scene.schema import ItuMaterial

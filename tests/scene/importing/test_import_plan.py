@@ -10,7 +10,7 @@ import pytest
 from rislam_rt.errors import SceneError
 from rislam_rt.model import Scene
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.check.probe import crossings, winding
+from rislam_rt.scene.check.mesh_queries import crossings, winding
 from rislam_rt.scene.importing import ImportOptions, import_corners, import_room
 
 WALL, DOOR, WINDOW = (0.1, 0.9, 2.0), (1.0, 1.9, 2.0), (3.0, 4.5, 2.1)

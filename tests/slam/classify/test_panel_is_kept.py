@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.model import PathKind
-from rislam_rt.pipeline.radio import build_radio
+from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.slam.classify import load_classifier
 from rislam_rt.studies import load_any

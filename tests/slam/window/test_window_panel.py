@@ -11,13 +11,16 @@ from rislam_rt import slam
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.information import amplitude_std
 from rislam_rt.measurement import ReceiverConfig, measure, with_reference_snr
-from rislam_rt.model import RadioConfig, RisCode, RisSpec, SensorModel
+from rislam_rt.model import RadioConfig, RisCode, RisSpec, RisSpecs, SensorModel
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.identity import MODEL_ERROR, point_amplitude
+from rislam_rt.slam.returns import TX as MOVING
 from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD
+from rislam_rt.slam.window.book import empty_book, enter
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.look import return_sides
 from rislam_rt.slam.window.panel import Sight, gains, spread_places, unknown, weigh
 
 SENSOR = SensorModel(RadioConfig(noise_psd=3.52e-12))
@@ -39,9 +42,9 @@ def test_one_amplitude_tells_what_quadrature_tells():
     code, radio, noise = _code(np.random.default_rng(1)), SENSOR.radio, amplitude_std(SENSOR.radio)
     sight = _sight(3.0 * noise)
     gain = gains(sight, SPEC, code, radio)
-    sight = sight._replace(amplitude=abs(gain).mean(axis=1) + noise)
-    found = weigh(unknown(1), sight, gain, SENSOR).log_ris[0] - np.log(LEVELS.panels)
-    loud = abs(gain[0])
+    sight = sight._replace(amplitude=abs(gain[0]).mean(axis=1) + noise)
+    found = weigh(unknown(1), sight, gain, SENSOR).log_ris[0, 0] - np.log(LEVELS.panels)
+    loud = abs(gain[0, 0])
     spread = np.hypot(noise, MODEL_ERROR * loud)
     panel = np.mean(rice.pdf(sight.amplitude[0], loud / spread, scale=spread))
     # the root of the cross-section is log-normal; far beyond the filter's own grid
@@ -61,11 +64,11 @@ def test_amplitudes_and_silence_tell_panel_from_scatterer():
         belief = unknown(1)
         for _ in range(25):
             gain = gains(_sight(1.0), SPEC, _code(rng), SENSOR.radio)
-            level = float(abs(gain[0, 0])) if is_panel else 2.0 * least
+            level = float(abs(gain[0, 0, 0])) if is_panel else 2.0 * least
             heard = float(np.hypot(level + noise * rng.standard_normal(), noise * rng.standard_normal()))
             belief = weigh(belief, _sight(max(heard, least), seen=heard > least), gain, SENSOR)
-        assert (belief.log_ris[0] > 3.0) == is_panel
-        assert abs(belief.log_ris[0]) > 3.0
+        assert (belief.log_ris[0, 0] > 3.0) == is_panel
+        assert abs(belief.log_ris[0, 0]) > 3.0
 
 
 def test_what_is_hidden_tells_nothing_by_silence_and_alternation_excludes():
@@ -73,12 +76,54 @@ def test_what_is_hidden_tells_nothing_by_silence_and_alternation_excludes():
     gain = 10.0 * gains(_sight(1.0), SPEC, code, SENSOR.radio)
     silent = _sight(1.0, seen=False)
     blocked = unknown(1)._replace(hidden=np.ones((1, 2)))
-    assert weigh(blocked, silent, gain, SENSOR).log_ris[0] == pytest.approx(np.log(LEVELS.panels))
+    assert weigh(blocked, silent, gain, SENSOR).log_ris[0, 0] == pytest.approx(np.log(LEVELS.panels))
     # a panel this loud would have been heard
-    assert weigh(unknown(1), silent, gain, SENSOR).log_ris[0] < np.log(LEVELS.panels)
+    assert weigh(unknown(1), silent, gain, SENSOR).log_ris[0, 0] < np.log(LEVELS.panels)
     level = float(abs(gain).mean())
-    told = [weigh(unknown(1), _sight(level, side=side), gain, SENSOR).log_ris[0] for side in (OTHER, UNTOLD, PANEL)]
+    told = [weigh(unknown(1), _sight(level, side=side), gain, SENSOR).log_ris[0, 0] for side in (OTHER, UNTOLD, PANEL)]
     assert told[0] < np.log(LEVELS.panels) < told[1] < told[2]
+
+
+@pytest.mark.parametrize(("told", "cycles"), [(True, 4), (False, 20)])
+def test_two_panels_of_one_data_sheet_are_told_apart(told, cycles):
+    """By the codes alone within 20 cycles, by whose signs a component has within four; a scatterer is neither."""
+    sheets, spots = RisSpecs((SPEC, SPEC)), np.array([[3.0, 3.0, 3.0], [1.5, 3.2, 3.0], [2.0, 1.0, 1.5]])
+    rng, noise = np.random.default_rng(5), amplitude_std(SENSOR.radio)
+    least, sides = np.sqrt(2.0 * SENSOR.threshold) * noise, np.array([PANEL, PANEL + 1, OTHER])
+    belief, places = unknown(3, 2), spread_places(spots, np.tile(1e-8 * np.eye(3), (3, 1, 1)))
+    for _ in range(cycles):
+        code = RisCode(rng.integers(4, size=(1, 72)), 4)
+        look = Sight(places, np.tile(TX, (3, 1)), np.tile(RX, (3, 1)), np.ones(3), *np.zeros((2, 3)), np.ones(3))
+        gain = gains(look, sheets, code, SENSOR.radio)
+        level = np.array([abs(gain[0, 0, 0]), abs(gain[1, 1, 0]), 3.0 * least])
+        heard = np.hypot(level + noise * rng.standard_normal(3), noise * rng.standard_normal(3))
+        look = look._replace(amplitude=heard, side=sides if told else np.full(3, UNTOLD), seen=heard > least)
+        belief = weigh(belief, look, gain, SENSOR)
+    own, other = belief.log_ris[[0, 1], [0, 1]], belief.log_ris[[0, 1], [1, 0]]
+    assert (own > 4.0).all()
+    assert (own - other > 4.0).all()
+    assert (belief.log_ris[2] < -2.0).all()
+
+
+def test_forms_take_the_side_of_the_panel_that_their_point_is_held_for():
+    forms = np.full((4, 5), -1)
+    forms[:, 0] = [0, 1, 2, MOVING]
+
+    def sides(odds):
+        book = empty_book(2)
+        for row in odds:
+            book = enter(book, False, np.zeros(3), 1, 0.0, unknown(1, 2)._replace(log_ris=np.array([row])))
+        return return_sides(forms, book), book.panels
+
+    found, held = sides([[-9.0, 9.0], [9.0, -9.0], [-9.0, -9.0]])
+    assert held == (1, 0)
+    np.testing.assert_array_equal(found, [PANEL + 1, PANEL, OTHER, OTHER])
+    found, held = sides([[-9.0, 0.0], [9.0, -9.0], [-9.0, 0.0]])  # the other panel may be either of two points
+    assert held == (1, -1)
+    np.testing.assert_array_equal(found, [UNTOLD, PANEL, UNTOLD, OTHER])
+    found, held = sides([[0.0, 0.0]] * 3)
+    assert held == (-1, -1)
+    assert (found == UNTOLD).all()
 
 
 def test_panel_is_found_as_soon_as_it_was_heard_six_times():

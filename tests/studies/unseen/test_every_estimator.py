@@ -15,7 +15,7 @@ from rislam_rt.model import Measurement
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.run import run_scheme
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.spec import PipelineSpec
+from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.studies.unseen import Recorder, build_truth, score_run
 from rislam_rt.studies.unseen.cell import find_stage, scheme_here, trace_key
 

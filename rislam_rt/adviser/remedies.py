@@ -1,0 +1,140 @@
+"""What would help a landmark that is not heard: a larger panel or scatterer, less noise, a nearer way."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rislam_rt.adviser.budget import Link, Survey
+from rislam_rt.adviser.reasons import WEAK
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.channel.image_source.antennas import amplitude
+from rislam_rt.design import exact_code
+from rislam_rt.geometry.angles import unit
+from rislam_rt.model import RisPanel, RisSpec
+from rislam_rt.ris import leg_response
+
+HEARD, SELDOM = 0.5, 0.05
+"""Shares of the way from which on a landmark counts as heard, and up to which as not heard; between, at times."""
+LARGEST = 128
+"""Elements a side of the largest panel that is proposed."""
+GROWTH = 1.05
+"""From one size tried to the next, once the law for a continuous phase has said where to begin."""
+
+
+def verdict(link: Link) -> str:
+    """`heard`, `heard at times` or `not heard`."""
+    return "heard" if link.share >= HEARD else "heard at times" if link.share >= SELDOM else "not heard"
+
+
+def remedies(looked: Survey, links: Sequence[Link]) -> list[str]:
+    """One line for each landmark that is not heard on half of the way under the best code, and one on finding it."""
+    lines = []
+    for link in links:
+        if link.code in ("", "aimed") and link.share < HEARD:
+            lines.append(
+                f"{link.landmark}: {verdict(link)} (on {link.share:.0%} of the way): {_what_helps(looked, link)}"
+            )
+    lines += [line for link in links if link.code == "swept" for line in _on_search(link, links)]
+    return lines
+
+
+def weak_places(link: Link) -> Integers:
+    """Places at which a path comes in that is only too weak."""
+    return np.array([place for place, reason in enumerate(link.reason) if reason == WEAK], dtype=np.int64)
+
+
+def lack_db(link: Link) -> float:
+    """By how much SNR lacks [dB] at the median of the places where it is all that lacks; 0 if there are none."""
+    weak = weak_places(link)
+    return -float(np.median(link.margin_db[weak])) if len(weak) else 0.0
+
+
+def enough_elements(looked: Survey, panel: RisPanel, link: Link) -> RisSpec | None:
+    """The smallest panel, grown alike along both sides, whose direct path under the best code is above the threshold at
+    the median of the places where it is too weak; None if none of up to `LARGEST` elements a side is.
+    """
+    spec, weak = panel.spec, weak_places(link)
+    scale = 10.0 ** (lack_db(link) / 40.0) * 0.9  # the amplitude goes with the sides' product
+    while True:
+        rows, cols = (max(count, int(np.ceil(count * scale))) for count in (spec.rows, spec.cols))
+        if max(rows, cols) > LARGEST:
+            return None
+        grown = replace(spec, rows=rows, cols=cols)
+        if float(np.median(_margins(looked, panel, grown)[weak])) >= 0.0:
+            return grown
+        scale *= GROWTH
+
+
+def _what_helps(looked: Survey, link: Link) -> str:
+    scene, lack = looked.scene, lack_db(link)
+    parts = list(_why_where(link))
+    if lack:
+        parts.append(f"{lack:.1f} dB lack where it is too weak: as much less noise (radio.reference_snr_db) would do")
+        parts += _larger(looked, link, lack)
+        point = scene.landmark_positions[scene.landmarks.index(link.landmark)]
+        weak = scene.agent.position[weak_places(link)]
+        far = float(np.median(np.linalg.norm(weak - point, axis=1)))
+        parts.append(f"or a way within {far * 10.0 ** (-lack / 40.0):.1f} m (there it is {far:.1f} m away)")
+    return "; ".join(parts)
+
+
+def _why_where(link: Link) -> Iterator[str]:
+    """Each reason with the share of the way on which it holds, the commonest first, and the way round it."""
+    for reason, count in Counter(reason for reason in link.reason if reason).most_common():
+        share = f"{reason} on {count / len(link.reason):.0%} of it"
+        yield share if reason == WEAK else f"{share} ({_way_round(reason)})"
+
+
+def _larger(looked: Survey, link: Link, lack: float) -> Iterator[str]:
+    scene = looked.scene
+    if link.code == "":
+        yield f"or an echo of {10.0 ** (lack / 10.0):.2g} times the cross-section"
+        return
+    panel = next(one for one in scene.panels if one.name == link.landmark)
+    spec, grown = panel.spec, enough_elements(looked, panel, link)
+    now = f"(now {spec.rows} x {spec.cols})"
+    yield (
+        f"or a panel of {grown.rows} x {grown.cols} elements {now}"
+        if grown
+        else (f"no panel of up to {LARGEST} elements a side would do {now}")
+    )
+
+
+def _on_search(link: Link, links: Sequence[Link]) -> Iterator[str]:
+    """A panel that an aimed code makes heard, but the sweep hardly ever hits."""
+    aimed = next(one for one in links if one.landmark == link.landmark and one.code == "aimed")
+    if aimed.share >= HEARD and link.share < SELDOM:
+        yield (
+            f"{link.landmark}: heard once it is known, but the beams that look for it are heard in {link.share:.1%} of "
+            "the cycles only: it may be found late or never"
+        )
+
+
+def _way_round(why: str) -> str:
+    if "behind the panel" in why:
+        return "turn the panel, or lead the way before it"
+    if "shaded" in why:
+        return "move the one or the other, or lead the way around"
+    if "below" in why:
+        return "raise it, lower the agent, or take radio.array.pattern = 'isotropic'"
+    if "told from" in why:
+        return "more bandwidth or antennas, or receiver.alternation for a panel"
+    return "lead the way to where it is seen"
+
+
+def _margins(looked: Survey, panel: RisPanel, spec: RisSpec) -> Floats:
+    """(K,) SNR over the threshold [dB] of the direct path under the best code, as if nothing were in its way."""
+    radio, agent = looked.settings.radio, looked.scene.agent
+    ends, patterns = ((agent.tx, radio.tx_gain), (agent.rx, radio.rx_gain)), (radio.antennas.tx, radio.antennas.rx)
+    tx, rx = (
+        leg_response(
+            spec, panel.center, end, np.sqrt(gain) * amplitude(pattern, unit(panel.center - end), agent.heading) + 0j,
+            radio.wavelength,
+        )
+        for (end, gain), pattern in zip(ends, patterns, strict=True)
+    )  # fmt: skip
+    _, gain = exact_code((tx * rx).reshape(len(agent), -1), spec.levels)
+    snr = radio.integrated_snr(gain) / looked.settings.sensor.threshold
+    return np.asarray(10.0 * np.log10(np.maximum(snr, 1e-40)))

@@ -1,0 +1,195 @@
+"""Diffuse scattering and diffraction: Sionna's own paths beside the specular ones. They have no analytic twin.
+
+Such paths have no identity that lasts from cycle to cycle and no wall sequence of their own, so they do not enter
+`Paths`: one flat list over the cycles holds them. They are what Sionna's `PathSolver` finds, position by position.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Complexes, Floats, Integers, freeze
+from rislam_rt.channel.traced.float32_limits import room_center
+from rislam_rt.channel.traced.tracer_startup import start_tracer
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.errors import ConfigError
+from rislam_rt.geometry.angles import unit
+from rislam_rt.model import RadioConfig, Scene, Trajectory
+
+
+class DiffuseKind(IntEnum):
+    """What a path without an analytic twin went through."""
+
+    DIFFUSE = 0
+    DIFFRACTED = 1
+
+
+@dataclass(frozen=True, slots=True)
+class DiffuseConfig:
+    """Switches of the tracer, all off at first."""
+
+    scattering: float = 0.0
+    """S in [0, 1]: share of the reflected field that walls scatter (Lambertian) whose material says nothing of it; 0 is
+    off. What they reflect specularly would lose `sqrt(1 - S^2)` at every bounce, which `Paths` of the same walls do not
+    know; of a material's own `scattering` they do."""
+    diffraction: bool = False
+    """Edges between walls, and free ones, diffract (uniform theory of diffraction, first order)."""
+    depth: int = 1
+    """Largest number of interactions."""
+    samples: int = 10_000
+    """Rays shot from every Tx position; each may end in a scattered path."""
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.scattering <= 1.0:
+            raise ConfigError(f"extras.scattering: {self.scattering} received; give a number in [0, 1]")
+        for name in ("depth", "samples"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"extras.{name}: {getattr(self, name)} received; give at least 1")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DiffusePaths:
+    """N paths of all cycles."""
+
+    cycle: Integers
+    """(N,)."""
+    kind: Integers
+    """(N,) values of `DiffuseKind`; a path that was both scattered and diffracted counts as diffracted."""
+    tau: Floats
+    """(N,) [s]."""
+    departure: Floats
+    """(N, 3) unit vector away from the Tx."""
+    arrival: Floats
+    """(N, 3) unit vector from the Rx towards the arriving ray."""
+    gain: Complexes
+    """(N,), carrier phase included; the phases of scattered paths are random by nature."""
+    vertices: Floats
+    """(N, D, 3) [m], zero beyond the last."""
+    source: str = "traced, no analytic twin"
+
+    def __post_init__(self) -> None:
+        count = len(np.asarray(self.cycle))
+        for name, dtype, shape in (
+            ("cycle", np.int64, (count,)),
+            ("kind", np.int64, (count,)),
+            ("tau", np.float64, (count,)),
+            ("departure", np.float64, (count, 3)),
+            ("arrival", np.float64, (count, 3)),
+            ("gain", np.complex128, (count,)),
+            ("vertices", np.float64, (count, None, 3)),
+        ):
+            freeze(self, name, dtype, shape)
+
+    def __len__(self) -> int:
+        return len(self.cycle)
+
+
+class SolvedPaths(NamedTuple):
+    """One position's paths, as `DiffusePaths` without the cycle."""
+
+    kind: Integers
+    tau: Floats
+    departure: Floats
+    arrival: Floats
+    gain: Complexes
+    vertices: Floats
+
+
+def trace_diffuse_paths(
+    scene: Scene, radio: RadioConfig, trajectory: Trajectory, config: DiffuseConfig
+) -> DiffusePaths:
+    """Scattered and diffracted paths from Tx to Rx at every cycle, one solve each (0.1 s and more).
+
+    Raises
+    ------
+    SetupError
+        The machine lacks something that the tracer needs.
+    """
+    solved = [_nothing(config.depth)]
+    cycles = [np.zeros(0, dtype=np.int64)]
+    own = any(reflector.material.scattering > 0.0 for reflector in scene.reflectors)
+    if config.scattering > 0.0 or config.diffraction or own:
+        start_tracer()
+        origin = room_center(scene)
+        tracer_scene = _rough_stage(scene, radio.carrier, origin, config.scattering)
+        for cycle, (tx, rx) in enumerate(zip(trajectory.tx - origin, trajectory.rx - origin, strict=True)):
+            solved.append(_solve(tracer_scene, tx, rx, origin, config, config.scattering > 0.0 or own))
+            cycles.append(np.full(len(solved[-1].kind), cycle))
+    columns = SolvedPaths(*(np.concatenate(column) for column in zip(*solved, strict=True)))
+    antennas = np.sqrt(radio.tx_gain * radio.rx_gain) * np.exp(-2j * np.pi * radio.carrier * columns.tau)
+    return DiffusePaths(np.concatenate(cycles), **columns._replace(gain=columns.gain * antennas)._asdict())
+
+
+def _rough_stage(scene: Scene, carrier: float, origin: Floats, scattering: float) -> Any:
+    """The room with scattering walls; corners of one material are joined, so that their edges are known."""
+    import sionna.rt as rt
+
+    from rislam_rt.channel.traced.scattering_materials import rough_material
+    from rislam_rt.channel.traced.tracer_scene import build_mesh
+
+    tracer_scene = rt.load_scene()
+    tracer_scene.frequency = carrier
+    tracer_scene.tx_array = tracer_scene.rx_array = rt.PlanarArray(
+        num_rows=1, num_cols=1, pattern="iso", polarization="V"
+    )
+    walls, absorber = build_walls(scene), rt.AbsorberRadioMaterial("shade")
+    objects = []
+    for scatterer in scene.scatterers:
+        if scatterer.shade is not None:
+            mesh = build_mesh(f"shade-{scatterer.name}", scatterer.shade.triangles - origin)
+            objects.append(rt.SceneObject(mesh, f"shade-{scatterer.name}", radio_material=absorber))
+    for index, shade in enumerate(scene.shades):
+        mesh = build_mesh(f"shade-alone-{index}", shade.triangles - origin)
+        objects.append(rt.SceneObject(mesh, f"shade-alone-{index}", radio_material=absorber))
+    for number, material in enumerate(dict.fromkeys(walls.material)):
+        wanted = np.array([m == material for m in walls.material])[walls.wall_of_triangle]
+        mesh = build_mesh(f"walls-{number}", walls.triangles[wanted] - origin)
+        rough = rough_material(material, number, scattering)
+        objects.append(rt.SceneObject(mesh, f"walls-{number}", radio_material=rough, remove_duplicate_vertices=True))
+    tracer_scene.add([*objects, rt.Transmitter("tx", [0.0, 0.0, 0.0]), rt.Receiver("rx", [0.0, 0.0, 0.0])])
+    return tracer_scene
+
+
+def _solve(
+    tracer_scene: Any, tx: Floats, rx: Floats, origin: Floats, config: DiffuseConfig, diffuse: bool
+) -> SolvedPaths:
+    """Sionna's paths between positions about the origin, the purely specular ones left out."""
+    import sionna.rt as rt
+
+    tracer_scene.get("tx").position, tracer_scene.get("rx").position = tx.tolist(), rx.tolist()
+    paths = rt.PathSolver(deterministic=True)(
+        tracer_scene,
+        max_depth=config.depth,
+        max_num_paths_per_src=10 * config.samples,
+        samples_per_src=config.samples,
+        los=False,
+        specular_reflection=True,
+        diffuse_reflection=diffuse,
+        refraction=False,
+        diffraction=config.diffraction,
+        edge_diffraction=config.diffraction,
+        seed=config.seed,
+    )
+    tau = np.array(paths.tau, dtype=np.float64).reshape(-1)
+    if tau.size == 0:
+        return _nothing(config.depth)
+    events = np.array(paths.interactions, dtype=np.int64).reshape(config.depth, -1)
+    diffracted = (events == rt.InteractionType.DIFFRACTION).any(axis=0)
+    keep = np.flatnonzero((tau >= 0.0) & (diffracted | (events == rt.InteractionType.DIFFUSE).any(axis=0)))
+    bounces = (events != rt.InteractionType.NONE).sum(axis=0)[keep]
+    vertices = np.moveaxis(np.array(paths.vertices, dtype=np.float64).reshape(config.depth, -1, 3), 0, 1)[keep] + origin
+    vertices[np.arange(config.depth) >= bounces[:, None]] = 0.0
+    first, last = vertices[:, 0], vertices[np.arange(len(keep)), bounces - 1]
+    gain = np.empty(len(tau), dtype=np.complex128)
+    gain.real, gain.imag = (np.array(part).ravel() for part in paths.a)
+    kind = np.where(diffracted, DiffuseKind.DIFFRACTED, DiffuseKind.DIFFUSE)
+    return SolvedPaths(kind[keep], tau[keep], unit(first - origin - tx), unit(last - origin - rx), gain[keep], vertices)
+
+
+def _nothing(depth: int) -> SolvedPaths:
+    """No paths."""
+    none, points = np.zeros(0), np.zeros((0, 3))
+    return SolvedPaths(none.astype(np.int64), none, points, points, none.astype(np.complex128), np.zeros((0, depth, 3)))

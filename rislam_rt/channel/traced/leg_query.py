@@ -1,0 +1,195 @@
+"""What is asked of the tracer, and what becomes of its answers: legs between many devices and their far ends."""
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.channel.legs import SpecularLegs
+from rislam_rt.channel.traced.candidate_indices import CandidateIndices, join_indices
+from rislam_rt.channel.traced.float32_limits import LIFT
+from rislam_rt.channel.traced.path_geometry import PathGeometry
+from rislam_rt.channel.traced.sequences import point_sides, possible_sequences
+from rislam_rt.channel.walls import Walls
+from rislam_rt.constants import SURFACE_TOLERANCE
+
+if TYPE_CHECKING:
+    from rislam_rt.channel.traced.tracer_scene import TracerScene
+
+
+class LegQuery(NamedTuple):
+    """Legs sought: devices (N, 3) each to its far end (N, 3), or all to one (1, 3) [m]."""
+
+    device: Floats
+    far: Floats
+    heading: Floats
+    """(N,) [rad] of the agent."""
+    from_rx: bool = False
+    """Whether the devices are the Rx (else the Tx)."""
+    to_rx: bool = False
+    """Whether the far ends are the Rx (else a landmark)."""
+    host: int = -1
+    """Wall behind a panel at the far end: no bounce on it next to the panel."""
+    front: Floats | None = None
+    """(3,) normal of that panel, which sees only what lies before it."""
+    spared: int = -1
+    """Number of the scatterer at the far end, if it has a shade: that does not hide its own centre."""
+
+    @property
+    def paired(self) -> bool:
+        """Whether every device has a far end of its own."""
+        return len(self.far) != 1
+
+
+class LegEndpoints(NamedTuple):
+    """What the two ends of N legs are."""
+
+    device: Floats
+    """(N, 3) [m]."""
+    far: Floats
+    """(N, 3) [m]."""
+    heading: Floats
+    """(N,) [rad]."""
+    from_rx: Booleans
+    """(N,)."""
+    to_rx: Booleans
+    """(N,)."""
+
+
+class FoundLegs(NamedTuple):
+    """N legs that the tracer confirmed."""
+
+    rows: CandidateIndices
+    geometry: PathGeometry
+    coefficient: Complexes
+    """(N,) field without spreading loss and carrier phase: the product of the reflections."""
+
+    def only(self, keep: Integers) -> "FoundLegs":
+        """The legs chosen."""
+        return FoundLegs(
+            self.rows.only(keep), PathGeometry(*(part[keep] for part in self.geometry)), self.coefficient[keep]
+        )
+
+
+class QueryBatch(NamedTuple):
+    """Several problems in one set of tables, so that one solve serves them all."""
+
+    problems: Sequence[LegQuery]
+    sequences: list[Integers]
+    """For each problem (S, D)."""
+    device: Floats
+    """(N, 3) [m] of all problems."""
+    far: Floats
+    """(F, 3) [m] of all problems, for the tracer: lifted off host walls."""
+    complete: bool
+    """Whether the sequences are all that the walls' sides allow; else cones have ruled out some."""
+
+    @property
+    def all_sequences(self) -> Integers:
+        """(S, D) of all problems."""
+        return np.concatenate(self.sequences)
+
+    def candidates(self, tracer_scene: "TracerScene") -> Iterator[CandidateIndices]:
+        """All rows worth tracing."""
+        from rislam_rt.channel.traced.culling import cull_candidates
+
+        first_device = first_far = first_sequence = 0
+        for problem, sequences in zip(self.problems, self.sequences, strict=True):
+            for device, sequence in cull_candidates(tracer_scene, sequences, problem.device, problem.far):
+                far = device if problem.paired else np.zeros_like(device)
+                yield CandidateIndices(far + first_far, device + first_device, sequence + first_sequence)
+            first_device += len(problem.device)
+            first_far += len(problem.far)
+            first_sequence += len(sequences)
+
+    def ends(self, rows: CandidateIndices) -> LegEndpoints:
+        """The two ends of each row."""
+        sizes = [len(problem.device) for problem in self.problems]
+        far = np.concatenate([problem.far for problem in self.problems])
+        heading = np.concatenate([problem.heading for problem in self.problems])
+        from_rx, to_rx = (np.repeat(np.array(flag, dtype=np.bool_), sizes) for flag in self._flags())
+        device = rows.device
+        return LegEndpoints(self.device[device], far[rows.far], heading[device], from_rx[device], to_rx[device])
+
+    def _flags(self) -> tuple[list[bool], list[bool]]:
+        """Which problems start, and which end, at the Rx."""
+        return [problem.from_rx for problem in self.problems], [problem.to_rx for problem in self.problems]
+
+    def legs(self, found: FoundLegs) -> list[SpecularLegs]:
+        """The tracer's answers, problem by problem."""
+        result = []
+        first_device = first_sequence = 0
+        for problem, sequences in zip(self.problems, self.sequences, strict=True):
+            here = found.rows.sequence - first_sequence
+            answer = found.only(np.flatnonzero((here >= 0) & (here < len(sequences))))
+            rows = answer.rows
+            result.append(
+                _as_legs(problem, sequences, rows.device - first_device, rows.sequence - first_sequence, answer)
+            )
+            first_device += len(problem.device)
+            first_sequence += len(sequences)
+        return result
+
+
+def build_batch(problems: Sequence[LegQuery], tracer_scene: "TracerScene", sides: Integers, depth: int) -> QueryBatch:
+    """Enumerate the wall sequences of every problem up to `depth` bounces."""
+    from rislam_rt.channel.traced.cones import build_cones
+
+    walls, sequences, complete = tracer_scene.walls, [], True
+    for problem in problems:
+        device_side, far_side = (np.bitwise_or.reduce(point_sides(walls, p)) for p in (problem.device, problem.far))
+        cones = partial(build_cones, tracer_scene, problem.device, problem.far)
+        table, all_of_them = possible_sequences(sides, device_side, far_side, depth, walls.beside(problem.host), cones)
+        sequences.append(table)
+        complete &= all_of_them
+    device = np.concatenate([problem.device for problem in problems])
+    far = np.concatenate([_lifted(problem, walls) for problem in problems])
+    return QueryBatch(problems, sequences, device, far, complete)
+
+
+def join_found(parts: list[FoundLegs]) -> FoundLegs:
+    """All legs, one part after the other."""
+    geometries = zip(*(part.geometry for part in parts), strict=True)
+    return FoundLegs(
+        join_indices([part.rows for part in parts]),
+        PathGeometry(*(np.concatenate(column) for column in geometries)),
+        np.concatenate([part.coefficient for part in parts]),
+    )
+
+
+def _lifted(problem: LegQuery, walls: Walls) -> Floats:
+    """Far ends (F, 3), a panel's at least `LIFT` in front of its host wall."""
+    if problem.host < 0 or problem.front is None:
+        return problem.far
+    outward = np.copysign(1.0, walls.normal[problem.host] @ problem.front)
+    height = outward * (problem.far @ walls.normal[problem.host] - walls.offset[problem.host])
+    return problem.far + np.maximum(LIFT - height, 0.0)[:, None] * problem.front
+
+
+def _as_legs(
+    problem: LegQuery, sequences: Integers, device: Integers, column: Integers, found: FoundLegs
+) -> SpecularLegs:
+    """Scatter found legs into dense arrays, one column a sequence that some device has."""
+    geometry = found.geometry
+    keep = np.ones(len(device), dtype=np.bool_)
+    if problem.front is not None:
+        keep = geometry.at_far_end @ problem.front > SURFACE_TOLERANCE
+    columns, place = np.unique(column[keep], return_inverse=True)
+    shape = len(problem.device), len(columns)
+
+    def dense(part: Any) -> Any:
+        values = np.zeros(shape + part.shape[1:], dtype=part.dtype)
+        values[device[keep], place] = part[keep]
+        return values
+
+    return SpecularLegs(
+        walls=sequences[columns],
+        valid=dense(np.ones(len(device), dtype=np.bool_)),
+        length=dense(geometry.length),
+        at_device=dense(geometry.at_device),
+        at_far_end=dense(geometry.at_far_end),
+        coefficient=dense(found.coefficient),
+        vertices=dense(geometry.vertices),
+    )

@@ -1,0 +1,238 @@
+"""The room as Sionna RT sees it: one mesh a material, triangle numbers kept, so that every hit names its wall."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import mitsuba as mi
+import numpy as np
+import sionna.rt as rt
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.occluders import ALONE
+from rislam_rt.channel.traced.material import ConstantReflection
+from rislam_rt.channel.traced.scattering_materials import PolarisedReflection, slab_of_ones_own
+from rislam_rt.channel.traced.sequences import NO_WALL
+from rislam_rt.channel.walls import Walls
+from rislam_rt.constants import SURFACE_TOLERANCE
+from rislam_rt.errors import SceneError
+from rislam_rt.geometry.triangles import inside_any
+from rislam_rt.model import Material
+
+NO_SHADE = -1
+"""Key of the view with everything in it."""
+
+
+class WallBoxes(NamedTuple):
+    """Planes and boxes of the walls, on the tracer's side."""
+
+    normal: mi.Vector3f
+    """(W,)."""
+    offset: mi.Float
+    """(W,) [m]."""
+    center: mi.Point3f
+    """(W,) [m] middle of each wall's bounds."""
+    half: mi.Vector3f
+    """(W,) [m] half the size of each wall's bounds."""
+    margin: float
+    """[m] A thousandth of the room, hundreds of times what float32 leaves uncertain."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TracerScene:
+    """A Sionna RT scene and the correspondence of its (shape, primitive) pairs with walls."""
+
+    scene: rt.Scene
+    walls: Walls
+    origin: Floats
+    """(3,) [m] point of the room that is the tracer's zero."""
+    shape: Integers
+    """(W,) shape of one triangle of each wall, its largest."""
+    primitive: Integers
+    """(W,) its number in that shape."""
+    corner: Floats
+    """(W, 3) [m] one of its corners, from `origin`."""
+    shapes: Integers
+    """(M,) all shapes, ascending."""
+    first: Integers
+    """(M,) where each shape's triangles begin in `wall_of_primitive`."""
+    wall_of_primitive: Integers
+    """(T,) walls, shape by shape."""
+    materials: tuple[rt.RadioMaterialBase, ...]
+    """All radio materials of walls."""
+    material_of_wall: Integers
+    """(W,) index into `materials`."""
+    wall_boxes: WallBoxes
+    views: dict[int, mi.Scene]
+    """Everything (`NO_SHADE`), and for each scatterer with a shade everything but that shade."""
+    shades: dict[int, mi.Scene]
+    """The shade of each scatterer that has one, alone."""
+
+    @property
+    def wavelength(self) -> float:
+        """Carrier wavelength [m] as the tracer has it."""
+        return float(self.scene.wavelength[0])
+
+    def wall_hit(self, shape: Integers, primitive: Integers) -> Integers:
+        """Walls (...,) of hits, `NO_WALL` where nothing was hit."""
+        place = np.searchsorted(self.shapes, shape)
+        known = (place < len(self.shapes)) & np.isin(shape, self.shapes)
+        index = np.where(known, self.first[np.where(known, place, 0)] + primitive, 0)
+        return np.where(known, self.wall_of_primitive[index], NO_WALL)
+
+    def is_stacked(self, wall: Integers) -> Booleans:
+        """Whether walls (...,) lie on others or others on them."""
+        sharing = np.bincount(self.walls.plane, minlength=len(self.walls)) > 1
+        return (wall != NO_WALL) & sharing[self.walls.plane[wall]] if len(self.walls) else wall != NO_WALL
+
+    def share_plane(self, a: Integers, b: Integers) -> Booleans:
+        """Whether walls (...,) are in one plane by lying on each other."""
+        return (a != NO_WALL) & (b != NO_WALL) & (self.walls.plane[a] == self.walls.plane[b])
+
+    def on_top(self, wall: Integers, points: Floats) -> Booleans:
+        """Whether walls (N, D) are there at points (N, D, 3) [m] and nothing lies on them; true for `NO_WALL`."""
+        top = np.ones(wall.shape, dtype=np.bool_)
+        for number in np.unique(wall[self.is_stacked(wall)]):
+            here = wall == number
+            top[here] = self._has(number, points[here])
+            for upper in self.walls.over[number]:
+                top[here] &= ~self._has(upper, points[here])
+        return top
+
+    def _has(self, wall: int, points: Floats) -> Booleans:
+        """Which points (N, 3) of its plane are on a wall, within the uncertainty of float32 vertices."""
+        return inside_any(points, self.walls.triangles[self.walls.wall_of_triangle == wall], SURFACE_TOLERANCE)
+
+
+def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, shades: Mapping[int, Floats]) -> TracerScene:
+    """Put walls and shades into a scene of the tracer at the carrier [Hz]: meshes about `origin`, faces in order.
+
+    Parameters
+    ----------
+    shades
+        Triangles (T, 3, 3) [m] of what hides and reflects nothing, by the number of its scatterer, or `ALONE`.
+
+    Raises
+    ------
+    SceneError
+        Sionna does not know a material at this carrier.
+    """
+    scene = rt.load_scene()
+    scene.frequency = carrier
+    materials = list(dict.fromkeys(walls.material))
+    radio_materials = tuple(_material(material, m) for m, material in enumerate(materials))
+    material_of_wall = np.array([materials.index(m) for m in walls.material], dtype=np.int64)
+    members = [np.flatnonzero(material_of_wall[walls.wall_of_triangle] == m) for m in range(len(materials))]
+    objects = [
+        rt.SceneObject(build_mesh(f"walls-{m}", walls.triangles[rows] - origin), f"walls-{m}", radio_material=material)
+        for m, (material, rows) in enumerate(zip(radio_materials, members, strict=True))
+    ]
+    absorber = rt.AbsorberRadioMaterial("shade")
+    dark = {
+        number: rt.SceneObject(build_mesh(f"shade-{number}", part - origin), f"shade-{number}", radio_material=absorber)
+        for number, part in shades.items()
+    }
+    try:
+        scene.add([*objects, *dark.values()])
+    except ValueError as error:
+        raise SceneError(f"material: {error}; give an ITU material that is specified at {carrier:g} Hz") from None
+    ids = np.array([int(o.object_id) for o in objects], dtype=np.int64)
+    removable = [number for number in dark if number != ALONE]  # the others are nobody's own
+    views = {number: _part([*objects, *(o for n, o in dark.items() if n != number)]) for number in removable}
+    alone = {number: _part([shade]) for number, shade in dark.items()}
+    views = {NO_SHADE: scene.mi_scene} | views
+    return _numbered(scene, origin, walls, ids, members, (radio_materials, material_of_wall), views, alone)
+
+
+def _part(objects: list[rt.SceneObject]) -> mi.Scene:
+    """A Mitsuba scene of some of the meshes."""
+    return mi.load_dict({"type": "scene"} | {o.name: o.mi_mesh for o in objects})
+
+
+def _numbered(
+    scene: rt.Scene,
+    origin: Floats,
+    walls: Walls,
+    ids: Integers,
+    members: list[Integers],
+    materials: tuple[tuple[rt.RadioMaterialBase, ...], Integers],
+    views: dict[int, mi.Scene],
+    shades: dict[int, mi.Scene],
+) -> TracerScene:
+    """Number the triangles of all shapes (M,) and pick each wall's largest."""
+    order = np.argsort(ids)
+    rows = np.concatenate([members[m] for m in order] or [np.zeros(0, dtype=np.int64)])
+    sizes = [len(members[m]) for m in order]
+    first = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64) if sizes else np.zeros(0, dtype=np.int64)
+    place = np.argsort(rows)
+    shape_of = np.repeat(ids[order], sizes)[place]
+    primitive_of = (np.arange(len(rows)) - np.repeat(first, sizes))[place]
+    edge = walls.triangles[:, 1:] - walls.triangles[:, :1]
+    area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=-1)
+    by_size = np.lexsort((-area, walls.wall_of_triangle))
+    largest = by_size[np.unique(walls.wall_of_triangle[by_size], return_index=True)[1]]
+    return TracerScene(
+        scene,
+        walls,
+        origin,
+        shape_of[largest],
+        primitive_of[largest],
+        walls.triangles[largest, 0] - origin,
+        ids[order],
+        first,
+        walls.wall_of_triangle[rows],
+        *materials,
+        _wall_boxes(walls, origin),
+        views,
+        shades,
+    )
+
+
+def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
+    """Planes and bounds about the origin."""
+    low, high = np.full((len(walls), 3), np.inf), np.full((len(walls), 3), -np.inf)
+    np.minimum.at(low, walls.wall_of_triangle, walls.triangles.min(axis=1) - origin)
+    np.maximum.at(high, walls.wall_of_triangle, walls.triangles.max(axis=1) - origin)
+    margin = 1e-3 * (1.0 + np.abs([low, high]).max(initial=0.0))
+    offset = mi.Float((walls.offset - walls.normal @ origin).astype(np.float32))
+    return WallBoxes(
+        mi.Vector3f(as_points(walls.normal)),
+        offset,
+        as_points(0.5 * (low + high)),
+        mi.Vector3f(as_points(0.5 * (high - low))),
+        margin,
+    )
+
+
+def as_points(points: Floats) -> mi.Point3f:
+    """Positions (N, 3) for the tracer, in float32."""
+    return mi.Point3f(*(mi.Float(np.ascontiguousarray(column, dtype=np.float32)) for column in points.T))
+
+
+def build_mesh(name: str, triangles: Floats) -> mi.Mesh:
+    """A mesh of separate triangles (T, 3, 3), in their order."""
+    mesh = mi.Mesh(
+        name, vertex_count=3 * len(triangles), face_count=len(triangles), has_vertex_normals=False,
+        has_vertex_texcoords=False,
+    )  # fmt: skip
+    params = mi.traverse(mesh)
+    params["vertex_positions"] = mi.Float(triangles.astype(np.float32).ravel())
+    params["faces"] = mi.UInt(np.arange(3 * len(triangles), dtype=np.uint32))
+    params.update()
+    return mesh
+
+
+def _material(material: Material, number: int) -> rt.RadioMaterialBase:
+    """The radio material of a wall: a constant R of ours, or Sionna's own slab."""
+    if material.reflection is not None:
+        return ConstantReflection(f"constant-{number}", material.reflection * material.specular_share)
+    if material.reflection_te is not None:
+        return PolarisedReflection(f"polarised-{number}", material, material.scattering)
+    if material.permittivity is not None:
+        return slab_of_ones_own(f"slab-{number}", material, material.scattering)
+    try:
+        return rt.ITURadioMaterial(
+            f"itu-{number}", material.itu, material.thickness, scattering_coefficient=material.scattering
+        )
+    except ValueError as error:
+        raise SceneError(f"material.itu: '{material.itu}' received; {error}") from None

@@ -1,0 +1,76 @@
+"""How much a command says beside its result: `-q` no bars and no warnings, `-v` what it used, and where it failed."""
+
+import inspect
+from collections.abc import Callable
+from functools import wraps
+from typing import Annotated, Any, NamedTuple
+
+import typer
+
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars and no warnings.")]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Also versions and time taken, and where in the program it failed.")
+]
+
+
+class Verbosity(NamedTuple):
+    """What was asked for."""
+
+    quiet: bool = False
+    verbose: bool = False
+
+
+_now = Verbosity()
+
+
+def verbosity() -> Verbosity:
+    """That of the command that runs."""
+    return _now
+
+
+def reset() -> None:
+    """As before any command."""
+    global _now
+    _now = Verbosity()
+
+
+def warn(line: str) -> None:
+    """A warning on the error stream, unless quiet was asked for."""
+    if not _now.quiet:
+        typer.echo(f"warning: {line}", err=True)
+
+
+def with_verbosity(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The command with `-q` and `-v` behind its own options."""
+
+    @wraps(command)
+    def wrapped(*arguments: Any, quiet: bool = False, verbose: bool = False, **options: Any) -> Any:
+        global _now
+        _now = Verbosity(quiet, verbose)
+        if not verbose:
+            return command(*arguments, **options)
+        return _watched(command, *arguments, **options)
+
+    own = inspect.signature(command)
+    more = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
+        for name, kind in (("quiet", Quiet), ("verbose", Verbose))
+    ]
+    wrapped.__signature__ = own.replace(parameters=[*own.parameters.values(), *more])  # type: ignore[attr-defined]
+    wrapped.__annotations__ = {**command.__annotations__, "quiet": Quiet, "verbose": Verbose}
+    return wrapped
+
+
+def _watched(command: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    """Say what the command used."""
+    from time import perf_counter, process_time
+
+    from rislam_rt.pipeline.run import library_versions
+
+    typer.echo(", ".join(f"{name} {number}" for name, number in library_versions().items()), err=True)
+    begin, used = perf_counter(), process_time()
+    try:
+        return command(*arguments, **options)
+    finally:
+        taken = f"{perf_counter() - begin:.1f} s, {process_time() - used:.1f} s of processor time in this process"
+        typer.echo(f"took {taken}", err=True)

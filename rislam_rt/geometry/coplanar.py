@@ -1,0 +1,153 @@
+"""Surfaces in one plane: which walls lie on which, within what a tracer in float32 can tell apart."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.constants import COPLANAR_ANGLE, RAY_OFFSET
+from rislam_rt.geometry.planes import signed_distance
+
+ALIKE = 1e-6
+"""Two areas that differ by less than this share are the same: corners in float32 say no more."""
+
+_BLOCK = 200_000
+"""Pairs of triangles looked at in one go."""
+
+
+class CoplanarPair(NamedTuple):
+    """Wall `upper` lies on wall `lower`."""
+
+    upper: int
+    lower: int
+    gap: float
+    """[m] Largest distance of the upper's corners from the lower's plane."""
+
+
+class CoplanarStack(NamedTuple):
+    """What lies on what among W walls."""
+
+    pairs: list[CoplanarPair]
+    plane: Integers
+    """(W,) the wall whose plane each has: its own number where it lies on nothing and nothing lies on it."""
+    over: tuple[Integers, ...]
+    """(W,) for each wall those that lie on it."""
+
+
+def tracer_gap(bounds: Floats) -> float:
+    """Distance [m] below which a float32 tracer cannot tell two surfaces of a room (2, 3) apart.
+
+    Sionna RT starts a ray this far off its surface, 1e2 units of the last place of (1 m + the largest coordinate),
+    because nearer by its own arithmetic may put it on either side. Coordinates count from the room's middle.
+    """
+    return RAY_OFFSET * (1.0 + 0.5 * float(np.ptp(bounds, axis=0).max()))
+
+
+def stack_walls(triangles: Floats, owner: Integers, normal: Floats, offset: Floats, gap: float) -> CoplanarStack:
+    """Find walls that overlap in one plane.
+
+    Two walls lie on each other when their normals (W, 3) agree within `COPLANAR_ANGLE`, all corners of the smaller are
+    within `gap` [m] of the larger's plane, and they overlap by more than `gap`. The smaller lies on the larger; of two
+    alike, the one with the lower number. All that hang together share the plane of the largest.
+
+    Parameters
+    ----------
+    triangles, owner
+        (T, 3, 3) [m] and the wall (T,) of each.
+    """
+    count = len(normal)
+    area = _areas(triangles, owner, count)
+    members = _members(owner, count)
+    corner = np.array([triangles[m[0], 0] for m in members]).reshape(-1, 3)
+    pairs = []
+    for i, j in _parallel_pairs(normal, offset, corner, gap):
+        upper, lower = (i, j) if _lies_on(area, i, j) else (j, i)
+        corners = triangles[members[upper]]
+        apart = float(np.abs(signed_distance(corners, normal[lower], offset[lower])).max())
+        if apart <= gap and overlap(corners, triangles[members[lower]], normal[lower], gap):
+            pairs.append(CoplanarPair(upper, lower, apart))
+    over = tuple(np.array(sorted(p.upper for p in pairs if p.lower == w), dtype=np.int64) for w in range(count))
+    return CoplanarStack(pairs, _joint_planes(pairs, area), over)
+
+
+def overlap(a: Floats, b: Floats, normal: Floats, depth: float) -> bool:
+    """Whether triangles (A, 3, 3) and (B, 3, 3), seen along a normal (3,), overlap by more than `depth` [m] anywhere.
+
+    Two triangles are apart if their shadows on a normal to one of their six edges are (separating axes).
+    """
+    right = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    frame = np.stack([right / np.linalg.norm(right), np.cross(normal, right) / np.linalg.norm(right)], axis=-1)
+    flat_a, flat_b = a @ frame, b @ frame
+    low, high = flat_b.min(axis=(0, 1)), flat_b.max(axis=(0, 1))
+    flat_a = flat_a[((flat_a.max(axis=1) > low) & (flat_a.min(axis=1) < high)).all(axis=-1)]
+    step = max(1, _BLOCK // max(len(b), 1))
+    return any(_any_overlap(flat_a[i : i + step], flat_b, depth) for i in range(0, len(flat_a), step))
+
+
+def _any_overlap(a: Floats, b: Floats, depth: float) -> bool:
+    """Whether any pair of flat triangles (A, 3, 2) and (B, 3, 2) overlaps by more than `depth`."""
+    boxed = np.minimum(a.max(axis=1)[:, None], b.max(axis=1)) - np.maximum(a.min(axis=1)[:, None], b.min(axis=1))
+    i, j = np.nonzero((boxed > depth).all(axis=-1))
+    pair_a, pair_b = a[i], b[j]
+    together = np.ones(len(i), dtype=np.bool_)
+    for shape in (pair_a, pair_b):
+        for corner in range(3):
+            edge = shape[:, (corner + 1) % 3] - shape[:, corner]
+            axis = np.stack([-edge[:, 1], edge[:, 0]], axis=-1) / np.linalg.norm(edge, axis=-1, keepdims=True)
+            on_a, on_b = (np.einsum("nci,ni->nc", s, axis) for s in (pair_a, pair_b))
+            common = np.minimum(on_a.max(axis=1), on_b.max(axis=1)) - np.maximum(on_a.min(axis=1), on_b.min(axis=1))
+            together &= common > depth
+    return bool(together.any())
+
+
+def _parallel_pairs(normal: Floats, offset: Floats, corner: Floats, gap: float) -> list[tuple[int, int]]:
+    """Pairs of walls with nearly one normal, one corner (W, 3) of either near the other's plane.
+
+    Walls sorted by their normal's component in a generic direction are compared with their neighbours in that order.
+    """
+    key = np.abs(normal @ np.array([0.36, 0.48, 0.80]))
+    order = np.argsort(key, kind="stable")
+    found: list[tuple[int, int]] = []
+    for step in range(1, len(order)):
+        near = np.flatnonzero(key[order[step:]] - key[order[:-step]] <= COPLANAR_ANGLE)
+        if len(near) == 0:
+            break
+        i, j = order[near], order[near + step]
+        turn = np.linalg.norm(np.cross(normal[i], normal[j]), axis=-1)
+        far = np.abs(signed_distance(corner[i], normal[j], offset[j]))
+        also = np.abs(signed_distance(corner[j], normal[i], offset[i]))
+        keep = (turn <= COPLANAR_ANGLE) & (np.minimum(far, also) <= gap)
+        found += [(int(min(p)), int(max(p))) for p in zip(i[keep], j[keep], strict=True)]
+    return sorted(found)
+
+
+def _lies_on(area: Floats, i: int, j: int) -> bool:
+    """Whether wall i, the lower number, lies on wall j where they overlap: it is smaller, or alike."""
+    return bool(area[i] <= area[j] * (1.0 + ALIKE))
+
+
+def _areas(triangles: Floats, owner: Integers, count: int) -> Floats:
+    """(W,) [m^2]."""
+    sides = triangles[:, 1:] - triangles[:, :1]
+    area = np.zeros(count)
+    np.add.at(area, owner, 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=-1))
+    return area
+
+
+def _members(owner: Integers, count: int) -> list[Integers]:
+    """The triangles of each wall."""
+    order = np.argsort(owner, kind="stable")
+    return np.split(order, np.searchsorted(owner[order], np.arange(1, count)))[:count]
+
+
+def _joint_planes(pairs: list[CoplanarPair], area: Floats) -> Integers:
+    """(W,) the largest wall of all that hang together with each."""
+    plane = np.arange(len(area))
+    for _ in pairs:  # a chain of n pairs settles within n rounds
+        before = plane.copy()
+        for upper, lower, _gap in pairs:
+            best = max(plane[upper], plane[lower], key=lambda w: (area[w], -w))
+            plane[upper] = plane[lower] = best
+        if np.array_equal(before, plane):
+            break
+    return plane

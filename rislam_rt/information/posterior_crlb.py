@@ -1,0 +1,109 @@
+"""The posterior bound: recursive information of a whole trajectory with unknown landmarks and a prior on the start."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, freeze
+from rislam_rt.errors import ConfigError
+from rislam_rt.information.landmark_model import LinearMeasurements
+
+
+@dataclass(frozen=True, slots=True)
+class MotionPrior:
+    """White-noise acceleration, and what is known of the start. Per axis, one standard deviation."""
+
+    acceleration: float = 0.01
+    """sigma_a [m/s^2]."""
+    start_position: float = 0.01
+    """[m]."""
+    start_velocity: float = 0.01
+    """[m/s]."""
+    axes: int = 2
+    """2: height known, the agent moves in a horizontal plane; 3: all of it unknown."""
+
+    def __post_init__(self) -> None:
+        for name in ("acceleration", "start_position", "start_velocity"):
+            if not getattr(self, name) >= 0.0:
+                raise ConfigError(f"motion.{name}: {getattr(self, name)} received; give a standard deviation")
+        if self.axes not in (2, 3):
+            raise ConfigError(f"motion.axes: {self.axes} received; give 2 or 3")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosteriorBound:
+    """Bound after each of K cycles; no unbiased filter with these measurements does better on average."""
+
+    agent: Floats
+    """(K, 2 D, 2 D) covariance of position and velocity [m, m/s], D axes."""
+    unknown: Floats
+    """(K, U) variances of landmarks and walls."""
+    last: Floats
+    """(U, U) covariance of landmarks and walls after the last cycle."""
+
+    def __post_init__(self) -> None:
+        freeze(self, "agent", np.float64, (None, None, None))
+        freeze(self, "unknown", np.float64, (len(self.agent), None))
+        freeze(self, "last", np.float64, (self.unknown.shape[1],) * 2)
+
+    @property
+    def rms(self) -> Floats:
+        """(K,) horizontal position error [m]."""
+        return np.sqrt(self.agent[:, 0, 0] + self.agent[:, 1, 1])
+
+
+def posterior_bound(
+    rows: Iterable[LinearMeasurements], time: Floats, motion: MotionPrior, unknown_std: Floats
+) -> PosteriorBound:  # fmt: skip
+    """Run the recursion along a trajectory, linearised at the truth.
+
+    Parameters
+    ----------
+    rows
+        Measurements of each cycle, e.g. `LandmarkModel.rows`.
+    time
+        (K,) [s].
+    unknown_std
+        (U,) standard deviation of each unknown beforehand; large where nothing is known.
+
+    `J_k+1 = (Q + F J_k^-1 F^T)^-1 + H^T R^-1 H` (Tichavsky et al. 1998), with a square root of the covariance: nothing
+    is subtracted, so that no SNR and no gap in time makes it indefinite (Kaminski, Bryson and Schmidt 1971).
+    """
+    axes, unknowns = motion.axes, len(unknown_std)
+    size = 2 * axes + unknowns
+    start = np.repeat([motion.start_position, motion.start_velocity], axes)
+    spread = np.diag(np.concatenate([start, unknown_std]))
+    agent = np.empty((len(time), 2 * axes, 2 * axes))
+    unknown = np.empty((len(time), unknowns))
+    for cycle, measured in enumerate(rows):
+        if cycle:
+            spread = _advance(spread, time[cycle] - time[cycle - 1], motion)
+        root = np.sqrt(measured.information)[:, None]
+        slope = np.zeros((len(root), size))
+        slope[:, :axes] = root * measured.agent[:, :axes]
+        slope[:, 2 * axes :] = root * measured.unknown
+        spread = _update(spread, slope)
+        agent[cycle] = spread[: 2 * axes] @ spread[: 2 * axes].T
+        unknown[cycle] = np.einsum("ij,ij->i", spread[2 * axes :], spread[2 * axes :])
+    return PosteriorBound(agent, unknown, spread[2 * axes :] @ spread[2 * axes :].T)
+
+
+def _advance(spread: Floats, dt: float, motion: MotionPrior) -> Floats:
+    """Root (N, N) of the covariance after one time step, (N, N + D): `F = [I dt; 0 I]`, discrete white noise."""
+    axes = motion.axes
+    moved = spread.copy()
+    moved[:axes] += dt * spread[axes : 2 * axes]
+    push = np.zeros((len(spread), axes))
+    push[:axes], push[axes : 2 * axes] = (np.eye(axes) * motion.acceleration * step for step in (0.5 * dt**2, dt))
+    return np.concatenate([moved, push], axis=1)
+
+
+def _update(spread: Floats, slope: Floats) -> Floats:
+    """Triangular root (N, N) after measurements with derivatives (M, N) of unit variance, of a root (N, N or more)."""
+    count, size = slope.shape
+    stacked = np.zeros((count + size, count + spread.shape[1]))
+    stacked[:count, :count] = np.eye(count)
+    stacked[:count, count:] = slope @ spread
+    stacked[count:, count:] = spread
+    return np.asarray(np.linalg.qr(stacked.T, mode="r")).T[count:, count:]

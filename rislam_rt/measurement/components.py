@@ -1,0 +1,126 @@
+"""Components before noise: single paths, or several that come out as one; and the bound of a lone one."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.information import amplitude_std, measurement_std
+from rislam_rt.measurement.received import Received
+from rislam_rt.model import RadioConfig, SensorModel
+
+DISC_STD = 0.5
+"""Standard deviation of each coordinate of a point spread evenly over the unit disc: what is known of a direction
+cosine along which the array has no aperture."""
+
+
+class NoiselessComponents(NamedTuple):
+    """N components of one cycle before noise: single paths, or several that cannot be resolved."""
+
+    path: Integers
+    """(N,) column of the strongest path."""
+    tau: Floats
+    """(N,) [s]."""
+    cosines: Floats
+    """(N, 2) body frame."""
+    gain: Complexes
+    """(N,)."""
+
+
+class ComponentErrors(NamedTuple):
+    """What the bound does to N components."""
+
+    error: Floats
+    """(N, 3) of delay [s] and cosines, drawn."""
+    deviation: Floats
+    """(N, 3) their standard deviations."""
+    gain_std: Floats
+    """(N,) standard deviation of the complex gain."""
+
+
+def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:
+    """Bounds of a lone path: standard deviations of the delay (...,) [s] and the cosines (..., 2).
+
+    `information.measurement_std` at the linear SNR over all L antennas, but no cosine is less certain than `DISC_STD`.
+    """
+    bound = measurement_std(snr, radio)
+    return bound.tau, np.minimum(bound.cosines, DISC_STD)
+
+
+def merge(received: Received, sensor: SensorModel) -> NoiselessComponents:
+    """Join paths of one capture closer than a resolution cell in delay and both cosines, from the strongest down."""
+    cell = np.ones((len(received.tau), len(received.tau)), dtype=bool)
+    for value in in_cells(received, sensor.radio).T:  # axis by axis: half the time of one three-dimensional array
+        cell &= np.abs(np.subtract.outer(value, value)) < 1.0
+    return join(received, _leaders(np.abs(received.gain), cell))
+
+
+def join(received: Received, leader: Integers) -> NoiselessComponents:
+    """One component for all paths of the same leader (N,), a row of `received`.
+
+    The joint gain is the sum. Delay and cosines are those at which one path fits the sum best, to first order
+    `Re sum_i alpha_i conj(alpha) tau_i / |alpha|^2`, kept between the members' own.
+    """
+    if not len(leader):
+        return single(received)
+    order = np.argsort(leader, kind="stable")
+    rows, start = np.unique(leader[order], return_index=True)
+    gain = np.add.reduceat(received.gain[order], start)
+    points = np.column_stack([received.tau, received.direction[:, :2]])[order]
+    weight = np.real(received.gain[order] * np.conj(np.repeat(gain, np.diff(start, append=len(order)))))
+    joint = np.add.reduceat(weight[:, None] * points, start) / np.maximum(np.abs(gain) ** 2, 1e-300)[:, None]
+    joint = np.clip(joint, np.minimum.reduceat(points, start), np.maximum.reduceat(points, start))
+    return NoiselessComponents(received.path[rows], joint[:, 0], joint[:, 1:], gain)
+
+
+def single(received: Received) -> NoiselessComponents:
+    """Every path on its own."""
+    return NoiselessComponents(received.path, received.tau, received.direction[:, :2], received.gain)
+
+
+def lone_errors(parts: NoiselessComponents, radio: RadioConfig, draws: Floats) -> ComponentErrors:
+    """Each component as if it were alone."""
+    tau, cosines = path_std(radio.integrated_snr(parts.gain), radio)
+    deviation = np.column_stack([tau, cosines])
+    gain_std = np.full(len(tau), np.sqrt(2.0) * amplitude_std(radio))
+    return ComponentErrors(deviation * draws[:, 2:], deviation, gain_std)
+
+
+def audible(received: Received, keep: Booleans) -> Received:
+    """The paths marked (N,)."""
+    return Received._make(field[keep] for field in received)
+
+
+def in_cells(received: Received, radio: RadioConfig) -> Floats:
+    """Delays and cosines (N, 3) in resolution cells; 0 along an axis without aperture."""
+    array = radio.array
+    widths = [count * array.spacing if count > 1 else 0.0 for count in (array.rows, array.cols)]
+    return np.column_stack([received.tau * radio.bandwidth, received.direction[:, :2] * widths])
+
+
+def into_disc(cosines: Floats) -> Floats:
+    """Cosines (..., 2) brought radially into the unit disc, where directions are."""
+    length = np.linalg.norm(cosines, axis=-1, keepdims=True)
+    return cosines / np.maximum(length, 1.0)
+
+
+def capped(deviation: Floats, radio: RadioConfig) -> Floats:
+    """Standard deviations (N, 2) of cosines, `DISC_STD` at most and along an axis without aperture."""
+    blind = np.array([radio.array.rows, radio.array.cols]) < 2
+    return np.where(blind, DISC_STD, np.minimum(deviation, DISC_STD))
+
+
+def blind_axes(cosines: Floats, radio: RadioConfig) -> Floats:
+    """Cosines (N, 2), zero along which the array has no aperture: nothing is measured there."""
+    return cosines * (np.array([radio.array.rows, radio.array.cols]) > 1)
+
+
+def _leaders(strength: Floats, cell: Booleans) -> Integers:
+    """(N,) for each path the strongest free path of its cell, taken from the strongest down."""
+    crowded = np.count_nonzero(cell, axis=1) > 1
+    leader = np.where(crowded, -1, np.arange(len(strength)))
+    rows = crowded.nonzero()[0]
+    for row in rows[np.argsort(-strength[rows], kind="stable")]:
+        if leader[row] < 0:
+            leader[cell[row] & (leader < 0)] = row
+    return leader

@@ -1,0 +1,91 @@
+"""Errors from the joint bound of all paths: what overlapping signals cost each other, and what cannot be told apart."""
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.measurement.components import ComponentErrors, NoiselessComponents, in_cells, join
+from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.inner_products import inner_of, waves_at
+from rislam_rt.measurement.received import Received
+from rislam_rt.measurement.refine import joint_bound
+from rislam_rt.measurement.signal import num_tones
+from rislam_rt.measurement.sounding import Sounding, build_sounding
+from rislam_rt.model import RadioConfig
+
+LEAST_CERTAINTY = 2.0
+"""A path whose amplitude is less than this many times its standard deviation is not resolved from its neighbour."""
+
+
+def joint_errors(
+    received: Received, radio: RadioConfig, config: ReceiverConfig, draws: Floats
+) -> tuple[NoiselessComponents, ComponentErrors]:
+    """Components that can be resolved, and errors drawn from their joint bound.
+
+    Paths merge until every component is certain enough, or has no neighbour to merge with.
+
+    Parameters
+    ----------
+    received
+        The paths of one capture.
+    draws
+        (P, 5) normal draws of all columns of the paths; the last three are used.
+    """
+    sounding = build_sounding(num_tones(radio, config), radio)
+    merging = config.merge
+    place = in_cells(received, radio)
+    near = np.linalg.norm(place[:, None] - place, axis=-1)
+    unit = np.sqrt(radio.energy * radio.array.num_antennas / (sounding.num_samples * radio.noise_psd))
+    strength = np.abs(received.gain)
+    leader = np.arange(len(strength))
+    if merging:
+        leader = _absorbed(strength * unit * np.sqrt(sounding.num_samples) < LEAST_CERTAINTY, near)
+    while True:
+        parts = join(received, leader)
+        covariance, variance = _bound(parts, sounding, radio, unit)
+        rows = np.unique(leader)
+        certainty = np.abs(parts.gain) * unit / np.sqrt(variance)
+        doubtful = rows[np.argsort(certainty)[: np.sum(certainty < LEAST_CERTAINTY)]]
+        merged = _paired(leader, doubtful, strength, near) if merging else leader
+        if np.array_equal(merged, leader):
+            return parts, _draw(parts, covariance, np.sqrt(variance) / unit, draws, radio)
+        leader = merged
+
+
+def _bound(parts: NoiselessComponents, sounding: Sounding, radio: RadioConfig, unit: float) -> tuple[Floats, Floats]:
+    parameters = np.column_stack([parts.tau * radio.bandwidth, parts.cosines])
+    return joint_bound(inner_of(sounding, waves_at(sounding, parameters)), parts.gain * unit)
+
+
+def _absorbed(faint: Booleans, near: Floats) -> Integers:
+    """Leaders (N,) when each path too faint to stand alone joins the nearest that is not, within a cell."""
+    distance = np.where(~faint & (near < 1.0), near, np.inf)
+    joins = faint & np.isfinite(distance).any(axis=1)
+    return np.where(joins, np.argmin(distance, axis=1), np.arange(len(faint))) if len(faint) else np.arange(0)
+
+
+def _paired(leader: Integers, doubtful: Integers, strength: Floats, near: Floats) -> Integers:
+    """Leaders (N,) after doubtful ones, in their order, joined their nearest neighbours within a cell, each once."""
+    merged = leader.copy()
+    free = leader == np.arange(len(leader))
+    for row in doubtful:
+        distance = np.where(free & (np.arange(len(free)) != row), near[row], np.inf)
+        nearest = int(np.argmin(distance))
+        if free[row] and distance[nearest] < 1.0:
+            weak, strong = (row, nearest) if strength[row] <= strength[nearest] else (nearest, row)
+            merged[merged == weak] = strong
+            free[[row, nearest]] = False
+    return merged
+
+
+def _draw(
+    parts: NoiselessComponents, covariance: Floats, gain_std: Floats, draws: Floats, radio: RadioConfig
+) -> ComponentErrors:
+    """Correlated errors of all components from independent draws."""
+    scale = np.sqrt(np.maximum(np.diagonal(covariance), np.finfo(np.float64).tiny))
+    correlation = covariance / scale[:, None] / scale
+    value, vector = np.linalg.eigh(correlation)
+    # The symmetric root keeps each component's own draw its own where nothing overlaps.
+    root = (vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T
+    units = np.array([1.0 / radio.bandwidth, 1.0, 1.0])
+    error = (scale * (root @ draws[parts.path, 2:].T.ravel())).reshape(3, -1).T * units
+    return ComponentErrors(error, scale.reshape(3, -1).T * units, gain_std)

@@ -1,0 +1,69 @@
+"""What the bound at an estimate leaves out: the bias of a peak, neighbours too faint to be found, mirrored directions.
+
+A bound knows the paths that were found and takes their amplitudes for true. The errors are larger, and a filter that
+believes the bound alone is sure of what is wrong.
+"""
+
+import numpy as np
+import scipy
+
+from rislam_rt.arrays import Floats
+from rislam_rt.model import RadioConfig
+
+PEAK_EXCESS = 2.5
+"""Mean of the SNR measured at a peak less the true one: one for the noise's energy, a half for each of the three
+parameters over which the peak is the highest."""
+REACH = 6.0
+"""Resolution cells of delay on either side over which neighbours are counted."""
+SAME = 0.7
+"""Cells in the other two parameters within which a neighbour counts: one further off does not pull."""
+UNSEEN = 0.4
+"""SNR of the unseen neighbours in a cell, over the threshold, for each seen neighbour in a cell: set to the wall
+returns of the paper's room, tried on everything else (`benchmarks/receiver_room.py`)."""
+
+
+def peak_bias(snr: Floats) -> Floats:
+    """By how much the variances (...,) at the measured SNR over all antennas, linear, are too small."""
+    return snr / np.maximum(snr - PEAK_EXCESS, 0.25 * snr)
+
+
+def crowding(parameters: Floats, threshold: float, radio: RadioConfig) -> Floats:
+    """By how much the variances (P, 3) of paths (P, 3), in (B tau, u, v), are too small for unseen neighbours.
+
+    Neighbours along one axis, `density` a cell and of SNR q each, do to the estimate on that axis what `q density` of
+    N0 would add: the square of the autocorrelation's slope, integrated over all offsets, is the bound's own second
+    derivative. What is not seen has an SNR below the threshold, and is the denser the more is seen.
+    """
+    cells = np.array([1.0, radio.array.rows * radio.array.spacing, radio.array.cols * radio.array.spacing])
+    reach = np.array([REACH, *(2.0 * cells[1:])])  # all of the sky, which is two cosines wide
+    span = np.array([2.0, 1.0, 1.0]) * reach
+    apart = np.abs(parameters[:, None] - parameters) * cells
+    factor = np.ones_like(parameters)
+    for axis in range(3):
+        beside = np.linalg.norm(np.delete(apart, axis, axis=-1), axis=-1) < SAME
+        seen = np.sum(beside & (apart[..., axis] < reach[axis]), axis=1) - 1
+        factor[:, axis] += UNSEEN * threshold * seen / span[axis]
+    return factor
+
+
+def unmirrored(cosines: Floats, radio: RadioConfig) -> Floats:
+    """Cosines (N, 2), those outside the sky moved by a period of the array to where they may lie in it."""
+    period = 1.0 / radio.array.spacing
+    outside = np.linalg.norm(cosines, axis=-1, keepdims=True) > 1.0
+    return np.where(outside, cosines - period * np.round(cosines / period), cosines)
+
+
+def mirror_variance(cosines: Floats, deviation: Floats, radio: RadioConfig) -> Floats:
+    """Variances (N, 2) for the chance that a direction is its own image, a period of the array away.
+
+    The samples are the same for both. Their odds are those of lying in the sky, given the estimate and its deviation.
+    """
+    period = 1.0 / radio.array.spacing
+    image = cosines - period * np.where(cosines < 0.0, -1.0, 1.0)
+    other = cosines[:, ::-1]
+    sure, inflation = (
+        scipy.special.ndtr((np.sqrt(np.maximum(1.0 - other**2, 0.0)) - np.abs(x)) / np.maximum(deviation, 1e-12))
+        for x in (cosines, image)
+    )
+    aperture = np.array([radio.array.rows, radio.array.cols]) > 1
+    return aperture * period**2 * inflation / np.maximum(sure + inflation, 1e-12)

@@ -1,0 +1,1 @@
+"""Runs of many cycles: led, written and scored slice by slice."""

@@ -1,0 +1,197 @@
+"""A long run from its slices: schemes side by side, scores counted slice by slice, the folder that it leaves."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.errors import ConfigError, ResultError, RislamError
+from rislam_rt.model import Scene, SlamResult
+from rislam_rt.pipeline.long import slices
+from rislam_rt.pipeline.long.slices import (
+    FOLDER,
+    SHOWN,
+    read_parts,
+    run_slices,
+    slice_bounds,
+    slice_files,
+    thin_scheme,
+)
+from rislam_rt.pipeline.long.tally import Tally
+from rislam_rt.pipeline.run import Progress, library_versions, panel_warnings, set_scene
+from rislam_rt.pipeline.scores.summary import summarise
+from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.pipeline.store.run_folder import (
+    DONE,
+    RUN_FILE,
+    RunFolder,
+    check_files,
+    read_marker,
+    read_run,
+    record_files,
+)
+from rislam_rt.pipeline.workers import run_side_by_side
+from rislam_rt.scene import load_scene
+from rislam_rt.scene.write import tum_bytes
+from rislam_rt.storage.files import write_pieces
+
+
+class LongRun(NamedTuple):
+    """A run in slices: its scores over all cycles, and every n-th cycle for figures."""
+
+    summary: dict[str, Any]
+    shown: SlamResult
+
+
+def is_long(scene: Scene, spec: PipelineSpec) -> bool:
+    """Whether a run goes slice by slice."""
+    return (spec.cycles or len(scene.agent)) > slices.SLICE
+
+
+def run_long(
+    scene: Scene, spec: PipelineSpec, store: RunFolder, *, rng: np.random.Generator, jobs: int, progress: Progress
+) -> LongRun:
+    """Run all schemes of a specification slice by slice into a run's folder, and complete it.
+
+    Schemes that are there are not run again. Memory does not grow with the cycles, and neither does what is returned:
+    the slices' files are the result.
+
+    Raises
+    ------
+    ConfigError
+        Scene and specification do not fit (see `check_run`).
+    StoreError
+        The disk refused.
+    TraceError, SetupError
+        The traced channel failed, or the machine lacks what it needs.
+    """
+    scene, body, seeds = set_scene(scene, spec, rng=rng)
+    run, folder, cycles = store.identity.digest, store.folder, len(scene.agent)
+    todo = [name for name in spec.schemes if not store.holds(slice_files(name, cycles))]
+    seconds = 0.0
+    try:
+        for name, outcome in run_side_by_side(
+            run_slices, todo, (scene, body, spec, seeds, folder, run), jobs, progress
+        ):
+            if isinstance(outcome, RislamError):
+                raise outcome
+            store.adopt(slice_files(name, cycles))
+            seconds = max(seconds, float(outcome))
+    finally:
+        _remove_unfinished(store)
+    about = {
+        "name": spec.name,
+        "seed": spec.seed,
+        "cycles": cycles,
+        "schemes": list(spec.schemes),
+        "seconds": {"trace": seconds},
+        "warnings": list(panel_warnings(scene, spec)),
+        "config": spec.model_dump(mode="json"),
+        "slices": len(slice_bounds(cycles)),
+    }
+    found = gather_long(folder, scene, {**about, "versions": library_versions()}, run)
+    _complete(store, scene, found, about)
+    return found
+
+
+def gather_long(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) -> LongRun:
+    """Scores and figures' cycles of schemes whose slices are all there; `about` as in the marker of the run.
+
+    Raises
+    ------
+    ResultError, StoreError
+        A file is missing, damaged or changed.
+    """
+    schemes, scores, paths, motion = {}, {}, None, scene.agent
+    for name in about["schemes"]:
+        tally = Tally(scene, about["config"]["budget"])
+        for part in read_parts(folder, name, scene, run):
+            tally.add(part)
+        scores[name] = tally.scores()
+        motion, paths, schemes[name] = thin_scheme(folder, name, scene, run)
+    if paths is None:
+        raise ResultError(f"{folder}: a run without schemes; run again with another --out")
+    stride = -(-len(scene.agent) // SHOWN)
+    lines = (*about["warnings"], f"a run in slices: no posterior bound, and figures show one cycle in {stride}")
+    names = ("name", "seed", "config", "versions", "seconds")
+    shown = SlamResult(
+        scene=replace(scene, agent=motion), paths=paths, schemes=schemes, warnings=lines,
+        **{name: about[name] for name in names},
+    )  # fmt: skip
+    summary = {
+        "seed": about["seed"],
+        "cycles": len(scene.agent),
+        "pipeline": about["name"],
+        "scene": scene.name,
+        "source": paths.source,
+        "trace_seconds": about["seconds"].get("trace", 0.0),
+        "warnings": list(lines),
+        "schemes": scores,
+    }
+    return LongRun(summary, shown)
+
+
+def read_any(folder: Path) -> LongRun:
+    """Scores and figures' cycles of a completed run, in slices or in one piece, worked out anew.
+
+    Raises
+    ------
+    ResultError
+        One of its files is missing, damaged or changed.
+    ConfigError
+        The folder is not a completed run.
+    """
+    about = read_marker(folder) if (folder / RUN_FILE).is_file() else {}
+    if "slices" not in about:
+        result = read_run(folder)
+        return LongRun(summarise(result), result)
+    if about["state"] != DONE:
+        raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
+    check_files(folder, about)
+    try:
+        scene = replace(load_scene(folder / "scene"), digest=about["scene"]["sha256"])
+        return gather_long(folder, scene, about, about["identity"])
+    except ResultError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RislamError) as error:
+        cause = f"{type(error).__name__}: {error}"[:120]
+        raise ResultError(f"{folder}: a file of the run is damaged ({cause}); run again with another --out") from None
+
+
+def _complete(store: RunFolder, scene: Scene, found: LongRun, about: Mapping[str, Any]) -> None:
+    """All that the slices do not hold; the last step is the marker."""
+    tracks = {"truth.tum": _truth_lines(scene)}
+    for name in about["schemes"]:
+        tracks[f"estimate_{name}.tum"] = _estimate_lines(store, name, scene)
+    for name, pieces in tracks.items():
+        write_pieces(store.folder / name, pieces)
+    store.adopt(tracks)
+    for name, content in record_files(found.shown, scene, found.summary).items():
+        store.put(name, content)
+    store.mark(DONE, about)
+
+
+def _remove_unfinished(store: RunFolder) -> None:
+    """Take away the slices of schemes that did not come to their end: they begin anew."""
+    for place in sorted((store.folder / FOLDER).glob("*")):
+        for file in place.glob("*.nc"):
+            if str(file.relative_to(store.folder)) not in store.files:
+                file.unlink(missing_ok=True)
+        with suppress(OSError):
+            place.rmdir()
+    with suppress(OSError):
+        (store.folder / FOLDER).rmdir()
+
+
+def _truth_lines(scene: Scene) -> Iterator[bytes]:
+    for first, last in slice_bounds(len(scene.agent)):
+        motion = scene.agent[first:last]
+        yield tum_bytes(motion.time, motion.position, motion.heading)
+
+
+def _estimate_lines(store: RunFolder, name: str, scene: Scene) -> Iterator[bytes]:
+    for part in read_parts(store.folder, name, scene, store.identity.digest):
+        yield tum_bytes(part.motion.time, part.scheme.position, part.scheme.heading)

@@ -1,0 +1,165 @@
+"""The scores of a run in slices, counted slice by slice: the same as of the whole run, but for the posterior bound.
+
+The bound is a recursion over all cycles with every path that is ever heard among its unknowns; it is left out (None).
+"""
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.evaluate import association_fractions, position_errors
+from rislam_rt.model import NOTHING, STEPS, Scene
+from rislam_rt.pipeline.long.slices import Part
+from rislam_rt.pipeline.scores.summary import (
+    has_diverged,
+    landmark_track,
+    map_score,
+    nees_per_dof,
+    over_budget,
+    path_sources,
+    wall_scores,
+)
+
+CLUTTER = None
+
+
+class Tally:
+    """Running sums of one scheme."""
+
+    def __init__(self, scene: Scene, budget: Any) -> None:
+        self.scene, self.budget = scene, budget
+        self.cycles, self.square, self.largest, self.final = 0, 0.0, 0.0, 0.0
+        self.diverged = False
+        self.nees: list[float] | None = [0.0]
+        self.outcomes: Counter[str] = Counter()
+        self.pairs: Counter[tuple[int, Any]] = Counter()
+        self.seconds = np.zeros(len(STEPS))
+        count = len(scene.landmarks)
+        self.landmark_square, self.held, self.identified = np.zeros(count), np.zeros(count, int), np.zeros(count, int)
+        self.landmark_final = np.full(count, np.nan)
+        self.overlap = _Overlap()
+        self.map: Any = None
+        self.panel = False
+
+    def add(self, part: Part) -> None:
+        """Count one slice."""
+        scheme, truth = part.scheme, part.motion.position
+        errors = position_errors(scheme.position, truth)
+        self.cycles += len(errors)
+        self.square += float(np.sum(errors**2))
+        self.largest, self.final = max(self.largest, float(errors.max())), float(errors[-1])
+        self.diverged |= has_diverged(errors, None)
+        squares = nees_per_dof(scheme, truth)
+        if squares is None or self.nees is None:
+            self.nees = None
+        else:
+            self.nees[0] += float(np.sum(squares))
+        self.outcomes.update(scheme.outcome)
+        self.seconds += scheme.seconds.sum(axis=0)
+        self.map, self.panel = scheme.map, bool(scheme.levels)
+        self.overlap.add(scheme.position, truth)
+        self._count_landmarks(part)
+        self._count_components(part)
+
+    def scores(self) -> dict[str, Any]:
+        """As `summarise_scheme` gives them."""
+        walls = wall_scores(self.scene, self.map)
+        seconds = dict(zip(STEPS, (self.seconds / self.cycles).tolist(), strict=True))
+        nees = None if self.nees is None else self.nees[0] / self.cycles
+        names = ("accuracy", "precision", "recall")
+        return {
+            "rmse_m": float(np.sqrt(self.square / self.cycles)),
+            "bound_m": None,
+            "over_bound": None,
+            "final_m": self.final,
+            "largest_m": self.largest,
+            "rmse_aligned_m": self.overlap.rmse() if self.cycles > 1 else None,
+            "nees_per_dof": nees if nees is None or np.isfinite(nees) else None,
+            "diverged": self.diverged,
+            "outcomes": dict(sorted(self.outcomes.items())),
+            "landmarks": self._landmarks(),
+            "walls": walls,
+            "ghost_walls": len(self.map.wall_offset) - sum(w["angle_deg"] is not None for w in walls.values()),
+            "map": map_score(self.scene, self.map, panel=self.panel),
+            "association": dict(zip(names, self._association(), strict=True)),
+            "step_seconds": seconds,
+            "over_budget": over_budget(seconds, self.budget),
+            "seconds": float(self.seconds.sum()),
+        }
+
+    def _count_landmarks(self, part: Part) -> None:
+        track = landmark_track(self.scene, part.scheme)
+        self.landmark_square += np.nansum(track.error**2, axis=0)
+        self.held += (track.column >= 0).sum(axis=0)
+        self.landmark_final = track.error[-1]
+        for panel in range(len(self.scene.panels)):
+            number = len(self.scene.scatterers) + panel
+            column = track.column[:, number]
+            rows = np.flatnonzero(column >= 0)
+            self.identified[number] += int(np.sum(part.scheme.named(panel)[rows, column[rows]]))
+
+    def _landmarks(self) -> dict[str, dict[str, Any]]:
+        found: dict[str, dict[str, Any]] = {}
+        for number, name in enumerate(self.scene.landmarks):
+            held, final = int(self.held[number]), float(self.landmark_final[number])
+            found[name] = {
+                "rmse_m": float(np.sqrt(self.landmark_square[number] / held)) if held else None,
+                "final_m": final if np.isfinite(final) else None,
+                "bound_m": None,
+                "cycles_held": held,
+            }
+            if self.scene.panel_number(number) >= 0:
+                found[name]["cycles_identified"] = int(self.identified[number])
+        return found
+
+    def _count_components(self, part: Part) -> None:
+        """How often each label met each landmark or image."""
+        scheme = part.scheme
+        shown = scheme.component_path != NOTHING
+        label = np.maximum(scheme.component_landmark[shown], -1)
+        sources = [*path_sources(part.paths), CLUTTER]
+        met, times = np.unique(np.stack([label, scheme.component_path[shown]]), axis=1, return_counts=True)
+        for (who, path), count in zip(met.T.tolist(), times.tolist(), strict=True):
+            self.pairs[who, sources[path]] += count
+
+    def _association(self) -> tuple[float, float, float]:
+        labels = sorted({label for label, _ in self.pairs})
+        sources = sorted({source for _, source in self.pairs}, key=lambda s: (s is not None, s))
+        counts = np.array([[self.pairs[label, source] for source in sources] for label in labels], dtype=np.int64)
+        identities = np.array([-1 if source is None else n for n, source in enumerate(sources)], dtype=np.int64)
+        return association_fractions(
+            np.array(labels, dtype=np.int64), identities, counts.reshape(len(labels), len(sources))
+        )
+
+
+class _Overlap:
+    """Sums for the error after the best turn about z and shift (see `evaluate.align`)."""
+
+    def __init__(self) -> None:
+        self.count, self.cross = 0, 0j
+        self.sums, self.squares = np.zeros((2, 3)), np.zeros((3, 3))
+        self.origin: Floats | None = None
+
+    def add(self, estimate: Floats, truth: Floats) -> None:
+        """About the first true position, so that little cancels."""
+        self.origin = truth[0].copy() if self.origin is None else self.origin
+        estimate, truth = estimate - self.origin, truth - self.origin
+        self.count += len(truth)
+        self.sums += np.stack([estimate.sum(axis=0), truth.sum(axis=0)])
+        self.squares += np.stack([(estimate**2).sum(axis=0), (truth**2).sum(axis=0), (estimate * truth).sum(axis=0)])
+        self.cross += complex(np.sum(np.conj(_plane(estimate)) * _plane(truth)))
+
+    def rmse(self) -> float:
+        """Root mean square [m] over x, y and z of the aligned positions."""
+        mean = self.sums / self.count
+        overlap = self.cross - self.count * complex(np.conj(_plane(mean[:1])[0]) * _plane(mean[1:])[0])
+        own, true, both = self.squares - self.count * np.stack([mean[0] ** 2, mean[1] ** 2, mean[0] * mean[1]])
+        flat = own[:2].sum() + true[:2].sum() - 2.0 * abs(overlap)
+        upright = own[2] + true[2] - 2.0 * both[2]
+        return float(np.sqrt(max(flat + upright, 0.0) / self.count))
+
+
+def _plane(points: Floats) -> Any:
+    return points[:, 0] + 1j * points[:, 1]

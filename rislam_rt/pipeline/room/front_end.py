@@ -1,0 +1,45 @@
+"""The receiver of a run as it was built, and its calibration before the run."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rislam_rt.measurement import FrontEnd, HardwareConfig, build_front_end, calibrate, capture, receive
+from rislam_rt.measurement.received import direct_gain
+from rislam_rt.model import Body, Paths, Trajectory
+from rislam_rt.pipeline.specification.spec import Settings
+
+
+def prepare_front_end(
+    paths: Paths, motion: Trajectory, body: Body, settings: Settings, *, rng: np.random.Generator
+) -> FrontEnd | None:
+    """The front end that all schemes of a run share; None for an ideal one that is not to be calibrated.
+
+    Parameters
+    ----------
+    paths
+        Along the motion, panel at level 0.
+    body
+        As it is drawn: where the direct path comes from.
+    """
+    if settings.hardware == HardwareConfig():
+        return None
+    build, noise = rng.spawn(2)
+    front_end = build_front_end(settings.hardware, settings.radio, settings.receiver, rng=build)
+    if not settings.hardware.calibration_cycles:
+        return front_end
+    return calibrated(front_end, paths, motion, body, settings, rng=noise)
+
+
+def calibrated(
+    front_end: FrontEnd, paths: Paths, motion: Trajectory, body: Body, settings: Settings, *, rng: np.random.Generator
+) -> FrontEnd:
+    """The front end with its calibration, from a walk of its own over the first cycles with the panel at level 0."""
+    radio, receiver = settings.radio, replace(settings.receiver, alternation=False)
+    recorded = []
+    for cycle in range(min(settings.hardware.calibration_cycles, len(motion))):
+        heard = receive(paths, cycle, float(motion.heading[cycle]), radio, receiver)
+        one, *_ = capture(heard, radio, receiver, front_end, direct_gain(paths, cycle), rng=rng)
+        recorded.append(one.samples)
+    swinging = settings.hardware.agc_std_db > 0.0
+    return front_end._replace(correction=calibrate(recorded, body, radio, receiver, swinging=swinging))

@@ -1,0 +1,1 @@
+"""The scores of a run, and the posterior bounds beside them."""

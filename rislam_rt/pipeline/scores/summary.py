@@ -1,0 +1,254 @@
+"""The scores of a run: agent, each landmark, each wall, for every scheme."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.walls import Walls, build_walls
+from rislam_rt.evaluate import (
+    association_score,
+    gospa,
+    match_points,
+    normalised_squares,
+    position_errors,
+    root_mean_square,
+    trajectory_error,
+)
+from rislam_rt.model import NOTHING, STEPS, MapEstimate, PathKind, Paths, Scene, SchemeResult, SlamResult
+from rislam_rt.pipeline.own_methods import is_own
+from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.pipeline.scores.bound import SchemeBound, scheme_bound, wall_surface
+
+DIVERGED = 0.5
+"""Position error [m] that no run may reach unless the bound is of that size: a fraction of the room."""
+FAR_OVER = 5.0
+"""Error over bound that chance does not explain: five standard deviations even if all error is along one line."""
+NEAR_LANDMARK = 1.0
+"""Distance [m] from a true landmark beyond which an estimate is not held for it."""
+NEAR_WALL = 0.5
+"""RMS distance [m] from a true wall, over its surface, beyond which an estimated plane is not held for it."""
+
+
+Source = tuple[int, int]
+"""Landmark of an image, and its wall next to the landmark; -1 for the landmark itself."""
+
+
+class LandmarkTrack(NamedTuple):
+    """Estimates of the true landmarks over K cycles."""
+
+    error: Floats
+    """(K, N) distance [m] of the estimate that stands for each landmark, NaN where there is none."""
+    column: Integers
+    """(K, N) its column in the scheme's record, -1 where there is none."""
+
+
+def summarise(result: SlamResult) -> dict[str, Any]:
+    """All scores of a run, for JSON."""
+    return {
+        "seed": result.seed,
+        "cycles": len(result.scene.agent),
+        "pipeline": result.name,
+        "scene": result.scene.name,
+        "source": result.paths.source,
+        "trace_seconds": result.seconds.get("trace", 0.0),
+        "warnings": list(result.warnings),
+        "schemes": {name: summarise_scheme(result, scheme) for name, scheme in result.schemes.items()},
+    }
+
+
+def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]:
+    """The scores of one scheme."""
+    scene, truth = result.scene, result.scene.agent.position
+    errors = position_errors(scheme.position, truth)
+    least = run_bound(result, scheme)
+    limit = least.agent if least else None
+    rmse, bound = root_mean_square(errors), None if limit is None else root_mean_square(limit)
+    motion = trajectory_error(scheme.position, truth) if len(truth) > 1 else None
+    squares = nees_per_dof(scheme, truth)
+    nees = None if squares is None else float(np.mean(squares))
+    score = association_score(*component_labels(result.paths, scheme))
+    largest = float(errors.max())
+    walls = wall_scores(scene, scheme.map, least)
+    seconds = dict(zip(STEPS, scheme.seconds.mean(axis=0).tolist(), strict=True))
+    return {
+        "rmse_m": rmse,
+        "bound_m": bound,
+        "over_bound": rmse / bound if bound else None,
+        "final_m": float(errors[-1]),
+        "largest_m": largest,
+        "rmse_aligned_m": motion.rmse_aligned if motion else None,
+        "nees_per_dof": nees if nees is None or np.isfinite(nees) else None,
+        "diverged": has_diverged(errors, limit),
+        "outcomes": {name: scheme.outcome.count(name) for name in sorted(set(scheme.outcome))},
+        "landmarks": landmark_scores(scene, scheme, least),
+        "walls": walls,
+        "ghost_walls": len(scheme.map.wall_offset) - sum(wall["angle_deg"] is not None for wall in walls.values()),
+        "map": map_score(scene, scheme.map, panel=bool(scheme.levels)),
+        "association": {"accuracy": score.accuracy, "precision": score.precision, "recall": score.recall},
+        "step_seconds": seconds,
+        "over_budget": over_budget(seconds, result.config["budget"]),
+        "seconds": float(scheme.seconds.sum()),
+    }
+
+
+def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:
+    """(K,) normalised squared position errors per degree of freedom; None where no axis is filtered."""
+    axes = np.flatnonzero(np.einsum("kii->ki", scheme.covariance[:, :3, :3]).min(axis=0) > 0.0)
+    if not len(axes):
+        return None
+    block = scheme.covariance[:, axes[:, None], axes]
+    return normalised_squares((scheme.position - truth)[:, axes], block) / len(axes)
+
+
+def run_bound(result: SlamResult, scheme: SchemeResult) -> SchemeBound | None:
+    """The posterior bound of agent, landmarks and walls; None where the scheme's name says nothing of it."""
+    if scheme.scheme not in SCHEMES and not is_own(scheme.scheme):
+        return None
+    return scheme_bound(result.scene, result.paths, scheme.gain, scheme.scheme, result.config)
+
+
+def has_diverged(errors: Floats, limit: Floats | None) -> bool:
+    """Whether the error (K,) [m] ever exceeds `DIVERGED`, and `FAR_OVER` times the bound where there is one."""
+    least = DIVERGED if limit is None else np.maximum(DIVERGED, FAR_OVER * limit)
+    return bool((errors > least).any())
+
+
+def map_score(scene: Scene, estimate: MapEstimate, *, panel: bool = True) -> dict[str, Any]:
+    """GOSPA of the last map's points (images left out) against all landmarks, cut off at `NEAR_LANDMARK`, order 2.
+
+    Without a `panel` in the scheme there is none to be found.
+    """
+    points = estimate.position[estimate.parent < 0]
+    truth = scene.landmark_positions if panel else scene.landmark_positions[: len(scene.scatterers)]
+    found = gospa(points, truth, cutoff=NEAR_LANDMARK)
+    names = ("gospa_m", "localisation_m", "missed", "false")
+    return dict(zip(names, found, strict=True))
+
+
+def over_budget(seconds: Mapping[str, float], budget: Mapping[str, float]) -> list[str]:
+    """Names of the steps whose mean time exceeds their share of the cycle."""
+    return [step for step in STEPS if seconds[step] > budget[f"{step}_s"]]
+
+
+def landmark_track(scene: Scene, scheme: SchemeResult) -> LandmarkTrack:
+    """For each true landmark and cycle, the estimated point (not an image) that stands for it, one to one."""
+    truth = scene.landmark_positions
+    error = np.full((len(scheme.position), len(truth)), np.nan)
+    column = np.full(error.shape, -1)
+    points = scheme.held & (scheme.parent < 0)
+    for cycle in range(len(error)):
+        candidates = np.flatnonzero(points[cycle])
+        match = match_points(scheme.landmark_position[cycle, candidates], truth, cutoff=NEAR_LANDMARK)
+        found = np.flatnonzero(match >= 0)
+        column[cycle, found] = candidates[match[found]]
+        where = scheme.landmark_position[cycle, column[cycle, found]]
+        error[cycle, found] = position_errors(where, truth[found])
+    return LandmarkTrack(error, column)
+
+
+def landmark_scores(scene: Scene, scheme: SchemeResult, least: SchemeBound | None = None) -> dict[str, dict[str, Any]]:
+    """Error of each landmark: RMS over the cycles that hold it, and at the end; null where it was never found.
+
+    With its bound at the end, null where nothing was heard of it.
+    """
+    track = landmark_track(scene, scheme)
+    scores: dict[str, dict[str, Any]] = {}
+    for number, name in enumerate(scene.landmarks):
+        error, column = track.error[:, number], track.column[:, number]
+        cycles = np.flatnonzero(column >= 0)
+        entry: dict[str, Any] = {
+            "rmse_m": float(np.sqrt(np.mean(error[cycles] ** 2))) if len(cycles) else None,
+            "final_m": float(error[-1]) if column[-1] >= 0 else None,
+            "bound_m": least.landmarks.get(name) if least else None,
+            "cycles_held": len(cycles),
+        }
+        if (panel := scene.panel_number(number)) >= 0:
+            entry["cycles_identified"] = int(np.sum(scheme.named(panel)[cycles, column[cycles]]))
+        scores[name] = entry
+    return scores
+
+
+def wall_scores(scene: Scene, estimate: MapEstimate, least: SchemeBound | None = None) -> dict[str, dict[str, Any]]:
+    """Each wall of the last map: RMS distance over its true surface, angle, offset at its middle; null if missing.
+
+    With the deviation of the angle, both tilts together, that the map itself reckons with, and the bounds of angle and
+    offset. A wall that no path meets cannot be found: it has no bound, and no plane stands for it.
+    """
+    walls = build_walls(scene)
+    heard = None if least is None else np.array([name in least.walls for name in walls.names], dtype=np.bool_)
+    match = match_walls(walls, estimate, heard)
+    scores: dict[str, dict[str, Any]] = {}
+    for number, name in enumerate(walls.names):
+        row, bound = match[number], least.walls.get(name) if least else None
+        bounds = {
+            "bound_deg": float(np.degrees(bound.angle)) if bound else None,
+            "bound_m": bound.distance if bound else None,
+        }
+        if row < 0:
+            scores[name] = {"rmse_m": None, "angle_deg": None, "offset_m": None, "std_deg": None, **bounds}
+            continue
+        normal, offset = estimate.wall_normal[row], estimate.wall_offset[row]
+        cosine = abs(float(normal @ walls.normal[number]))
+        sine = float(np.linalg.norm(np.cross(normal, walls.normal[number])))
+        middle, _ = wall_surface(walls, number)
+        scores[name] = {
+            "rmse_m": surface_rms(walls, number, normal, offset),
+            "angle_deg": float(np.degrees(np.arctan2(sine, cosine))),
+            "offset_m": abs(float(normal @ middle - offset)),
+            "std_deg": float(np.degrees(np.sqrt(2.0) * estimate.wall_std[row, 0])),
+            **bounds,
+        }
+    return scores
+
+
+def match_walls(walls: Walls, estimate: MapEstimate, heard: Booleans | None = None) -> Integers:
+    """Row (W,) of the estimated plane that stands for each true wall that is `heard` (W,), -1 for none; one to one."""
+    match = np.full(len(walls), -1)
+    asked = np.arange(len(walls)) if heard is None else np.flatnonzero(heard)
+    planes = list(zip(estimate.wall_normal, estimate.wall_offset, strict=True))
+    if not planes or not len(asked):
+        return match
+    cost = np.array([[surface_rms(walls, int(w), n, float(d)) for n, d in planes] for w in asked])
+    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(cost, 10.0 * NEAR_WALL))
+    good = cost[rows, columns] <= NEAR_WALL
+    match[asked[rows[good]]] = columns[good]
+    return match
+
+
+def surface_rms(walls: Walls, number: int, normal: Floats, offset: float) -> float:
+    """RMS distance [m] of a plane from a wall, over the wall's surface.
+
+    The distance is linear in the point: over a triangle its mean square is (sum of squares + square of the sum) / 12.
+    """
+    _, weight = wall_surface(walls, number)
+    distance = walls.triangles[walls.wall_of_triangle == number] @ normal - offset
+    square = (np.sum(distance**2, axis=1) + np.sum(distance, axis=1) ** 2) / 12.0
+    return float(np.sqrt(weight @ square))
+
+
+def component_labels(paths: Paths, scheme: SchemeResult) -> tuple[Integers, Integers]:
+    """What the agent took each component for, and which landmark or image it truly was; -1 for none, in time order.
+
+    As in the map, a path with walls belongs to the image in the wall next to the landmark, on the Rx leg if it has one.
+    """
+    shown = scheme.component_path != NOTHING
+    label = np.maximum(scheme.component_landmark[shown], -1)
+    numbers: dict[Source, int] = {}
+    identity = np.full(paths.num_paths + 1, -1)
+    for path, source in enumerate(path_sources(paths)):
+        if source is not None:
+            identity[path] = numbers.setdefault(source, len(numbers))
+    return label, identity[scheme.component_path[shown]]
+
+
+def path_sources(paths: Paths) -> list[Source | None]:
+    """(P,) landmark and wall of the image that each path comes from; None for LOS and wall returns."""
+    found: list[Source | None] = []
+    for path in range(paths.num_paths):
+        kind, landmark, tx, rx = paths.identity(path)
+        wall = rx[0] if rx else tx[-1] if tx else -1
+        found.append(None if kind in (PathKind.LOS, PathKind.VT) else (landmark, wall))
+    return found

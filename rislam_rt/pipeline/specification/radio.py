@@ -1,0 +1,119 @@
+"""The table `[radio]` of a pipeline file, and the radio that it becomes."""
+
+from typing import Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from rislam_rt.measurement import with_reference_snr
+from rislam_rt.model import Antennas, RadioConfig, RxArray
+from rislam_rt.pipeline.specification.section import Carrier, Decibel, Positive, Section, Side
+
+Pattern = Literal["iso", "dipole", "hw_dipole", "tr38901"]
+Polarization = Literal["V", "H"]
+
+
+class ArraySection(Section):
+    """The Rx array."""
+
+    rows: Side = 4
+    """Antennas along the body's x axis, forward."""
+    cols: Side = 4
+    """Antennas along the body's y axis."""
+    spacing_wavelengths: Positive = 0.5
+    """Between neighbours, in wavelengths of the carrier."""
+    pattern: Literal["upper", "isotropic"] = "upper"
+    """`upper` hears nothing from below the array's plane."""
+
+
+class RadioSection(Section):
+    """The radio. The noise is given by what it does to the paper's sphere at 3 m, or by its density."""
+
+    carrier_ghz: Carrier = 10.0
+    """Carrier frequency."""
+    bandwidth_ghz: Positive = 1.0
+    """Of a flat band; delays are resolved to its inverse."""
+    tx_gain_db: Decibel = 0.0
+    """Of the transmit antenna in all directions, besides what its pattern says."""
+    rx_gain_db: Decibel = 0.0
+    """Of each receive antenna in all directions where the array hears, besides what its pattern says."""
+    tx_pattern: Pattern = "iso"
+    """Of the transmit antenna: isotropic, short or half-wave dipole (upright), sector of 3GPP TR 38.901 (ahead)."""
+    rx_pattern: Pattern = "iso"
+    """Of each receive antenna; `radio.array.pattern` may make it blind below, besides."""
+    tx_polarization: Polarization = "V"
+    """Of the transmit antenna: vertical or horizontal."""
+    rx_polarization: Polarization | None = None
+    """Of the receive antennas; as the transmit antenna's if not given. A crossed link hears what slabs have turned."""
+    energy_j: Positive = 1.0
+    """Of one sounding; SNR follows from its ratio to the noise."""
+    power_dbm: Decibel | None = None
+    """Transmit power, instead of the energy: that is then power times `sounding_s`. Needs `noise_psd`."""
+    sounding_s: Positive | None = None
+    """Duration of one sounding, with `power_dbm`."""
+    reference_snr_db: Decibel | None = None
+    """SNR of the paper's sphere 3 m away, integrated over the signal and over all antennas; 13 if nothing is given."""
+    noise_psd: Positive | None = None
+    """N0 [W/Hz], instead."""
+    array: ArraySection = ArraySection()
+
+    @model_validator(mode="after")
+    def _one_noise(self) -> "RadioSection":
+        if self.reference_snr_db is not None and self.noise_psd is not None:
+            raise ValueError("give 'reference_snr_db' or 'noise_psd', not both")
+        return self
+
+    @model_validator(mode="after")
+    def _one_energy(self) -> "RadioSection":
+        if self.power_dbm is None and self.sounding_s is None:
+            return self
+        if self.power_dbm is None or self.sounding_s is None:
+            raise ValueError("give 'power_dbm' and 'sounding_s' together: energy is power times duration")
+        if "energy_j" in self.model_fields_set and self.energy_j != RadioSection.model_fields["energy_j"].default:
+            raise ValueError("give 'energy_j' or 'power_dbm', not both")
+        if self.noise_psd is None:
+            raise ValueError(
+                "power_dbm: a reference SNR sets the noise by the energy, whatever that is; give 'noise_psd'"
+            )
+        return self
+
+    @property
+    def energy(self) -> float:
+        """[J] of one sounding."""
+        if self.power_dbm is None or self.sounding_s is None:
+            return self.energy_j
+        return 1e-3 * linear(self.power_dbm) * self.sounding_s
+
+    @property
+    def antennas(self) -> Antennas:
+        """Pattern and polarisation of either end."""
+        return Antennas(self.tx_pattern, self.rx_pattern, self.tx_polarization, self.rx_polarization or "")
+
+
+def build_radio(section: RadioSection) -> RadioConfig:
+    """The radio in SI units and linear ratios.
+
+    Raises
+    ------
+    ConfigError
+        A value is out of the range that the record itself checks.
+    """
+    array = RxArray(section.array.rows, section.array.cols, section.array.spacing_wavelengths, section.array.pattern)
+    radio = RadioConfig(
+        carrier=section.carrier_ghz * 1e9,
+        bandwidth=section.bandwidth_ghz * 1e9,
+        tx_gain=linear(section.tx_gain_db),
+        rx_gain=linear(section.rx_gain_db),
+        energy=section.energy,
+        array=array,
+        antennas=section.antennas,
+        **({} if section.noise_psd is None else {"noise_psd": section.noise_psd}),
+    )
+    if section.noise_psd is None:
+        radio = with_reference_snr(radio, 13.0 if section.reference_snr_db is None else section.reference_snr_db)
+    return radio
+
+
+def linear(decibel: float) -> float:
+    """A power ratio."""
+    return float(np.power(10.0, decibel / 10.0))

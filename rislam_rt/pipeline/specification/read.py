@@ -1,0 +1,227 @@
+"""Read a pipeline file, with settings of the command line put over it."""
+
+from collections.abc import Callable, Sequence
+from copy import deepcopy
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from rislam_rt.errors import ConfigError
+from rislam_rt.model import RadioConfig
+from rislam_rt.pipeline.specification.radio import RadioSection, build_radio
+from rislam_rt.pipeline.specification.section import Section
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.shipped import shipped_pipelines
+from rislam_rt.toml import MAX_LEVELS, parse_toml
+
+MAX_BYTES = 1_000_000
+"""A pipeline file is written by people; anything larger is another file by mistake."""
+
+EITHER = (("radio", "reference_snr_db", "noise_psd"),)
+"""Section, and the keys in it of which one alone may be given."""
+
+Spec = TypeVar("Spec", bound=BaseModel)
+
+
+class Table(NamedTuple):
+    """What a pipeline file and the command line say, not yet looked at."""
+
+    path: Path
+    content: dict[str, Any]
+    changed: tuple[str, ...]
+    """Keys that the command line set."""
+    sweep: dict[str, Any] | None = None
+    """The table `[sweep]`, which is no part of the experiment itself."""
+
+
+def load_spec(path: str | Path, overrides: Sequence[str] = ()) -> PipelineSpec:
+    """The specification of a file, `key=value` settings (dotted keys) put over it first.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read or is not TOML; a key is unknown, a value of the wrong type or out of range. One line.
+    """
+    return build_spec(read_table(path, overrides), PipelineSpec, build_settings)
+
+
+class RadioSpec(Section):
+    """What a command may set that knows no more of a pipeline than its radio."""
+
+    radio: RadioSection = RadioSection()
+
+
+def load_radio(overrides: Sequence[str]) -> RadioConfig:
+    """The usual radio, with `radio.key=value` settings put over it.
+
+    Raises
+    ------
+    ConfigError
+        A key is unknown, a value of the wrong type or out of range. One line.
+    """
+    if not overrides:
+        return RadioConfig()
+    return build_radio(build_spec(settings_table(overrides, {}), RadioSpec, lambda spec: build_radio(spec.radio)).radio)
+
+
+def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
+    """A pipeline file of any kind, `key=value` settings (dotted keys) put over it.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read or is not TOML; a setting has no such form.
+    """
+    path = Path(path)
+    content = _read_toml(path)
+    changed = tuple(_override(content, setting) for setting in overrides)
+    _make_way(content, changed)
+    return Table(path, content, changed, content.pop("sweep", None))
+
+
+def make_way(table: Table, keys: Sequence[str]) -> None:
+    """Take out of a table what excludes one of some keys (dotted) that are to be set later, unless the command line set
+    it: then it is a contradiction, and stays one."""
+    for section, *names in EITHER:
+        if any(f"{section}.{name}" in keys for name in names):
+            for name in names:
+                if f"{section}.{name}" not in (*keys, *table.changed) and section in table.content:
+                    table.content[section].pop(name, None)
+
+
+def settings_table(overrides: Sequence[str], defaults: dict[str, Any]) -> Table:
+    """A table of `key=value` settings (dotted keys) alone, put over defaults.
+
+    Raises
+    ------
+    ConfigError
+        A setting has no such form.
+    """
+    content = deepcopy(defaults)
+    return Table(Path("--set"), content, tuple(_override(content, setting) for setting in overrides))
+
+
+def build_spec(table: Table, model: type[Spec], check: Callable[[Spec], object]) -> Spec:
+    """The table as a specification; `check` tries what it becomes, with errors that begin with the field.
+
+    Raises
+    ------
+    ConfigError
+        A key is unknown, a value of the wrong type or out of range. A line for each that names file and field.
+    """
+    path, content, changed = table.path, table.content, table.changed
+    try:
+        spec = model.model_validate(content)
+    except ValidationError as error:
+        items = error.errors(include_url=False, include_context=False)
+        items = [item for item in items if item["loc"] == ("kind",)] or items  # a file of another kind has other keys
+        raise ConfigError(
+            *(f"{_source(path, _place(item), changed)}: {_remark(item, model)}" for item in items)
+        ) from None
+    try:
+        check(spec)
+    except ConfigError as error:
+        raise ConfigError(f"{_source(path, str(error).partition(':')[0], changed)}: {error}") from None
+    return spec
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: no such pipeline file; {_near_pipeline(path)}") from None
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}); give a pipeline file in TOML") from None
+    if len(content) > MAX_BYTES:
+        raise ConfigError(f"{path}: more than {MAX_BYTES} bytes; give a pipeline file in TOML")
+    try:
+        return parse_toml(content.decode("utf-8"))
+    except ValueError as error:
+        cause = " ".join(str(error).split())[:120]
+        raise ConfigError(f"{path}: not valid TOML ({cause}); mend that place") from None
+
+
+def _near_pipeline(path: Path) -> str:
+    known = shipped_pipelines()
+    near = get_close_matches(path.stem, known, n=1)
+    return f"did you mean '{near[0]}'?" if near else f"give one, or a built-in one: {', '.join(known)}"
+
+
+def _override(table: dict[str, Any], setting: str) -> str:
+    """Put one `key=value` into the table; returns the key."""
+    key, equals, text = setting.partition("=")
+    parts = key.strip().split(".")
+    if not equals or len(parts) > MAX_LEVELS or not all(part.isidentifier() for part in parts):
+        raise ConfigError(f"--set {setting[:80]!r}: not of the form key=value; give e.g. --set radio.bandwidth_ghz=0.5")
+    for part in parts[:-1]:
+        table = table.setdefault(part, {})
+        if not isinstance(table, dict):
+            raise ConfigError(f"--set {setting[:80]!r}: '{part}' is not a section; mend the key")
+    table[parts[-1]] = _value(text.strip())
+    return ".".join(parts)
+
+
+def _make_way(table: dict[str, Any], changed: Sequence[str]) -> None:
+    """Of two keys that exclude each other, the file's goes where the command line set the other."""
+    for section, *keys in EITHER:
+        given = [key for key in keys if f"{section}.{key}" in changed]
+        if len(given) == 1:
+            for key in set(keys) - set(given):
+                table[section].pop(key, None)
+
+
+def _value(text: str) -> Any:
+    """A TOML value, or the text itself (so that strings need no quotes)."""
+    try:
+        return parse_toml(f"value = {text}")["value"]
+    except (ValueError, KeyError):
+        return text
+
+
+def _source(path: Path, place: str, changed: Sequence[str]) -> str:
+    """The command line if it set the field at fault, else the file."""
+    return "--set" if any(place == key or place.startswith((f"{key}.", f"{key}[")) for key in changed) else str(path)
+
+
+def _place(item: Any) -> str:
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"]).lstrip(".")[:100]
+
+
+def _remark(item: Any, model: type[BaseModel]) -> str:
+    """One bad field: where, what was received, how to mend it."""
+    place = _place(item)
+    if item["type"] == "missing":
+        return f"{place}: missing; add it"
+    if item["type"] == "extra_forbidden":
+        near = _near_key([str(part) for part in item["loc"]], model)
+        return f"{place}: unknown key; " + (f"did you mean '{near}'?" if near else "remove it or mend its name")
+    message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
+    if isinstance(item["input"], dict):
+        return f"{place}: {message}" if place else message
+    return f"{place}: {str(item['input'])[:60]!r} received; {message[:1].lower()}{message[1:]}"
+
+
+def _near_key(words: list[str], model: type[BaseModel]) -> str | None:
+    """What an unknown key was meant to be: one of the same table, or else the key of that name of another."""
+    keys = _keys(model)
+    table = ".".join(word for word in words[:-1] if not word.isdigit())
+    own = [key.rpartition(".")[2] for key in keys if key.rpartition(".")[0] == table]
+    near = get_close_matches(words[-1], own, n=1)
+    if near:
+        return near[0]
+    names = {key.rpartition(".")[2]: key for key in reversed(keys)}  # of several tables the first
+    return names.get(words[-1])
+
+
+def _keys(section: type[BaseModel], above: str = "") -> list[str]:
+    """Every key of a section and of those below it, dotted."""
+    keys = []
+    for name, field in section.model_fields.items():
+        keys.append(f"{above}{name}")
+        for part in (field.annotation, *get_args(field.annotation)):
+            if isinstance(part, type) and issubclass(part, BaseModel):
+                keys += _keys(part, f"{above}{name}.")
+    return keys

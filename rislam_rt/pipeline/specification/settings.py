@@ -1,0 +1,230 @@
+"""Every setting of a pipeline, asked of the typed models themselves: default, unit, range, meaning."""
+
+import ast
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import is_dataclass, replace
+from difflib import get_close_matches
+from functools import cache
+from typing import Any, Literal, NamedTuple, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from rislam_rt.errors import ConfigError
+from rislam_rt.pipeline.specification.section import Choices
+from rislam_rt.pipeline.specification.spec import RECORDS
+
+UNITS = {
+    "_m_s2": "m/s^2",
+    "_m_s": "m/s",
+    "_bits_s": "bit/s",
+    "_ns_s": "ns/s",
+    "_ghz": "GHz",
+    "_db": "dB",
+    "_deg": "degrees",
+    "_ns": "ns",
+    "_s": "s",
+    "_m": "m",
+    "_j": "J",
+    "_wavelengths": "wavelengths",
+}
+"""Units by the suffix of a name; the longest that fits. A name without one has its unit in its meaning."""
+
+LARGEST = 2.0**40
+"""Up to here the edge of a range is looked for; beyond, a number counts as unlimited."""
+
+BISECTIONS = 120
+"""Halvings of the interval from a value to `LARGEST`: more than doubles can tell apart."""
+
+
+class Setting(NamedTuple):
+    """One setting of a pipeline file."""
+
+    key: str
+    """Dotted."""
+    default: Any
+    required: bool
+    kind: str
+    """Type in plain words."""
+    allowed: str
+    """Range or choices; empty if everything of its kind is allowed."""
+    unit: str
+    meaning: str
+
+
+def list_settings(model: type[BaseModel], prefix: str = "") -> list[Setting]:
+    """All settings of a specification, those of its tables after its own, in the order of the model."""
+    plain, tables = [], []
+    for name, field in model.model_fields.items():
+        below = field.annotation
+        if isinstance(below, type) and issubclass(below, BaseModel):
+            tables += list_settings(below, f"{prefix}{name}.")
+        else:
+            plain.append(_setting(model, name, field, prefix))
+    return plain + tables
+
+
+def explain(settings: list[Setting], key: str) -> Setting:
+    """The setting of that key, or of the only key that ends with it.
+
+    Raises
+    ------
+    ConfigError
+        There is none, or several.
+    """
+    found = [one for one in settings if one.key == key or one.key.endswith(f".{key}")]
+    if len(found) == 1 or any(one.key == key for one in found):
+        return next((one for one in found if one.key == key), found[0])
+    if found:
+        raise ConfigError(
+            f"--explain {key}: several settings end so; give one of {', '.join(one.key for one in found)}"
+        )
+    raise ConfigError(f"--explain {key[:80]}: no such setting; {_near(key, [one.key for one in settings])}")
+
+
+def _near(key: str, keys: list[str]) -> str:
+    near = get_close_matches(key, keys, n=3, cutoff=0.5) or [
+        one for one in keys if get_close_matches(key.rpartition(".")[2], [one.rpartition(".")[2]], cutoff=0.6)
+    ]
+    return f"did you mean {' or '.join(near[:3])}?" if near else "`rislam-rt config` lists them all"
+
+
+def _setting(model: type[BaseModel], name: str, field: FieldInfo, prefix: str) -> Setting:
+    owner, record = _owner(model, name)
+    meaning = _meanings(record or owner).get(name, "")
+    unit = next((unit for suffix, unit in UNITS.items() if name.endswith(suffix)), "")
+    default = None if field.is_required() else field.get_default(call_default_factory=True)
+    allowed = _of_constraints(field) or (_of_record(record, name) if record else "")
+    return Setting(f"{prefix}{name}", default, field.is_required(), _kind(field.annotation), allowed, unit, meaning)
+
+
+def _owner(model: type[BaseModel], name: str) -> tuple[type, type | None]:
+    """The class that declares the field, and the record behind it."""
+    owner = next(part for part in model.__mro__ if name in inspect.get_annotations(part))
+    return owner, RECORDS.get(owner)
+
+
+@cache
+def _meanings(declared: type) -> dict[str, str]:
+    """The docstrings under a class's fields, in one line each, by name."""
+    body = _classes(declared.__module__)[declared.__name__]
+    found = {}
+    for field, doc in zip(body.body, body.body[1:], strict=False):
+        if isinstance(field, ast.AnnAssign) and isinstance(doc, ast.Expr) and isinstance(doc.value, ast.Constant):
+            assert isinstance(field.target, ast.Name)
+            found[field.target.id] = " ".join(str(doc.value.value).split())
+    return found
+
+
+@cache
+def _classes(module: str) -> dict[str, ast.ClassDef]:
+    """A module's classes as they stand in its file, by name."""
+    body = ast.parse(inspect.getsource(sys.modules[module])).body
+    return {node.name: node for node in body if isinstance(node, ast.ClassDef)}
+
+
+def _kind(annotation: Any) -> str:
+    names = {int: "whole number", float: "number", bool: "true or false", str: "text"}
+    if annotation in names:
+        return names[annotation]
+    origin, args = get_origin(annotation), get_args(annotation)
+    if origin is Literal:
+        return "text" if isinstance(args[0], str) else "number"
+    if origin in (list, tuple):
+        return "list"
+    if origin is dict:
+        return "table"
+    inner = [_kind(arg) for arg in args if arg is not type(None) and not isinstance(arg, FieldInfo)]
+    return inner[0] if inner else "table"
+
+
+def _of_constraints(field: FieldInfo) -> str:
+    """What a field's type says of its values."""
+    metadata = [*field.metadata, *_inner_metadata(field.annotation)]
+    choices = list(_choices(field.annotation)) + [name for m in metadata if isinstance(m, Choices) for name in m.names]
+    if choices:
+        return "one of " + ", ".join(map(str, choices))
+    words = {Ge: "at least", Gt: "above", Le: "at most", Lt: "below"}
+    return ", ".join(
+        f"{word} {_short(getattr(item, kind.__name__.lower()))}"
+        for kind, word in words.items()
+        for item in metadata
+        if isinstance(item, kind)
+    )
+
+
+def _choices(annotation: Any) -> Iterator[Any]:
+    if get_origin(annotation) is Literal:
+        yield from get_args(annotation)
+    else:
+        for part in get_args(annotation):
+            yield from _choices(part)
+
+
+def _inner_metadata(annotation: Any) -> Iterator[Any]:
+    """Constraints inside an optional or a list."""
+    for part in get_args(annotation):
+        for item in getattr(part, "__metadata__", ()):
+            yield from getattr(item, "metadata", ()) if isinstance(item, FieldInfo) else (item,)
+
+
+def _of_record(record: type, name: str) -> str:
+    """What a record that checks itself lets pass, the other settings at their defaults: found by trying."""
+    standard = record()
+    assert is_dataclass(standard)
+    assert not isinstance(standard, type)
+    value = getattr(standard, name)
+
+    def passes(tried: Any) -> bool:
+        try:
+            replace(standard, **{name: tried})
+        except ConfigError:
+            return False
+        return True
+
+    if isinstance(value, bool):
+        return ""
+    if isinstance(value, str):
+        try:
+            replace(standard, **{name: "?"})
+        except ConfigError as error:
+            return re.sub(r"^.*; give (one of )?", "one of ", str(error)).replace(" or ", ", ").replace("'", "")
+        return ""
+    if isinstance(value, int | float):
+        whole = isinstance(value, int)
+        return ", ".join(part for part in (_edge(passes, value, -1, whole), _edge(passes, value, 1, whole)) if part)
+    return ""
+
+
+def _edge(passes: Callable[[Any], bool], inside: float, sign: int, whole: bool) -> str:
+    """The end of the range on one side of a value that passes, by bisection; empty if there is none."""
+    outside: float = sign * (int(LARGEST) if whole else LARGEST)
+    step = 1 if whole else 1e-9
+    if passes(outside):
+        return ""
+    for landmark in (0, 1):  # most ranges end here, open or closed, and bisection would not tell which
+        beyond = [passes(landmark + sign * step * steps) for steps in (1, 2)]
+        if (landmark - inside) * sign >= 0 and not any(beyond):
+            if passes(landmark):
+                return f"{_word(sign)} {landmark}"
+            if not whole and passes(landmark - sign * step):
+                return f"{'above' if sign < 0 else 'below'} {landmark}"
+    for _ in range(BISECTIONS):
+        middle = (inside + outside) // 2 if whole else (inside + outside) / 2
+        good = passes(middle) or (whole and passes(middle - sign))  # a range may hold even numbers alone
+        inside, outside = (middle, outside) if good else (inside, middle)
+    if whole and not passes(inside):
+        inside -= sign
+    return f"{_word(sign)} {_short(inside)}"
+
+
+def _word(sign: int) -> str:
+    return "at least" if sign < 0 else "at most"
+
+
+def _short(value: float) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,332 @@
+"""Experiment specifications: what a pipeline file may say, and the settings that it becomes."""
+
+from dataclasses import fields
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import AfterValidator, Field, create_model, model_validator
+
+from rislam_rt.design import DESIGNERS, DesignConfig
+from rislam_rt.errors import ConfigError
+from rislam_rt.measurement import HardwareConfig, ReceiverConfig, build_sensor
+from rislam_rt.model import RadioConfig, SensorModel
+from rislam_rt.pipeline.own_methods import is_own
+from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
+from rislam_rt.pipeline.specification.extras import ExtrasSection
+from rislam_rt.pipeline.specification.mistold import ToldSection
+from rislam_rt.pipeline.specification.radio import RadioSection, build_radio, linear
+from rislam_rt.pipeline.specification.section import (
+    Choices,
+    Count,
+    Decibel,
+    Name,
+    NotNegative,
+    Positive,
+    Probability,
+    Section,
+    Wide,
+)
+from rislam_rt.ris import PanelTolerance
+from rislam_rt.slam import SlamConfig
+from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
+from rislam_rt.slam.schemes.channel_slam import ChannelSlamConfig
+
+RECORDS: dict[type, type] = {}
+"""The records behind the sections that are made of one."""
+
+
+def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()) -> Any:
+    """A section with the fields, types and defaults of a frozen record of scalars, which checks its own ranges."""
+    kinds: dict[str, Any] = {f.name: (f.type, f.default) for f in fields(record) if f.name not in without}
+    section = create_model(name, __base__=Section, __doc__=doc, **kinds)
+    RECORDS[section] = record
+    return section
+
+
+_Filter = _section("_Filter", SlamConfig, "Fields of `SlamConfig`.")
+_Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.", without=("slot", "panels"))
+_BpSlam = _section("_BpSlam", BpSlamConfig, "Fields of `BpSlamConfig`.")
+_ChannelSlam = _section("_ChannelSlam", ChannelSlamConfig, "Fields of `ChannelSlamConfig`.")
+_Designers = _section("_Designers", DesignConfig, "Fields of `DesignConfig`.", without=("certify",))
+
+
+_Hardware = _section("_Hardware", HardwareConfig, "Fields of `HardwareConfig`.")
+
+
+class SlamSection(_Filter):  # type: ignore[misc, valid-type]
+    """The filter's settings, SI units."""
+
+
+class BpSlamSection(_BpSlam):  # type: ignore[misc, valid-type]
+    """Settings of the scheme `bp_slam`, SI units."""
+
+
+class ChannelSlamSection(_ChannelSlam):  # type: ignore[misc, valid-type]
+    """Settings of the scheme `channel_slam`, SI units."""
+
+
+class ReceiverSection(_Receiver):  # type: ignore[misc, valid-type]
+    """The receiver's settings, SI units; its slot is `budget.measure_s`, its panels the room's."""
+
+
+class HardwareSection(_Hardware):  # type: ignore[misc, valid-type]
+    """What the real front end does wrong (`receiver.estimator = "waveform"`); an ideal one by default."""
+
+
+def _check_channel(name: str) -> str:
+    if name not in CHANNELS and not is_own(name):
+        raise ValueError(f"give one of {', '.join(CHANNELS)}, or module:Class of your own")
+    return name
+
+
+CHANNELS = ("traced", "image_source")
+SchemeName = Annotated[str, AfterValidator(check_scheme), Choices(SCHEMES)]
+ChannelName = Annotated[str, AfterValidator(_check_channel), Choices(CHANNELS)]
+
+
+class DesignerSection(_Designers):  # type: ignore[misc, valid-type]
+    """A designer and its settings."""
+
+    method: Literal[tuple(DESIGNERS)] = "genetic"  # type: ignore[valid-type]
+    """Designer of the codes: the paper's genetic algorithm, the exact single-target optimum, coordinate descent, ..."""
+
+
+class DesignSection(DesignerSection):
+    """How the scheme `optimized` chooses codes."""
+
+    samples: Annotated[int, Field(ge=1, le=10_000)] = 4
+    """Positions of the belief over which the objective is averaged; 1 designs on the mean."""
+    landmark_uncertainty: bool = False
+    """Whether each landmark's covariance discounts its path."""
+    gradient: Literal["exact", "paper", "appendix"] = "exact"
+    """How the design holds a path's length to change with the agent; the last two are the paper's."""
+    least_snr_db: Decibel | None = None
+    """SNR over all antennas at which the receiver detects a path every other time, for a design that knows what will be
+    missed; the paper's objective counts the information of every path."""
+
+    @property
+    def least_snr(self) -> float:
+        """Linear; 0 if there is none."""
+        return 0.0 if self.least_snr_db is None else linear(self.least_snr_db)
+
+
+class BudgetSection(Section):
+    """Time [s] of the cycle's four steps; together they are the scene's cycle."""
+
+    optimise_s: NotNegative = 0.04
+    """To design the code."""
+    communicate_s: NotNegative = 0.01
+    """To send it to the panel's controller."""
+    measure_s: NotNegative = 0.01
+    """To sound the channel."""
+    localise_s: NotNegative = 0.04
+    """To localise and map."""
+
+
+class ControlSection(Section):
+    """The message that carries a code to the panel's controller."""
+
+    levels: Annotated[int, Field(ge=2, le=65536)] | None = None
+    """Phase levels that the message can name, a divisor of the panel's; all of them by default."""
+    rate_bits_s: Positive = 1e6
+    """Of the link to the controller."""
+    loss_probability: Probability = 0.0
+    """Probability that a message is lost; the panel then keeps its code and the agent does not know."""
+    delay_cycles: Annotated[int, Field(ge=0, le=1000)] = 0
+    """Cycles from sending to effect, known to the agent."""
+
+
+class StartSection(Section):
+    """What the agent is told of its start: the truth plus one draw of these errors."""
+
+    position_std_m: Wide = 0.01
+    """Of each coordinate of the start."""
+    velocity_std_m_s: Wide = 0.01
+    """Of each component of the first velocity."""
+    heading_std_deg: NotNegative = 0.0
+    """Where the heading is estimated."""
+
+
+class MotionSection(Section):
+    """How the true motion departs from the scene's trajectory."""
+
+    sigma_a_m_s2: NotNegative = 0.0
+    """White acceleration in the horizontal plane, drawn anew for every seed (see `pipeline.room`); 0 leaves the
+    trajectory as it is. Estimators whose own `sigma_a` is not given are told this one."""
+
+
+class PanelSection(Section):
+    """What the real panel does wrong; the agent knows nothing of it."""
+
+    amplitude_std: NotNegative = 0.0
+    """Of an element's amplitude, relative."""
+    phase_std_deg: NotNegative = 0.0
+    """Of an element's phase."""
+    dead: Probability = 0.0
+    """Probability that an element reflects nothing."""
+    stuck: Probability = 0.0
+    """Probability that an element stays at a level of its own."""
+    bit_flip: Probability = 0.0
+    """Probability that a bit of a message arrives turned over."""
+
+    @property
+    def tolerance(self) -> PanelTolerance:
+        """In radians."""
+        return PanelTolerance(self.amplitude_std, float(np.radians(self.phase_std_deg)), self.dead, self.stuck)
+
+
+class RoomSection(Section):
+    """What of the scene is replaced; nothing by default."""
+
+    panel_rows: Annotated[int, Field(ge=1, le=256)] | None = None
+    """Rows of elements."""
+    panel_cols: Annotated[int, Field(ge=1, le=256)] | None = None
+    """Columns of elements. The spacing of the elements and the panel's centre stay as they are."""
+    panel_levels: Annotated[int, Field(ge=2, le=65536)] | None = None
+    """Phase levels of an element."""
+    scatterers: Annotated[int, Field(ge=0, le=100)] | None = None
+    """Their number: the scene's first ones, and then spheres at places drawn for every seed (`pipeline.room`)."""
+    scattering: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
+    """Share of the reflected field that every wall scatters: what it reflects like a mirror is weaker for it."""
+
+
+class PipelineSpec(Section):
+    """A whole pipeline file of the main job."""
+
+    kind: Literal["slam"] = "slam"
+    """What the file is: the main job."""
+    name: Name
+    """Of run folders and pages."""
+    description: str = ""
+    """For readers alone."""
+    scene: str | None = None
+    """Scene folder, relative to the pipeline file; `--scene` comes first."""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 7
+    """Of every random draw; the same seed gives the same result."""
+    cycles: Count | None = None
+    """Only the first so many cycles of the scene's trajectory; all of them by default."""
+    channel: ChannelName = "traced"
+    """Ray tracer, exact image sources, or `module:Class` of one's own."""
+    depth: Annotated[int, Field(ge=0, le=4)] = 2
+    """Largest number of wall bounces on a path, both legs together."""
+    schemes: list[SchemeName] = Field(default=["optimized", "random"], min_length=1)
+    """What is compared: who chooses the panel's codes, and who estimates; under the same motion, channel and noise.
+    Also `module:function`, a designer or an estimator of one's own."""
+    radio: RadioSection = RadioSection()
+    receiver: ReceiverSection = ReceiverSection()
+    hardware: HardwareSection = HardwareSection()
+    design: DesignSection = DesignSection()
+    budget: BudgetSection = BudgetSection()
+    control: ControlSection = ControlSection()
+    room: RoomSection = RoomSection()
+    extras: ExtrasSection = ExtrasSection()
+    panel: PanelSection = PanelSection()
+    motion: MotionSection = MotionSection()
+    start: StartSection = StartSection()
+    told: ToldSection = ToldSection()
+    slam: SlamSection = SlamSection()
+    bp_slam: BpSlamSection = BpSlamSection()
+    channel_slam: ChannelSlamSection = ChannelSlamSection()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _tell_all_estimators(cls, content: Any) -> Any:
+        """What no file says of one estimator is as for the others: process noise and what is known of the height."""
+        return share_settings(content) if isinstance(content, dict) else content
+
+    @model_validator(mode="after")
+    def _each_scheme_once(self) -> "PipelineSpec":
+        if len(set(self.schemes)) < len(self.schemes):
+            raise ValueError("schemes: each at most once")
+        return self
+
+    @model_validator(mode="after")
+    def _antennas_told(self) -> "PipelineSpec":
+        if not self.radio.antennas.plain and not self.told.antennas:
+            raise ValueError(
+                "radio.tx_pattern, rx_pattern, *_polarization: others than isotropic and vertical ones received, which "
+                "no estimator can be told of; give told.antennas = 'iso' to have them reckon with isotropic ones"
+            )
+        if not self.radio.antennas.plain and self.extras.wanted:
+            raise ValueError("extras: traced between isotropic, vertical antennas alone; leave out [extras] or those")
+        return self
+
+
+ESTIMATOR_SECTIONS = ("bp_slam", "channel_slam")
+"""Sections of the estimators that are not the project's own."""
+
+
+def share_settings(content: dict[str, Any]) -> dict[str, Any]:
+    """The content of a file with `sigma_a` and `height` handed on to every estimator that is not told its own.
+
+    The motion's acceleration goes to the filter, and the filter's to the others. What is not a table is left for the
+    validation to complain about.
+    """
+    motion, slam = content.get("motion", {}), content.get("slam", {})
+    if not isinstance(motion, dict) or not isinstance(slam, dict):
+        return content
+    told = {"sigma_a": motion.get("sigma_a_m_s2") or _Filter.model_fields["sigma_a"].default}
+    slam = {**told, **slam}
+    shared = {"sigma_a": slam["sigma_a"], "height": slam.get("height", _Filter.model_fields["height"].default)}
+    found = {**content, "slam": slam}
+    for name in ESTIMATOR_SECTIONS:
+        section = content.get(name, {})
+        found[name] = {**shared, **section} if isinstance(section, dict) else section
+    return found
+
+
+class Settings(NamedTuple):
+    """The records that the parts of a run take, made from a specification."""
+
+    radio: RadioConfig
+    receiver: ReceiverConfig
+    slam: SlamConfig
+    design: DesignConfig
+    bp_slam: BpSlamConfig
+    channel_slam: ChannelSlamConfig
+    sensor: SensorModel
+    """What the estimators are told of the receiver."""
+    hardware: HardwareConfig
+    """What the front end does wrong."""
+
+
+def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
+    """Radio, receiver and filter settings in SI units and linear ratios, in a room of so many panels.
+
+    Raises
+    ------
+    ConfigError
+        A value is out of the range that the record itself checks.
+    """
+    own = {"slot": spec.budget.measure_s, "panels": panels}
+    radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump() | own)
+    return Settings(
+        radio,
+        receiver,
+        SlamConfig(**spec.slam.model_dump()),
+        build_design(spec.design),
+        BpSlamConfig(**spec.bp_slam.model_dump()),
+        ChannelSlamConfig(**spec.channel_slam.model_dump()),
+        build_sensor(radio, receiver),
+        _build_hardware(spec.hardware, receiver),
+    )
+
+
+def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> HardwareConfig:
+    hardware = HardwareConfig(**section.model_dump())
+    if receiver.estimator != "waveform" and hardware != HardwareConfig():
+        raise ConfigError(
+            f"hardware: set, with receiver.estimator '{receiver.estimator}', which has no front end; give 'waveform'"
+        )
+    return hardware
+
+
+def build_design(section: DesignerSection) -> DesignConfig:
+    """The designer's settings; no certificate, which takes longer than a cycle has.
+
+    Raises
+    ------
+    ConfigError
+        A value is out of the range that the record itself checks.
+    """
+    return DesignConfig(**{name: getattr(section, name) for name in _Designers.model_fields}, certify=False)

@@ -1,0 +1,94 @@
+"""What decides a run's numbers, and the name that its folder has from it."""
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rislam_rt.model import Scene
+from rislam_rt.pipeline.own_methods import own_digests
+from rislam_rt.pipeline.run import library_versions
+from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.scene.file_names import safe_name
+from rislam_rt.storage.seal import SCHEMA, checksum
+
+SHORT = 8
+"""Digits of the hash in a folder's name; the marker inside has all of them."""
+
+BACKEND = ("RISLAM_RT_DEVICE", "RISLAM_RT_THREADS")
+"""Environment that the tracer's last digits depend on."""
+
+NO_NUMBERS = ("cli", "report")
+"""Folders of the package that decide how numbers are shown, and none of them."""
+
+
+class Identity(NamedTuple):
+    """All that a run's numbers depend on: runs of one identity have one result."""
+
+    content: Mapping[str, Any]
+    """`config` (every setting, defaults filled in), `scene` (name, SHA-256 of its files), `versions` of the libraries,
+    `own` (SHA-256 of methods of one's own),
+    `code` (SHA-256 of this package), `backend` (what the environment says of the tracer), `schema`."""
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of it, 64 hexadecimal digits."""
+        return checksum(self.content)
+
+    @property
+    def folder(self) -> str:
+        """`<pipeline>-<scene>-<seed>-<hash>`."""
+        config = self.content["config"]
+        name = f"{config['name']}-{safe_name(self.content['scene']['name'])}-{config['seed']}"
+        return short_name(name, self.digest)
+
+    def difference(self, other: Mapping[str, Any]) -> str:
+        """One entry in which another run differs, as `key is A there and B here`."""
+        here, there = dict(_flat(self.content)), dict(_flat(other))
+        for key in sorted(here):
+            if here[key] != there.get(key):
+                return f"{key} is {str(there.get(key))[:40]} there and {str(here[key])[:40]} here"
+        return "it has settings that this version does not know"
+
+
+def run_identity(spec: PipelineSpec, scene: Scene) -> Identity:
+    """The identity of a run of the main job; where its room lies and how it is described are no part of it."""
+    return Identity(
+        {
+            "schema": SCHEMA,
+            "config": spec.model_dump(mode="json", exclude={"description", "scene"}),
+            "scene": {"name": scene.name, "sha256": scene.digest},
+            "versions": library_versions(),
+            "code": code_digest(),
+            "own": own_digests([*spec.schemes, spec.channel]),
+            "backend": {name: os.environ.get(name, "") for name in BACKEND},
+        }
+    )
+
+
+def short_name(name: str, digest: str) -> str:
+    """The name with the first digits of a hash."""
+    return f"{name}-{digest[:SHORT]}"
+
+
+@cache
+def code_digest(root: Path = Path(__file__).parents[2]) -> str:
+    """SHA-256 over this package's files but those that only show numbers: an edit is another version."""
+    digest = hashlib.sha256()
+    for file in sorted(root.rglob("*")):
+        parts = file.relative_to(root).parts
+        if file.is_file() and parts[0] not in NO_NUMBERS and "__pycache__" not in parts:
+            data = file.read_bytes()
+            digest.update(f"{'/'.join(parts)}\0{len(data)}\0".encode())
+            digest.update(data)
+    return digest.hexdigest()
+
+
+def _flat(content: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in content.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value

@@ -1,0 +1,393 @@
+"""The run folder: everything of a run, readable without this package, and never anybody else's.
+
+`run.json` is its marker: it holds the run's whole identity, whether the run is `running` or `done`, and the SHA-256 of
+every file. A scheme's file appears as soon as the scheme is complete, so that a run that was stopped in any way goes on
+where it was. One process at a time writes there.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping, MutableMapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.errors import ConfigError, ResultError, RislamError
+from rislam_rt.model import MapEstimate, Scene, SchemeResult, SlamResult, Trajectory
+from rislam_rt.pipeline.dataset import (
+    check_dataset,
+    dataset_bytes,
+    dataset_to_paths,
+    dataset_to_scheme,
+    paths_to_dataset,
+    read_dataset,
+    scheme_to_dataset,
+    seal_dataset,
+)
+from rislam_rt.pipeline.record import given_to_dataset
+from rislam_rt.pipeline.store.identity import Identity
+from rislam_rt.scene import load_scene
+from rislam_rt.scene.write import scene_files, toml_bytes, tum_bytes
+from rislam_rt.storage.files import TEMPORARY, make_folders, remove_empty, remove_temporaries, write_atomic
+from rislam_rt.storage.lock import LOCK_FILE, hold
+from rislam_rt.storage.seal import file_digest, read_sealed, seal
+
+RUN_FILE, PATHS_FILE, SUMMARY_FILE = "run.json", "paths.nc", "summary.json"
+RUNNING, DONE = "running", "done"
+"""States of a run."""
+OWN_FOLDERS = ("", "figures", "scene", "scene/meshes")
+"""In which files of ours grow."""
+
+
+class RunFolder(MutableMapping[str, SchemeResult]):
+    """Schemes of a run that is under way, on disk. One that is not as it was written counts as not there."""
+
+    def __init__(self, folder: Path, identity: Identity, files: Mapping[str, str] | None = None) -> None:
+        """`files`: SHA-256 by name of what was written before."""
+        self.folder, self.identity, self.files = folder, identity, dict(files or {})
+
+    def __getitem__(self, name: str) -> SchemeResult:
+        file = scheme_file(self.folder, name)
+        if file.name not in self.files:
+            raise KeyError(name)
+        try:
+            if file_digest(file) != self.files[file.name]:
+                raise KeyError(name)
+            return _read_scheme(file, name, self.identity.digest)
+        except RislamError:
+            raise KeyError(name) from None
+
+    def __setitem__(self, name: str, result: SchemeResult) -> None:
+        data = seal_dataset(scheme_to_dataset(result), **self._stamp())
+        if result.given is not None:
+            given = seal_dataset(given_to_dataset(result), **self._stamp())
+            self._write(given_file(self.folder, name).name, dataset_bytes(given))
+        self._write(scheme_file(self.folder, name).name, dataset_bytes(data))
+        self.mark(RUNNING)
+
+    def __delitem__(self, name: str) -> None:
+        file = scheme_file(self.folder, name)
+        file.unlink()
+        self.files.pop(file.name, None)
+
+    def __iter__(self) -> Iterator[str]:
+        names = (file.removesuffix(".nc") for file in sorted(self.files) if file.startswith("scheme_"))
+        return (name.removeprefix("scheme_") for name in names)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def __contains__(self, name: object) -> bool:
+        try:
+            return isinstance(name, str) and self[name] is not None
+        except KeyError:
+            return False
+
+    @property
+    def spoiled(self) -> list[str]:
+        """Schemes that were written and are not as they were; they run again."""
+        return [name for name in self if name not in self]
+
+    def mark(self, state: str, more: Mapping[str, Any] | None = None) -> None:
+        """Say where the run stands.
+
+        Raises
+        ------
+        StoreError
+            The disk refused.
+        """
+        about = {"state": state, "identity": self.identity.digest, **self.identity.content, **(more or {})}
+        write_atomic(self.folder / RUN_FILE, _json(seal({**about, "files": self.files})))
+
+    def complete(self, result: SlamResult, summary: Mapping[str, Any]) -> Path:
+        """Add what the schemes' files do not hold; the last step is the marker. Returns the folder.
+
+        Raises
+        ------
+        StoreError
+            The disk refused.
+        """
+        paths = seal_dataset(paths_to_dataset(result.paths, result.scene.agent), **self._stamp())
+        self._write(PATHS_FILE, dataset_bytes(paths))
+        for name, content in export_files(result, summary).items():
+            self._write(name, content)
+        told = {
+            "name": result.name,
+            "seed": result.seed,
+            "cycles": len(result.scene.agent),
+            "schemes": list(result.schemes),
+            "seconds": dict(result.seconds),
+            "warnings": list(result.warnings),
+            "config": dict(result.config),
+        }
+        self.mark(DONE, told)
+        return self.folder
+
+    def put(self, name: str, content: bytes) -> None:
+        """Write a file of the run."""
+        self._write(name, content)
+
+    def adopt(self, names: Iterable[str]) -> None:
+        """Count files that were written here already among the run's, and say so in the marker."""
+        self.files |= {name: file_digest(self.folder / name) for name in names}
+        self.mark(RUNNING)
+
+    def holds(self, names: Iterable[str]) -> bool:
+        """Whether files are there as they were written."""
+        try:
+            return all(name in self.files and file_digest(self.folder / name) == self.files[name] for name in names)
+        except ResultError:
+            return False
+
+    def abandon(self) -> None:
+        """Take the marker away if no scheme was completed."""
+        if not self.files:
+            (self.folder / RUN_FILE).unlink(missing_ok=True)
+
+    def _stamp(self) -> dict[str, str]:
+        return {"run": self.identity.digest, "scene_sha256": self.identity.content["scene"]["sha256"]}
+
+    def _write(self, name: str, content: bytes) -> None:
+        write_atomic(self.folder / name, content)
+        self.files[name] = hashlib.sha256(content).hexdigest()
+
+
+def find_run(folder: Path, identity: Identity) -> dict[str, Any] | None:
+    """What the marker of a folder says; None if there is no folder, or nothing in it.
+
+    Raises
+    ------
+    ConfigError
+        It holds something else, or a run of another identity: nothing there may be replaced.
+    ResultError
+        The marker is not as it was written.
+    """
+    try:
+        names = sorted(entry.name for entry in folder.iterdir())
+    except FileNotFoundError:
+        if folder.is_symlink():
+            raise ConfigError(f"--out {folder}: a link to nothing; mend it, or give another folder") from None
+        return None
+    except OSError as error:
+        raise ConfigError(f"--out {folder}: cannot be used ({error.strerror}); give another folder") from None
+    if RUN_FILE not in names:
+        if all(name == LOCK_FILE or TEMPORARY.fullmatch(name) for name in names):
+            return None
+        raise ConfigError(f"--out {folder}: exists and is not a run; give a folder that does not exist yet")
+    about = read_marker(folder)
+    if about.get("identity") != identity.digest:
+        differ = identity.difference({key: about.get(key, {}) for key in identity.content})
+        raise ConfigError(f"--out {folder}: holds another run ({differ}); give another folder")
+    return about
+
+
+def read_marker(folder: Path) -> dict[str, Any]:
+    """The marker of a run, with its state, identity and the digests of its files.
+
+    Raises
+    ------
+    ResultError
+        It is not as it was written, or holds none of these.
+    """
+    about = read_sealed(folder / RUN_FILE)
+    files = about.get("files")
+    named = isinstance(files, dict) and all(isinstance(digest, str) for digest in files.values())
+    if not named or about.get("state") not in (RUNNING, DONE) or not isinstance(about.get("identity"), str):
+        raise ResultError(f"{folder / RUN_FILE}: no state, identity or files as a run writes them; give another folder")
+    return about
+
+
+@contextmanager
+def open_run(folder: Path, identity: Identity) -> Iterator[RunFolder]:
+    """The folder of a run, to be gone on with or begun; nobody else writes there meanwhile.
+
+    Raises
+    ------
+    ConfigError
+        It holds something else, or another process is at work there.
+    ResultError
+        Its marker is not as it was written.
+    StoreError
+        The disk refused.
+    """
+    find_run(folder, identity)
+    made = make_folders(folder)
+    try:
+        with hold_run(folder):
+            about = find_run(folder, identity)
+            store = RunFolder(folder, identity, about["files"] if about else None)
+            try:
+                store.mark(RUNNING)
+                yield store
+            except BaseException:
+                store.abandon()
+                raise
+    finally:
+        remove_empty(made)
+
+
+@contextmanager
+def hold_run(folder: Path) -> Iterator[None]:
+    """Keep others out of the folder of a run, and remove what a killed process was writing there.
+
+    Raises
+    ------
+    ConfigError
+        Another process is at work there.
+    StoreError
+        The disk refused.
+    """
+    with hold(folder, "run"):
+        remove_temporaries([*(folder / part for part in OWN_FOLDERS), *folder.glob("slices/*")])
+        yield
+
+
+def is_left_locked(folder: Path) -> bool:
+    """Whether somebody is at work in a folder, or died there."""
+    return (folder / LOCK_FILE).exists()
+
+
+def check_files(folder: Path, about: Mapping[str, Any]) -> None:
+    """Whether every file of a completed run is as it was written.
+
+    Raises
+    ------
+    ResultError
+        One is not. One line that names it.
+    """
+    for name, digest in about["files"].items():
+        if file_digest(folder / name) != digest:
+            raise ResultError(f"{folder / name}: changed since it was written; run again with another --out")
+
+
+def read_summary(folder: Path, about: Mapping[str, Any]) -> dict[str, Any]:
+    """The scores of a completed run, every file of which is as it was written.
+
+    Raises
+    ------
+    ResultError
+        One is not.
+    """
+    check_files(folder, about)
+    return dict(json.loads((folder / SUMMARY_FILE).read_bytes()))
+
+
+def scheme_file(folder: Path, name: str) -> Path:
+    """Where a scheme's data set lies."""
+    return folder / f"scheme_{name}.nc"
+
+
+def given_file(folder: Path, name: str) -> Path:
+    """Where what a scheme's estimator was given lies."""
+    return folder / f"measurements_{name}.nc"
+
+
+def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, bytes]:
+    """Trajectories, maps, room, configuration and summary: name -> content."""
+    motion = result.scene.agent
+    files = {"truth.tum": tum_bytes(motion.time, motion.position, motion.heading)}
+    for name, scheme in result.schemes.items():
+        files[f"estimate_{name}.tum"] = tum_bytes(motion.time, scheme.position, scheme.heading)
+    return files | record_files(result, result.scene, summary)
+
+
+def record_files(result: SlamResult, scene: Scene, summary: Mapping[str, Any]) -> dict[str, bytes]:
+    """Maps, configuration and summary of a result, and its room: name -> content."""
+    maps = {name: map_table(scheme.map) for name, scheme in result.schemes.items()}
+    files = {"map.json": _json(maps), "config.toml": toml_bytes(_without_none({**result.config}))}
+    files |= {f"scene/{name}": content for name, content in scene_files(scene).items()}
+    return files | {SUMMARY_FILE: _json(summary)}
+
+
+def read_run(folder: Path) -> SlamResult:
+    """A completed run, every file of which is as it was written.
+
+    Raises
+    ------
+    ResultError
+        One of its files is missing, damaged or changed.
+    ConfigError
+        The folder is not a completed run.
+    """
+    if not (folder / RUN_FILE).is_file():
+        raise ConfigError(f"{folder}: not a completed run (no {RUN_FILE}); give a folder that `run` wrote")
+    about = read_marker(folder)
+    try:
+        if about["state"] != DONE:
+            raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
+        check_files(folder, about)
+        data = read_dataset(folder / PATHS_FILE)
+        check_dataset(data, folder / PATHS_FILE, run=about["identity"], cycles=about["cycles"])
+        paths, scene = dataset_to_paths(data), load_scene(folder / "scene")
+        agent = Trajectory(
+            data["time"].to_numpy(),
+            data["true_position"].to_numpy(),
+            data["true_velocity"].to_numpy(),
+            data["true_heading"].to_numpy(),
+            scene.agent.body,
+        )
+        schemes = {
+            name: _read_scheme(scheme_file(folder, name), name, about["identity"], about["cycles"])
+            for name in about["schemes"]
+        }
+        return SlamResult(
+            name=about["name"],
+            scene=replace(scene, agent=agent, digest=about["scene"]["sha256"]),
+            paths=paths,
+            schemes=schemes,
+            config=about["config"],
+            seed=about["seed"],
+            versions=about["versions"],
+            seconds=about["seconds"],
+            warnings=tuple(about["warnings"]),
+        )
+    except (ConfigError, ResultError):
+        raise
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RislamError) as error:
+        cause = f"{type(error).__name__}: {error}"[:120]
+        raise ResultError(f"{folder}: a file of the run is damaged ({cause}); run again with another --out") from None
+
+
+def map_table(estimate: MapEstimate) -> dict[str, Any]:
+    """A map as plain lists: landmarks, their images, walls."""
+    std = np.sqrt(np.einsum("nii->ni", estimate.covariance))
+    features = [
+        {
+            "ident": int(estimate.ident[row]),
+            "position_m": estimate.position[row].tolist(),
+            "std_m": std[row].tolist(),
+            "image_of": int(estimate.ident[estimate.parent[row]]) if estimate.parent[row] >= 0 else None,
+            "ris_probability": float(estimate.ris_probability[row]),
+            **({} if estimate.panel is None else {"panel": int(estimate.panel[row])}),
+            "strength": float(estimate.strength[row]),
+        }
+        for row in range(len(estimate.ident))
+    ]
+    walls = [
+        {"normal": normal.tolist(), "offset_m": float(offset), "angle_std_rad": float(a), "offset_std_m": float(b)}
+        for normal, offset, (a, b) in zip(estimate.wall_normal, estimate.wall_offset, estimate.wall_std, strict=True)
+    ]
+    return {"landmarks": features, "walls": walls}
+
+
+def _read_scheme(file: Path, name: str, run: str, cycles: int | None = None) -> SchemeResult:
+    """A scheme's data set, which must be of this scheme and run."""
+    data = read_dataset(file)
+    check_dataset(data, file, scheme=name, run=run, **({} if cycles is None else {"cycles": cycles}))
+    return dataset_to_scheme(data)
+
+
+def _without_none(table: dict[str, Any]) -> dict[str, Any]:
+    """TOML has no null: what is not set is left out."""
+    return {
+        key: _without_none(value) if isinstance(value, dict) else value
+        for key, value in table.items()
+        if value is not None
+    }
+
+
+def _json(content: Any) -> bytes:
+    return (json.dumps(content, indent=2, allow_nan=False) + "\n").encode()

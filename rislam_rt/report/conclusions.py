@@ -1,0 +1,122 @@
+"""What a run comes to, in sentences: the first thing that a reader of its page sees."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans
+from rislam_rt.measurement import build_sensor
+from rislam_rt.model import PathKind, SchemeResult, SlamResult
+from rislam_rt.pipeline.scores.summary import landmark_track
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+
+CODES = {"optimized": "optimised codes", "random": "random codes", "no_ris": "no panel", "exact": "exact codes"}
+"""Schemes in words; others go by their names."""
+AT_BOUND = float(np.sqrt(-np.log(0.05)))
+"""Error over posterior bound up to which a run counts as at the bound: 1.73. Of the runs of an efficient estimator
+whose error along two axes lasts over the run (chi-square with two degrees of freedom), 95 % lie below."""
+
+
+class Conclusions(NamedTuple):
+    """Sentences, the most important first."""
+
+    headline: str
+    """All schemes in one."""
+    schemes: dict[str, str]
+    """What each found."""
+    missing: dict[str, list[str]]
+    """What each did not find, and why."""
+
+
+def judge_run(result: SlamResult, summary: Mapping[str, Any]) -> Conclusions:
+    """The verdict on a run from its scores and from what could be heard in it."""
+    found, missing = {}, {}
+    for name, scheme in result.schemes.items():
+        scores = summary["schemes"][name]
+        found[name] = f"{_words(name)}: {_found(result, scheme, scores)}."
+        missing[name] = list(_missing(result, scheme, scores))
+    return Conclusions(_headline(summary["schemes"]), found, missing)
+
+
+def _headline(schemes: Mapping[str, Any]) -> str:
+    """`The agent is off by 2.7 cm with optimised codes, 6.7 cm with random codes, 15 cm with no panel.`"""
+    best, *others = schemes.items()
+    parts = [f"{_centimetres(best[1]['rmse_m'])} with {_words(best[0])}"]
+    parts += [f"{_centimetres(scores['rmse_m'])} with {_words(name)}" for name, scores in others]
+    text = f"The agent is off by {', '.join(parts)} (RMSE)"
+    lost = [_words(name) for name, scores in schemes.items() if scores["diverged"]]
+    return text + (f"; lost with {', '.join(lost)}." if lost else ".")
+
+
+def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> str:
+    over = scores["over_bound"]
+    bound = f"{_centimetres(scores['bound_m'])} would be possible" if scores["bound_m"] else "no bound"
+    parts = [f"{_centimetres(scores['rmse_m'])}, " + ("at the bound" if over and over <= AT_BOUND else bound)]
+    panels = result.scene.panels if scheme.levels else ()
+    for number, panel in enumerate(panels):
+        found, name = panel_found_at(result, scheme, number), "panel" if len(panels) == 1 else panel.name
+        parts.append(f"{name} not found" if found is None else f"{name} found after {found:.1f} s")
+    names = [name for name in scores["landmarks"] if "cycles_identified" not in scores["landmarks"][name]]
+    held = sum(scores["landmarks"][name]["final_m"] is not None for name in names)
+    walls = [wall for wall in scores["walls"].values() if wall["bound_deg"] is not None]
+    parts.append(f"{held} of {len(names)} scatterers")
+    parts.append(f"{sum(wall['angle_deg'] is not None for wall in walls)} of {len(walls)} walls that were heard")
+    return "; ".join(parts)
+
+
+def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> float | None:
+    """Time [s] from which on the map holds a panel as that panel to the end; None if it does not."""
+    if panel >= len(result.scene.panels):
+        return None
+    column = landmark_track(result.scene, scheme).column[:, len(result.scene.scatterers) + panel]
+    rows = np.arange(len(column))
+    if not len(column) or column[-1] < 0:
+        return None
+    known = (column >= 0) & scheme.named(panel)[rows, column]
+    if not known[-1]:
+        return None
+    gaps = np.flatnonzero(~known)
+    first = int(gaps[-1]) + 1 if len(gaps) else 0
+    time = result.scene.agent.time
+    return float(time[first] - time[0])
+
+
+def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> Iterator[str]:
+    """One line on each landmark that the last map lacks."""
+    spec = PipelineSpec.model_validate(dict(result.config))
+    settings = build_settings(spec)
+    threshold = build_sensor(settings.radio, settings.receiver).threshold
+    paths = result.paths
+    snr = np.where(paths.valid, settings.radio.integrated_snr(scheme.gain), 0.0)
+    for number, (name, entry) in enumerate(scores["landmarks"].items()):
+        panel = "cycles_identified" in entry
+        if entry["final_m"] is not None or (panel and not scheme.levels):
+            continue
+        own = (paths.landmark == number) & (paths.kind != PathKind.LOS) & (paths.kind != PathKind.VT)
+        yield f"{name}: {why_not(snr[:, own], paths.valid[:, own], threshold)}"
+
+
+def why_not(snr: Any, valid: Booleans, threshold: float) -> str:
+    """Why a landmark with paths (K, P) of these SNRs is not in the map.
+
+    `threshold` is that of detection; both linear, over all antennas.
+    """
+    if not valid.any():
+        return "no path reaches the agent"
+    strongest = snr.max(axis=1)
+    below = 10.0 * np.log10(threshold / max(float(strongest.max()), 1e-300))
+    if below > 0.0:
+        return f"never heard: its strongest path stays {below:.0f} dB below the threshold"
+    heard = float(np.mean(strongest > threshold))
+    if heard < 0.05:
+        return f"heard in {100.0 * heard:.1f} % of the cycles only"
+    return f"heard in {100.0 * heard:.0f} % of the cycles, and not in the map at the end"
+
+
+def _words(name: str) -> str:
+    return CODES.get(name, name)
+
+
+def _centimetres(metres: float) -> str:
+    return f"{100.0 * metres:.2g} cm" if metres < 1.0 else f"{metres:.2g} m"

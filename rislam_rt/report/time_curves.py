@@ -1,0 +1,105 @@
+"""Curves against time: errors with what the filter believes of them, and the levels of the path classes."""
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from rislam_rt.arrays import Floats
+from rislam_rt.evaluate import position_errors
+from rislam_rt.model import PathKind, SchemeResult, SlamResult
+from rislam_rt.pipeline.scores.summary import landmark_track
+from rislam_rt.report.style import KIND, scheme_colour, styled
+
+
+def draw_agent_error(result: SlamResult) -> Figure:
+    """Distance between true and estimated position, with the believed standard deviation as a band."""
+    time = result.scene.agent.elapsed
+    with styled():
+        figure = Figure(figsize=(8.6, 4.1))
+        axis = figure.subplots()
+        for name, scheme in reversed(list(result.schemes.items())):
+            error = position_errors(scheme.position, result.scene.agent.position)
+            believed = np.sqrt(np.einsum("kii->k", scheme.covariance[:, :3, :3]))
+            colour = scheme_colour(name)
+            axis.fill_between(time, 0.0, 100.0 * believed, color=colour, alpha=0.15, lw=0.0)
+            label = f"{name}, RMSE {100.0 * np.sqrt(np.mean(error**2)):.1f} cm"
+            axis.plot(time, 100.0 * error, color=colour, lw=1.6, label=label)
+        axis.set_xlabel("time [s]")
+        axis.set_ylabel("agent position error [cm]")
+        axis.set_title("How far off the agent is, and how far off it believes to be", weight="bold")
+        axis.set_xlim(time[0], time[-1])
+        axis.set_ylim(0.0)
+        band = Patch(color="#555555", alpha=0.2, lw=0.0, label="the filter's own σ")
+        handles, _ = axis.get_legend_handles_labels()
+        figure.legend(handles=[*handles[::-1], band], loc="outside lower center", ncols=6, fontsize=9)
+    return figure
+
+
+def draw_landmark_errors(result: SlamResult) -> Figure:
+    """Distance between each true landmark and the estimate that stands for it."""
+    scene, time = result.scene, result.scene.agent.elapsed
+    tracks = {name: landmark_track(scene, scheme).error for name, scheme in result.schemes.items()}
+    with styled():
+        figure = Figure(figsize=(8.6, 3.9))
+        axes = figure.subplots(1, max(len(scene.landmarks), 1), sharey=True, squeeze=False)[0]
+        for name, errors in reversed(tracks.items()):
+            for number, axis in enumerate(axes[: errors.shape[1]]):
+                axis.plot(time, 100.0 * errors[:, number], color=scheme_colour(name), lw=1.4, label=name)
+        never = set(np.flatnonzero(~np.any([np.isfinite(e).any(axis=0) for e in tracks.values()], axis=0)).tolist())
+        for number, (axis, landmark) in enumerate(zip(axes, scene.landmarks, strict=False)):
+            axis.set_title(landmark, weight="bold")
+            axis.set_xlabel("time [s]")
+            axis.set_xlim(time[0], time[-1])
+            axis.set_ylim(0.0)
+            if number in never:
+                axis.text(0.5, 0.5, "never found", transform=axis.transAxes, ha="center", color="#555555")
+        axes[0].set_ylabel("landmark position error [cm]")
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles[::-1], labels[::-1], loc="outside lower center", ncols=5, fontsize=9)
+    return figure
+
+
+def draw_levels(result: SlamResult, detection_snr_db: float, snr_per_gain_db: float) -> Figure:
+    """Strongest path of each class against time; the panel's once a scheme.
+
+    Parameters
+    ----------
+    detection_snr_db
+        Integrated SNR at which the receiver reports a path.
+    snr_per_gain_db
+        Integrated SNR of a path with gain 0 dB.
+    """
+    time, paths = result.scene.agent.elapsed, result.paths
+    with styled():
+        figure = Figure(figsize=(8.6, 4.8))
+        axis = figure.subplots()
+        first = next(iter(result.schemes.values()))
+        for kind in (PathKind.LOS, PathKind.VT, PathKind.PS, PathKind.VS):
+            level = strongest_db(first, paths.kind == kind)
+            if np.isfinite(level).any():
+                axis.plot(time, level, color=KIND[kind], lw=1.6, label=f"{kind.name}, strongest")
+        for name, scheme in result.schemes.items():
+            level = strongest_db(scheme, paths.kind == PathKind.RIS)
+            if np.isfinite(level).any():
+                random = name == "random"
+                width, order = (0.7, 2) if random else (1.8, 3)
+                axis.plot(time, level, color=scheme_colour(name), lw=width, zorder=order, label=f"RIS, {name}")
+        threshold = detection_snr_db - snr_per_gain_db
+        axis.axhline(threshold, color="#555555", lw=1.0, ls="--", label="detection threshold")
+        axis.set_xlim(time[0], time[-1])
+        axis.set_xlabel("time [s]")
+        axis.set_ylabel("path gain [dB]")
+        shift = (lambda g: np.asarray(g) + snr_per_gain_db, lambda s: np.asarray(s) - snr_per_gain_db)
+        right = axis.secondary_yaxis("right", functions=shift)
+        right.set_ylabel("SNR over all antennas [dB]")
+        axis.set_title("What each class of paths brings", weight="bold")
+        figure.legend(loc="outside lower center", ncols=4, fontsize=9)
+    return figure
+
+
+def strongest_db(scheme: SchemeResult, columns: Floats) -> Floats:
+    """(K,) level [dB] of the strongest of some paths; NaN where there is none."""
+    gain = np.abs(scheme.gain[:, columns]).max(axis=1, initial=0.0)
+    with np.errstate(divide="ignore"):
+        level = 20.0 * np.log10(gain)
+    return np.where(gain > 0.0, level, np.nan)

@@ -1,0 +1,181 @@
+"""From the cells of a study in unseen rooms to score cards: over all rooms, and by class of room and motion."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.evaluate import Interval, bootstrap, median_over_runs, share_interval
+from rislam_rt.studies.unseen.sweep import SNR
+from rislam_rt.sweeps import Row
+from rislam_rt.sweeps.store import DONE
+
+CONSISTENT = (0.7, 2.0)
+"""NEES per degree of freedom, over a run, that counts as consistent."""
+
+
+class SchemeRun(NamedTuple):
+    """One scheme in one room."""
+
+    series: str
+    """Variant, SNR and scheme, as far as they differ in the study."""
+    ident: str
+    """Of its cell."""
+    scheme: str
+    room: int
+    traits: Mapping[str, Any]
+    scores: Mapping[str, Any]
+    """Empty if it failed."""
+    failed: str
+    """Why; empty if it did not."""
+
+
+def read_runs(rows: Sequence[Row]) -> list[SchemeRun]:
+    """All runs that there are, in the order of the series; cells that have not run are left out."""
+    keys = {key: {row.cell.point.get(key) for row in rows} for key in ("variant", SNR)}
+    schemes = {name for row in rows for name in row.result.get("schemes", {})}
+    found = []
+    for row in rows:
+        point = row.cell.point
+        parts = [str(point["variant"])] if len(keys["variant"]) > 1 else []
+        parts += [f"{point[SNR]:g} dB"] if len(keys[SNR]) > 1 else []
+        if row.state == DONE:
+            for scheme, scores in sorted(row.result["schemes"].items()):
+                name = ", ".join([*parts, *([scheme] if len(schemes) > 1 or not parts else [])])
+                failed = str(scores.get("failed", ""))
+                traits = row.result["traits"]
+                found.append(
+                    SchemeRun(
+                        name, row.cell.ident, scheme, int(str(point["room"])), traits, {} if failed else scores, failed
+                    )
+                )
+        elif row.failed:
+            message = f"{row.state}: {row.message}"
+            found.append(
+                SchemeRun(", ".join(parts) or "all", row.cell.ident, "", int(str(point["room"])), {}, {}, message)
+            )
+    order = {name: number for number, name in enumerate(dict.fromkeys(run.series for run in found))}
+    return sorted(found, key=lambda run: (order[run.series], run.room))
+
+
+def _banded(name: str, limits: Sequence[float], unit: str = "") -> Callable[[Mapping[str, Any]], str]:
+    """Class of a number: below the first limit, between two, from the last on."""
+
+    def band(traits: Mapping[str, Any]) -> str:
+        number = int(np.searchsorted(limits, traits[name], side="right"))
+        if number == 0:
+            return f"below {limits[0]:g}{unit}"
+        return (
+            f"from {limits[-1]:g}{unit}"
+            if number == len(limits)
+            else f"{limits[number - 1]:g} to {limits[number]:g}{unit}"
+        )
+
+    return band
+
+
+CLASSES: dict[str, Callable[[Mapping[str, Any]], str]] = {
+    "motion": lambda traits: str(traits["motion"]),
+    "plan": lambda traits: traits["shape"] if traits["shape"] == "convex" else str(traits["shape"]).upper(),
+    "ceiling": lambda traits: str(traits["ceiling"]),
+    "size": _banded("size", (6.0, 15.0), " m"),
+    "reflection": _banded("reflection", (0.4, 0.65)),
+    "furniture": _banded("pieces", (1, 4)),
+    "panel": lambda traits: str(traits["panel"]),
+    "scatterers below the agent": lambda traits: "some" if traits["below"] else "none",
+    "scatterers hidden": lambda traits: "some" if traits["hidden"] else "none",
+    "speed": _banded("speed", (0.1, 0.25), " m/s"),
+}
+"""Class of a room by name of the division."""
+
+
+def card(runs: Sequence[SchemeRun]) -> dict[str, Any]:
+    """The score card of runs: medians with intervals, 95th percentiles, shares with intervals, means a run."""
+    good = [run for run in runs if run.scores]
+    entry: dict[str, Any] = {"runs": len(good), "failed": len(runs) - len(good)}
+    for name in (
+        "rmse_m", "ratio", "late_rmse_m", "late_ratio", "relative_rmse_m", "relative_ratio", "late_relative_rmse_m",
+        "late_relative_ratio", "relative_bound_m", "dead_reckoning_m", "nees", "wall_delay_s", "point_delay_s",
+        "panel_delay_s", "wall_deg", "wall_m", "point_m", "gospa_m",
+    ):  # fmt: skip
+        entry |= _spread(name, column(good, name))
+    nees = column(good, "nees")
+    entry["nees_mean"] = _mean(nees)
+    inside = int(np.sum((nees >= CONSISTENT[0]) & (nees <= CONSISTENT[1])))
+    entry |= _share("consistent", inside, int(np.sum(~np.isnan(nees))))
+    entry |= _share("lost", _count(good, "lost"), len(good))
+    entry |= _share("silent", _count(good, "silent"), len(good))
+    entry |= _share("walls_found", _count(good, "walls_found"), _count(good, "walls_heard"))
+    entry |= _share("walls_good", _count(good, "walls_good"), _count(good, "walls_heard"))
+    entry |= _share("points_found", _count(good, "points_found"), _count(good, "points_heard"))
+    entry |= _share("panel_found", _count(good, "panel_found"), _count(good, "panel_heard"))
+    entry |= _share("births_right", _count(good, "births_right"), _count(good, "births_judged"))
+    for name in ("births", "ghost_walls", "ghost_points"):
+        entry[name] = _mean(column(good, name))
+    return entry
+
+
+def class_cards(runs: Sequence[SchemeRun]) -> list[dict[str, Any]]:
+    """A card for every class of every division."""
+    known = [run for run in runs if run.traits]
+    cards = []
+    for division, of in CLASSES.items():
+        members: dict[str, list[SchemeRun]] = {}
+        for run in known:
+            members.setdefault(of(run.traits), []).append(run)
+        order = sorted(members, key=lambda name: (not name.startswith("below"), name.startswith("from"), name))
+        cards += [{"division": division, "class": name, **card(members[name])} for name in order]
+    return cards
+
+
+def by_series(runs: Sequence[SchemeRun]) -> dict[str, list[SchemeRun]]:
+    """Runs of each series, in their order."""
+    found: dict[str, list[SchemeRun]] = {}
+    for run in runs:
+        found.setdefault(run.series, []).append(run)
+    return found
+
+
+def cycle_times(
+    runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Mapping[str, Any]]
+) -> dict[str, float | None]:
+    """Median CPU time [ms] of the estimator a cycle, by series; of cells timed more than once the last one counts."""
+    told = {entry["ident"]: entry.get("timing", {}) for entry in timings}
+    found: dict[str, float | None] = {}
+    for name, members in runs.items():
+        known = [told.get(run.ident, {}).get(run.scheme, {}).get("cycle_s") for run in members]
+        values = [1e3 * value for value in known if value is not None]
+        found[name] = float(np.median(values)) if values else None
+    return found
+
+
+def column(runs: Sequence[SchemeRun], name: str) -> Floats:
+    """(R,) a score; NaN where there is none."""
+    found = [run.scores.get(name) for run in runs]
+    return np.array([np.nan if value is None else value for value in found], dtype=np.float64)
+
+
+def _count(runs: Sequence[SchemeRun], name: str) -> int:
+    return int(np.nansum(column(runs, name)))
+
+
+def _spread(name: str, values: Floats) -> dict[str, float | None]:
+    """Median with its 95 % interval, and 95th percentile."""
+    known = values[~np.isnan(values)]
+    low = high = None
+    if len(known) > 1:
+        _, low, high = bootstrap(known, rng=np.random.default_rng(0), statistic=median_over_runs, resamples=1000)
+    median, p95 = (float(np.quantile(known, q)) if len(known) else None for q in (0.5, 0.95))
+    return {name: median, f"{name}_low": low, f"{name}_high": high, f"{name}_p95": p95}
+
+
+def _share(name: str, count: int, runs: int) -> dict[str, Any]:
+    found = share_interval(count, runs) if runs and count <= runs else Interval(np.nan, np.nan, np.nan)
+    value, low, high = (None if np.isnan(part) else float(part) for part in found)
+    return {name: value, f"{name}_low": low, f"{name}_high": high, f"{name}_count": count, f"{name}_of": runs}
+
+
+def _mean(values: Floats) -> float | None:
+    known = values[~np.isnan(values)]
+    return float(np.mean(known)) if len(known) else None

@@ -1,0 +1,115 @@
+"""Questions to a triangle array: what is near, what is crossed, what does a ray hit, what encloses a point."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.geometry.triangles import edge_planes, triangle_planes
+
+_CHUNK = 2_000_000
+"""Point-triangle pairs looked at in one go: 16 MB an array."""
+
+
+def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Integers, Integers]:
+    """Pairs (point, triangle) no more than `distance` [m] apart, of points (K, 3) and triangles (T, 3, 3)."""
+    normal, offset = triangle_planes(triangles)
+    edges = edge_planes(triangles)
+    found = []
+    for rows in _blocks(len(points), len(triangles)):
+        k, t = np.nonzero(np.abs(points[rows] @ normal.T - offset) <= distance)
+        near = _depth(points[rows][k], edges, t) >= -distance
+        found.append((k[near] + rows.start, t[near]))
+    return _joined(found)
+
+
+def crossings(start: Floats, end: Floats, triangles: Floats) -> tuple[Integers, Integers]:
+    """Pairs (segment, triangle) where a segment (K, 3) to (K, 3) passes through a triangle (T, 3, 3)."""
+    normal, offset = triangle_planes(triangles)
+    edges = edge_planes(triangles)
+    found = []
+    for rows in _blocks(len(start), len(triangles)):
+        a, b = start[rows] @ normal.T - offset, end[rows] @ normal.T - offset
+        k, t = np.nonzero(a * b < 0.0)
+        fraction = (a[k, t] / (a[k, t] - b[k, t]))[:, None]
+        point = start[rows][k] * (1.0 - fraction) + end[rows][k] * fraction
+        inside = _depth(point, edges, t) >= 0.0
+        found.append((k[inside] + rows.start, t[inside]))
+    return _joined(found)
+
+
+def ray_hits(origin: Floats, directions: Floats, triangles: Floats, slack: float = 1e-6) -> Integers:
+    """The nearest triangle (D,) that rays from one point (3,) along unit vectors (D, 3) hit, -1 for none.
+
+    `slack` [m] widens every triangle, so that no ray slips through the seam between two.
+    """
+    normal, offset = triangle_planes(triangles)
+    edges = edge_planes(triangles)
+    height = offset - normal @ origin
+    nearest = np.full(len(directions), -1, dtype=np.int64)
+    for rows in _blocks(len(directions), len(triangles)):
+        slope = directions[rows] @ normal.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = height / slope
+        k, t = np.nonzero(np.isfinite(distance) & (distance > 0.0))
+        point = origin + distance[k, t][:, None] * directions[rows][k]
+        hit = _depth(point, edges, t) >= -slack
+        k, t = k[hit], t[hit]
+        order = np.argsort(-distance[k, t], kind="stable")
+        nearest[k[order] + rows.start] = t[order]
+    return nearest
+
+
+def winding(point: Floats, triangles: Floats) -> float:
+    """How often a surface (T, 3, 3) winds around a point (3,): 1 or -1 inside a closed one, 0 outside.
+
+    Sum of solid angles (van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 1983); an object that lacks its bottom
+    still gives more than one half inside.
+    """
+    a, b, c = np.moveaxis(triangles - point, 1, 0)
+    na, nb, nc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    top = np.einsum("ti,ti->t", a, np.cross(b, c))
+    dot = np.einsum
+    below = na * nb * nc + dot("ti,ti->t", a, b) * nc + dot("ti,ti->t", b, c) * na + dot("ti,ti->t", c, a) * nb
+    return float(np.sum(np.arctan2(top, below)) / (2.0 * np.pi))
+
+
+def components(triangles: Floats, tolerance: float = 1e-6) -> Integers:
+    """Number (T,) of the connected piece each triangle belongs to; corners within `tolerance` [m] are one."""
+    _, corner = np.unique(np.round(triangles.reshape(-1, 3) / tolerance), axis=0, return_inverse=True)
+    faces = corner.reshape(-1, 3)
+    label = np.arange(faces.max(initial=-1) + 1)
+    while True:
+        lowest = label[faces].min(axis=1)
+        new = label.copy()
+        np.minimum.at(new, faces, lowest[:, None])
+        new = new[new]
+        if (new == label).all():
+            break
+        label = new
+    return np.asarray(np.unique(label[faces[:, 0]], return_inverse=True)[1], dtype=np.int64)
+
+
+def sphere_directions(count: int) -> Floats:
+    """Unit vectors (count, 3) spread evenly (Fibonacci lattice)."""
+    k = np.arange(count) + 0.5
+    z = 1.0 - 2.0 * k / count
+    phi = k * np.pi * (3.0 - np.sqrt(5.0))
+    r = np.sqrt(1.0 - z**2)
+    return np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
+
+
+def _depth(points: Floats, edges: tuple[Floats, Floats], triangle: Integers) -> Floats:
+    """Distance (S,) [m] of points (S, 3) from the nearest edge line of their own triangle: positive inside."""
+    inward, offset = edges
+    return (np.einsum("sei,si->se", inward[triangle], points) - offset[triangle]).min(axis=1, initial=np.inf)
+
+
+def _blocks(rows: int, columns: int) -> Iterator[slice]:
+    step = max(1, _CHUNK // max(columns, 1))
+    return (slice(first, min(first + step, rows)) for first in range(0, rows, step))
+
+
+def _joined(found: list[tuple[Integers, Integers]]) -> tuple[Integers, Integers]:
+    none = np.zeros(0, dtype=np.int64)
+    return np.concatenate([none, *(k for k, _ in found)]), np.concatenate([none, *(t for _, t in found)])

@@ -1,0 +1,66 @@
+"""All triangles of a scene as one array, and the limits that every part of the check shares."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.model import Scene
+from rislam_rt.scene.findings import Finding
+
+MIN_CLEARANCE = 1e-3
+"""[m] A device or scatterer nearer to a surface loses that surface's reflection."""
+
+
+MIN_ALTITUDE = 1e-6
+"""[m] A triangle with a smaller height has no usable normal."""
+
+
+class TriangleArray(NamedTuple):
+    """All triangles of a scene, and whose they are."""
+
+    file: str
+    scene: Scene
+    triangles: Floats
+    """(T, 3, 3) [m]."""
+    owner: Integers
+    """(T,) reflector of each triangle."""
+    bounds: Floats
+    """(2, 3) [m]."""
+
+    def name(self, triangle: int) -> str:
+        """Name of the reflector a triangle belongs to."""
+        return self.scene.reflectors[self.owner[triangle]].name
+
+    def outside(self, points: Floats) -> Integers:
+        """Indices of those points (K, 3) that lie outside the bounds."""
+        low, high = self.bounds
+        return np.flatnonzero(((points < low) | (points > high)).any(axis=-1))
+
+    def error(self, field: str, message: str, mend: str) -> Finding:
+        """An error at a key of the scene file."""
+        return Finding("error", self.file, field, message, mend)
+
+    def warning(self, field: str, message: str, mend: str) -> Finding:
+        """A warning at a key of the scene file."""
+        return Finding("warning", self.file, field, message, mend)
+
+    def note(self, field: str, message: str, mend: str) -> Finding:
+        """Something worth knowing at a key of the scene file."""
+        return Finding("note", self.file, field, message, mend)
+
+
+def build_triangle_array(scene: Scene, file: str) -> TriangleArray:
+    """The triangles of a scene that was read from `file`."""
+    triangles = np.concatenate([r.triangles for r in scene.reflectors])
+    owner = np.repeat(np.arange(len(scene.reflectors)), [len(r.faces) for r in scene.reflectors])
+    corners = triangles.reshape(-1, 3)
+    return TriangleArray(file, scene, triangles, owner, np.stack([corners.min(axis=0), corners.max(axis=0)]))
+
+
+def without_area(triangles: Floats) -> Booleans:
+    """Which triangles (T, 3, 3) are no more than a line."""
+    edges = np.roll(triangles, -1, axis=1) - triangles
+    longest = np.linalg.norm(edges, axis=-1).max(axis=1)
+    double_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
+    return double_area <= MIN_ALTITUDE * longest

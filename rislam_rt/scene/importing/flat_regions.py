@@ -1,0 +1,159 @@
+"""Flat regions of a mesh: corners joined, neighbours in one plane joined, with the size of each."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.angles import unit
+
+WELD = 2e-5
+"""[m] Corners nearer than this are one: what float32 leaves open in a file of 100 m, and no drawing means less."""
+FLAT_ANGLE = np.radians(0.5)
+"""Neighbours that meet at less than this are one plane: half a degree looks flat to whoever drew it."""
+
+
+class Welded(NamedTuple):
+    """A mesh whose triangles share their corners."""
+
+    vertices: Floats
+    """(V, 3) [m]."""
+    faces: Integers
+    """(F, 3)."""
+    part: Integers
+    """(F,) part of the file that each comes from."""
+
+
+class Edges(NamedTuple):
+    """Pairs of triangles that share an edge."""
+
+    a: Integers
+    b: Integers
+    turn: Floats
+    """(E,) [rad] angle at which they meet, zero in one plane, whichever way either is turned."""
+
+
+class FlatRegions(NamedTuple):
+    """R flat regions of a welded mesh."""
+
+    mesh: Welded
+    """Its triangles turned to their region's normal."""
+    region: Integers
+    """(F,)."""
+    normal: Floats
+    """(R, 3)."""
+    offset: Floats
+    """(R,) [m]."""
+    area: Floats
+    """(R,) [m^2]."""
+    width: Floats
+    """(R,) [m] short side of the rectangle with the same second moments."""
+    residual: Floats
+    """(R,) [m] farthest corner from the plane."""
+    component: Integers
+    """(R,) piece of the mesh that hangs together by edges: a leg that stands on a corner of the floor is none of it."""
+    edges: Edges
+
+    def faces_of(self, regions: Integers) -> Integers:
+        """(T, 3) triangles of regions."""
+        return self.mesh.faces[np.isin(self.region, regions)]
+
+
+def weld(triangles: list[Floats]) -> Welded:
+    """Join the corners of parts (T, 3, 3) [m]; triangles without area and doubles are left out."""
+    corners = np.concatenate([t.reshape(-1, 3) for t in triangles])
+    part = np.repeat(np.arange(len(triangles)), [len(t) for t in triangles])
+    vertices, index = np.unique(corners, axis=0, return_inverse=True)
+    pairs = cKDTree(vertices).query_pairs(WELD, output_type="ndarray")
+    group = connected(pairs, len(vertices))
+    _, first = np.unique(group, return_index=True)
+    vertices, faces = vertices[first], group[index.ravel()].reshape(-1, 3)
+    edge = vertices[np.roll(faces, -1, axis=1)] - vertices[faces]
+    height = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
+    solid = height > WELD * np.linalg.norm(edge, axis=-1).max(axis=1)
+    _, single = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    keep = np.intersect1d(np.flatnonzero(solid), single)
+    return Welded(vertices, faces[keep], part[keep])
+
+
+def find_facets(mesh: Welded) -> FlatRegions:
+    """Part a welded mesh into flat regions: neighbours of one part that meet at less than `FLAT_ANGLE`."""
+    triangles = mesh.vertices[mesh.faces]
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    area, normal = 0.5 * np.linalg.norm(cross, axis=1), unit(cross)
+    edges = _edges(mesh.faces, normal)
+    flat = (edges.turn < FLAT_ANGLE) & (mesh.part[edges.a] == mesh.part[edges.b])
+    region = connected(np.stack([edges.a[flat], edges.b[flat]], axis=-1), len(mesh.faces))
+    count = int(region.max(initial=-1)) + 1
+    biggest = _largest(region, area, count)
+    side = np.sign(np.einsum("fi,fi->f", normal, normal[biggest][region]))
+    faces = np.where((side < 0.0)[:, None], mesh.faces[:, ::-1], mesh.faces)
+    plane, offset, width, residual = _planes(triangles, area, region, normal[biggest])
+    piece = connected(np.stack([edges.a, edges.b], axis=-1), len(mesh.faces))
+    component = np.asarray(np.unique(piece[biggest], return_inverse=True)[1], dtype=np.int64)
+    total = np.asarray(np.bincount(region, area, count), dtype=np.float64)
+    turned = mesh._replace(faces=faces)
+    return FlatRegions(turned, region, plane, offset, total, width, residual, component, edges)
+
+
+def bounds_of(facets: FlatRegions, regions: Integers) -> Floats:
+    """(2, 3) [m] lowest and highest corner of regions."""
+    corners = facets.mesh.vertices[facets.faces_of(regions)].reshape(-1, 3)
+    return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+
+def crease_groups(facets: FlatRegions, chosen: Booleans, low: float, high: float) -> Integers:
+    """Number (R,) of the patch of chosen regions that hang together by edges that meet at `low` to `high` [rad]."""
+    edges, region = facets.edges, facets.region
+    a, b = region[edges.a], region[edges.b]
+    joined = (a != b) & (edges.turn >= low) & (edges.turn <= high) & chosen[a] & chosen[b]
+    return connected(np.stack([a[joined], b[joined]], axis=-1), len(facets.area))
+
+
+def connected(pairs: Integers, count: int) -> Integers:
+    """Number (count,) of the group that each belongs to, pairs (P, 2) being joined."""
+    ones = np.ones(len(pairs), dtype=np.int8)
+    graph = coo_matrix((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _edges(faces: Integers, normal: Floats) -> Edges:
+    ends = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    owner = np.tile(np.arange(len(faces)), 3)
+    order = np.lexsort((owner, ends[:, 1], ends[:, 0]))
+    same = (ends[order][1:] == ends[order][:-1]).all(axis=1)
+    a, b = owner[order][:-1][same], owner[order][1:][same]
+    cosine = np.abs(np.einsum("ei,ei->e", normal[a], normal[b]))
+    sine = np.linalg.norm(np.cross(normal[a], normal[b]), axis=1)
+    return Edges(a, b, np.arctan2(sine, cosine))
+
+
+def _largest(region: Integers, area: Floats, count: int) -> Integers:
+    """(R,) the largest triangle of each region."""
+    order = np.lexsort((-area, region))
+    return order[np.searchsorted(region[order], np.arange(count))]
+
+
+def _planes(triangles: Floats, area: Floats, region: Integers, side: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Least-squares plane of every region by its triangles' second moments; normals on the side of `side` (R, 3)."""
+    count = len(side)
+    total = np.bincount(region, area, count)
+    middle = triangles.mean(axis=1)
+    center = np.stack([np.bincount(region, area * middle[:, i], count) for i in range(3)], axis=-1) / total[:, None]
+    local = triangles - center[region][:, None]
+    inner = local.mean(axis=1)
+    # the second moment of a triangle: area / 12 times (the sum of its corners' products and 9 times its middle's)
+    moment = (np.einsum("tci,tcj->tij", local, local) + 9.0 * inner[:, :, None] * inner[:, None, :]) / 12.0
+    spread = np.zeros((count, 3, 3))
+    np.add.at(spread, region, area[:, None, None] * moment)
+    values, vectors = np.linalg.eigh(spread / total[:, None, None])
+    normal = vectors[:, :, 0]
+    normal *= np.where(np.einsum("ri,ri->r", normal, side) < 0.0, -1.0, 1.0)[:, None]
+    height = np.abs(np.einsum("tci,ti->tc", local, normal[region])).max(axis=1)
+    residual = np.zeros(count)
+    np.maximum.at(residual, region, height)
+    width = np.sqrt(12.0 * np.maximum(values[:, 1], 0.0))
+    return normal, np.einsum("ri,ri->r", normal, center), width, residual

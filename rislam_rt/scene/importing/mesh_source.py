@@ -1,0 +1,194 @@
+"""What a drawing program wrote, as triangles with the names of their node and material: GLB, glTF, OBJ, PLY, STL."""
+
+import json
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.scene.importing.obj import read_obj
+from rislam_rt.scene.mesh_containers import check_glb
+from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, read_inside, sound_mesh, unfold
+
+MESH_FORMATS = (".glb", ".gltf", ".obj", ".ply", ".stl")
+MAX_IMPORT_FACES = 2_000_000
+MAX_IMPORT_NODES = 5_000
+"""Reading takes time in proportion to their square."""
+ANY_UNIT = 1e9
+"""Coordinates of a file whose unit is not known yet: 1000 km in millimetres."""
+_COMPRESSED = ("draco", "meshopt", "quantization")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeshPart:
+    """Triangles of one node and one material."""
+
+    node: str
+    material: str
+    triangles: Floats
+    """(T, 3, 3) in the file's units and axes."""
+
+
+def read_source(path: Path) -> tuple[list[MeshPart], list[str]]:
+    """The parts of a mesh file, and remarks on what it names and does not hold.
+
+    Raises
+    ------
+    Fault
+        Missing, too large, of no known format, damaged, or without a triangle.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in MESH_FORMATS:
+        known = ", ".join((*MESH_FORMATS, ".geojson", ".svg", ".xml"))
+        raise Fault(f"files of kind '{one_line(suffix)[:12]}' cannot be read", f"give one of {known}")
+    content = read_content(path)
+    notes: list[str] = []
+    if suffix in (".glb", ".gltf"):
+        parts = _from_gltf(content, suffix, path.parent)
+    elif suffix == ".obj":
+        found, library = read_obj(content)
+        parts = [MeshPart(node, material, triangles) for node, material, triangles in found]
+        if library and not (path.parent / library).is_file():
+            notes.append(f"'{library[:60]}' is not there: materials are known by their names in the OBJ file alone")
+    else:
+        mesh = MeshReader().parse(content, path.name, max_faces=MAX_IMPORT_FACES, reach=ANY_UNIT)
+        parts = [MeshPart("", "", mesh.vertices[mesh.faces])]
+    if not parts:
+        raise Fault("the file has no triangles", "export it with its meshes")
+    return [MeshPart(part.node, part.material, _sound(part)) for part in parts], notes
+
+
+def read_content(path: Path, limit: int = MAX_MESH_BYTES) -> bytes:
+    """All of a file that the user named.
+
+    Raises
+    ------
+    Fault
+        There is none, it is too large, or the system refuses.
+    """
+    if not path.is_file():
+        raise Fault("no such file", "mend the path")
+    try:
+        with path.open("rb") as file:
+            content = file.read(limit + 1)
+    except OSError as error:
+        raise Fault(f"cannot be read ({error.strerror})", "check its permissions") from None
+    if len(content) > limit:
+        raise Fault(f"larger than {limit} bytes", "simplify it, or export without textures")
+    if not content:
+        raise Fault("the file is empty", "export it again")
+    return content
+
+
+def _sound(part: MeshPart) -> Floats:
+    corners = part.triangles.reshape(-1, 3)
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    return sound_mesh(Mesh(corners, faces), MAX_IMPORT_FACES, ANY_UNIT).vertices[faces]
+
+
+def _from_gltf(content: bytes, suffix: str, folder: Path) -> list[MeshPart]:
+    """Parts of a glTF file, its buffers from beside it, pictures left where they are."""
+    content = _plain_glb(content) if suffix == ".glb" else _joined_glb(content, folder)
+    check_glb(content, MAX_IMPORT_FACES, MAX_IMPORT_NODES)
+    loaded = unfold(content, "glb")
+    parts, seen = [], 0
+    for name in loaded.graph.nodes_geometry:
+        matrix, geometry = loaded.graph[name]
+        mesh = loaded.geometry[geometry]
+        faces = np.asarray(getattr(mesh, "faces", np.zeros((0, 3))))
+        if not len(faces):
+            continue
+        seen += len(faces)
+        vertices = np.asarray(mesh.vertices, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+        mesh_checked = sound_mesh(Mesh(vertices, faces.astype(np.int64)), MAX_IMPORT_FACES, ANY_UNIT)
+        material = getattr(getattr(mesh.visual, "material", None), "name", None)
+        parts.append(MeshPart(str(name), str(material or ""), mesh_checked.vertices[mesh_checked.faces]))
+    return parts
+
+
+def _plain_glb(content: bytes) -> bytes:
+    """A GLB file without its pictures: the same chunks, another table of contents."""
+    try:
+        magic, version, length, size, kind = struct.unpack_from("<4sIII4s", content)
+    except struct.error:
+        raise Fault("not a GLB file: too short", "export it again") from None
+    if magic != b"glTF" or kind != b"JSON":
+        raise Fault("not a GLB file: its head says something else", "export it as binary glTF (.glb)")
+    if version != 2:
+        raise Fault(f"glTF of version {version}", "export it as glTF 2.0")
+    if length > len(content):
+        raise Fault(f"the file ends after {len(content)} of {length} bytes", "copy or export it again")
+    document = _without_pictures(content[20 : 20 + size])
+    return _glb(document, content[20 + size : length])
+
+
+def _joined_glb(content: bytes, folder: Path) -> bytes:
+    """A glTF file and its buffers as one GLB file."""
+    document = _without_pictures(content)
+    data, starts = b"", []
+    for number, buffer in enumerate(_rows(document, "buffers")):
+        uri = buffer.get("uri")
+        if not isinstance(uri, str):
+            raise Fault(f"buffer {number} names no file", "export it again, or as .glb")
+        found = _embedded(uri) if uri.startswith("data:") else read_inside(folder, uri, MAX_MESH_BYTES)
+        if len(found) < int(buffer.get("byteLength", 0)):
+            raise Fault(f"'{uri[:60]}' ends after {len(found)} of {buffer['byteLength']} bytes", "copy it again")
+        starts.append(len(data))
+        data += found + b"\0" * (-len(found) % 4)
+        if len(data) > MAX_MESH_BYTES:
+            raise Fault(f"its buffers are larger than {MAX_MESH_BYTES} bytes", "simplify the mesh")
+    for view in _rows(document, "bufferViews"):
+        number = view.get("buffer", 0)
+        if not isinstance(number, int) or not 0 <= number < len(starts):
+            raise Fault(f"a view names buffer {number!r} of {len(starts)}", "export it again")
+        view["byteOffset"] = view.get("byteOffset", 0) + starts[number]
+        view["buffer"] = 0
+    document["buffers"] = [{"byteLength": len(data)}]
+    return _glb(document, struct.pack("<I4s", len(data), b"BIN\0") + data)
+
+
+def _embedded(uri: str) -> bytes:
+    import base64
+
+    try:
+        return base64.b64decode(uri.partition(",")[2], validate=True)
+    except ValueError:
+        raise Fault("a buffer inside the file is damaged", "export it again, or as .glb") from None
+
+
+def _glb(document: dict[str, Any], rest: bytes) -> bytes:
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    return struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON") + text + rest
+
+
+def _without_pictures(text: bytes) -> dict[str, Any]:
+    """The table of contents; materials keep their names alone, so that no picture is unpacked."""
+    try:
+        document = json.loads(text)
+        if not isinstance(document, dict):
+            raise ValueError("no table")
+    except (ValueError, RecursionError) as error:
+        raise Fault(f"its JSON cannot be read ({one_line(str(error))[:60]})", "copy or export it again") from None
+    wanted = " ".join(str(name) for name in document.get("extensionsRequired", []))
+    if any(word in wanted.lower() for word in _COMPRESSED):
+        raise Fault(f"the meshes are packed ({one_line(wanted)[:60]})", "export without compression")
+    for key in ("images", "textures", "samplers", "animations", "skins", "cameras", "extensionsRequired"):
+        document.pop(key, None)
+    document["materials"] = [{"name": str(m.get("name", ""))} for m in _rows(document, "materials")]
+    for mesh in _rows(document, "meshes"):
+        for part in mesh.get("primitives", []):
+            if isinstance(part, dict) and isinstance(part.get("attributes"), dict):
+                part["attributes"] = {k: v for k, v in part["attributes"].items() if k == "POSITION"}
+    return document
+
+
+def _rows(document: dict[str, Any], key: str) -> list[dict[str, Any]]:
+    rows = document.get(key, [])
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise Fault(f"'{key}' is no list of tables", "export it again")
+    return rows

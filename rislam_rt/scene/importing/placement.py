@@ -1,0 +1,62 @@
+"""Placing a file in the room: units, axis, origin, and whether what comes out has the size of a room."""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.importing.mesh_source import MeshPart
+from rislam_rt.scene.importing.options import ImportOptions
+from rislam_rt.scene.mesh_placement import UNITS, place_points
+
+SMALLEST_ROOM, LARGEST_ROOM = 1.0, 200.0
+"""[m] Diagonals outside are taken for a wrong unit, unless the user gave one."""
+USUAL = (2.0, 60.0)
+"""[m] Diagonals of the rooms that a wrong unit is mended to."""
+
+
+def place_parts(parts: list[MeshPart], suffix: str, options: ImportOptions) -> tuple[list[Floats], list[str]]:
+    """The parts' triangles (T, 3, 3) [m], z up, and remarks.
+
+    Raises
+    ------
+    Fault
+        The result has no room's size and the user gave no units.
+    """
+    units = options.units or "m"
+    up = options.up or ("y" if suffix in (".glb", ".gltf") else "z")
+    origin = np.array(options.origin, dtype=np.float64)
+    placed = [place_points(part.triangles, up, UNITS[units], origin) for part in parts]
+    corners = np.concatenate([t.reshape(-1, 3) for t in placed])
+    size = np.ptp(corners, axis=0)
+    check_size(float(np.linalg.norm(size)), options.units)
+    remarks = [f"{size[0]:.3g} x {size[1]:.3g} x {size[2]:.3g} m, with units = {units}, up = {up}"]
+    facing = _facing(placed)
+    other = "y" if up == "z" else "z"
+    if options.up is None and facing[1] > 1.2 * facing[2] and size[1] < size[2]:
+        remarks.append(f"its largest surfaces look sideways: if it lies on its side, give --up {other}")
+    return placed, remarks
+
+
+def check_size(diagonal: float, units: str | None) -> None:
+    """Refuse what has no room's size [m across], and say which unit would mend it.
+
+    Raises
+    ------
+    Fault
+        Too small or too large, and the units were not given.
+    """
+    if units is not None or SMALLEST_ROOM <= diagonal <= LARGEST_ROOM:
+        return
+    fitting = [u for u, length in UNITS.items() if USUAL[0] <= diagonal * length <= USUAL[1] and u != "m"]
+    words = " or ".join(f"--units {u} ({diagonal * UNITS[u]:.2g} m)" for u in fitting)
+    mend = f"give {words}, or --units m if it is meant" if words else "give --units mm, cm, m or in"
+    if not words and diagonal < SMALLEST_ROOM:
+        mend += "; degrees of longitude and latitude have to be projected to metres first"
+    raise Fault(f"in metres it would measure {diagonal:.4g} m across", mend)
+
+
+def _facing(placed: list[Floats]) -> Floats:
+    """(3,) area [m^2] seen along each axis."""
+    triangles = np.concatenate(placed)
+    edge = triangles[:, 1:] - triangles[:, :1]
+    return np.asarray(0.5 * np.abs(np.cross(edge[:, 0], edge[:, 1])).sum(axis=0))

@@ -1,0 +1,107 @@
+"""A room in the making: what reflects, what shades, and what is worth saying; then agent, panel and files."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.geometry.angles import unit
+from rislam_rt.geometry.triangles import triangle_planes
+from rislam_rt.scene.check.mesh_queries import ray_hits
+from rislam_rt.scene.file_names import safe_name
+from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.importing.free_space import FreeSpace, find_free
+from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.rooms.room import BASELINE, CYCLES, RoomFiles, panel, reflector
+
+FROM_EDGE = 0.1
+"""[m] The panel measures 9 cm: so far it keeps off the edges of its host."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomDraft:
+    """Meshes of a room by name, and remarks on how they came about."""
+
+    reflectors: dict[str, tuple[Mesh, dict[str, Any]]]
+    """Mesh and table of the material."""
+    shades: dict[str, Mesh] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def triangles(self) -> Floats:
+        """(T, 3, 3) [m] of all that stands in the room."""
+        meshes = [mesh for mesh, _ in self.reflectors.values()] + list(self.shades.values())
+        return np.concatenate([mesh.vertices[mesh.faces] for mesh in meshes])
+
+
+def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, list[str]]:
+    """The room with an agent on a free way and a panel above it, and all remarks on it.
+
+    Raises
+    ------
+    Fault
+        There is no place for an agent.
+    """
+    free = find_free(draft.triangles, float(draft.triangles[..., 2].min()))
+    if free is None:
+        raise Fault(
+            "no free place inside is found for the agent",
+            "check --units and --up; a room wants walls around a free way of 0.3 m",
+        )
+    start, end = free.way
+    agent = {"start": start.round(4).tolist(), "velocity": ((end - start) / 60.0).round(6).tolist(), **CYCLES}
+    table: dict[str, Any] = {"name": name}
+    table["reflector"] = [_reflector(key, material) for key, (_, material) in draft.reflectors.items()]
+    table["shade"] = [{"name": key, "mesh": f"meshes/{safe_name(key)}.ply"} for key in draft.shades]
+    ris, about = propose_panel(draft, free)
+    table |= {"ris": ris} if ris else {}
+    table["agent"] = agent | BASELINE
+    meshes = {safe_name(key): mesh for key, (mesh, _) in draft.reflectors.items()}
+    meshes |= {safe_name(key): mesh for key, mesh in draft.shades.items()}
+    length = float(np.linalg.norm(end - start))
+    remarks = [
+        *draft.remarks,
+        f"proposed way: {length:.2g} m in a minute, {free.clearance:g} m off all surfaces; {about}",
+    ]
+    if free.enclosed < 1.0:
+        remarks.append(f"open: {1.0 - free.enclosed:.0%} of rays from the start leave the room")
+    readme = f"{origin} " + " ".join(f"{remark[:1].upper()}{remark[1:]}." for remark in remarks)
+    return RoomFiles({key: value for key, value in table.items() if value != []}, meshes, readme), remarks
+
+
+def _reflector(name: str, material: dict[str, Any]) -> dict[str, Any]:
+    return reflector(name, material) | {"mesh": f"meshes/{safe_name(name)}.ply"}
+
+
+def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | None, str]:
+    """A panel like the paper's on what is above the middle of the way, or else beside it."""
+    names = [key for key, (mesh, _) in draft.reflectors.items() for _ in range(len(mesh.faces))]
+    triangles = np.concatenate([mesh.vertices[mesh.faces] for mesh, _ in draft.reflectors.values()])
+    middle, along = free.way.mean(axis=0), unit(free.way[1] - free.way[0])
+    side = np.array([-along[1], along[0], 0.0])
+    up = np.array([0.0, 0.0, 1.0])
+    for look in (up, unit(side + 0.5 * up), unit(-side + 0.5 * up), side, -side, along, -along):
+        hit = int(ray_hits(middle, look[None], draft.triangles)[0])
+        if not 0 <= hit < len(names):
+            continue
+        normal, offset = (part[0] for part in triangle_planes(triangles[hit : hit + 1]))
+        center = middle + look * float((offset - normal @ middle) / (normal @ look))
+        normal = normal * (1.0 if (middle - center) @ normal > 0.0 else -1.0) + 0.0
+        right = unit(np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))]))
+        if _fits(center, normal, right, names[hit], draft, free):
+            table = panel(center.round(9).tolist(), normal.tolist(), right.tolist(), names[hit])
+            return table, f"a panel of 6 x 6 elements on '{names[hit]}'"
+    return None, "no panel: nothing flat is free above or beside the way"
+
+
+def _fits(center: Floats, normal: Floats, right: Floats, host: str, draft: RoomDraft, free: FreeSpace) -> bool:
+    """Whether the corners of a panel look out from the same host, seen from the middle of the way."""
+    mesh, _ = draft.reflectors[host]
+    down = np.cross(normal, right)
+    corners = center + FROM_EDGE * np.array([right + down, right - down, -right + down, -right - down])
+    middle = free.way.mean(axis=0)
+    hits = ray_hits(middle, unit(corners - middle), draft.triangles)
+    seen = draft.triangles[hits]
+    own = mesh.vertices[mesh.faces]
+    return bool((hits >= 0).all()) and all((own == triangle).all(axis=(1, 2)).any() for triangle in seen)

@@ -1,0 +1,163 @@
+"""Recorded poses: TUM files (`timestamp x y z qx qy qz qw`, one pose a line) and CSV files whose columns have names."""
+
+import csv
+import io
+import re
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.schema import SMALLEST
+
+MAX_TIME = 1e11
+"""[s] From the epoch on, three thousand years: a recording's clock, and float64 still tells microseconds apart."""
+MAX_STEP = 1e6
+"""[s] Twelve days: longer gaps lie between recordings, not within one."""
+MAX_TILT = 1e-3
+"""Largest angle [rad] of a pose's z axis from the room's: the body turns about z only."""
+QUATERNION = ("qx", "qy", "qz", "qw")
+COLUMNS = ("time", "x", "y", "z", "heading", *QUATERNION)
+"""What a CSV file may tell of each pose."""
+ALIASES = {"time": ("time", "timestamp", "t"), "heading": ("heading", "yaw")}
+"""Names that are looked for where the scene file names no column."""
+UNITS = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "heading": {"rad": 1.0, "deg": float(np.pi / 180.0)},
+    **{axis: {"m": 1.0, "cm": 1e-2, "mm": 1e-3} for axis in "xyz"},
+}
+"""Endings of column names, after `_`, and what they stand for; seconds, radians and metres without one."""
+
+
+class RecordedPoses(NamedTuple):
+    """K poses."""
+
+    time: Floats
+    """(K,) [s]."""
+    position: Floats
+    """(K, 3) [m]."""
+    heading: Floats | None
+    """(K,) [rad]; None where the file says nothing of it."""
+
+
+def parse_tum(content: bytes) -> tuple[Floats, Floats, Floats]:
+    """Time (K,) [s], position (K, 3) [m] and heading (K,) [rad] of a TUM file; `#` starts a comment.
+
+    Raises
+    ------
+    Fault
+        A line is not eight finite numbers, time does not grow, or a pose is tilted.
+    """
+    rows = []
+    for number, line in enumerate(content.decode("utf-8", errors="replace").splitlines(), start=1):
+        words = line.split("#")[0].split()
+        if words:
+            rows.append(_numbers(words, 8, number, "give 'timestamp x y z qx qy qz qw'"))
+    if not rows:
+        raise Fault("the trajectory file holds no pose", "give lines 'timestamp x y z qx qy qz qw'")
+    table = np.array(rows)
+    time, position = _checked(table[:, 0], table[:, 1:4])
+    return time, position, _heading(table[:, 4:])
+
+
+def parse_csv(content: bytes, named: Mapping[str, str]) -> RecordedPoses:
+    """Poses of a CSV file with one line of column names; `named` says which columns hold what, where they are not
+    called `time`, `x`, `y`, `z`, `heading`, `qx` to `qw` anyway.
+
+    A name's ending tells its unit: `stamp_ns`, `x_mm`, `yaw_deg`. Other columns are left alone.
+
+    Raises
+    ------
+    Fault
+        A column is missing, a line is not as long as the header, a number is none, or time does not grow.
+    """
+    lines = list(csv.reader(io.StringIO(content.decode("utf-8-sig", errors="replace"))))
+    header = [name.strip() for name in lines[0]] if lines else []
+    place = {what: at for what in COLUMNS if (at := _column(what, header, named)) is not None}
+    rows = [
+        _numbers([line[at] if at < len(line) else "" for at, _ in place.values()], len(place), number, _wanted(header))
+        for number, line in enumerate(lines[1:], start=2)
+        if any(word.strip() for word in line)
+    ]
+    if not rows:
+        raise Fault("the trajectory file holds no pose", "give a line of column names, then one line a pose")
+    table = {what: column * scale for (what, (_, scale)), column in zip(place.items(), np.array(rows).T, strict=True)}
+    time, position = _checked(table["time"], np.column_stack([table[axis] for axis in "xyz"]))
+    if "heading" in table:
+        return RecordedPoses(time, position, table["heading"])
+    turned = all(part in table for part in QUATERNION)
+    return RecordedPoses(time, position, _heading(np.column_stack([table[q] for q in QUATERNION])) if turned else None)
+
+
+def _column(what: str, header: Sequence[str], named: Mapping[str, str]) -> tuple[int, float] | None:
+    """Where a quantity stands, and its unit; None for one that may be left out."""
+    if what in named:
+        if named[what] not in header:
+            raise Fault(f"no column '{named[what]}' for '{what}' in the trajectory", f"it has {_few(header)}")
+        return header.index(named[what]), _unit(what, named[what])
+    for at, name in enumerate(header):
+        if re.sub("_[a-z]+$", "", name.lower()) in ALIASES.get(what, (what,)):
+            return at, _unit(what, name)
+    if what in ("time", "x", "y", "z"):
+        mend = f'name it in agent.columns, e.g. columns = {{ {what} = "..." }}; the file has {_few(header)}'
+        raise Fault(f"no column '{what}' in the trajectory", mend)
+    return None
+
+
+def _unit(what: str, name: str) -> float:
+    return UNITS.get(what, {}).get(name.lower().rpartition("_")[2], 1.0)
+
+
+def _wanted(header: Sequence[str]) -> str:
+    return f"give a number in each column that is read, of {_few(header)}"
+
+
+def _few(header: Sequence[str]) -> str:
+    return ", ".join(f"'{name[:20]}'" for name in header[:12]) or "no columns"
+
+
+def _numbers(words: Sequence[str], count: int, number: int, mend: str) -> list[float]:
+    try:
+        row = [float(word) for word in words]
+    except ValueError:
+        row = []
+    if len(row) != count or not np.isfinite(row).all():
+        amount = {8: "eight"}.get(count, str(count))
+        raise Fault(f"line {number} of the trajectory is not {amount} finite numbers", mend)
+    return row
+
+
+def _checked(time: Floats, position: Floats) -> tuple[Floats, Floats]:
+    """Times and places as they are, if they can be a recording's."""
+    if np.abs(time).max() > MAX_TIME:
+        raise Fault(f"a time of {time[np.argmax(np.abs(time))]:.3g} s in the trajectory", "give seconds")
+    step = np.diff(time)
+    if (step <= 0.0).any():
+        pose = int(np.argmax(step <= 0.0)) + 1
+        raise Fault(f"time does not grow at pose {pose} ({time[pose]} s)", "sort the poses and drop repeated ones")
+    odd = (step < SMALLEST) | (step > MAX_STEP)
+    if odd.any():
+        pose = int(np.argmax(odd)) + 1
+        raise Fault(
+            f"{step[pose - 1]:.3g} s from the pose before to pose {pose}",
+            f"give steps of {SMALLEST:g} to {MAX_STEP:g} s: cut the file at a gap, thin it out where it is too dense",
+        )
+    if np.abs(position).max() > 1e5:
+        raise Fault(f"a coordinate of {np.abs(position).max():.3g} m in the trajectory", "give metres")
+    return time, position
+
+
+def _heading(q: Floats) -> Floats:
+    """(K,) [rad] of quaternions (K, 4) of turns about z."""
+    length = np.linalg.norm(np.clip(q, -2.0, 2.0), axis=1)  # a wrong length stays one, and no square overflows
+    if (np.abs(length - 1.0) > 1e-3).any():
+        raise Fault(
+            f"quaternion of pose {int(np.argmax(np.abs(length - 1.0) > 1e-3))} has not length 1", "normalise it"
+        )
+    x, y, z, w = (q / length[:, None]).T
+    tilt = 2.0 * np.hypot(x, y)
+    if (tilt > MAX_TILT).any():
+        raise Fault(f"pose {int(np.argmax(tilt > MAX_TILT))} is tilted", "give rotations about z only (qx = qy = 0)")
+    return np.asarray(2.0 * np.arctan2(z, w))

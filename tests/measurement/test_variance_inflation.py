@@ -1,0 +1,101 @@
+"""Reported deviations are those of the errors: near the threshold, beside what is not seen, and at the sky's edge."""
+
+import numpy as np
+import pytest
+
+from rislam_rt.measurement import ReceiverConfig, measure
+from rislam_rt.measurement.inner_products import waves_at
+from rislam_rt.measurement.refine import accuracy, fit_amplitudes, refine
+from rislam_rt.measurement.signal import add_noise
+from rislam_rt.measurement.sounding import build_sounding
+from rislam_rt.measurement.variance_inflation import UNSEEN, crowding, mirror_variance, peak_bias, unmirrored
+from rislam_rt.model import PathKind, RadioConfig, RxArray
+
+RADIO = RadioConfig()
+WAVEFORM = ReceiverConfig(estimator="waveform")
+
+
+@pytest.mark.slow
+def test_errors_of_faint_paths_are_as_reported(make_paths, make_gain):
+    """At 11 dB only lucky draws pass a threshold of 10 dB: the bound at the measured amplitude would be too small."""
+    paths = make_paths([(PathKind.PS, 4.0, (0.3, -0.2, 0.9), make_gain(11.0, RADIO, 0.4))])
+    rng = np.random.default_rng(3)
+    ratio = []
+    for _ in range(160):
+        measurement, truth = measure(paths, 0, 0.0, RADIO, WAVEFORM, rng=rng)
+        for row in np.flatnonzero(truth.path == 0):
+            error = np.array(
+                [measurement.tau[row] - paths.tau[0, 0], *(measurement.cosines[row] - paths.arrival[0, 0, :2])]
+            )
+            ratio.append(error / np.array([measurement.tau_std[row], *measurement.cosines_std[row]]))
+    assert len(ratio) > 70
+    # 200 numbers: standard error 5 %. The bound alone gives 1.35; the side lobes' share stays, at this SNR
+    assert 0.85 < np.sqrt(np.mean(np.square(ratio))) < 1.25
+
+
+def test_luck_vanishes_for_strong_paths():
+    assert peak_bias(np.array([10.0, 1e4])) == pytest.approx([10.0 / 7.5, 1.0], rel=1e-3)
+    assert np.isfinite(peak_bias(np.array([1.0, 0.1]))).all()
+
+
+def test_unseen_neighbours_act_like_noise_of_their_power():
+    """The law behind `crowding`: neighbours of SNR q, `density` a cell, multiply the variance by `1 + q density`."""
+    sounding = build_sounding(128, RADIO)
+    density, power, trials = 1.0, 3.0, 300
+    rng = np.random.default_rng(5)
+    errors = []
+    for _ in range(trials):
+        count = rng.poisson(density * 40.0)
+        delay = np.append(40.0, rng.uniform(20.0, 60.0, count))
+        parameters = np.column_stack([delay, np.tile([0.2, -0.1], (count + 1, 1))])
+        phase = np.exp(2j * np.pi * rng.uniform(size=count))
+        amplitude = np.append(100.0, np.sqrt(power) * phase) / np.sqrt(sounding.num_samples)
+        samples = add_noise(waves_at(sounding, parameters).sum(amplitude), 1.0, rng=rng)
+        fit = refine(sounding, fit_amplitudes(sounding, parameters[:1], samples), samples, steps=5, tolerance=1e-4)
+        errors.append((fit.parameters[0, 0] - 40.0) / accuracy(fit).parameters[0, 0])
+    # a variance from 300 draws has a standard error of 8 %, three of them
+    assert np.mean(np.square(errors)) == pytest.approx(1.0 + power * density, rel=0.25)
+
+
+def test_neighbours_count_along_the_axis_on_which_they_pull():
+    same_direction = np.array([[20.0, 0.1, 0.2], [23.0, 0.1, 0.2]])
+    factor = crowding(same_direction, 10.0, RADIO)
+    assert factor[:, 0] == pytest.approx(1.0 + UNSEEN * 10.0 / 12.0)
+    assert factor[:, 1:] == pytest.approx(1.0)
+    same_delay = np.array([[20.0, 0.1, 0.2], [20.1, -0.8, 0.2]])
+    factor = crowding(same_delay, 10.0, RADIO)
+    assert factor[:, 1] == pytest.approx(1.0 + UNSEEN * 10.0 / 4.0)
+    assert factor[:, [0, 2]] == pytest.approx(1.0)
+    assert crowding(same_delay[:1], 10.0, RADIO) == pytest.approx(1.0)
+    assert crowding(np.zeros((0, 3)), 10.0, RADIO).shape == (0, 3)
+
+
+def test_directions_outside_the_sky_come_back_on_the_other_side():
+    assert unmirrored(np.array([[1.02, 0.1], [0.9, 0.1], [0.0, -1.01]]), RADIO) == pytest.approx(
+        np.array([[-0.98, 0.1], [0.9, 0.1], [0.0, 0.99]])
+    )
+    fine = RadioConfig(array=RxArray(spacing=0.4))  # no second direction with the same samples
+    assert unmirrored(np.array([[1.02, 0.1]]), fine) == pytest.approx(np.array([[1.02, 0.1]]))
+
+
+def test_doubt_is_even_on_the_horizon_and_gone_above_it():
+    cosines = np.array([[1.0, 0.0], [0.5, 0.1]])
+    variance = mirror_variance(cosines, np.full((2, 2), 0.02), RADIO)
+    assert variance[0, 0] == pytest.approx(0.5 * 2.0**2)
+    assert variance[1] == pytest.approx(0.0, abs=1e-12)
+    blind = RadioConfig(array=RxArray(rows=1, cols=4))
+    assert mirror_variance(cosines, np.full((2, 2), 0.02), blind)[0, 0] == 0.0
+
+
+def test_level_paths_err_as_reported(make_paths, make_gain):
+    direction = (-0.97, 0.1, np.sqrt(1.0 - 0.97**2 - 0.01))
+    paths = make_paths([(PathKind.VS, 6.0, direction, make_gain(16.0, RADIO, 0.4))])
+    rng = np.random.default_rng(4)
+    ratio = []
+    for _ in range(60):
+        measurement, truth = measure(paths, 0, 0.0, RADIO, WAVEFORM, rng=rng)
+        for row in np.flatnonzero(truth.path == 0):
+            ratio.append((measurement.cosines[row] - paths.arrival[0, 0, :2]) / measurement.cosines_std[row])
+    assert len(ratio) > 55
+    # one on the wrong side in thirty would make this 10, were it reported like the others
+    assert np.sqrt(np.mean(np.square(ratio))) < 2.0

@@ -1,0 +1,131 @@
+"""Runs in slices: the scores of the whole, the same files after a stop, and no changed slice read in silence."""
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from rislam_rt.errors import ResultError
+from rislam_rt.model import SlamResult
+from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline.dataset import read_dataset
+from rislam_rt.pipeline.long import slices
+from rislam_rt.pipeline.long.join import join_paths, join_schemes
+from rislam_rt.pipeline.long.run import is_long, read_any, run_long
+from rislam_rt.pipeline.recordings.inputs import PADDING, dataset_to_inputs
+from rislam_rt.pipeline.recordings.own_measurements import localise, run_rng
+from rislam_rt.pipeline.scores.summary import summarise_scheme
+from rislam_rt.pipeline.store.identity import run_identity
+from rislam_rt.pipeline.store.run_folder import open_run
+
+ROOT = Path(__file__).parents[3]
+BOUND = {"bound_m", "over_bound", "walls", "ghost_walls"}
+"""What only a run in one piece has, and what hangs on it."""
+
+
+@pytest.fixture
+def short_slices(monkeypatch):
+    monkeypatch.setattr(slices, "SLICE", 25)
+
+
+@pytest.fixture(scope="module")
+def spec():
+    settings = ["channel=image_source", "cycles=90", "depth=1", 'schemes=["random", "no_ris"]', "slam.use_vt=true"]
+    return load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
+
+
+def lead(room, spec, folder, progress=lambda *_: None):
+    with open_run(folder, run_identity(spec, room)) as store:
+        return run_long(room, spec, store, rng=np.random.default_rng(spec.seed), jobs=1, progress=progress)
+
+
+def contents(folder):
+    """Digest of every file; but for those that hold times taken."""
+    files = (f for f in sorted(folder.rglob("*")) if f.suffix == ".tum" or f.name == "scene.toml")
+    return {str(f.relative_to(folder)): hashlib.sha256(f.read_bytes()).hexdigest() for f in files}
+
+
+@pytest.fixture
+def done(room, spec, short_slices, tmp_path):
+    """A completed run of four slices, the last of them short."""
+    return lead(room, spec, tmp_path / "run"), tmp_path / "run"
+
+
+def test_scores_counted_slice_by_slice_are_those_of_the_whole(room, spec, done):
+    found, folder = done
+    assert is_long(room, spec)
+    assert sorted(p.name for p in (folder / "slices").iterdir()) == [f"{n:05d}" for n in range(4)]
+    run = run_identity(spec, room).digest
+    for name, scores in found.summary["schemes"].items():
+        parts = list(slices.read_parts(folder, name, _cut(room), run))
+        paths, scheme = (
+            join_paths([p.paths for p in parts]),
+            join_schemes([p.scheme for p in parts], [p.paths for p in parts]),
+        )
+        whole = SlamResult("a", _cut(room), paths, {name: scheme}, spec.model_dump(mode="json"), 7, {})
+        expected = summarise_scheme(whole, scheme)
+        for key in expected.keys() - BOUND - {"landmarks"}:
+            exact = isinstance(expected[key], list | str | bool | type(None))
+            assert scores[key] == (expected[key] if exact else pytest.approx(expected[key], rel=1e-9)), key
+        for landmark, entry in expected["landmarks"].items():
+            for key in entry.keys() - BOUND:
+                value = scores["landmarks"][landmark][key]
+                assert value == (None if entry[key] is None else pytest.approx(entry[key], rel=1e-9))
+    measurements_of_all_slices_give_the_estimate_again(folder, spec, scheme)
+
+
+def measurements_of_all_slices_give_the_estimate_again(folder, spec, scheme):
+    files = sorted((folder / "slices").glob(f"*/measurements_{scheme.scheme}.nc"))
+    parts = [read_dataset(file) for file in files]
+    how = {"data_vars": "minimal", "combine_attrs": "drop_conflicts", "join": "outer", "fill_value": PADDING}
+    inputs = dataset_to_inputs(xr.concat(parts, "time", **how))
+    answers = localise(inputs, spec, rng=run_rng(files[0]))
+    np.testing.assert_array_equal([one.position for one in answers.estimates], scheme.position)
+
+
+def _cut(room):
+    from rislam_rt.pipeline.run import cut_scene
+
+    return cut_scene(room, 90)
+
+
+def test_a_stopped_run_goes_on_and_leaves_the_same(room, spec, done, tmp_path):
+    def stop(stage, at, total):
+        if (stage, at) == ("no_ris", 30):
+            raise KeyboardInterrupt
+
+    again = tmp_path / "again"
+    with pytest.raises(KeyboardInterrupt):
+        lead(room, spec, again, stop)
+    assert {f.name for f in again.rglob("*.nc")} == {"paths.nc", "scheme_random.nc", "measurements_random.nc"}
+    told = []
+    lead(room, spec, again, lambda stage, *_: told.append(stage))
+    assert set(told) == {"no_ris"}
+    assert contents(again) == contents(done[1])
+
+
+def test_a_stop_before_the_first_scheme_is_done_leaves_nothing(room, spec, short_slices, tmp_path):
+    def stop(stage, at, total):
+        if at == 30:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        lead(room, spec, tmp_path / "run", stop)
+    assert not (tmp_path / "run").exists()
+
+
+def test_it_can_be_read_again_and_a_changed_slice_is_told(done):
+    found, folder = done
+    again = read_any(folder)
+    assert again.summary["schemes"]["random"]["rmse_m"] == pytest.approx(
+        found.summary["schemes"]["random"]["rmse_m"], rel=1e-6
+    )  # the room's path file holds nanometres
+    assert len(again.shown.schemes["random"].position) == 90
+    file = folder / "slices" / "00002" / "scheme_random.nc"
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 1
+    file.write_bytes(data)
+    with pytest.raises(ResultError, match=r"scheme_random\.nc: changed"):
+        read_any(folder)

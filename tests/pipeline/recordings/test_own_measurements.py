@@ -1,0 +1,226 @@
+"""Measurements of one's own: the same answer as in the run they came from, and a clear line for a wrong unit."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rislam_rt
+from rislam_rt.cli.slam import _new_folder, command
+from rislam_rt.errors import ConfigError
+from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline.estimators import ESTIMATORS
+from rislam_rt.pipeline.recordings.own_measurements import inputs_of, localise, read_inputs
+from rislam_rt.pipeline.specification.radio import build_radio
+from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.scene.write import tum_bytes
+from rislam_rt.shipped import find_pipeline
+from rislam_rt.slam import StartPrior
+from rislam_rt.studies.unseen import Inputs, Recorder
+
+CYCLES = 40
+CHANGES = [f"cycles={CYCLES}", "channel=image_source", "depth=1", "schemes=['no_ris']", "slam.use_vt=true"]
+Table = dict[str, list[float]]
+
+
+@pytest.fixture(scope="module")
+def spec() -> PipelineSpec:
+    return load_spec(find_pipeline("trace_then_slam"), CHANGES)
+
+
+@pytest.fixture(scope="module")
+def recorded(spec: PipelineSpec) -> tuple[Inputs, np.ndarray]:
+    """What the filter was given in a run, and where it held itself to be."""
+    recorder, own = Recorder(ESTIMATORS["slam"]), ESTIMATORS["slam"]
+    ESTIMATORS["slam"] = recorder.estimator
+    try:
+        result = rislam_rt.run_slam(rislam_rt.load_scene("paper_room"), spec, rng=np.random.default_rng(spec.seed))
+    finally:
+        ESTIMATORS["slam"] = own
+    return recorder.inputs, result.schemes["no_ris"].position
+
+
+@pytest.fixture
+def table(recorded: tuple[Inputs, np.ndarray]) -> Table:
+    inputs, _ = recorded
+    names = "time_s heading_rad delay_s cos_x cos_y amplitude delay_std_s cos_x_std cos_y_std amplitude_std"
+    rows = [
+        (t, h, m.tau[k], *m.cosines[k], m.amplitude[k], m.tau_std[k], *m.cosines_std[k], m.amplitude_std[k])
+        for t, h, m in zip(inputs.time, inputs.heading, inputs.measurements, strict=True)
+        for k in range(len(m))
+    ]
+    return {
+        name: [float(v) for v in column] for name, column in zip(names.split(), zip(*rows, strict=True), strict=True)
+    }
+
+
+def test_from_a_file_comes_the_answer_of_the_run(
+    recorded: tuple[Inputs, np.ndarray], table: Table, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    inputs, position = recorded
+    file, poses = tmp_path / "mine.csv", tmp_path / "true.tum"
+    with file.open("w", newline="") as lines:
+        writer = csv.writer(lines)
+        writer.writerow(table)
+        writer.writerows(zip(*table.values(), strict=True))
+    true = rislam_rt.load_scene("paper_room").agent[:CYCLES]
+    poses.write_bytes(tum_bytes(true.time, true.position, true.heading))
+    told = (inputs.start.position, inputs.start.velocity, inputs.body.tx_offset, inputs.body.rx_offset)
+    start, speed, tx, rx = (",".join(map(repr, map(float, v))) for v in told)
+    pipeline = find_pipeline("trace_then_slam")
+    command(
+        file,
+        pipeline,
+        set_=CHANGES,
+        start=start,
+        velocity=speed,
+        tx=tx,
+        rx=rx,
+        truth=poses,
+        out=tmp_path / "out",
+        json=tmp_path / "said.json",
+    )
+    said = capsys.readouterr().out
+    assert f"cycles: {CYCLES}" in said
+    assert "rmse_m: " in said
+    with (tmp_path / "out" / "estimate.csv").open() as lines:
+        rows = list(csv.DictReader(lines))
+    found = np.array([[float(row[name]) for name in ("x_m", "y_m", "z_m")] for row in rows])
+    # nine digits in the file; the run's own deviations pass through the table unrounded
+    np.testing.assert_allclose(found, position, rtol=1e-8)
+    with pytest.raises(ConfigError, match="not empty; give a new folder"):
+        command(file, pipeline, set_=CHANGES, start=start, out=tmp_path / "out")
+
+
+def test_snr_and_angles_say_the_same_as_amplitudes_and_cosines(
+    recorded: tuple[Inputs, np.ndarray], table: Table, spec: PipelineSpec
+) -> None:
+    inputs, _ = recorded
+    radio, body = build_radio(spec.radio), inputs.body
+    x, y = np.array(table["cos_x"]), np.array(table["cos_y"])
+    inside = np.hypot(x, y) < 1.0
+    rows = {name: np.array(column)[inside] for name, column in table.items()}
+    plain = inputs_of(rows, inputs.start, radio, body)
+    other = {name: rows[name] for name in ("time_s", "heading_rad", "delay_s", "delay_std_s", "cos_x_std", "cos_y_std")}
+    other["theta_r_rad"], other["phi_r_rad"] = np.arcsin(np.hypot(x, y)[inside]), np.arctan2(y, x)[inside]
+    other["snr_db"] = 10.0 * np.log10(radio.integrated_snr(rows["amplitude"]))
+    again = inputs_of(other, inputs.start, radio, body)
+    for one, two in zip(plain.measurements, again.measurements, strict=True):
+        np.testing.assert_allclose(two.cosines, one.cosines, atol=1e-12)
+        np.testing.assert_allclose(two.amplitude, one.amplitude, rtol=1e-12)
+
+
+def test_a_cycle_in_which_nothing_is_heard_counts(table: Table, spec: PipelineSpec) -> None:
+    start = StartPrior(np.zeros(3), np.zeros(3), 0.0)
+    rows = {name: [*column, np.nan] for name, column in table.items()}
+    rows["time_s"][-1], rows["heading_rad"][-1] = 99.0, 0.0
+    inputs = inputs_of(rows, start, build_radio(spec.radio))
+    assert len(inputs.measurements) == CYCLES + 1
+    assert len(inputs.measurements[-1]) == 0
+    assert len(localise(inputs, spec, rng=np.random.default_rng(0)).estimates) == CYCLES + 1
+
+
+def test_two_cosines_of_no_direction_are_refused(table: Table, spec: PipelineSpec) -> None:
+    """0.8 and 0.7: the squares sum to 1.13. Six digits of a ray on the horizon pass."""
+    start, rows = StartPrior(np.zeros(3), np.zeros(3), 0.0), len(table["time_s"])
+    level = {"cos_x": rows * [round(np.cos(0.7), 6) + 1e-7], "cos_y": rows * [round(np.sin(0.7), 6) + 1e-7]}
+    inputs_of({**table, **level}, start, build_radio(spec.radio))
+    with pytest.raises(ConfigError, match=r"squares sum to 1\.13 received"):
+        inputs_of({**table, "cos_x": rows * [0.8], "cos_y": rows * [0.7]}, start, build_radio(spec.radio))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "said"),
+    [
+        ("delay_s", 33.0, "delays are in seconds"),
+        ("delay_s", -1e-9, "give none below 0"),
+        ("cos_x", 1.7, "direction cosines from -1 to 1"),
+        ("delay_std_s", -1e-10, "tau_std of -1e-10 received"),
+        ("delay_std_s", np.inf, "tau_std: not a finite number"),
+        ("cos_y_std", 0.0, "cosines_std of 0 received"),
+        ("amplitude", -1.0, "amplitude of -1 received"),
+        ("delay_s", 1e-9 + 1j, "complex numbers received"),
+        ("cos_x", "north", "not numbers"),
+        ("speed", 1.0, "unknown column"),
+        ("heading_rad", 45.0, "radians, not degrees"),
+        ("amplitude_std", 0.0, "amplitude_std of 0 received"),
+        ("delay_s", np.inf, "delay_s: infinite"),
+        ("heading_rad", np.nan, "heading_rad: empty in cycle 0"),
+        ("panel_probability", 7.0, "not from 0 to 1"),
+        ("panel_probability", np.nan, "not from 0 to 1"),
+        ("snr_db", 30.0, "columns that say the same"),
+        ("phi_r_rad", 0.1, "columns that say the same"),
+    ],
+)
+def test_a_wrong_unit_or_range_is_one_line(
+    table: Table, spec: PipelineSpec, name: str, values: object, said: str
+) -> None:
+    rows = {**table, name: [values] * len(table["time_s"])}
+    with pytest.raises(ConfigError, match=said) as raised:
+        inputs_of(rows, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
+    assert "\n" not in str(raised.value)
+
+
+def test_a_missing_column_is_named(table: Table, spec: PipelineSpec) -> None:
+    del table["amplitude"]
+    with pytest.raises(ConfigError, match="amplitude or snr_db: column missing"):
+        inputs_of(table, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
+
+
+def test_a_cosine_goes_with_a_cosine(table: Table, spec: PipelineSpec) -> None:
+    table["phi_r_rad"] = table.pop("cos_y")
+    with pytest.raises(ConfigError, match="a cosine beside an angle"):
+        inputs_of(table, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
+
+
+def test_a_ray_from_below_is_not_taken_for_its_mirror_image(table: Table, spec: PipelineSpec) -> None:
+    del table["cos_x"], table["cos_y"]
+    table["theta_r_rad"], table["phi_r_rad"] = ([value] * len(table["time_s"]) for value in (3.0, 0.2))
+    with pytest.raises(ConfigError, match="outside 0 to pi/2"):
+        inputs_of(table, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
+
+
+def test_a_column_given_twice_is_refused(tmp_path: Path, spec: PipelineSpec) -> None:
+    file = tmp_path / "twice.csv"
+    file.write_text("time_s,delay_s,delay_s,cos_x,cos_y,snr_db\n0,6e-9,9e-9,0.1,0.1,30\n")
+    with pytest.raises(ConfigError, match="a column is there twice"):
+        read_inputs(file, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
+
+
+def test_the_noise_of_the_command_line_goes_before_the_snr_of_the_file() -> None:
+    spec = load_spec(find_pipeline("trace_then_slam"), ["radio.noise_psd=3.5e-11"])
+    assert build_radio(spec.radio).noise_psd == 3.5e-11
+    with pytest.raises(ConfigError, match="not both"):
+        load_spec(find_pipeline("trace_then_slam"), ["radio.noise_psd=3.5e-11", "radio.reference_snr_db=3"])
+
+
+def test_a_folder_by_another_name_is_not_written_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "map.json").write_text("mine")
+    monkeypatch.chdir(tmp_path)
+    for folder in ("missing/..", "x" * 300):
+        with pytest.raises(ConfigError, match="--out"):
+            _new_folder(Path(folder))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("missing.csv", "no such file; give a CSV or NetCDF file"),
+        ("missing.nc", "no such file; give one as a run folder's"),
+        ("damaged.nc", "not a readable NetCDF file; give one as a run folder's"),
+        ("mine.csv", "give --start X,Y,Z"),
+    ],
+)
+def test_a_wrong_file_is_told_before_a_missing_start(tmp_path: Path, spec: PipelineSpec, name: str, said: str) -> None:
+    for there in ("damaged.nc", "mine.csv"):
+        (tmp_path / there).write_text("time_s,delay_s,cos_x,cos_y,snr_db\n0,6e-9,0.1,0.1,30\n")
+    with pytest.raises(ConfigError, match=said):
+        read_inputs(tmp_path / name, None, build_radio(spec.radio))
+
+
+def test_a_delay_at_the_edge_of_the_window_passes(table: Table, spec: PipelineSpec) -> None:
+    """0 s, as our own receiver reports a false component at times: the file of a run is not refused for it."""
+    rows = {**table, "delay_s": [0.0] * len(table["time_s"])}
+    given = inputs_of(rows, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
+    assert max(one.tau.max(initial=0.0) for one in given.measurements) == 0.0

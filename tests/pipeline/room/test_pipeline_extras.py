@@ -1,0 +1,100 @@
+"""Scattered and diffracted paths in a run: heard, unnamed, and told to nobody."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rislam_rt.errors import ConfigError
+from rislam_rt.measurement import Clutter, ReceiverConfig, measure
+from rislam_rt.model import RadioConfig
+from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline.long import slices
+from rislam_rt.pipeline.run import run_scheme, set_stage
+from rislam_rt.scene import load_scene
+from rislam_rt.shipped import find_pipeline
+
+PIPELINE = find_pipeline("trace_then_slam")
+ROUGH = ["cycles=6", "depth=1", "schemes=['optimized']", "room.scattering=0.3", "extras.diffuse=true"]
+
+
+@pytest.fixture(scope="module")
+def stage():
+    spec = load_spec(PIPELINE, ROUGH)
+    return set_stage(load_scene("paper_room"), spec, rng=np.random.default_rng(7)), spec
+
+
+def lead(stage, spec):
+    return run_scheme("optimized", stage, spec, lambda *_: None)
+
+
+def test_what_walls_scatter_is_heard_and_has_no_name(stage):
+    stage, spec = stage
+    heard, silent = lead(stage, spec), lead(stage._replace(extras=None), spec)
+    count = [(result.component_path == -1).sum(axis=1).mean() for result in (heard, silent)]
+    assert count[0] > 10.0 * (count[1] + 0.5)
+    assert (heard.component_path < stage.paths.num_paths).all()
+    again = lead(stage, spec)
+    np.testing.assert_array_equal(heard.position, again.position)
+
+
+def test_rough_walls_reflect_less(stage):
+    rough, _ = stage
+    smooth = load_spec(PIPELINE, ROUGH[:3])
+    plain = set_stage(load_scene("paper_room"), smooth, rng=np.random.default_rng(7))
+    bounces = (plain.paths.tx_walls >= 0).sum(axis=1) + (plain.paths.rx_walls >= 0).sum(axis=1)
+    np.testing.assert_allclose(
+        np.abs(rough.paths.gain), np.abs(plain.paths.gain) * np.sqrt(1.0 - 0.09) ** bounces, rtol=2e-6
+    )
+    assert plain.extras is None
+    assert set(bounces) == {0, 1}
+
+
+def test_slices_hear_it_too(stage, tmp_path, monkeypatch):
+    stage, spec = stage
+    monkeypatch.setattr(slices, "SLICE", 3)
+    tell = lambda *_: None  # noqa: E731
+    slices.run_slices("optimized", stage.scene, stage.body, spec, stage.seeds, tmp_path, "0" * 64, tell)
+    parts = list(slices.read_parts(tmp_path, "optimized", stage.scene, "0" * 64))
+    assert [len(part.motion) for part in parts] == [3, 3]
+    assert all((part.scheme.component_path == -1).sum(axis=1).min() > 5 for part in parts)
+
+
+def test_the_noise_of_named_paths_is_the_same_with_and_without(stage):
+    """So that a study is paired: a path that nothing merges with comes out with the same error."""
+    stage, _ = stage
+    radio, receiver = RadioConfig(), ReceiverConfig(estimator="bound", merge=False)
+    faint = replace(stage.extras, gain=1e-9 * stage.extras.gain)
+    clutter = Clutter(faint, np.zeros(faint.valid.shape))
+    plain, who = measure(stage.paths, 0, 0.3, radio, receiver, rng=np.random.default_rng(1))
+    with_it, who_too = measure(stage.paths, 0, 0.3, radio, receiver, clutter=clutter, rng=np.random.default_rng(1))
+    for path in set(who.path) - {-1}:
+        here, there = plain.tau[who.path == path], with_it.tau[who_too.path == path]
+        np.testing.assert_array_equal(here, there)
+
+
+@pytest.mark.parametrize("estimator", ["bound", "waveform"])
+def test_every_receiver_hears_it(stage, estimator):
+    stage, _ = stage
+    receiver = ReceiverConfig(estimator=estimator)
+    clutter = Clutter(stage.extras, np.zeros(stage.extras.valid.shape))
+    heard = [
+        measure(stage.paths, 2, 0.3, RadioConfig(), receiver, clutter=what, rng=np.random.default_rng(2))
+        for what in (None, clutter)
+    ]
+    assert len(heard[1][0]) > len(heard[0][0]) + 10
+    assert (heard[1][1].path < stage.paths.num_paths).all()
+    assert (heard[1][1].path == -1).sum() > (heard[0][1].path == -1).sum() + 5
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (["extras.diffuse=true"], "extras.diffuse: no wall scatters"),
+        (["extras.diffraction=true", "channel=image_source"], "give channel = 'traced'"),
+    ],
+)
+def test_what_nobody_could_trace_is_refused(settings, words):
+    spec = load_spec(PIPELINE, ["cycles=2", *settings])
+    with pytest.raises(ConfigError, match=words):
+        set_stage(load_scene("paper_room"), spec, rng=np.random.default_rng(7))

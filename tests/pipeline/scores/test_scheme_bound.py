@@ -1,0 +1,190 @@
+"""The bound that a run is held against: the benchmark's own figures, what may lower it, and what must not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import ncx2
+
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.information import MotionPrior, build_landmark_model, plane_tangents, posterior_bound
+from rislam_rt.information.landmark_model import LinearMeasurements
+from rislam_rt.model import PathKind
+from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline.run import set_stage
+from rislam_rt.pipeline.scores.bound import (
+    FLOOR_TILT,
+    UPRIGHT_TILT,
+    fewer_rows,
+    heard_paths,
+    over_distortion,
+    prior_std,
+    scheme_bound,
+)
+from rislam_rt.pipeline.scores.summary import map_score, summarise
+from rislam_rt.pipeline.specification.spec import build_settings
+from rislam_rt.pipeline.walk import without_panel
+
+PIPELINE = Path(__file__).parents[3] / "pipelines" / "trace_then_slam.toml"
+SHORT = ["channel=image_source", "cycles=40", "depth=1"]
+SEEN = "radio.reference_snr_db=60.0"
+"""At which even a panel at level 0 throughout is heard."""
+
+
+@pytest.fixture(scope="module")
+def stage(room):
+    return set_stage(room, load_spec(PIPELINE, SHORT), rng=np.random.default_rng(1))
+
+
+def bound(stage, scheme, *settings, gain=None):
+    config = load_spec(PIPELINE, [*SHORT, *settings]).model_dump(mode="json")
+    return scheme_bound(stage.scene, stage.paths, stage.paths.gain if gain is None else gain, scheme, config).agent
+
+
+def test_it_is_the_recursion_over_all_paths_times_their_detection_probability(stage):
+    """The same without dropping columns or rows, the probability from the noncentral chi-square law itself."""
+    settings = build_settings(load_spec(PIPELINE, SHORT))
+    walls, motion = build_walls(stage.scene), stage.scene.agent
+    snr = settings.radio.integrated_snr(stage.paths.gain)
+    reported = (stage.paths.arrival[..., 2] >= 0.0) & (stage.paths.tau <= settings.receiver.max_delay)
+    gain = np.where(reported, stage.paths.gain * np.sqrt(ncx2.sf(20.0, 2, 2.0 * snr)), 0.0)
+    model = build_landmark_model(
+        stage.paths.with_gain(gain), motion, stage.scene.landmark_positions, walls.normal, walls.offset, settings.radio
+    )
+    beforehand = prior_std(model, stage.scene, upright=False)
+    expected = posterior_bound(model.rows(1e-6), motion.time, MotionPrior(), beforehand).rms
+    # the table of probabilities has steps of 0.1 dB, and paths of less than 1e-3 in SNR are left out
+    np.testing.assert_allclose(bound(stage, "random"), expected, rtol=2e-3)
+
+
+def test_a_path_below_the_threshold_counts_for_something(stage):
+    """Noise lifts it over the threshold now and then: no step at 10 dB."""
+    values = [bound(stage, "random", f"radio.reference_snr_db={snr}")[-1] for snr in np.arange(0.0, 8.0, 0.5)]
+    ratio = np.array(values[1:]) / values[:-1]
+    assert (ratio < 1.0).all()
+    assert ratio.min() > 0.8
+
+
+def test_without_signals_it_is_the_start_carried_on(stage):
+    """No path is heard: variance `s_x^2 + t^2 s_v^2` an axis and the noise of the motion, which adds to it."""
+    found = bound(stage, "random", "radio.reference_snr_db=-200.0", "slam.sigma_a=1e-9")
+    time = stage.scene.agent.time
+    np.testing.assert_allclose(found, np.sqrt(2.0) * 0.01 * np.hypot(1.0, time), rtol=1e-6)
+
+
+def test_less_noise_and_more_signals_lower_it(stage):
+    loud, quiet = (bound(stage, "random", f"radio.reference_snr_db={snr}")[-1] for snr in (30.0, 0.0))
+    assert loud < quiet
+    plain = without_panel(stage.paths).gain
+    assert bound(stage, "random", SEEN)[-1] < bound(stage, "no_ris", SEEN, gain=plain)[-1]
+
+
+def test_told_of_the_front_ends_faults_it_is_that_of_the_noise_they_make(stage):
+    """Between the bounds at the least and at the largest distortion of any cycle; untold, as with an ideal one."""
+    fault = ('receiver.estimator="waveform"', "hardware.phase_std_deg=1.0")
+    ideal, untold = bound(stage, "random"), bound(stage, "random", *fault)
+    told = bound(stage, "random", *fault, "hardware.told=true")
+    assert (untold == ideal).all()
+    assert (bound(stage, "random", *fault, "hardware.told=true", "hardware.calibration_cycles=5") == ideal).all()
+    noise = build_settings(load_spec(PIPELINE, SHORT)).radio.noise_psd
+    lit = over_distortion(stage.paths, build_settings(load_spec(PIPELINE, [*SHORT, *fault, "hardware.told=true"])))
+    here = stage.paths.gain[:, 0] != 0.0
+    rise = np.abs(stage.paths.gain[here, 0] / lit[here, 0]) ** 2
+    low, high = (bound(stage, "random", f"radio.noise_psd={float(noise * r)!r}")[-1] for r in (rise.min(), rise.max()))
+    assert ideal[-1] < low * (1.0 - 1e-9) < told[-1] < high * (1.0 + 1e-9)
+
+
+def test_delays_alone_and_images_apart_know_less(stage):
+    less, more = bound(stage, "bp_slam", SEEN), bound(stage, "random", SEEN)
+    # covariances of 100 m^2 beforehand beside information of 1e8 / m^2: rounding leaves some 1e-6 of a value
+    assert (less >= more * (1.0 - 1e-5)).all()
+    assert less[-1] > more[-1]
+
+
+def test_what_the_receiver_does_not_report_does_not_count(stage):
+    settings = build_settings(load_spec(PIPELINE, [*SHORT, "receiver.max_delay=25e-9"]))
+    heard = heard_paths(stage.paths, settings.sensor, use_vt=True)
+    shown = heard.gain != 0.0
+    assert 0 < shown.sum() < stage.paths.valid.sum()
+    assert (heard.tau[shown] <= 25e-9).all()
+    assert (heard.arrival[shown][:, 2] >= 0.0).all()
+    assert (heard.kind != PathKind.LOS).all()
+    assert (heard_paths(stage.paths, settings.sensor, use_vt=False).kind != PathKind.VT).all()
+
+
+def test_what_the_filter_takes_for_granted_is_in_the_bound(stage):
+    """A level floor always; walls upright with wall returns alone. Nothing of their direction, nor of the ceiling."""
+    walls = build_walls(stage.scene)
+    model = build_landmark_model(
+        stage.paths, stage.scene.agent, stage.scene.landmark_positions, walls.normal, walls.offset,
+        build_settings(load_spec(PIPELINE, SHORT)).radio,
+    )  # fmt: skip
+    for upright in (False, True):
+        std = prior_std(model, stage.scene, upright=upright)
+        tilts = {w: std[model.wall_column[n] + np.arange(2)] for n, w in enumerate(walls.names)}
+        np.testing.assert_array_equal(tilts["floor"], FLOOR_TILT)
+        np.testing.assert_array_equal(tilts["ceiling"], 0.5)
+        for name in ("wall_x0", "wall_y0", "wall_x6", "wall_y6"):
+            assert sorted(tilts[name]) == [UPRIGHT_TILT if upright else 0.5, 0.5]
+            lean = plane_tangents(walls.normal[walls.names.index(name)])[int(np.argmin(tilts[name]))]
+            assert not upright or abs(lean[2]) == 1.0
+
+
+def test_landmarks_and_walls_have_bounds_where_they_are_heard(stage):
+    """Louder is sharper; nothing heard, nothing known."""
+    found = [
+        scheme_bound(
+            stage.scene, stage.paths, stage.paths.gain, "random",
+            load_spec(PIPELINE, [*SHORT, f"radio.reference_snr_db={snr}"]).model_dump(mode="json"),
+        )
+        for snr in (60.0, 30.0, -200.0)
+    ]  # fmt: skip
+    loud, quiet, silent = found
+    assert set(loud.landmarks) == set(stage.scene.landmarks)
+    assert set(loud.walls) == set(build_walls(stage.scene).names)
+    for name in set(loud.walls) & set(quiet.walls):
+        assert loud.walls[name].angle < quiet.walls[name].angle
+        assert loud.walls[name].distance < quiet.walls[name].distance
+    assert all(loud.landmarks[name] < quiet.landmarks.get(name, np.inf) for name in loud.landmarks)
+    assert (dict(silent.landmarks), dict(silent.walls)) == ({}, {})
+
+
+def test_fewer_rows_hold_the_same_information():
+    rng = np.random.default_rng(2)
+    rows = LinearMeasurements(rng.standard_normal((50, 3)), rng.standard_normal((50, 4)), rng.uniform(0.1, 2.0, 50))
+    short = fewer_rows(rows)
+    assert len(short.information) == 7
+    for first, second in ((rows, short), (rows, fewer_rows(short))):
+        matrices = [
+            (m := np.concatenate([r.agent, r.unknown], axis=1)).T @ (r.information[:, None] * m)
+            for r in (first, second)
+        ]
+        np.testing.assert_allclose(*matrices, atol=1e-12)
+
+
+def test_summary_holds_the_bound_and_the_map_score(short_result):
+    for name, scheme in summarise(short_result)["schemes"].items():
+        own = scheme_bound(
+            short_result.scene, short_result.paths, short_result.schemes[name].gain, name, short_result.config
+        ).agent
+        assert scheme["bound_m"] == pytest.approx(np.sqrt(np.mean(own**2)))
+        assert scheme["over_bound"] == pytest.approx(scheme["rmse_m"] / scheme["bound_m"])
+        assert scheme["landmarks"]["ris"]["bound_m"] > 0.0
+        assert set(scheme["map"]) == {"gospa_m", "localisation_m", "missed", "false"}
+
+
+def test_map_score_counts_points_and_not_images(room, short_result):
+    """Nothing was found in so short a run: each of two landmarks is missed and costs half the squared cut-off."""
+    from dataclasses import replace
+
+    from rislam_rt.model.estimate import MapEstimate, empty_map
+
+    assert map_score(room, empty_map()) == {"gospa_m": 1.0, "localisation_m": 0.0, "missed": 2, "false": 0}
+    points = np.vstack([room.landmark_positions + np.array([0.0, 0.3, 0.0]), [[9.0, 9.0, 9.0]]])
+    found = MapEstimate(
+        np.arange(3), points, np.zeros((3, 3, 3)), np.array([-1, -1, 0]), np.zeros(3), np.zeros(3),
+        np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2)),
+    )  # fmt: skip
+    assert map_score(room, found)["gospa_m"] == pytest.approx(np.sqrt(2 * 0.3**2))
+    ghost = replace(found, parent=np.array([-1, -1, -1]))
+    assert map_score(room, ghost)["false"] == 1

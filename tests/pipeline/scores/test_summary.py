@@ -1,0 +1,140 @@
+"""Scores of landmarks and walls against hand-made maps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.information import WallSpread
+from rislam_rt.model import MapEstimate
+from rislam_rt.pipeline.dataset import SCHEME
+from rislam_rt.pipeline.scores.bound import SchemeBound
+from rislam_rt.pipeline.scores.summary import (
+    component_labels,
+    landmark_track,
+    match_walls,
+    over_budget,
+    summarise,
+    surface_rms,
+    wall_scores,
+)
+
+PER_CYCLE = [
+    name
+    for name, (dims, _, _) in SCHEME.items()
+    if dims[0] == "time" and not name.startswith("component") and name != "panel"  # of several panels alone
+]
+
+
+def map_of_walls(normal, offset):
+    count = len(offset)
+    return MapEstimate(
+        np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0), np.zeros(0), np.zeros(0),
+        np.array(normal), np.array(offset), np.zeros((count, 2)),
+    )  # fmt: skip
+
+
+def test_surface_rms_is_the_mean_over_the_wall(room):
+    walls = build_walls(room)
+    number = walls.names.index("wall_x0")
+    normal = np.array([1.0, 0.1, -0.05]) / np.linalg.norm([1.0, 0.1, -0.05])
+    points = np.zeros((200_000, 3))
+    points[:, 1:] = np.random.default_rng(0).uniform([0.0, 0.0], [6.0, 3.0], (200_000, 2))
+    sampled = np.sqrt(np.mean((points @ normal - 0.2) ** 2))
+    # relative sampling error of a mean of squares over 200 000 points: below 0.3 %, halved by the root; 4 sigma
+    assert surface_rms(walls, number, normal, 0.2) == pytest.approx(sampled, rel=6e-3)
+
+
+def test_shifted_and_tilted_walls_are_scored(room):
+    tilt = np.radians(2.0)
+    estimate = map_of_walls(
+        [[-1.0, 0.0, 0.0], [np.sin(tilt), np.cos(tilt), 0.0]],
+        [0.05, 6.0 * np.cos(tilt) + 3.0 * np.sin(tilt)],
+    )
+    scores = wall_scores(room, estimate)
+    assert scores["wall_x0"]["rmse_m"] == pytest.approx(0.05)
+    assert scores["wall_x0"]["angle_deg"] == pytest.approx(0.0, abs=1e-9)
+    assert scores["wall_y6"]["angle_deg"] == pytest.approx(2.0)
+    assert scores["wall_y6"]["offset_m"] == pytest.approx(0.0, abs=1e-12)
+    # a plane tilted by a about the middle of a wall of width 6: rms of sin(a) u over u in [-3, 3]
+    assert scores["wall_y6"]["rmse_m"] == pytest.approx(np.sin(tilt) * 3.0 / np.sqrt(3.0))
+    assert scores["floor"]["rmse_m"] is None
+
+
+def test_one_plane_stands_for_one_wall(room):
+    walls = build_walls(room)
+    match = match_walls(walls, map_of_walls([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [0.3, 0.01]))
+    number = walls.names.index("wall_x0")
+    assert match[number] == 1
+    assert (np.delete(match, number) == -1).all()
+
+
+def test_a_plane_stands_for_no_wall_that_no_path_meets(room):
+    """The same plane, with and without a bound for the wall that it lies in."""
+    estimate = map_of_walls([[1.0, 0.0, 0.0]], [0.01])
+    heard = SchemeBound(np.zeros(1), {}, {"wall_x0": WallSpread(np.radians(0.5), 0.02)})
+    scores = wall_scores(room, estimate, heard)["wall_x0"]
+    assert (scores["offset_m"], scores["bound_m"]) == (pytest.approx(0.01), 0.02)
+    assert scores["bound_deg"] == pytest.approx(0.5)
+    elsewhere = heard._replace(walls={"ceiling": heard.walls["wall_x0"]})
+    scores = wall_scores(room, estimate, elsewhere)
+    assert all(wall["angle_deg"] is None for wall in scores.values())
+    assert scores["ceiling"]["bound_m"] == 0.02
+    assert scores["wall_x0"]["bound_m"] is None
+
+
+def test_images_never_stand_for_landmarks(room, short_result):
+    scheme = short_result.schemes["random"]
+    cycles = len(scheme.position)
+    position = np.tile(room.landmark_positions[0], (cycles, 2, 1)) + np.array([[0.1, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    held = replace(
+        scheme, ident=np.array([4, 9]), parent=np.array([-1, 4]), held=np.ones((cycles, 2), dtype=bool),
+        landmark_position=position, ris_probability=np.zeros((cycles, 2)),
+    )  # fmt: skip
+    track = landmark_track(room, held)
+    assert (track.column[:, 0] == 0).all()
+    np.testing.assert_allclose(track.error[:, 0], 0.1)
+    assert (track.column[:, 1] == -1).all()
+
+
+def test_true_identity_joins_reciprocals_and_leaves_wall_returns_out(short_result):
+    paths = short_result.paths
+    scheme = short_result.schemes["random"]
+    everything = np.arange(paths.num_paths)[None]
+    record = replace(
+        scheme,
+        **{name: getattr(scheme, name)[:1] for name in PER_CYCLE},
+        component_path=everything, component_landmark=np.full_like(everything, 5), outcome=("ok",),
+        info={name: value[:1] for name, value in scheme.info.items()},
+    )  # fmt: skip
+    label, identity = component_labels(paths, record)
+    assert (label == 5).all()
+    for path, number in enumerate(identity):
+        kind, landmark, tx, rx = paths.identity(path)
+        if landmark < 0:
+            assert number == -1
+            continue
+        same = [(kind, landmark, rx[:1], ()), (kind, landmark, (), rx[:1])] if rx else [(kind, landmark, (), tx[-1:])]
+        assert all(identity[q] == number for q in range(paths.num_paths) if paths.identity(q) in same)
+    assert (
+        len(np.unique(identity[identity >= 0])) == 2 * (1 + 6) - 1
+    )  # two landmarks with their images; none of the panel in its host
+
+
+def test_summary_is_plain_and_complete(short_result):
+    import json
+
+    summary = summarise(short_result)
+    json.dumps(summary, allow_nan=False)
+    for scheme in summary["schemes"].values():
+        assert set(scheme["landmarks"]) == {"sphere", "ris"}
+        assert len(scheme["walls"]) == 6
+        assert scheme["rmse_m"] > 0.0
+        assert scheme["diverged"] is False
+
+
+def test_steps_over_budget_are_named():
+    seconds = {"optimise": 0.2, "communicate": 0.0, "measure": 0.01, "localise": 0.02}
+    budget = {"optimise_s": 0.1, "communicate_s": 0.1, "measure_s": 0.1, "localise_s": 0.01}
+    assert over_budget(seconds, budget) == ["optimise", "localise"]

@@ -1,0 +1,118 @@
+"""Pipeline files: what they become, and what is said of a bad one."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from rislam_rt.design import DesignConfig
+from rislam_rt.errors import ConfigError
+from rislam_rt.measurement import HardwareConfig, ReceiverConfig, reference_gain
+from rislam_rt.pipeline import PipelineSpec, load_spec
+from rislam_rt.pipeline.specification.spec import (
+    DesignSection,
+    HardwareSection,
+    ReceiverSection,
+    SlamSection,
+    build_settings,
+)
+from rislam_rt.slam import SlamConfig
+
+MINIMAL = 'name = "small"\n'
+
+
+@pytest.fixture
+def write(tmp_path):
+    def _write(text):
+        path = tmp_path / "pipeline.toml"
+        path.write_text(text)
+        return path
+
+    return _write
+
+
+def test_defaults_are_those_of_the_records(write):
+    settings = build_settings(load_spec(write(MINIMAL)))
+    assert settings.slam == SlamConfig()
+    assert settings.receiver == ReceiverConfig()
+    assert settings.design == DesignConfig(certify=False)
+
+
+@pytest.mark.parametrize(
+    ("section", "record", "without"),
+    [
+        (SlamSection, SlamConfig, set()),
+        (ReceiverSection, ReceiverConfig, {"slot", "panels"}),  # it is `budget.measure_s`
+        (HardwareSection, HardwareConfig, set()),
+        (DesignSection, DesignConfig, {"certify"}),
+    ],
+)
+def test_every_setting_of_a_record_can_be_given(section, record, without):
+    assert {f.name for f in fields(record)} - without <= set(section.model_fields)
+
+
+def test_units_become_si(write):
+    radio = build_settings(load_spec(write(MINIMAL + "[radio]\ncarrier_ghz = 28.0\ntx_gain_db = 20.0\n"))).radio
+    assert radio.carrier == 28e9
+    assert radio.tx_gain == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize(("given", "expected"), [("", 13.0), ("[radio]\nreference_snr_db = -4.0\n", -4.0)])
+def test_noise_is_set_by_the_reference_sphere(write, given, expected):
+    radio = build_settings(load_spec(write(MINIMAL + given))).radio
+    snr = 10.0 * np.log10(radio.integrated_snr(np.array(reference_gain(radio))))
+    assert snr == pytest.approx(expected, abs=1e-9)
+
+
+def test_noise_density_is_taken_as_it_is(write):
+    assert build_settings(load_spec(write(MINIMAL + "[radio]\nnoise_psd = 2e-11\n"))).radio.noise_psd == 2e-11
+
+
+def test_override_wins_over_the_file(write):
+    path = write(MINIMAL + "seed = 1\n[radio]\ncarrier_ghz = 5.0\n")
+    spec = load_spec(path, ["seed=9", "radio.carrier_ghz=28.0", "channel=image_source", 'schemes=["no_ris"]'])
+    assert (spec.seed, spec.radio.carrier_ghz, spec.channel, spec.schemes) == (9, 28.0, "image_source", ["no_ris"])
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "hint"),
+    [
+        ("", "name", "missing"),
+        (MINIMAL + "[radio]\ncarier_ghz = 5.0\n", "radio.carier_ghz", "carrier_ghz"),
+        (MINIMAL + "[radio.array]\nrows = 0\n", "radio.array.rows", "greater than or equal to 1"),
+        (MINIMAL + '[slam]\nnum_particles = "many"\n', "slam.num_particles", "many"),
+        (MINIMAL + "[slam]\nnum_particles = -3\n", "slam.num_particles", "-3"),
+        (MINIMAL + "[radio]\nreference_snr_db = 1.0\nnoise_psd = 1.0\n", "radio", "not both"),
+        (MINIMAL + 'schemes = ["random", "random"]\n', "schemes", "at most once"),
+        (MINIMAL + 'schemes = ["bp"]\n', "schemes[0]", "optimized"),
+        (MINIMAL + "[control]\nloss_probability = 1.5\n", "control.loss_probability", "1.5"),
+        ("name = ", "", "not valid TOML"),
+    ],
+)
+def test_bad_file_is_one_line_with_file_and_field(write, text, place, hint):
+    path = write(text)
+    with pytest.raises(ConfigError) as caught:
+        load_spec(path)
+    message = str(caught.value)
+    assert message.startswith(str(path))
+    assert place in message
+    assert hint in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize("setting", ["", "seed", "=3", "a b=1", "name.x=1", "seed=seven", "radio.x=1"])
+def test_bad_override_is_laid_to_the_command_line(write, setting):
+    with pytest.raises(ConfigError, match="--set"):
+        load_spec(write(MINIMAL), [setting])
+
+
+def test_missing_file_and_folder(tmp_path):
+    with pytest.raises(ConfigError, match="no such pipeline file"):
+        load_spec(tmp_path / "none.toml")
+    with pytest.raises(ConfigError, match="cannot be read"):
+        load_spec(tmp_path)
+
+
+def test_specification_survives_its_own_dump(write):
+    spec = load_spec(write(MINIMAL + "[control]\ndelay_cycles = 2\n"))
+    assert PipelineSpec.model_validate(spec.model_dump(mode="json")) == spec

@@ -1,0 +1,78 @@
+"""The list of all settings says what the models say."""
+
+from pathlib import Path
+
+import pytest
+from pydantic import BaseModel
+
+from rislam_rt.cli.config import command
+from rislam_rt.errors import ConfigError
+from rislam_rt.pipeline.specification.settings import Setting, explain, list_settings
+from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.shipped import shipped_pipelines
+from rislam_rt.studies import load_any
+
+SETTINGS = {one.key: one for one in list_settings(PipelineSpec)}
+
+
+@pytest.mark.parametrize("file", shipped_pipelines().values(), ids=lambda file: file.stem)
+def test_every_setting_of_every_pipeline_has_a_meaning(file: Path) -> None:
+    settings = list_settings(type(load_any(file)))
+    assert not [one.key for one in settings if not one.meaning]
+
+
+@pytest.mark.parametrize("file", shipped_pipelines().values(), ids=lambda file: file.stem)
+def test_what_is_printed_is_the_same_pipeline(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command(file)
+    again = tmp_path / "printed.toml"
+    again.write_text(capsys.readouterr().out)
+    assert load_any(again) == load_any(file)
+
+
+def test_no_setting_is_left_out() -> None:
+    assert set(SETTINGS) == set(_leaves(PipelineSpec(name="x"), ""))
+
+
+@pytest.mark.parametrize(
+    ("key", "default", "allowed", "unit"),
+    [
+        ("depth", 2, "at least 0, at most 4", ""),
+        ("radio.carrier_ghz", 10.0, "at least 0.001, at most 3000", "GHz"),
+        ("channel", "traced", "one of traced, image_source", ""),
+        # What follows is checked by the records themselves; their ranges are found by trying.
+        ("receiver.converter_bits", 0, "at least 0, at most 32", ""),
+        ("receiver.min_delay", 0.0, "at least 0, at most 8e-08", ""),
+        ("receiver.max_delay", 80e-9, "above 0", ""),
+        ("design.population", 50, "at least 12", ""),
+        ("design.elite", 10, "at least 0, at most 48", ""),
+        ("design.mutation", 0.02, "at least 0, at most 1", ""),
+        ("slam.height", "known", "one of known, estimated", ""),
+        ("bp_slam.detection_probability", 0.7, "above 0, below 1", ""),
+    ],
+)
+def test_default_range_and_unit(key: str, default: object, allowed: str, unit: str) -> None:
+    found = SETTINGS[key]
+    assert (found.default, found.allowed, found.unit) == (default, allowed, unit)
+
+
+def test_one_setting_is_found_by_its_last_name() -> None:
+    assert explain(list(SETTINGS.values()), "mutation").key == "design.mutation"
+    assert explain(list(SETTINGS.values()), "name").key == "name"
+    with pytest.raises(ConfigError, match=r"give one of slam\.sigma_a"):
+        explain(list(SETTINGS.values()), "sigma_a")
+    with pytest.raises(ConfigError, match=r"did you mean radio\.carrier_ghz"):
+        explain(list(SETTINGS.values()), "carier_ghz")
+
+
+def _leaves(section: BaseModel, prefix: str) -> list[str]:
+    found: list[str] = []
+    for name in type(section).model_fields:
+        value = getattr(section, name)
+        found += _leaves(value, f"{prefix}{name}.") if isinstance(value, BaseModel) else [f"{prefix}{name}"]
+    return found
+
+
+def test_a_setting_knows_whether_it_must_be_given() -> None:
+    assert SETTINGS["name"].required
+    assert isinstance(SETTINGS["name"], Setting)
+    assert not SETTINGS["seed"].required

@@ -1,0 +1,63 @@
+"""The verdict on a run: the right numbers in sentences, and the right reason for what is missing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rislam_rt.pipeline import load_spec, run_slam
+from rislam_rt.pipeline.scores.summary import summarise
+from rislam_rt.report.conclusions import judge_run, panel_found_at, why_not
+from rislam_rt.report.page import build_page
+from rislam_rt.scene import load_scene
+from rislam_rt.shipped import find_pipeline
+
+
+@pytest.fixture(scope="module")
+def result():
+    settings = ["channel=image_source", "depth=1", "cycles=6", 'schemes=["random", "no_ris"]']
+    spec = load_spec(find_pipeline("trace_then_slam"), settings)
+    return run_slam(load_scene("paper_room"), spec, rng=np.random.default_rng(7))
+
+
+def test_the_page_begins_with_the_error_of_every_scheme(result):
+    summary = summarise(result)
+    said = judge_run(result, summary)
+    for name, words in (("random", "random codes"), ("no_ris", "no panel")):
+        assert f"{100 * summary['schemes'][name]['rmse_m']:.2g} cm with {words}" in said.headline
+    assert "panel not found" in said.schemes["random"]
+    assert "panel" not in said.schemes["no_ris"].removeprefix("no panel")
+    page = build_page(result, summary, {"room": b""})
+    assert page.index(said.headline) < page.index("<img") < page.index("<table")
+
+
+def test_a_lost_scheme_is_named(result):
+    summary = summarise(result)
+    summary["schemes"]["random"]["diverged"] = True
+    assert judge_run(result, summary).headline.endswith("lost with random codes.")
+
+
+def test_the_panel_is_found_from_when_it_stays(result):
+    scheme, centre = result.schemes["random"], result.scene.ris.center
+    held = np.array([[False], [True], [False], [True], [True], [True]])
+    place = np.broadcast_to(centre, (6, 1, 3))
+
+    def known(probability):
+        return replace(scheme, ident=[0], parent=[-1], held=held, landmark_position=place, ris_probability=probability)
+
+    assert panel_found_at(result, known(np.full((6, 1), 0.9))) == pytest.approx(0.3)
+    assert panel_found_at(result, known(np.array([[0.9], [0.9], [0.9], [0.9], [0.1], [0.9]]))) == pytest.approx(0.5)
+    assert panel_found_at(result, known(np.full((6, 1), 0.1))) is None
+
+
+@pytest.mark.parametrize(
+    ("snr", "valid", "said"),
+    [
+        (np.zeros((4, 0)), np.zeros((4, 0), dtype=bool), "no path reaches the agent"),
+        (np.full((4, 1), 4.0), np.ones((4, 1), dtype=bool), "4 dB below the threshold"),
+        (np.array([[40.0]] + 99 * [[1.0]]), np.ones((100, 1), dtype=bool), "heard in 1.0 % of the cycles only"),
+        (np.full((4, 2), 40.0), np.ones((4, 2), dtype=bool), "heard in 100 % of the cycles"),
+    ],
+)
+def test_why_something_is_missing(snr, valid, said):
+    assert said in why_not(snr, valid, 10.0)
