@@ -12,30 +12,41 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window import egomotion, gauss
 from rislam_rt.slam.window.egomotion import Rates
-from rislam_rt.slam.window.gauss import Window
+from rislam_rt.slam.window.gauss import Quadratic, Window
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log
 from rislam_rt.slam.window.look import Look
 
 RATE = 1e-4
 """Probability that a cycle is the one in which the agent is lost: once in 1000 s."""
-MOST = 15.0
-"""Log odds beyond which nothing more is learnt."""
+SURE = float(np.log(RATE))
+"""Log odds of an agent that is tracked for certain, but for the last cycle."""
 JUMP = 1.0
 """Standard deviation [m] of an agent's place after it was lost, and of a jump."""
 CELL = 0.01
 """Distance [m] within which two places are one: as far as a cycle's returns tell."""
 LOG_JUMP = np.log(RATE) + 2.0 * np.log(CELL / JUMP)
 """Log probability of a jump to one certain place."""
+FEWEST = 3
+"""Pairs without which nothing is told of a jump."""
+CUT, NEW = 0.7, 0.1
+"""Shares of the components that continue nothing after a jump, and else."""
+PAIRS = 60
+"""Pairs of returns and components of which a jump is asked."""
 ALIKE = 0.1
 """Difference of cosines, and of log amplitudes in units of ten times that, within which a component may be a return."""
 
 
-def advance(log_odds: float, score: float) -> float:
-    """Log odds of being lost, a cycle on, after one that the map explains better than strangers do by `score`."""
+def advance(log_odds: float, score: float, heard: int, fresh: int) -> float:
+    """Log odds of being lost, a cycle on: one that the map explains better than strangers do by `score`.
+
+    Of `heard` components `fresh` ones continue nothing: if those are many, the agent may be elsewhere all at once.
+    """
+    burst = fresh * np.log(CUT / NEW) + (heard - fresh) * np.log((1.0 - CUT) / (1.0 - NEW))
+    rate = 1.0 / (1.0 + np.exp(-SURE - max(burst, 0.0)))
     lost = 1.0 / (1.0 + np.exp(-log_odds))
-    lost += (1.0 - lost) * RATE
-    return float(np.clip(np.log(lost / (1.0 - lost)) - score, np.log(RATE), MOST))
+    lost = min(lost + (1.0 - lost) * rate, 1.0 - 1e-9)
+    return float(np.clip(np.log(lost / (1.0 - lost)) - score, SURE, -SURE))
 
 
 def jump(view: Look, glance: Glance) -> Floats:
@@ -44,26 +55,38 @@ def jump(view: Look, glance: Glance) -> Floats:
     expected, heard = view.expected.seen[lead], glance.seen
     off = np.abs(heard[:, 1:] - expected[:, None, 1:]).max(axis=-1)
     level = np.abs(glance.log_amplitude - view.groups.log_amplitude[:, None])
-    row, column = ((off < ALIKE) & (level < 10.0 * ALIKE)).nonzero()
-    if len(row) < egomotion.FEWEST:
+    off = off + np.where(level < 10.0 * ALIKE, 0.0, ALIKE)
+    near = np.argsort(off, axis=None, kind="stable")[:PAIRS]
+    row, column = np.unravel_index(near[off.ravel()[near] < ALIKE], off.shape)
+    if len(row) < FEWEST:
         return np.zeros(3)
     gap = heard[column, 0] - expected[row, 0]
     found = Rates(view.expected.jacobian[lead[row], 0, :3], gap, np.full(len(row), CELL**2))
     return egomotion.agreed(found)
 
 
-def displaced(window: Window, by: Floats) -> Window:
-    """The window with the last pose elsewhere, its velocity as it was: two steps that nothing is known of."""
-    dt = window.step[-2:]
-    accel, precision = window.accel.copy(), window.precision.copy()
-    moved = np.append(by, 0.0)[window.axes]
+def shifted(window: Window, by: Floats) -> Window:
+    """The window with the last pose elsewhere, its velocity as it was: for a look, not for a solution."""
+    accel, dt = window.accel.copy(), window.step[-2:]
     flat = window.axes < 3
-    # v stays: a dt of the one is what the other takes back
+    # what one step gives to the velocity the next one takes back
     size = dt[0] * (0.5 * dt[0] + dt[1]) - 0.5 * dt[0] * dt[1]
-    accel[-2, flat] += moved[flat] / size
-    accel[-1, flat] -= moved[flat] / size * dt[0] / dt[1]
-    precision[-2:, flat] = (JUMP / size) ** -2.0
-    return window._replace(accel=accel, precision=precision)
+    accel[-2, flat] += by[window.axes[flat]] / size
+    accel[-1, flat] -= by[window.axes[flat]] / size * dt[0] / dt[1]
+    return window._replace(accel=accel)
+
+
+def landed(window: Window, by: Floats) -> Window:
+    """The window after a jump: its last pose alone, elsewhere within `JUMP`; velocity and map as they were."""
+    while window.num_poses > 1:
+        window = gauss.slide(window)
+    head, size = window.head.copy(), len(window.head)
+    head[:3] += by
+    covariance = gauss.inverse(window.prior.hessian)
+    covariance[[0, 1], [0, 1]] += JUMP**2
+    slots = window.slots._replace(middle=np.concatenate([head[[0, 1, 2, 6]], head[gauss.HEAD :]])[None])
+    prior = Quadratic(gauss.inverse(covariance), np.zeros(size), head)
+    return window._replace(head=head, prior=prior, slots=slots, covariance=covariance)
 
 
 def ask_tracks(window: Window, log: Log, idents: Integers, heading: Floats) -> egomotion.Told | None:
@@ -82,18 +105,24 @@ CYCLE = 0.1
 """Time [s] that is held to pass from cycle to cycle where the clock says that none does."""
 
 
-def restarted(window: Window, velocity: Floats, spread: float, turned: float) -> Window:
-    """Before anything is born: with another velocity at its start, or an offset of the compass within `turned` [rad]."""
-    head, prior = window.head.copy(), window.prior
-    head[3:5] = velocity[:2]
-    hessian = prior.hessian.copy()
-    hessian[[3, 4], [3, 4]] = np.minimum(hessian[[3, 4], [3, 4]], spread**-2.0)
-    if turned > 0.0:
-        hessian[6, 6] = turned**-2.0
-    prior = prior._replace(hessian=hessian, middle=head, gradient=np.zeros(len(head)))
-    return gauss.solve(window._replace(head=head, prior=prior))
+def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
+    """Before anything is born: with another level velocity, within `std` [m/s], at its start."""
+    head, hessian = window.head.copy(), window.prior.hessian.copy()
+    head[3:5], hessian[[3, 4], [3, 4]] = velocity[:2], std**-2.0
+    return _begun(window, head, hessian)
 
 
-def lost(log_odds: float) -> bool:
+def with_free_compass(window: Window, std: float) -> Window:
+    """Before anything is born: with an offset of the compass within `std` [rad]."""
+    hessian = window.prior.hessian.copy()
+    hessian[6, 6] = std**-2.0
+    return _begun(window, window.head, hessian)
+
+
+def _begun(window: Window, head: Floats, hessian: Floats) -> Window:
+    return gauss.solve(window._replace(head=head, prior=Quadratic(hessian, np.zeros(len(head)), head)))
+
+
+def is_lost(log_odds: float) -> bool:
     """Whether the map is given up."""
     return log_odds > np.log(LEVELS.born / (1.0 - LEVELS.born))

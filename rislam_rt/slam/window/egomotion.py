@@ -39,12 +39,16 @@ class Rates(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What the tracks say of the start: log odds of it being wrong, in speed or in heading, against right."""
+    """What the tracks say of the start."""
 
-    wrong_speed: float
-    wrong_compass: float
+    log_odds: float
+    """That it was told wrong."""
+    is_compass: bool
+    """Whether it is the compass that is wrong, rather than the speed."""
     velocity: Floats
     """(3,) [m/s] that they agree on, as the compass shows it."""
+    std: float
+    """[m/s] of it, or, if the compass is wrong, of what was told."""
     turn: float
     """[rad] by which the compass shows too little, if it is that which is wrong."""
 
@@ -93,13 +97,22 @@ def weigh(found: Rates, told: Floats, std: Floats) -> Told:
     ring = -0.5 * (length - aim) ** 2 / along - 0.5 * np.log(2.0 * np.pi * along)
     ring -= np.log(2.0 * np.pi * np.hypot(length, np.sqrt(along)))
     compass = every.evidence + ring
-    best = int(np.argmax(np.maximum(speed, compass)))
+    is_compass = bool(compass.max() > speed.max())
+    best = int(np.argmax(compass if is_compass else speed))
     velocity = np.append(every.velocity[best], told[2])
     turn = float(np.arctan2(told[1], told[0]) - np.arctan2(velocity[1], velocity[0]))
+    variance = spread[best] if is_compass else every.covariance[best]
     return Told(
-        float(speed.max()) - right + LOG_WRONG, float(compass.max()) - right + LOG_WRONG, velocity,
-        float((turn + np.pi) % (2.0 * np.pi) - np.pi),
+        max(float(speed.max()), float(compass.max())) - right + LOG_WRONG, is_compass, velocity,
+        float(np.sqrt(np.trace(variance) / 2.0)), float((turn + np.pi) % (2.0 * np.pi) - np.pi),
     )  # fmt: skip
+
+
+def agreed(found: Rates) -> Floats:
+    """(3,) level velocity, or way, that most agree on; near to nothing if it may be."""
+    every = _settle(found, _starts(found, np.zeros(3)), 0.0)
+    best = int(np.argmax(every.evidence + _log_normal(every.velocity, every.covariance + WALK**2 * np.eye(2))))
+    return np.append(every.velocity[best], 0.0)
 
 
 def _log_normal(off: Floats, spread: Floats) -> Floats:

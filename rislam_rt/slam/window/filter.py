@@ -11,7 +11,7 @@ from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of,
 from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.returns import TX
 from rislam_rt.slam.tracks import Glance
-from rislam_rt.slam.window import gauss, motion, tracks
+from rislam_rt.slam.window import doubt, gauss, motion, tracks
 from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.book import Book, empty_book, idents, image_ident
 from rislam_rt.slam.window.context import Context
@@ -50,7 +50,11 @@ class WindowState(NamedTuple):
     """(3,) [m] standard deviation of the start's position: what no measurement tells."""
     scene: Scene
     doubt: float
-    """Running log odds that the map explains nothing of what is heard."""
+    """Log odds that the agent is lost: that the map explains nothing of what is heard (see `doubt`)."""
+    asked: bool
+    """Whether the first tracks were asked for the velocity."""
+    turned: float
+    """[rad] by which the compass was found to be wrong."""
     codes: tuple[RisCode | None, ...]
     """(K,) as the agent believes they were applied."""
     passed: Floats
@@ -63,9 +67,9 @@ def init(
 ) -> WindowState:  # fmt: skip
     """The start prior, and an empty map."""
     free = np.array([1.0, 1.0, float(config.height == "estimated")])
-    doubt = start.heading_std if config.heading == "estimated" else 0.0
+    offset = start.heading_std if config.heading == "estimated" else 0.0
     axes = np.arange(3) if config.heading == "known" else np.append(np.arange(3), gauss.TURN)
-    std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [doubt]])
+    std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [offset]])
     window = gauss.begin(start.position, start.velocity, axes, std)
     scene = Scene(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
@@ -74,7 +78,8 @@ def init(
     return WindowState(
         0, config, window, empty_book(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_sights(),
         gait, gait,
-        np.array([start.heading]), start.position_std * free, scene, 0.0, (None,), np.zeros((0, 3)),
+        np.array([start.heading]), start.position_std * free, scene, doubt.SURE, False, 0.0,
+        (None,), np.zeros((0, 3)),
     )  # fmt: skip
 
 
@@ -87,6 +92,8 @@ def step(
     check_sides(measurement, state.scene.ris)
     if config.heading != "known":
         heading = float(state.heading[-1])
+    else:
+        heading += state.turned
     turn = heading - float(state.heading[-1])
     state = _move(state, dt, heading)
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
@@ -118,6 +125,9 @@ def step(
     turn += float(np.diff(gauss.poses(state.window)[-2:, 3]).sum())
     followed = _follow(state, mean, glance, (~taken).nonzero()[0], dt, turn, bend)
     state = state._replace(tracks=followed.tracks, log=followed.log)
+    jumped = state.doubt == 0.0
+    if len(expected.seen) and len(glance.seen):
+        state = state._replace(doubt=doubt.advance(state.doubt, view.score, len(glance.seen), followed.fresh))
     if min(book.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, poses, scene, code))
     sights, book = learn(
@@ -126,6 +136,7 @@ def step(
     state = state._replace(sights=sights, book=book)
     landmark[free[pick]] = np.where(used, _names(state.book, expected, groups, row), REMOVED)
 
+    state, wrong = _ask(state)
     context = Context(
         state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle, state.sights, state.codes
     )  # fmt: skip
@@ -139,9 +150,46 @@ def step(
     state = state._replace(
         window=context.window, book=context.book, log=context.log, tracks=context.tracks, sights=context.sights
     )  # fmt: skip
-    outcome = _outcome(len(measurement), len(state.book.ident), state.doubt)
+    outcome = _outcome(len(measurement), len(state.book.ident), wrong or jumped or state.doubt >= 0.0)
+    if doubt.is_lost(state.doubt) and len(state.book.ident):
+        state = _restart(state)
     info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome)
     return state._replace(cycle=state.cycle + 1), info
+
+
+def _ask(state: WindowState) -> tuple[WindowState, bool]:
+    """Before anything is born: the start, as the first tracks would have it, and whether it was told wrong."""
+    if state.asked or len(state.book.ident) or len(state.heading) != state.window.num_poses or len(state.level) > 2:
+        return state, False
+    told = doubt.ask_tracks(state.window, state.log, state.tracks.ident, state.heading)
+    if told is None:
+        return state, False
+    state = state._replace(asked=True)
+    if told.log_odds <= 0.0:
+        return state, False
+    if not told.is_compass:
+        return state._replace(window=doubt.with_velocity(state.window, told.velocity, told.std)), True
+    window = doubt.with_free_compass(state.window, told.std / np.linalg.norm(told.velocity))
+    turned = state.turned + told.turn
+    return state._replace(window=window, heading=state.heading + told.turn, turned=turned), True
+
+
+def _restart(state: WindowState) -> WindowState:
+    """The pose that is kept, with what it may be off by beside it, and nothing else."""
+    window = state.window
+    mean, covariance = gauss.now(window)
+    lively = np.sqrt(motion.expected_variance(state.level))[[0, 0, 1]]
+    std = np.sqrt(np.concatenate([np.full(3, 1e-10), np.diag(covariance)[3:6] + lively**2, [covariance[6, 6]]]))
+    away = doubt.JUMP * np.array([1.0, 1.0, float(state.config.height == "estimated")])
+    fresh = gauss.begin(mean[:3], mean[3:6], window.axes, std)
+    if gauss.TURN in window.axes:
+        fresh = fresh._replace(head=mean[:gauss.HEAD])
+    return state._replace(
+        window=fresh, book=empty_book(state.scene.num_panels)._replace(next_ident=state.book.next_ident),
+        log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), sights=no_sights(), gait=state.level,
+        heading=state.heading[-1:], shift=np.hypot(state.shift, away), doubt=0.0, asked=False,
+        codes=state.codes[-1:], passed=np.concatenate([state.passed, gauss.poses(window)[:-1, :3]]),
+    )  # fmt: skip
 
 
 def _move(state: WindowState, dt: float, heading: float) -> WindowState:
@@ -176,9 +224,9 @@ manoeuvre is looked for."""
 def _notice(
     state: WindowState, heading: float, code: RisCode | None, glance: Glance, strangers: Floats
 ) -> tuple[WindowState, Look]:
-    """What is seen, and the belief that explains it best: as it was, or with a manoeuvre in the last steps.
+    """What is seen, and the belief that explains it best: as it was, with a manoeuvre in the last steps, or a jump.
 
-    The score of the better one tells whether the map explains anything at all (`doubt`).
+    A jump has to explain the cycle better than being lost does, which explains nothing.
     """
 
     def view_of(window: Window) -> Look:
@@ -194,14 +242,23 @@ def _notice(
             view = view_of(trial)
             if view.score + LOG_START > best.score:
                 best, window = view, trial
-    if not len(best.expected.seen) or not len(glance.seen):
-        return state._replace(window=window), best
-    doubt = np.clip(state.doubt - np.clip(best.score, -2.0, 2.0), 0.0, 2.0 * LOST)
-    return state._replace(window=window, doubt=float(doubt)), best
+    if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
+        by = doubt.jump(best, glance)
+        view = view_of(doubt.shifted(state.window, by)) if by.any() else best
+        if view.score + doubt.LOG_JUMP > max(best.score, doubt.SURE):
+            return _landed(state, by), view
+    return state._replace(window=window), best
 
 
-LOST = 10.0
-"""Log odds against the map from which on the agent is lost: some cycles that strangers explain better."""
+def _landed(state: WindowState, by: Floats) -> WindowState:
+    """After a jump: the last pose alone, with the map; held for lost until the next cycle agrees."""
+    passed = np.concatenate([state.passed, gauss.poses(state.window)[:-1, :3]])
+    return state._replace(
+        window=doubt.landed(state.window, by), gait=state.level, heading=state.heading[-1:], codes=state.codes[-1:],
+        passed=passed, doubt=0.0,
+    )  # fmt: skip
+
+
 GROUPS = (np.array([0, 1]), np.array([2]), np.array([gauss.TURN]))
 """Axes that are as lively as each other: an agent that turns does not climb."""
 COLUMNS = np.array([0, 0, 1, 2])
@@ -289,6 +346,8 @@ DAMPING = 0.3
 class _Followed(NamedTuple):
     tracks: Tracks
     log: Log
+    fresh: int
+    """Components that continue nothing."""
 
 
 def _follow(
@@ -310,7 +369,7 @@ def _follow(
     base = len(state.log.cycle) - len(glance.seen)
     track = state.log.track.copy()
     track[base + picks], track[base + spare] = found.ident[rows], fresh
-    return _Followed(found.keep(tracks.alive(found, state.cycle)), state.log._replace(track=track))
+    return _Followed(found.keep(tracks.alive(found, state.cycle)), state.log._replace(track=track), len(spare))
 
 
 def _names(book: Book, expected: Expected, groups: Clusters, row: Integers) -> Integers:
@@ -324,9 +383,9 @@ def _names(book: Book, expected: Expected, groups: Clusters, row: Integers) -> I
     return np.where(image, image_ident(own, book.ident[wall]), own)
 
 
-def _outcome(heard: int, features: int, doubt: float) -> Outcome:
+def _outcome(heard: int, features: int, lost: bool) -> Outcome:
     if not heard:
         return Outcome.NO_MEASUREMENTS
-    if doubt > LOST:
+    if lost:
         return Outcome.DIVERGED
     return Outcome.OK if features else Outcome.NO_LANDMARKS
