@@ -8,7 +8,7 @@ a jump to where the map's returns and what is heard agree.
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats
 from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window import egomotion, gauss
 from rislam_rt.slam.window.egomotion import Rates
@@ -16,6 +16,7 @@ from rislam_rt.slam.window.gauss import Quadratic, Window
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log
 from rislam_rt.slam.window.look import Look
+from rislam_rt.slam.window.tracks import CYCLE
 
 RATE = 1e-4
 """Probability that a cycle is the one in which the agent is lost: once in 1000 s."""
@@ -89,20 +90,39 @@ def landed(window: Window, by: Floats) -> Window:
     return window._replace(head=head, prior=prior, slots=slots, covariance=covariance)
 
 
-def ask_tracks(window: Window, log: Log, idents: Integers, heading: Floats) -> egomotion.Told | None:
+def ask_tracks(window: Window, log: Log, heading: Floats) -> egomotion.Told | None:
     """What the first tracks say of the start, once there are enough of them."""
     passes = window.step[window.step > 0.0]
     step = float(passes.mean()) if len(passes) else CYCLE
-    found = egomotion.rates(log, idents, heading, step)
+    found = egomotion.rates(log, heading, step)
     if len(found.rate) < egomotion.FEWEST:
         return None
     share = window.step.mean() / step
     std = np.sqrt(np.diag(window.covariance)[3:6])
-    return egomotion.weigh(found, share * window.head[3:6], share * std + 1e-6)
+    told = egomotion.weigh(found, share * window.head[3:6], share * std + 1e-6)
+    return told._replace(velocity=told.velocity / share if share > 0.0 else window.head[3:6])
 
 
-CYCLE = 0.1
-"""Time [s] that is held to pass from cycle to cycle where the clock says that none does."""
+def ask_picture(window: Window, log: Log, heading: Floats, lively: float) -> float:
+    """Log likelihood ratio of the last cycles' picture moving in any way against moving as the agent is thought to.
+
+    `lively` [m/s^2] of that motion.
+    """
+    if len(window.step) < PAST:
+        return 0.0
+    passed = float(window.step[-PAST:].sum())
+    time = passed if passed > 0.0 else PAST * CYCLE
+    found = egomotion.rates(log, heading[-PAST - 1 :], time / PAST)
+    if len(found.rate) < egomotion.FEWEST:
+        return 0.0
+    place = gauss.poses(window)[-PAST - 1 :, :3]
+    # what a clock that stands still does not allow for was not foreseen
+    std = passed / time * np.sqrt(np.diag(gauss.now(window)[1])[3:6] + (lively * time) ** 2) + 1e-6
+    return egomotion.weigh(found, (place[-1] - place[0]) / time, std).log_odds - egomotion.LOG_WRONG
+
+
+PAST = 10
+"""Cycles over which the picture's motion is looked at."""
 
 
 def with_velocity(window: Window, velocity: Floats, std: float) -> Window:

@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.log import Log
+from rislam_rt.slam.window.forms import UNKNOWN
+from rislam_rt.slam.window.log import Log, unique_forms
 
 WALK = 1.0
 """Standard deviation [m/s] of a velocity of which nothing is known."""
@@ -53,13 +54,19 @@ class Told(NamedTuple):
     """[rad] by which the compass shows too little, if it is that which is wrong."""
 
 
-def rates(log: Log, idents: Integers, heading: Floats, step: float) -> Rates:
-    """Of the tracks `idents` with enough in the log, cycles of `step` [s]; `heading` (K,) of its last K cycles."""
+def rates(log: Log, heading: Floats, step: float) -> Rates:
+    """Of all that was heard often enough, understood or not, in the log's last K cycles of `step` [s].
+
+    `heading` (K,) [rad] of these.
+    """
     first = int(log.cycle[-1]) - len(heading) + 1 if len(log.cycle) else 0
-    rows = (np.isin(log.track, idents) & (log.cycle >= first)).nonzero()[0]
+    known = log.explained
+    rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
     if not len(rows):
         return Rates(np.zeros((0, 3)), np.zeros(0), np.zeros(0))
-    names, which = np.unique(log.track[rows], return_inverse=True)
+    forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
+    every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
+    names, which = unique_forms(every)
     count = len(names)
     x = (log.cycle[rows] - log.cycle[-1]) * step
     weight = 1.0 / log.std[rows, 0] ** 2

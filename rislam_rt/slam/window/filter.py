@@ -52,7 +52,7 @@ class WindowState(NamedTuple):
     doubt: float
     """Log odds that the agent is lost: that the map explains nothing of what is heard (see `doubt`)."""
     asked: bool
-    """Whether the first tracks were asked for the velocity."""
+    """Whether the first tracks told that the start is another."""
     turned: float
     """[rad] by which the compass was found to be wrong."""
     codes: tuple[RisCode | None, ...]
@@ -158,15 +158,19 @@ def step(
 
 
 def _ask(state: WindowState) -> tuple[WindowState, bool]:
-    """Before anything is born: the start, as the first tracks would have it, and whether it was told wrong."""
-    if state.asked or len(state.book.ident) or len(state.heading) != state.window.num_poses or len(state.level) > 2:
+    """Whether the picture moves as the agent is told; before anything is born, the start as the tracks would have it."""
+    if len(state.level) > 2 or len(state.heading) != state.window.num_poses:
         return state, False
-    told = doubt.ask_tracks(state.window, state.log, state.tracks.ident, state.heading)
-    if told is None:
+    if len(state.book.ident):
+        if state.cycle % doubt.PAST == 0:
+            lively = float(np.sqrt(motion.expected_variance(state.level[0])))
+            odds = doubt.ask_picture(state.window, state.log, state.heading, lively)
+            state = state._replace(doubt=float(np.clip(state.doubt + odds, doubt.SURE, -doubt.SURE)))
+        return state, False
+    told = None if state.asked else doubt.ask_tracks(state.window, state.log, state.heading)
+    if told is None or told.log_odds <= 0.0:
         return state, False
     state = state._replace(asked=True)
-    if told.log_odds <= 0.0:
-        return state, False
     if not told.is_compass:
         return state._replace(window=doubt.with_velocity(state.window, told.velocity, told.std)), True
     window = doubt.with_free_compass(state.window, told.std / np.linalg.norm(told.velocity))
