@@ -18,14 +18,21 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.geometry.angles import unit
-from rislam_rt.information import LinearMeasurements, MotionPrior, build_landmark_model, posterior_bound
+from rislam_rt.information import (
+    LinearMeasurements,
+    MotionPrior,
+    build_landmark_model,
+    fewer_rows,
+    heard_paths,
+    posterior_bound,
+)
+from rislam_rt.information.heard_paths import SILENT
 from rislam_rt.information.landmark_model import LandmarkModel, mirror_chain
 from rislam_rt.information.position import range_information
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import PathKind, SlamResult
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import run_slam
-from rislam_rt.pipeline.scores.bound import SILENT, fewer_rows, heard_paths
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
 

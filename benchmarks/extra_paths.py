@@ -17,7 +17,7 @@ import numpy as np
 
 from rislam_rt import load_scene
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.run import run_scheme, set_stage
+from rislam_rt.pipeline.run import prepare_setup, run_scheme
 from rislam_rt.pipeline.seeds import spawn_seeds
 
 FALSE_ALARMS = 0.5
@@ -36,7 +36,7 @@ def lead(room: str, settings: list[str], seeds: int, cycles: int) -> tuple[np.nd
         "pipelines/trace_then_slam.toml",
         ["receiver.estimator=bound", f"cycles={cycles}", "schemes=['optimized']", *settings],
     )
-    stage = set_stage(load_scene(room), spec, rng=np.random.default_rng(7))
+    stage = prepare_setup(load_scene(room), spec, rng=np.random.default_rng(7))
     errors, false = [], []
     for seed in range(seeds):
         drawn = stage._replace(seeds=spawn_seeds(rng=np.random.default_rng(1000 + seed)))

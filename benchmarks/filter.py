@@ -25,7 +25,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.backend import prepare_backend
 from rislam_rt.model import Body
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.run import run_scheme, set_stage
+from rislam_rt.pipeline.run import prepare_setup, run_scheme
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.moments import poses_of
@@ -79,7 +79,7 @@ def default_run(seeds: int) -> None:
         load_scene(HOME / "scenes" / "paper_room"),
     )
     for seed in range(seeds):
-        stage = set_stage(room, spec, rng=np.random.default_rng(seed))
+        stage = prepare_setup(room, spec, rng=np.random.default_rng(seed))
         motion = float(stage.scene.agent.time[-1])
         spent = run_scheme("random", stage, spec, lambda *_: None).seconds[:, 3]
         print(

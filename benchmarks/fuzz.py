@@ -240,10 +240,10 @@ def cell_reader(folder: Path) -> tuple[Path, Callable[[bytes], object]]:
     from rislam_rt.errors import ResultError
     from rislam_rt.sweeps import Sweep, build_cells
     from rislam_rt.sweeps.store import MISSING, read_row, write_cell
-    from rislam_rt.sweeps.work import Outcome
+    from rislam_rt.sweeps.work import CellOutcome
 
     cell = build_cells(Sweep("math:hypot", base={"cycles": 3}))[0]
-    write_cell(folder, cell, "math:hypot", Outcome({"rmse_m": [0.1, 0.2], "name": "random"}))
+    write_cell(folder, cell, "math:hypot", CellOutcome({"rmse_m": [0.1, 0.2], "name": "random"}))
     file = next((folder / "cells").iterdir())
 
     def read(content: bytes) -> object:

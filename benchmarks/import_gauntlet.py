@@ -27,7 +27,7 @@ import numpy as np
 
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.rooms.shapes import block, box_walls, joined
+from rislam_rt.scene.built_in_rooms.shapes import block, box_walls, joined
 
 SIZE = (6.0, 4.5, 2.7)
 TABLE, CHAIRS = np.array([3.0, 2.2]), 6

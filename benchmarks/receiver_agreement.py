@@ -27,8 +27,8 @@ from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.measurement import ReceiverConfig, build_sensor, measure, receive, with_reference_snr
 from rislam_rt.model import Measurement, PathKind, Paths, PathTruth, RadioConfig, RisCode, Scene, Trajectory
 from rislam_rt.ris import rephase
+from rislam_rt.scene.random_rooms.box_rooms import random_room
 from rislam_rt.slam import SlamConfig, StartPrior, estimate, init, step
-from rislam_rt.studies.classifier.random_rooms import random_room
 from rislam_rt.studies.classifier.walks import random_walk
 
 RECEIVERS: dict[str, dict[str, Any]] = {

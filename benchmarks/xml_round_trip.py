@@ -42,7 +42,7 @@ def as_written(room: Scene, folder: Path) -> tuple[Scene, bool]:
     here, there = (ImageSourceChannel(scene, RADIO, DEPTH).paths(where) for scene in (room, back))
     (folder / "scene.toml").unlink()
     bare, _ = scene_of_xml(file, room.name)
-    bare = replace(bare, scatterers=room.scatterers, shades=room.shades, agent=room.agent)
+    bare = replace(bare, scatterers=room.scatterers, occluders=room.occluders, agent=room.agent)
     return bare, all(np.array_equal(getattr(here, name), getattr(there, name)) for name in FIELDS)
 
 

@@ -69,7 +69,7 @@ _HOMES = {
     "rislam_rt.sweeps": (
         "Axis",
         "Sweep",
-        "Effort",
+        "SweepOptions",
         "run_sweep",
     ),
 }

@@ -1,8 +1,10 @@
-"""TOML from people who may be mistaken, or mean harm: one kind of exception, and no text that takes minutes."""
+"""TOML from people who may be mistaken, or mean harm (one kind of exception, no text that takes minutes), and back."""
 
+import json
 import re
 import tomllib
 from collections.abc import Mapping
+from numbers import Integral
 from typing import Any
 
 from rislam_rt.errors import ConfigError
@@ -52,3 +54,36 @@ def put_dotted(settings: Mapping[str, Any], key: str, value: Any) -> dict[str, A
     if not isinstance(inner, Mapping):
         raise ConfigError(f"'{key}': '{head}' holds {inner!r}, which is no table; check the key")
     return {**settings, head: put_dotted(inner, rest, value)}
+
+
+def toml_bytes(table: Mapping[str, Any]) -> bytes:
+    """A table as TOML: plain keys first, then (lists of) tables; text and numbers so that they read back equal."""
+    lines = [f"{_toml_key(key)} = {toml_value(value)}" for key, value in table.items() if not _is_table(value)]
+    for key, value in table.items():
+        for section in value if isinstance(value, list) and _is_table(value) else [value]:
+            if isinstance(section, Mapping):
+                lines += ["", f"[[{_toml_key(key)}]]" if isinstance(value, list) else f"[{_toml_key(key)}]"]
+                lines += [f"{_toml_key(name)} = {toml_value(item)}" for name, item in section.items()]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def toml_value(value: Any) -> str:
+    """A value as TOML; tables inline, numbers so that they read back equal."""
+    if isinstance(value, str):
+        # TOML's strings are JSON's, but for DEL.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, Integral):
+        return str(value).lower()
+    if isinstance(value, float):
+        return repr(float(value))
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_toml_key(key)} = {toml_value(item)}" for key, item in value.items()) + " }"
+    return "[" + ", ".join(toml_value(item) for item in value) + "]"
+
+
+def _is_table(value: Any) -> bool:
+    return isinstance(value, Mapping) or (isinstance(value, list) and bool(value) and isinstance(value[0], Mapping))
+
+
+def _toml_key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else str(toml_value(key))

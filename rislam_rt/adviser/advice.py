@@ -4,9 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.adviser.budget import NOTHING_DB, Link, link_budget, survey
-from rislam_rt.adviser.cost import Cost, trace_cost
-from rislam_rt.adviser.remedies import remedies, verdict
+from rislam_rt.adviser.budget import NOTHING_DB, LandmarkLink, link_budget, survey
+from rislam_rt.adviser.cost import TraceCost, trace_cost
+from rislam_rt.adviser.remedies import detection_label, remedies
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.specification.spec import Settings
 
@@ -14,9 +14,9 @@ from rislam_rt.pipeline.specification.spec import Settings
 class Advice(NamedTuple):
     """What is to be expected of a run in a room, with the radio and receiver of `settings`."""
 
-    links: list[Link]
+    links: list[LandmarkLink]
     remedies: list[str]
-    costs: list[Cost]
+    costs: list[TraceCost]
     threshold_db: float
     """Of detection: SNR over all antennas."""
 
@@ -28,7 +28,12 @@ class Advice(NamedTuple):
                 {"margin_db": _finite(link.margin_db[at]), "probability": float(link.probability[at]),
                  "reason": link.reason[at]} for at in link.three
             ]  # fmt: skip
-            words = {"landmark": link.landmark, "code": link.code, "share": link.share, "verdict": verdict(link)}
+            words = {
+                "landmark": link.landmark,
+                "code": link.code,
+                "share": link.share,
+                "verdict": detection_label(link),
+            }
             links.append(words | dict(zip(("start", "middle", "end"), places, strict=True)))
         costs = [cost._asdict() for cost in self.costs]
         return {"threshold_db": self.threshold_db, "links": links, "remedies": self.remedies, "costs": costs}

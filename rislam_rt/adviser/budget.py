@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.adviser.codes import codes_of, under
-from rislam_rt.adviser.hearing import Heard, hear
+from rislam_rt.adviser.detection import DetectionForecast, forecast_detection
 from rislam_rt.adviser.reasons import Reasons, build_reasons
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source import ImageSourceChannel
@@ -22,7 +22,7 @@ NOTHING_DB = -400.0
 """SNR over the threshold [dB] where there is no path."""
 
 
-class Link(NamedTuple):
+class LandmarkLink(NamedTuple):
     """One landmark under one kind of codes, at K places."""
 
     landmark: str
@@ -68,13 +68,13 @@ def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
     return Survey(scene, channel.paths(scene.agent), settings, channel.depth)
 
 
-def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[Link]:
+def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLink]:
     """A link for each scatterer, and one for each kind of codes of each panel. `rng` draws the random codes."""
     scene, paths, settings = looked.scene, looked.paths, looked.settings
     reasons = build_reasons(scene, paths, settings)
     if scene.ris is None:
         return [_link(name, "", [_all_places(paths, looked)], reasons, n) for n, name in enumerate(scene.landmarks)]
-    links: list[Link] = []
+    links: list[LandmarkLink] = []
     for codes in codes_of(paths, scene.ris.spec, settings.radio, rng=rng):
         heard = [_all_places(under(paths, scene.ris.spec, levels), looked) for levels in codes.levels]
         if codes.name == "aimed":
@@ -93,12 +93,14 @@ def at_rows(motion: Trajectory, rows: Integers) -> Trajectory:
     )
 
 
-def _all_places(paths: Paths, looked: Survey) -> list[Heard]:
+def _all_places(paths: Paths, looked: Survey) -> list[DetectionForecast]:
     heading = looked.scene.agent.heading
-    return [hear(paths, place, float(heading[place]), looked.settings) for place in range(paths.num_cycles)]
+    return [
+        forecast_detection(paths, place, float(heading[place]), looked.settings) for place in range(paths.num_cycles)
+    ]
 
 
-def _link(name: str, code: str, heard: list[list[Heard]], reasons: Reasons, number: int) -> Link:
+def _link(name: str, code: str, heard: list[list[DetectionForecast]], reasons: Reasons, number: int) -> LandmarkLink:
     """Over C codes: the mean of the chance, and of the power, but of swept codes the best beam's."""
     snr = np.array([[place.snr[number] for place in places] for places in heard])
     chance = np.array([[place.probability[number] for place in places] for places in heard]).mean(axis=0)
@@ -109,4 +111,4 @@ def _link(name: str, code: str, heard: list[list[Heard]], reasons: Reasons, numb
         "" if chance[place] > 0.5 else reasons.why(number, place, float(margin[place]), int(covered[place]))
         for place in range(len(margin))
     )
-    return Link(name, code, margin, chance, said)
+    return LandmarkLink(name, code, margin, chance, said)

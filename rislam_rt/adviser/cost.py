@@ -21,7 +21,7 @@ COUNTED = 300_000
 them down by cones, at a cost that these rates do not tell."""
 
 
-class Cost(NamedTuple):
+class TraceCost(NamedTuple):
     """A trace of the whole way with up to `depth` wall bounces."""
 
     depth: int
@@ -34,24 +34,24 @@ class Cost(NamedTuple):
     """Processor time, or None likewise."""
 
 
-def trace_cost(scene: Scene, radio: RadioConfig, walls: int) -> list[Cost]:
+def trace_cost(scene: Scene, radio: RadioConfig, walls: int) -> list[TraceCost]:
     """The cost at each of `DEPTHS` in a scene of so many walls."""
     middle = at_rows(scene.agent, np.array([len(scene.agent) // 2]))
     legs = 1 + 2 * len(scene.landmarks)
-    costs: list[Cost] = []
+    costs: list[TraceCost] = []
     for depth in DEPTHS:
         most = sum(walls * max(walls - 1, 0) ** (bounces - 1) for bounces in range(1, depth + 1))
         if most > COUNTED or walls > MANY_WALLS:
-            costs.append(Cost(depth, walls, legs * most, None, None))
+            costs.append(TraceCost(depth, walls, legs * most, None, None))
             continue
         channel = ImageSourceChannel(scene, radio, depth)
         asked, paths = _asked(channel, depth), int(channel.paths(middle).valid.sum())
         seconds = START_SECONDS + len(scene.agent) * (PATH_SECONDS * paths + SEQUENCE_SECONDS * asked)
-        costs.append(Cost(depth, walls, asked, paths, seconds))
+        costs.append(TraceCost(depth, walls, asked, paths, seconds))
     return costs
 
 
-def cost_words(cost: Cost) -> str:
+def cost_words(cost: TraceCost) -> str:
     """`2 bounces: 173 wall sequences, 172 paths, 0.31 s`."""
     bounces = f"{cost.depth} bounce{'s' if cost.depth > 1 else ''}"
     if cost.seconds is None:

@@ -53,23 +53,23 @@ class Reasons(NamedTuple):
             last = point + CLEARANCE * (end - point)
             _, hit = crossings(end[None], last[None], self.triangles)
             names = [self.owner[t] for t in hit]
-            names = [name for name in names if name != _shade_name(self.scene, number)]
+            names = [name for name in names if name != _occluder_name(self.scene, number)]
             if names:
                 return names[0]
         return ""
 
 
 def build_reasons(scene: Scene, paths: Paths, settings: Settings) -> Reasons:
-    """All that hides, walls and shades."""
+    """All that hides, walls and occluders."""
     meshes = [(r.name, r.triangles) for r in scene.reflectors]
-    meshes += [(shade.name, shade.triangles) for shade in scene.shades]
+    meshes += [(shade.name, shade.triangles) for shade in scene.occluders]
     meshes += [(s.name, s.shade.triangles) for s in scene.scatterers if s.shade is not None]
     triangles = np.concatenate([triangles for _, triangles in meshes])
     owner = tuple(name for name, triangles in meshes for _ in range(len(triangles)))
     return Reasons(scene, paths, settings, triangles, owner)
 
 
-def _shade_name(scene: Scene, number: int) -> str:
+def _occluder_name(scene: Scene, number: int) -> str:
     """A scatterer's own shade does not hide its centre."""
     if number < len(scene.scatterers) and scene.scatterers[number].shade is not None:
         return scene.scatterers[number].name

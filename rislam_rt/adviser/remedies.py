@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rislam_rt.adviser.budget import Link, Survey
+from rislam_rt.adviser.budget import LandmarkLink, Survey
 from rislam_rt.adviser.reasons import WEAK
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.antennas import amplitude
@@ -23,35 +23,34 @@ GROWTH = 1.05
 """From one size tried to the next, once the law for a continuous phase has said where to begin."""
 
 
-def verdict(link: Link) -> str:
+def detection_label(link: LandmarkLink) -> str:
     """`heard`, `heard at times` or `not heard`."""
     return "heard" if link.share >= HEARD else "heard at times" if link.share >= SELDOM else "not heard"
 
 
-def remedies(looked: Survey, links: Sequence[Link]) -> list[str]:
+def remedies(looked: Survey, links: Sequence[LandmarkLink]) -> list[str]:
     """One line for each landmark that is not heard on half of the way under the best code, and one on finding it."""
     lines = []
     for link in links:
         if link.code in ("", "aimed") and link.share < HEARD:
-            lines.append(
-                f"{link.landmark}: {verdict(link)} (on {link.share:.0%} of the way): {_what_helps(looked, link)}"
-            )
+            heard = f"{detection_label(link)} (on {link.share:.0%} of the way)"
+            lines.append(f"{link.landmark}: {heard}: {_what_helps(looked, link)}")
     lines += [line for link in links if link.code == "swept" for line in _on_search(link, links)]
     return lines
 
 
-def weak_places(link: Link) -> Integers:
+def weak_places(link: LandmarkLink) -> Integers:
     """Places at which a path comes in that is only too weak."""
     return np.array([place for place, reason in enumerate(link.reason) if reason == WEAK], dtype=np.int64)
 
 
-def lack_db(link: Link) -> float:
+def lack_db(link: LandmarkLink) -> float:
     """By how much SNR lacks [dB] at the median of the places where it is all that lacks; 0 if there are none."""
     weak = weak_places(link)
     return -float(np.median(link.margin_db[weak])) if len(weak) else 0.0
 
 
-def enough_elements(looked: Survey, panel: RisPanel, link: Link) -> RisSpec | None:
+def enough_elements(looked: Survey, panel: RisPanel, link: LandmarkLink) -> RisSpec | None:
     """The smallest panel, grown alike along both sides, whose direct path under the best code is above the threshold at
     the median of the places where it is too weak; None if none of up to `LARGEST` elements a side is.
     """
@@ -67,7 +66,7 @@ def enough_elements(looked: Survey, panel: RisPanel, link: Link) -> RisSpec | No
         scale *= GROWTH
 
 
-def _what_helps(looked: Survey, link: Link) -> str:
+def _what_helps(looked: Survey, link: LandmarkLink) -> str:
     scene, lack = looked.scene, lack_db(link)
     parts = list(_why_where(link))
     if lack:
@@ -80,14 +79,14 @@ def _what_helps(looked: Survey, link: Link) -> str:
     return "; ".join(parts)
 
 
-def _why_where(link: Link) -> Iterator[str]:
+def _why_where(link: LandmarkLink) -> Iterator[str]:
     """Each reason with the share of the way on which it holds, the commonest first, and the way round it."""
     for reason, count in Counter(reason for reason in link.reason if reason).most_common():
         share = f"{reason} on {count / len(link.reason):.0%} of it"
         yield share if reason == WEAK else f"{share} ({_way_round(reason)})"
 
 
-def _larger(looked: Survey, link: Link, lack: float) -> Iterator[str]:
+def _larger(looked: Survey, link: LandmarkLink, lack: float) -> Iterator[str]:
     scene = looked.scene
     if link.code == "":
         yield f"or an echo of {10.0 ** (lack / 10.0):.2g} times the cross-section"
@@ -102,7 +101,7 @@ def _larger(looked: Survey, link: Link, lack: float) -> Iterator[str]:
     )
 
 
-def _on_search(link: Link, links: Sequence[Link]) -> Iterator[str]:
+def _on_search(link: LandmarkLink, links: Sequence[LandmarkLink]) -> Iterator[str]:
     """A panel that an aimed code makes heard, but the sweep hardly ever hits."""
     aimed = next(one for one in links if one.landmark == link.landmark and one.code == "aimed")
     if aimed.share >= HEARD and link.share < SELDOM:

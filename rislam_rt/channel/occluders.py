@@ -20,7 +20,7 @@ _BLOCK = 1_000_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Occluders:
-    """S shades made of T triangles, shade by shade."""
+    """S occluders made of T triangles, one after the other."""
 
     names: tuple[str, ...]
     """(S,)."""
@@ -66,12 +66,12 @@ class Occluders:
 
 
 def build_occluders(scene: Scene) -> Occluders:
-    """Collect the shades of a scene's scatterers, and those that stand alone."""
+    """Collect the occluders of a scene's scatterers, and those that stand alone."""
     owners = [n for n, scatterer in enumerate(scene.scatterers) if scatterer.shade is not None]
     meshes = [s.shade.triangles for s in scene.scatterers if s.shade is not None]
-    names = [scene.scatterers[n].name for n in owners] + [shade.name for shade in scene.shades]
-    owners += [ALONE] * len(scene.shades)
-    meshes += [shade.triangles for shade in scene.shades]
+    names = [scene.scatterers[n].name for n in owners] + [shade.name for shade in scene.occluders]
+    owners += [ALONE] * len(scene.occluders)
+    meshes += [shade.triangles for shade in scene.occluders]
     center = np.array([(m.min(axis=(0, 1)) + m.max(axis=(0, 1))) / 2.0 for m in meshes]).reshape(-1, 3)
     reach = [np.linalg.norm(m - c, axis=-1).max() for m, c in zip(meshes, center, strict=True)]
     return Occluders(

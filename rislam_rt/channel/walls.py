@@ -35,7 +35,7 @@ class Walls:
     """(W,) for each wall those that lie on it: where they are, they reflect and it does not."""
     hosts: tuple[int, ...]
     """The wall behind each panel, -1 where there is none."""
-    shades: Occluders
+    occluders: Occluders
     """What hides but is no wall: it never reflects."""
 
     def __len__(self) -> int:
@@ -44,6 +44,14 @@ class Walls:
     def beside(self, wall: int) -> Booleans:
         """(W,) which walls share a wall's plane by lying on each other; none for -1."""
         return (self.plane == self.plane[wall]) if wall >= 0 else np.zeros(len(self), dtype=np.bool_)
+
+    def surface(self, wall: int) -> tuple[Floats, Floats]:
+        """Centroid (3,) of a wall and the share (T,) of each of its triangles in its area."""
+        triangles = self.triangles[self.wall_of_triangle == wall]
+        edges = triangles[:, 1:] - triangles[:, :1]
+        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
+        weight = area / area.sum()
+        return weight @ triangles.mean(axis=1), weight
 
 
 def build_walls(scene: Scene) -> Walls:

@@ -40,7 +40,7 @@ def command(
 
 def _print_file(settings: "list[Setting]", spec: Any) -> None:
     """All settings as TOML, each under one line on its meaning; those without a value are commented out."""
-    from rislam_rt.scene.write import toml_value
+    from rislam_rt.toml import toml_value
 
     table = ""
     for one in settings:
@@ -54,7 +54,7 @@ def _print_file(settings: "list[Setting]", spec: Any) -> None:
 
 
 def _print_one(one: "Setting", value: Any) -> None:
-    from rislam_rt.scene.write import toml_value
+    from rislam_rt.toml import toml_value
 
     typer.echo(f"{one.key} = {'(not set)' if value is None else toml_value(_plain(value))}")
     typer.echo(_facts(one))

@@ -9,7 +9,7 @@ from rislam_rt.cli.verbosity import verbosity
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
-    from rislam_rt.sweeps import Cost, Told
+    from rislam_rt.sweeps import SweepCost, SweepProgress
 
 
 class ProgressReport(Protocol):
@@ -53,7 +53,7 @@ def show_progress() -> Iterator[ProgressReport]:
 
 
 @contextmanager
-def show_sweep() -> "Iterator[Callable[[Told], None]]":
+def show_sweep() -> "Iterator[Callable[[SweepProgress], None]]":
     """Show a sweep: its cost before it starts, a bar with the time left, and every failure as it comes."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
@@ -62,7 +62,7 @@ def show_sweep() -> "Iterator[Callable[[Told], None]]":
     with Progress(*columns, console=Console(stderr=True), refresh_per_second=4, disable=verbosity().quiet) as bar:
         task = bar.add_task("cells", total=None, left="one cell goes first, to tell the cost")
 
-        def tell(told: "Told") -> None:
+        def tell(told: "SweepProgress") -> None:
             if told.last is None and not verbosity().quiet:
                 bar.console.print(describe_cost(told), markup=False, highlight=False)
             elif told.last is not None and told.last.failed:
@@ -77,7 +77,7 @@ def show_sweep() -> "Iterator[Callable[[Told], None]]":
         yield tell
 
 
-def describe_cost(told: "Told") -> str:
+def describe_cost(told: "SweepProgress") -> str:
     """How many cells there are, how many are there, and what the rest will cost."""
     there = f"{told.total} cells, {told.done} done" + (f", {told.failed} failed" if told.failed else "")
     if not told.cost.cells:
@@ -85,7 +85,7 @@ def describe_cost(told: "Told") -> str:
     return f"{there}; {told.cost.cells} left at about {told.cost.cell_seconds or 0.0:.3g} s each: {clock(told.cost)}"
 
 
-def clock(cost: "Cost") -> str:
+def clock(cost: "SweepCost") -> str:
     """The time that is left as `h:mm:ss`."""
     if cost.seconds is None:
         return "unknown time"

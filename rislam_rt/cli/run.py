@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from rislam_rt.model import Scene
     from rislam_rt.pipeline import PipelineSpec
-    from rislam_rt.pipeline.store.identity import Identity
+    from rislam_rt.pipeline.store.identity import RunIdentity
 
 
 def command(
@@ -116,7 +116,9 @@ def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> N
     write_json(given.json, summary)
 
 
-def compute_run(spec: "PipelineSpec", room: "Scene", identity: "Identity", folder: Path, given: StudyOptions) -> None:
+def compute_run(
+    spec: "PipelineSpec", room: "Scene", identity: "RunIdentity", folder: Path, given: StudyOptions
+) -> None:
     """Begin a run or go on with it, and report it."""
     import os
 

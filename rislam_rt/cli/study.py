@@ -67,7 +67,7 @@ def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
     from rislam_rt.cli.scenes import open_scene, scene_of
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
-    from rislam_rt.report.fig4a import fig4a_table, verdict
+    from rislam_rt.report.fig4a import fig4a_table, findings_of
     from rislam_rt.report.study import write_fig4a
     from rislam_rt.scene.file_names import safe_name
     from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
@@ -84,7 +84,7 @@ def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
         found = run_fig4a(scene, spec, rng=np.random.default_rng(spec.seed), progress=progress)
     content = {**record, **fig4a_table(found)}
     for element in found.curves:
-        typer.echo("\n".join([*verdict(found, element), ""]))
+        typer.echo("\n".join([*findings_of(found, element), ""]))
     typer.echo(f"page: {write_fig4a(found, spec, scene.name, content, folder, figures=given.page)}")
     write_json(given.json, content)
 
@@ -97,7 +97,7 @@ def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
     from rislam_rt.report.swept import write_swept
     from rislam_rt.studies.swept import build_sweep
     from rislam_rt.studies.swept.record import swept_record
-    from rislam_rt.sweeps import Effort, build_cells, run_sweep
+    from rislam_rt.sweeps import SweepOptions, build_cells, run_sweep
     from rislam_rt.sweeps.store import check_folder
 
     sweep = build_sweep(spec, given.pipeline, given.scene)
@@ -111,7 +111,7 @@ def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
     def grow(rows: "Sequence[Row]") -> None:
         write_swept(rows, spec, record, folder, figures=given.page)
 
-    effort = Effort(given.jobs or os.cpu_count() or 1, None, spec.time_limit_s)
+    effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, spec.time_limit_s)
     try:
         with show_sweep() as tell:
             report = run_sweep(sweep, cells, effort, tell=tell, grow=grow)

@@ -10,7 +10,7 @@ from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption,
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rislam_rt.sweeps import Effort, Report, Row, Sweep
+    from rislam_rt.sweeps import Row, Sweep, SweepOptions, SweepReport
 
 
 def command(
@@ -47,11 +47,11 @@ def command(
     from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.report.tables import print_sweep
     from rislam_rt.studies.pipeline_sweep import load_section, score_rows, slam_sweep
-    from rislam_rt.sweeps import Effort
+    from rislam_rt.sweeps import SweepOptions
 
     sweep = slam_sweep(pipeline, set_ or (), axis or (), scene=scene, repeat=repeat)
     limit = time_limit if time_limit is not None else load_section(pipeline, set_ or ()).time_limit_s
-    effort = Effort(jobs or os.cpu_count() or 1, dask, limit, retry, estimate)
+    effort = SweepOptions(jobs or os.cpu_count() or 1, dask, limit, retry, estimate)
     target = out or Path("sweeps") / f"{sweep.name}-{Path(sweep.base['scene']).name}"
     try:
         report = _run(sweep, target, effort)
@@ -67,7 +67,7 @@ def command(
         raise typer.Exit(1)
 
 
-def _run(sweep: "Sweep", target: Path, effort: "Effort") -> "Report":
+def _run(sweep: "Sweep", target: Path, effort: "SweepOptions") -> "SweepReport":
     """The sweep with its bar; scores and their picture grow beside the table."""
     from rislam_rt.cli.progress import show_sweep
     from rislam_rt.pipeline.run import prepare_channel

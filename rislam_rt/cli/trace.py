@@ -75,7 +75,7 @@ def command(
         raise ConfigError(f"--set {beyond[0][:60]}: without --signals radio.* alone; add it, or leave this out")
     radio = signal_settings(load_signals_spec(set_ or ()))[0] if signals else load_radio(set_ or ())
     opened = open_scene(scene, radio)
-    room = thinned(opened.scene, cycles, stride)
+    room = part_of_motion(opened.scene, cycles, stride)
     if deepmimo is not None:
         check_new(deepmimo)
     prepare_channel(channel)
@@ -113,7 +113,7 @@ def check_new(folder: Path) -> None:
         raise ConfigError(f"--deepmimo {folder}: exists already; give a folder that does not exist yet")
 
 
-def thinned(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
+def part_of_motion(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
     """The scene with a part of its trajectory's cycles.
 
     Raises

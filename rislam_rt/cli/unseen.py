@@ -26,7 +26,7 @@ def run_unseen(spec: "UnseenSpec", given: StudyOptions) -> None:
     from rislam_rt.report.unseen.terminal import print_cards
     from rislam_rt.studies.unseen import build_unseen, count_tests
     from rislam_rt.studies.unseen.record import unseen_record
-    from rislam_rt.sweeps import Effort, build_cells, run_sweep
+    from rislam_rt.sweeps import SweepOptions, build_cells, run_sweep
     from rislam_rt.sweeps.store import check_folder, read_timings
 
     if given.scene is not None:
@@ -47,7 +47,7 @@ def run_unseen(spec: "UnseenSpec", given: StudyOptions) -> None:
     def grow(rows: "Sequence[Row]") -> None:
         write(rows)
 
-    effort = Effort(given.jobs or os.cpu_count() or 1, None, spec.time_limit_s)
+    effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, spec.time_limit_s)
     try:
         with show_sweep() as tell:
             report = run_sweep(sweep, cells, effort, tell=tell, grow=grow)

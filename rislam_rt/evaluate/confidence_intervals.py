@@ -1,6 +1,8 @@
 """Confidence intervals by the bootstrap: what a difference between schemes is worth after so many seeds."""
 
+import warnings
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -55,6 +57,8 @@ def bootstrap(
 ) -> Interval:
     """Bias-corrected and accelerated interval (Efron 1987) of a statistic of samples (R, ...), R independent runs.
 
+    Of quantiles alone where that is not defined: where leaving out any one run changes nothing.
+
     Parameters
     ----------
     statistic
@@ -64,16 +68,21 @@ def bootstrap(
     if len(samples) < 2:
         raise ConfigError(f"samples: {len(samples)} received; an interval needs at least 2 runs")
     value = float(statistic(samples[:, None])[0])
-    draws = rng.integers(len(samples), size=(len(samples), resamples))
-    replicates = np.asarray(statistic(samples[draws]))
-    if np.ptp(replicates) == 0.0:
-        return Interval(value, value, value)
-    below = np.mean(replicates < value) + 0.5 * np.mean(replicates == value)
-    bias = scipy.special.ndtri(np.clip(below, 0.5 / resamples, 1.0 - 0.5 / resamples))
-    quantile = scipy.special.ndtri(np.array([(1.0 - level) / 2.0, (1.0 + level) / 2.0]))
-    shifted = bias + (bias + quantile) / (1.0 - _acceleration(samples, statistic) * (bias + quantile))
-    lower, upper = np.quantile(replicates, scipy.special.ndtr(shifted))
-    return Interval(value, float(lower), float(upper))
+    columns = samples.reshape(len(samples), -1).T
+
+    def of_columns(*drawn: Floats, axis: int) -> Floats:
+        runs = np.stack([np.moveaxis(one, axis, 0) for one in drawn], axis=-1)
+        return statistic(runs.reshape(*runs.shape[:-1], *samples.shape[1:]))
+
+    again = partial(
+        scipy.stats.bootstrap, tuple(columns), of_columns, confidence_level=level, paired=True, vectorized=True, rng=rng
+    )  # fmt: skip
+    with warnings.catch_warnings(), np.errstate(divide="ignore", invalid="ignore"):
+        warnings.simplefilter("ignore", scipy.stats.DegenerateDataWarning)
+        found = again(method="BCa", n_resamples=resamples)
+        if not np.isfinite(found.confidence_interval).all():  # no spread without any one run: a median, or all alike
+            found = again(method="percentile", n_resamples=0, bootstrap_result=found)
+    return Interval(value, *(float(end) for end in found.confidence_interval))
 
 
 def bootstrap_ratio(
@@ -96,13 +105,3 @@ def bootstrap_ratio(
         return statistic(samples[..., 0]) / statistic(samples[..., 1])
 
     return bootstrap(pairs, rng=rng, statistic=ratio, level=level, resamples=resamples)
-
-
-def _acceleration(samples: Floats, statistic: Statistic) -> float:
-    """Skewness of the jackknife values over six: how the spread changes with the value."""
-    count = len(samples)
-    others = np.array([np.delete(np.arange(count), run) for run in range(count)]).T
-    values = np.asarray(statistic(samples[others]))
-    centred = values.mean() - values
-    spread = np.sum(centred**2)
-    return float(np.sum(centred**3) / (6.0 * spread**1.5)) if spread > 0.0 else 0.0

@@ -52,6 +52,5 @@ def chi_square_bounds(dof: int, runs: int = 1, *, level: float = 0.95) -> tuple[
         raise ConfigError(
             f"dof, runs, level: {dof}, {runs}, {level} received; give 1 or more, 1 or more, within (0, 1)"
         )
-    tail = (1.0 - level) / 2.0
-    lower, upper = 2.0 * scipy.special.gammaincinv(0.5 * dof * runs, np.array([tail, 1.0 - tail])) / (dof * runs)
-    return float(lower), float(upper)
+    lower, upper = scipy.stats.chi2.interval(level, dof * runs)
+    return float(lower) / (dof * runs), float(upper) / (dof * runs)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.arrays import Floats
 from rislam_rt.information.gradient import GradientMode, vertex_gradient
 from rislam_rt.information.position import PositionBound, position_bound, position_information
 from rislam_rt.model import PathKind, Paths, RadioConfig
@@ -42,12 +42,3 @@ def position_error_map(
     snr = radio.integrated_snr(paths.gain)
     heard = paths.valid & np.isin(paths.kind, kinds) & (snr >= least_snr)
     return position_bound(position_information(gradient, np.where(heard, snr, 0.0), radio), prior)
-
-
-def dilution(gradient: Floats, heard: Booleans) -> PositionBound:
-    """Geometric dilution of precision (...,): the bound when every heard path's length is known to 1 m.
-
-    `gradient` (..., P, D), `heard` (..., P). The result's `rms` is the GDOP, without unit.
-    """
-    weighted = gradient * heard[..., None]
-    return position_bound(np.swapaxes(weighted, -1, -2) @ weighted)

@@ -62,25 +62,6 @@ def vertex_gradient(
     return last[..., 0, :] - segment[..., 0, :]
 
 
-def landmark_gradient(before: Floats, point: Floats, after: Floats) -> Floats:
-    """Gradient (..., 3) of a path's length with respect to a landmark, from its neighbours on the path."""
-    return unit(point - before) + unit(point - after)
-
-
-def heading_gradient(
-    tx_offset: Floats, rx_offset: Floats, heading: Floats, tx: Floats, rx: Floats, first: Floats, last: Floats
-) -> Floats:
-    """Derivative (...,) [m/rad] of a path's length with respect to the heading, which turns both ends.
-
-    `tx_offset`, `rx_offset` (3,) [m] in the body frame; `heading` (...,) [rad]; the rest as in `path_gradient`.
-    """
-    turned = rotation_z(np.asarray(heading) + np.pi / 2.0)
-    horizontal = np.array([1.0, 1.0, 0.0])
-    return np.sum(unit(tx - first) * (turned @ (tx_offset * horizontal)), axis=-1) + np.sum(
-        unit(rx - last) * (turned @ (rx_offset * horizontal)), axis=-1
-    )
-
-
 def cosine_gradient(rx: Floats, apparent: Floats, heading: Floats) -> Floats:
     """Gradient (..., 2, 3) [1/m] of the direction cosines along body x and y with respect to the Rx position.
 

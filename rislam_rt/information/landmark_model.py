@@ -34,6 +34,15 @@ class LinearMeasurements(NamedTuple):
     """(M,) inverse variances."""
 
 
+def fewer_rows(rows: LinearMeasurements) -> LinearMeasurements:
+    """At most as many measurements as there are unknowns, with the same information: the factor R of a QR."""
+    weighted = np.sqrt(rows.information)[:, None] * np.concatenate([rows.agent, rows.unknown], axis=1)
+    if len(weighted) <= weighted.shape[1]:
+        return rows
+    factor = np.asarray(np.linalg.qr(weighted, mode="r"))
+    return LinearMeasurements(factor[:, :3], factor[:, 3:], np.ones(len(factor)))
+
+
 class WallSpread(NamedTuple):
     """RMS errors of a plane."""
 

@@ -49,8 +49,9 @@ class PosteriorBound:
 
     @property
     def rms(self) -> Floats:
-        """(K,) horizontal position error [m]."""
-        return np.sqrt(self.agent[:, 0, 0] + self.agent[:, 1, 1])
+        """(K,) position error [m] over the axes that are filtered."""
+        axes = self.agent.shape[1] // 2
+        return np.asarray(np.sqrt(np.einsum("kii->k", self.agent[:, :axes, :axes])))
 
 
 def posterior_bound(

@@ -14,7 +14,7 @@ from rislam_rt.measurement.noise import (
     with_paper_snr,
     with_reference_snr,
 )
-from rislam_rt.measurement.received import Clutter, Received, receive, twin
+from rislam_rt.measurement.received import Clutter, Received, phase_reversed, receive
 from rislam_rt.measurement.sensor_model import build_sensor
 from rislam_rt.measurement.signal import num_tones, pulse_samples, to_samples, to_tones, tones
 from rislam_rt.measurement.tracking import TrackInfo, TrackingConfig, TrackState, init_tracks, step_tracks
@@ -50,6 +50,7 @@ __all__ = [
     "paper_snr_db",
     "path_snr_db",
     "path_std",
+    "phase_reversed",
     "pulse_samples",
     "receive",
     "reference_gain",
@@ -58,7 +59,6 @@ __all__ = [
     "to_samples",
     "to_tones",
     "tones",
-    "twin",
     "with_paper_snr",
     "with_reference_snr",
 ]

@@ -16,12 +16,12 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Complexes, Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.detect import MatchedFilterGrid, build_grid
-from rislam_rt.measurement.estimate import estimate_paths
+from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
+from rislam_rt.measurement.estimation.estimate import estimate_paths
+from rislam_rt.measurement.estimation.refine import fit_amplitudes
+from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding, tone_response
 from rislam_rt.measurement.hardware import Correction, mirrored
-from rislam_rt.measurement.refine import fit_amplitudes
 from rislam_rt.measurement.signal import num_tones
-from rislam_rt.measurement.sounding import Sounding, build_sounding, tone_response
 from rislam_rt.model import Body, RadioConfig
 
 FAINTEST = (0.3, 0.1, 0.03, 0.01, 0.003)

@@ -113,7 +113,7 @@ def _tx_leg_length(paths: Paths, cycle: int, path: Integers) -> Floats:
     return length
 
 
-def twin(code: RisCode) -> RisCode:
+def phase_reversed(code: RisCode) -> RisCode:
     """The phase-reversed code: every path over the panel changes its sign, and nothing else does.
 
     Raises

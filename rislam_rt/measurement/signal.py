@@ -9,8 +9,8 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.estimation.sounding import tone_response
 from rislam_rt.measurement.received import Received
-from rislam_rt.measurement.sounding import tone_response
 from rislam_rt.model import RadioConfig
 from rislam_rt.waveform import delay_response, flat_pulse, subcarrier_frequencies
 

@@ -9,8 +9,9 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import measurement_std
 from rislam_rt.measurement.components import capped, into_disc
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.detect import MatchedFilterGrid, build_grid
-from rislam_rt.measurement.estimate import NOTHING, Estimate, estimate_paths
+from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
+from rislam_rt.measurement.estimation.estimate import NOTHING, Estimate, estimate_paths
+from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding
 from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_swing, in_step
 from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
@@ -18,7 +19,6 @@ from rislam_rt.measurement.panel_probability import ComponentSides, panel_probab
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.signal import num_tones, tones
 from rislam_rt.measurement.slot_motion import codes_in_turn, split
-from rislam_rt.measurement.sounding import Sounding, build_sounding
 from rislam_rt.measurement.true_identity import identify
 from rislam_rt.measurement.variance_inflation import crowding, mirror_variance, peak_bias, unmirrored
 from rislam_rt.model import Measurement, PathTruth, RadioConfig

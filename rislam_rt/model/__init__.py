@@ -1,7 +1,7 @@
 """Floor 2: frozen data, checked once on construction. No behaviour beyond what a field's name promises."""
 
 from rislam_rt.model.antennas import Antennas
-from rislam_rt.model.estimate import MapEstimate, SlamEstimate, Suspect, empty_map, pose_estimate
+from rislam_rt.model.estimate import MapEstimate, PanelCandidate, SlamEstimate, empty_map, pose_estimate
 from rislam_rt.model.measurement import Measurement, PathTruth
 from rislam_rt.model.paths import PathKind, Paths, RisLegs
 from rislam_rt.model.radio import RadioConfig, RxArray
@@ -17,7 +17,7 @@ from rislam_rt.model.ris import (
     join_panels,
     join_sheets,
 )
-from rislam_rt.model.scene import Material, Reflector, Scatterer, Scene, Shade
+from rislam_rt.model.scene import Material, Occluder, Reflector, Scatterer, Scene
 from rislam_rt.model.sensor import SensorModel, detection_probability, merged_pull
 from rislam_rt.model.trajectory import Body, Trajectory
 
@@ -30,6 +30,8 @@ __all__ = [
     "MapEstimate",
     "Material",
     "Measurement",
+    "Occluder",
+    "PanelCandidate",
     "PathKind",
     "PathTruth",
     "Paths",
@@ -46,10 +48,8 @@ __all__ = [
     "Scene",
     "SchemeResult",
     "SensorModel",
-    "Shade",
     "SlamEstimate",
     "SlamResult",
-    "Suspect",
     "Trajectory",
     "detection_probability",
     "empty_map",

@@ -75,7 +75,7 @@ class MapEstimate:
         return best if best >= 0 and probability[best] > 0.5 else -1
 
 
-class Suspect(NamedTuple):
+class PanelCandidate(NamedTuple):
     """Something that may be the panel."""
 
     position: Floats
@@ -102,7 +102,7 @@ class SlamEstimate:
     """(S, 3) positions drawn from the belief [m], equally likely; design averages over them."""
     body: Body
     map: MapEstimate
-    suspects: tuple[Suspect, ...] = ()
+    suspects: tuple[PanelCandidate, ...] = ()
     """What may be a panel, for each that the map holds no landmark for, if anything may; empty where no design is to
     follow (see `slam.predict`)."""
 

@@ -71,8 +71,9 @@ class SchemeResult:
     """(K, 3) positions with hindsight [m], of filters that look back (`slam.filter = "window"`: 40 cycles, fewer at the
     end); None of others, and of runs in slices."""
     given: Any = None
-    """What the estimator was given, cycle by cycle, and the seed that it drew from (`rislam_rt.pipeline.record.Given`);
-    None where the result was read from a file: it lies in one of its own."""
+    """What the estimator was given, cycle by cycle, and the seed that it drew from
+    (`rislam_rt.pipeline.record.RecordedInputs`); None where the result was read from a file: it lies in one of its
+    own."""
 
     def __post_init__(self) -> None:
         cycles, held = np.shape(self.position)[0], len(np.asarray(self.ident))

@@ -125,7 +125,7 @@ class Reflector:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shade:
+class Occluder:
     """An opaque mesh that hides what lies behind it and reflects nothing."""
 
     vertices: Floats
@@ -162,7 +162,7 @@ class Scatterer:
     """Length [m] of a cylinder along its axis."""
     axis: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     """(3,) unit vector along a cylinder."""
-    shade: Shade | None = None
+    shade: Occluder | None = None
     """What it hides; its own centre it does not hide."""
 
     def __post_init__(self) -> None:
@@ -193,7 +193,7 @@ class Scene:
     agent: Trajectory
     digest: str = ""
     """SHA-256 over the scene file and its meshes; empty for a scene built in memory."""
-    shades: tuple[Shade, ...] = ()
+    occluders: tuple[Occluder, ...] = ()
     """What hides and is neither wall nor landmark: clutter too small or too round to reflect like a plane."""
 
     def __repr__(self) -> str:

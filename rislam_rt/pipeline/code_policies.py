@@ -8,25 +8,29 @@ from rislam_rt.design import design_code, designer, problem_from_paths
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import prior_from_covariance
 from rislam_rt.model import DataSheet, RisCode, SlamEstimate
-from rislam_rt.pipeline.cycle import Designer, Room
+from rislam_rt.pipeline.assumed_model import AssumedModel
+from rislam_rt.pipeline.cycle import CodePolicy, GroundTruth
 from rislam_rt.pipeline.own_methods import is_own, own_code
 from rislam_rt.pipeline.schemes import Scheme
 from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings
-from rislam_rt.pipeline.told import Told
 
 
-def build_designer(scheme: Scheme, panel: DataSheet, spec: PipelineSpec, settings: Settings, told: Told) -> Designer:
+def build_designer(
+    scheme: Scheme, panel: DataSheet, spec: PipelineSpec, settings: Settings, told: AssumedModel
+) -> CodePolicy:
     """The designer of a scheme that has a panel: true panel and settings serve the one that knows the truth."""
     method = spec.design.method if scheme.method == "spec" else str(scheme.method)
     return _on_truth(method, panel, spec, settings) if scheme.on_truth else _on_belief(method, spec, told)
 
 
-def _on_belief(method: str, spec: PipelineSpec, told: Told) -> Designer:
+def _on_belief(method: str, spec: PipelineSpec, told: AssumedModel) -> CodePolicy:
     section, panel, settings = spec.design, told.panel, told.settings
     assert panel is not None
     last: RisCode | None = None
 
-    def choose(belief: Callable[[], SlamEstimate], cycle: int, room: Room, *, rng: np.random.Generator) -> RisCode:
+    def choose(
+        belief: Callable[[], SlamEstimate], cycle: int, room: GroundTruth, *, rng: np.random.Generator
+    ) -> RisCode:
         nonlocal last
         if method == "random":  # looks at no belief
             return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)
@@ -43,10 +47,12 @@ def _on_belief(method: str, spec: PipelineSpec, told: Told) -> Designer:
     return choose
 
 
-def _on_truth(method: str, panel: DataSheet, spec: PipelineSpec, settings: Settings) -> Designer:
+def _on_truth(method: str, panel: DataSheet, spec: PipelineSpec, settings: Settings) -> CodePolicy:
     """The genie: true paths of the cycle in which the code will take effect, and the belief's own prior."""
 
-    def choose(belief: Callable[[], SlamEstimate], cycle: int, room: Room, *, rng: np.random.Generator) -> RisCode:
+    def choose(
+        belief: Callable[[], SlamEstimate], cycle: int, room: GroundTruth, *, rng: np.random.Generator
+    ) -> RisCode:
         due = min(cycle + spec.control.delay_cycles, len(room.trajectory) - 1)
         prior = prior_from_covariance(belief().covariance[:2, :2])
         there = room.trajectory[due : due + 1]

@@ -10,7 +10,7 @@ from rislam_rt.pipeline.specification.spec import ControlSection
 from rislam_rt.ris import flip_bits, zero_code
 
 
-class Link(NamedTuple):
+class ControlLink(NamedTuple):
     """State of the control channel."""
 
     applied: RisCode
@@ -21,15 +21,15 @@ class Link(NamedTuple):
     """Codes on their way, oldest first, and what will arrive of each; None if nothing will."""
 
 
-def open_link(spec: DataSheet) -> Link:
+def open_link(spec: DataSheet) -> ControlLink:
     """A panel at level 0, nothing on its way."""
     start = zero_code(spec)
-    return Link(start, start)
+    return ControlLink(start, start)
 
 
 def send_code(
-    link: Link, code: RisCode, control: ControlSection, *, rng: np.random.Generator, bit_flip: float = 0.0
-) -> Link:
+    link: ControlLink, code: RisCode, control: ControlSection, *, rng: np.random.Generator, bit_flip: float = 0.0
+) -> ControlLink:
     """The link one cycle later, after `code` was sent over a link that turns bits over with a probability."""
     arrives = bool(rng.random() >= control.loss_probability)
     sent = quantise(code, control.levels)
@@ -38,7 +38,7 @@ def send_code(
     if len(waiting) <= control.delay_cycles:
         return link._replace(waiting=waiting)
     (due, came), *rest = waiting
-    return Link(link.applied if came is None else came, due, tuple(rest))
+    return ControlLink(link.applied if came is None else came, due, tuple(rest))
 
 
 def _damaged(code: RisCode, levels: int, bit_flip: float, *, rng: np.random.Generator) -> RisCode:

@@ -14,14 +14,14 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.measurement import Clutter, FrontEnd, measure
 from rislam_rt.model import DataSheet, Measurement, Paths, PathTruth, RisCode, SlamEstimate, Trajectory
-from rislam_rt.pipeline.control import Link, message_seconds, send_code
+from rislam_rt.pipeline.assumed_model import AssumedModel, tell_measurement
+from rislam_rt.pipeline.control import ControlLink, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings
-from rislam_rt.pipeline.told import Told, tell_measurement
 from rislam_rt.ris import PanelErrors, rephase
 
 
-class Rng(NamedTuple):
+class CycleGenerators(NamedTuple):
     """Generators of one cycle."""
 
     design: np.random.Generator
@@ -30,11 +30,11 @@ class Rng(NamedTuple):
     filter: np.random.Generator
 
 
-class Room(NamedTuple):
+class GroundTruth(NamedTuple):
     """The true side of a run."""
 
     paths: Paths
-    """As the array hears them (`told.deceive`)."""
+    """As the array hears them (`assumed_model.perceived_paths`)."""
     trajectory: Trajectory
     doppler: Floats
     """(K, P) shifts [Hz]: what paths turn by within the measurement slot."""
@@ -61,22 +61,22 @@ class Agent(NamedTuple):
     """What the agent carries from cycle to cycle, with its control channel."""
 
     state: Any
-    link: Link | None
+    link: ControlLink | None
     """None without a panel."""
     heard: Measurement | None = None
     """What the receiver found in the cycle before."""
 
 
-class Means(NamedTuple):
+class RunContext(NamedTuple):
     """What leads a scheme through its cycles, the same in all of them."""
 
     panel: DataSheet | None
-    designer: "Designer | None"
+    designer: "CodePolicy | None"
     estimator: Estimator
     spec: PipelineSpec
     settings: Settings
     """True ones: what the room and the receiver go by."""
-    told: Told
+    told: AssumedModel
     """What filter and design go by."""
 
 
@@ -96,17 +96,19 @@ class Cycle(NamedTuple):
     """What the agent holds to be applied."""
 
 
-class Designer(Protocol):
+class CodePolicy(Protocol):
     """Chooses a code from the predicted belief."""
 
     def __call__(
-        self, belief: Callable[[], SlamEstimate], cycle: int, room: Room, *, rng: np.random.Generator
+        self, belief: Callable[[], SlamEstimate], cycle: int, room: GroundTruth, *, rng: np.random.Generator
     ) -> RisCode:
         """`belief` is worked out on being called, for not all need it; `room` is for the one that knows the truth."""
         ...
 
 
-def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -> tuple[Agent, Cycle]:
+def run_cycle(
+    agent: Agent, room: GroundTruth, cycle: int, means: RunContext, *, rng: CycleGenerators
+) -> tuple[Agent, Cycle]:
     """One cycle of one scheme."""
     control, estimator, told = means.spec.control, means.estimator, means.told
     config = estimator.config(told.settings)
@@ -127,7 +129,7 @@ def run_cycle(agent: Agent, room: Room, cycle: int, means: Means, *, rng: Rng) -
 
     paths, applied = room.at(cycle), None
     if link is not None:
-        applied = link.applied if room.faults is None else room.faults.settle(link.applied)
+        applied = link.applied if room.faults is None else room.faults.applied(link.applied)
         paths = rephase(paths, applied, 1.0 if room.faults is None else room.faults.weight)
     measurement, truth = measure(
         paths, 0, float(room.trajectory.heading[cycle]), means.settings.radio, means.settings.receiver, agent.heard,

@@ -238,11 +238,11 @@ def _entries(values: dict[str, Any], table: dict[str, Entry], prefix: str) -> di
         if np.iscomplexobj(value):
             parts = [("_real", np.real(value)), ("_imag", np.imag(value))]
         for suffix, part in parts:
-            content[prefix + name + suffix] = (dims, part, told(table[name]))
+            content[prefix + name + suffix] = (dims, part, attributes_of(table[name]))
     return content
 
 
-def told(entry: Entry) -> dict[str, str]:
+def attributes_of(entry: Entry) -> dict[str, str]:
     """Unit and meaning as attributes."""
     return {"units": entry[1], "long_name": entry[2]}
 

@@ -7,22 +7,22 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import NOTHING, RisCode, SchemeResult
+from rislam_rt.pipeline.assumed_model import AssumedModel
 from rislam_rt.pipeline.cycle import Cycle
 from rislam_rt.pipeline.recordings.inputs import Inputs, inputs_to_dataset, seed_marks
-from rislam_rt.pipeline.told import Told
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-class Given(NamedTuple):
+class RecordedInputs(NamedTuple):
     """What an estimator was given over some cycles, and what it drew from."""
 
     inputs: Inputs
     seed: np.random.SeedSequence
 
 
-def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, given: Given) -> SchemeResult:
+def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, given: RecordedInputs) -> SchemeResult:
     """All cycles of a scheme, whose times (K,) [s] these are, as one record."""
     estimates = [cycle.estimate for cycle in cycles]
     maps = [estimate.map for estimate in estimates]
@@ -68,13 +68,13 @@ def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, give
     )
 
 
-def given_of(told: Told, first: int, cycles: Sequence[Cycle], seed: np.random.SeedSequence) -> Given:
+def given_of(told: AssumedModel, first: int, cycles: Sequence[Cycle], seed: np.random.SeedSequence) -> RecordedInputs:
     """What the estimator was given from cycle `first` on."""
     span = slice(first, first + len(cycles))
     time, heading = told.time[span] - told.time[0], told.heading[span]
     measurements = tuple(cycle.measurement for cycle in cycles)
     codes = tuple(cycle.believed for cycle in cycles)
-    return Given(Inputs(told.start, told.body, told.panel, time, heading, measurements, codes), seed)
+    return RecordedInputs(Inputs(told.start, told.body, told.panel, time, heading, measurements, codes), seed)
 
 
 def given_to_dataset(result: SchemeResult) -> "xr.Dataset":

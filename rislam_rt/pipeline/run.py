@@ -13,19 +13,19 @@ from rislam_rt.backend import prepare_backend
 from rislam_rt.channel.protocol import Channel
 from rislam_rt.errors import ConfigError, RislamError, expect
 from rislam_rt.model import Body, Paths, RadioConfig, Scene, SchemeResult, SlamResult
+from rislam_rt.pipeline.assumed_model import tilted_motion
 from rislam_rt.pipeline.control import check_control
 from rislam_rt.pipeline.cycle import usual_step
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.own_methods import OwnChannel
-from rislam_rt.pipeline.room.extras import check_extras, trace_clutter
+from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_diffuse_clutter
 from rislam_rt.pipeline.room.motion import draw_motion
 from rislam_rt.pipeline.room.scene_overrides import change_room
+from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.specification.spec import PipelineSpec
-from rislam_rt.pipeline.told import lean
-from rislam_rt.pipeline.walk import Walk
 from rislam_rt.pipeline.workers import run_side_by_side
 from rislam_rt.ris import delay_spread_warnings
 from rislam_rt.scene.check import material_errors
@@ -46,7 +46,7 @@ CYCLE_BYTES = 100_000
 """Of a cycle while it is traced, in the paper's room with two bounces."""
 
 
-class Stage(NamedTuple):
+class RunSetup(NamedTuple):
     """What all schemes of a run share."""
 
     scene: Scene
@@ -74,10 +74,10 @@ def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
     seeds = spawn_seeds(rng=rng)
     scene = change_room(cut_scene(scene, spec.cycles), spec.room, rng=np.random.default_rng(seeds.room))
     motion = draw_motion(scene, spec.motion.sigma_a_m_s2, rng=np.random.default_rng(seeds.motion))
-    return replace(scene, agent=lean(motion, spec.told)), motion.body, seeds
+    return replace(scene, agent=tilted_motion(motion, spec.told)), motion.body, seeds
 
 
-def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> Stage:
+def prepare_setup(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> RunSetup:
     """Draw the true motion and find all paths along it. None of it depends on the noise, so that one stage serves many.
 
     Raises
@@ -92,8 +92,8 @@ def set_stage(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
     begin = perf_counter()
     radio = build_radio(spec.radio)
     paths = build_channel(spec.channel, scene, radio, spec.depth).paths(scene.agent)
-    extras = trace_clutter(scene, radio, scene.agent, spec.extras)
-    return Stage(scene, paths, body, seeds, perf_counter() - begin, extras)
+    extras = trace_diffuse_clutter(scene, radio, scene.agent, spec.extras)
+    return RunSetup(scene, paths, body, seeds, perf_counter() - begin, extras)
 
 
 def check_one_piece(cycles: int, way_out: str) -> None:
@@ -146,7 +146,7 @@ def run_slam(
     done = {} if done is None else done
     tell = progress or (lambda stage, at, total: None)
     tell("trace", 0, 1)
-    stage = set_stage(scene, spec, rng=rng)
+    stage = prepare_setup(scene, spec, rng=rng)
     tell("trace", 1, 1)
     todo = [name for name in spec.schemes if name not in done]
     for name, scheme in run_side_by_side(run_scheme, todo, (stage, spec), jobs, tell):
@@ -156,7 +156,9 @@ def run_slam(
     return result_of(stage, spec, {name: done[name] for name in spec.schemes}, seed=_seed_of(rng))
 
 
-def result_of(stage: Stage, spec: PipelineSpec, schemes: Mapping[str, SchemeResult], *, seed: int | None) -> SlamResult:
+def result_of(
+    stage: RunSetup, spec: PipelineSpec, schemes: Mapping[str, SchemeResult], *, seed: int | None
+) -> SlamResult:
     """Schemes that ran on one stage, as a run."""
     return SlamResult(
         name=spec.name,
@@ -172,10 +174,10 @@ def result_of(stage: Stage, spec: PipelineSpec, schemes: Mapping[str, SchemeResu
 
 
 def run_scheme(
-    name: str, stage: Stage, spec: PipelineSpec, tell: Progress, estimator: Estimator | None = None
+    name: str, stage: RunSetup, spec: PipelineSpec, tell: Progress, estimator: Estimator | None = None
 ) -> SchemeResult:
     """One scheme over all cycles, with its own estimator unless another is given."""
-    walk = Walk(name, stage.scene, stage.body, spec, stage.seeds, estimator)
+    walk = SchemeSimulation(name, stage.scene, stage.body, spec, stage.seeds, estimator)
     return walk.lead(stage.paths, 0, len(stage.scene.agent), tell, stage.extras)
 
 
@@ -192,7 +194,7 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     """
     raise_errors(list(material_errors(scene, f"scene '{scene.name}'", build_radio(spec.radio))))
     scene = change_room(scene, spec.room, rng=np.random.default_rng(0))
-    check_extras(scene, spec.extras, spec.channel)
+    check_diffuse(scene, spec.extras, spec.channel)
     motion, budget = scene.agent, spec.budget
     if spec.cycles is not None and spec.cycles > len(motion):
         raise ConfigError(f"cycles: {spec.cycles} received; the scene has {len(motion)}, give no more")

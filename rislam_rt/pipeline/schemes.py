@@ -1,10 +1,10 @@
 """The schemes that a run compares: the panel and its codes, and who estimates from what is measured."""
 
-from difflib import get_close_matches
 from typing import NamedTuple
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.own_methods import is_own, load_own
+from rislam_rt.spelling import did_you_mean, nearest
 
 
 class Scheme(NamedTuple):
@@ -63,9 +63,8 @@ def check_scheme(name: str) -> str:
     if name in SCHEMES:
         return name
     if not is_own(name):
-        near = get_close_matches(name, SCHEMES, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        raise ValueError(f"{hint}give one of {', '.join(SCHEMES)}, or module:function of your own")
+        hint = did_you_mean(nearest(name, SCHEMES))
+        raise ValueError(f"{hint} give one of {', '.join(SCHEMES)}, or module:function of your own".lstrip())
     try:
         load_own(name)
     except ConfigError as error:

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from rislam_rt.design import focus_codes
 from rislam_rt.errors import ConfigError, StoreError
-from rislam_rt.measurement import NO_COMPONENT, ReceiverConfig, num_tones, signals_dataset, twin
+from rislam_rt.measurement import NO_COMPONENT, ReceiverConfig, num_tones, phase_reversed, signals_dataset
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene
 from rislam_rt.pipeline.dataset import paths_to_dataset
 from rislam_rt.pipeline.run import build_channel
@@ -117,7 +117,7 @@ def coded_paths(scene: Scene, channel: str, depth: int, spec: SignalsSpec, *, rn
     """
     radio, receiver = signal_settings(spec, scene)
     if scene.ris is not None and receiver.alternation:
-        twin(RisCode(np.zeros((1, 1), dtype=np.int64), scene.ris.spec.levels))
+        phase_reversed(RisCode(np.zeros((1, 1), dtype=np.int64), scene.ris.spec.levels))
     tracer = build_channel(channel, scene, radio, depth)
     paths = tracer.paths(scene.agent)
     chosen = panel_codes(scene, paths, spec.code, rng=rng)

@@ -17,7 +17,7 @@ Work = Callable[..., Any]
 Tell = Callable[[str, int, int], None]
 
 
-class Worker(NamedTuple):
+class SchemeWorker(NamedTuple):
     """A process and what it says."""
 
     name: str
@@ -40,7 +40,7 @@ def run_side_by_side(
             except RislamError as error:
                 yield name, error
         return
-    waiting, running = list(names), list[Worker]()
+    waiting, running = list(names), list[SchemeWorker]()
     try:
         while waiting or running:
             while waiting and len(running) < jobs:
@@ -60,7 +60,7 @@ def run_side_by_side(
             worker.process.join()
 
 
-def _start(work: Work, name: str, common: tuple[Any, ...]) -> Worker:
+def _start(work: Work, name: str, common: tuple[Any, ...]) -> SchemeWorker:
     """Start a fresh interpreter (never a fork: numerical libraries keep threads) on one piece of work."""
     context = mp.get_context("spawn")
     ear, mouth = context.Pipe(duplex=False)
@@ -68,7 +68,7 @@ def _start(work: Work, name: str, common: tuple[Any, ...]) -> Worker:
     with _deaf():
         process.start()
     mouth.close()
-    return Worker(name, process, ear)
+    return SchemeWorker(name, process, ear)
 
 
 @contextmanager
@@ -93,7 +93,7 @@ def _run(mouth: Connection, work: Work, name: str, common: tuple[Any, ...]) -> N
             mouth.send(("failed", error))
 
 
-def _hear(worker: Worker) -> tuple[str, Any]:
+def _hear(worker: SchemeWorker) -> tuple[str, Any]:
     try:
         word, value = worker.ear.recv()
     except EOFError:

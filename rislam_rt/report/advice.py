@@ -11,10 +11,10 @@ from rich.console import Console
 from rich.table import Table
 
 from rislam_rt.adviser.advice import Advice
-from rislam_rt.adviser.budget import NOTHING_DB, Link
+from rislam_rt.adviser.budget import NOTHING_DB, LandmarkLink
 from rislam_rt.adviser.cost import cost_words
 from rislam_rt.adviser.coverage import Coverage
-from rislam_rt.adviser.remedies import verdict
+from rislam_rt.adviser.remedies import detection_label
 from rislam_rt.model import Scene
 from rislam_rt.report.room import draw_plan
 from rislam_rt.report.style import save_figure, styled
@@ -74,7 +74,7 @@ def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> N
     bar.set_label("SNR of the direct path under the best code,\nover the threshold [dB]; grey: no such path")
 
 
-def _cell(link: Link, at: int) -> str:
+def _cell(link: LandmarkLink, at: int) -> str:
     """The margin at a place; in brackets where it is not heard all the same."""
     if link.margin_db[at] <= NOTHING_DB:
         return "none"
@@ -82,6 +82,6 @@ def _cell(link: Link, at: int) -> str:
     return text if link.probability[at] > 0.5 else f"({text})"
 
 
-def _why(link: Link) -> str:
+def _why(link: LandmarkLink) -> str:
     said = [reason for reason in link.reason if reason]
-    return "" if verdict(link) == "heard" or not said else max(said, key=said.count)
+    return "" if detection_label(link) == "heard" or not said else max(said, key=said.count)

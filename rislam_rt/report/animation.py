@@ -38,7 +38,7 @@ def gif_bytes(result: SlamResult, tell: Callable[[str, int, int], None] = lambda
     rows = spread(len(result.scene.agent), FRAMES)
     pictures: list[Image] = []
     with styled():
-        figure, room, near = _stage(result)
+        figure, room, near = _empty_frame(result)
         canvas: Any = FigureCanvasAgg(figure)
         for number, cycle in enumerate(rows):
             moving = _draw_moment(room, near, result, int(cycle))
@@ -55,7 +55,7 @@ def gif_bytes(result: SlamResult, tell: Callable[[str, int, int], None] = lambda
     return target.getvalue()
 
 
-def _stage(result: SlamResult) -> tuple[Figure, Axes, Axes]:
+def _empty_frame(result: SlamResult) -> tuple[Figure, Axes, Axes]:
     """The figure with all that stands still, its layout settled."""
     low, high = result.scene.bounds
     aspect = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.35, 1.6))

@@ -12,7 +12,7 @@ from rislam_rt.slam.classify import FEATURES, network_arrays
 from rislam_rt.studies.classifier.codes import POLICIES
 from rislam_rt.studies.classifier.gather import Examples
 from rislam_rt.studies.classifier.run import Training
-from rislam_rt.studies.classifier.score import Score, by_value, mistakes, panel_dropped, rules
+from rislam_rt.studies.classifier.score import ClassifierScore, by_value, mistakes, panel_dropped, rules
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 
 COLOUR = {"network": "#0072B2", "single": "#56B4E9", "geometric": "#D55E00", "amplitude": "#009E73"}
@@ -271,5 +271,5 @@ def _row(cells: list[str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def _f1(score: Score) -> str:
+def _f1(score: ClassifierScore) -> str:
     return f"{score.f1:.3f} ({score.low:.3f} to {score.high:.3f})"

@@ -93,7 +93,7 @@ def fig4a_page(found: Fig4a, spec: Fig4aSpec, scene: str, figure: str | None) ->
     lines = ["# Gain against distance: Fig. 4(a)", "", *_method(found, spec, scene), "", "## What holds", ""]
     lines += ["The paper's claim: optimised codes lie significantly above random codes and above the sphere.", ""]
     for element in found.curves:
-        lines += [*verdict(found, element), ""]
+        lines += [*findings_of(found, element), ""]
     if figure is not None:
         lines += [f"![Gain against distance]({figure})", ""]
     shown = np.unique(np.linspace(0, len(found.distance) - 1, NUM_SHOWN).round().astype(int))
@@ -127,7 +127,7 @@ def _method(found: Fig4a, spec: Fig4aSpec, scene: str) -> list[str]:
     ]
 
 
-def verdict(found: Fig4a, element: str) -> list[str]:
+def findings_of(found: Fig4a, element: str) -> list[str]:
     """Markdown: what holds with one element pattern, and where what does not hold fails."""
     curves = found.curves[element]
     gap = curves.exact - curves.optimized.middle

@@ -90,10 +90,10 @@ def draw_scene(scene: Scene, path: Path) -> Path:
 
 
 def draw_plan(axis: Axes, scene: Scene) -> None:
-    """Walls (thick where they stand at the agent's height), shades, path and landmarks as they are."""
+    """Walls (thick where they stand at the agent's height), occluders, path and landmarks as they are."""
     walls, path = build_walls(scene), scene.agent.position
     cuts = section(walls.triangles, float(path[-1, 2]))
-    axis.add_collection(PolyCollection(list(walls.shades.triangles[..., :2]), color=SHADE, lw=0.5, zorder=0))
+    axis.add_collection(PolyCollection(list(walls.occluders.triangles[..., :2]), color=SHADE, lw=0.5, zorder=0))
     axis.add_collection(LineCollection(list(outline_edges(walls)[..., :2]), colors="#dddddd", lw=0.8, zorder=0))
     axis.add_collection(LineCollection(list(cuts), colors=WALL, lw=3.0, capstyle="round", zorder=1))
     axis.plot(path[:, 0], path[:, 1], color=TRUTH, lw=4.0, alpha=0.25, zorder=2)
@@ -229,7 +229,7 @@ def _draw_room_3d(axis: Any, scene: Scene) -> None:
     if len(floor):
         axis.add_collection3d(Poly3DCollection(list(floor), facecolor="#f1f1f1", edgecolor="none", zorder=0))
     axis.add_collection3d(Line3DCollection(list(outline_edges(walls)), colors=WALL, lw=1.0, zorder=1))
-    axis.add_collection3d(Poly3DCollection(list(walls.shades.triangles), facecolor=SHADE, alpha=0.3, zorder=1))
+    axis.add_collection3d(Poly3DCollection(list(walls.occluders.triangles), facecolor=SHADE, alpha=0.3, zorder=1))
     axis.set_xlim(low[0], high[0])
     axis.set_ylim(low[1], high[1])
     axis.set_zlim(low[2], high[2])

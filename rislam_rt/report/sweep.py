@@ -8,13 +8,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.report.style import save_figure, scheme_colour, styled
-from rislam_rt.studies.pipeline_sweep import Score
+from rislam_rt.studies.pipeline_sweep import SchemeScore
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 LINES = ("-", "--", ":", "-.")
 
 
-def draw_scores(scores: Sequence[Score], path: Path) -> Path | None:
+def draw_scores(scores: Sequence[SchemeScore], path: Path) -> Path | None:
     """Draw what there is; None, and no picture, before the first run has ended.
 
     Raises
@@ -26,12 +26,12 @@ def draw_scores(scores: Sequence[Score], path: Path) -> Path | None:
     return save_figure(scores_figure(shown), path) if shown else None
 
 
-def scores_figure(scores: Sequence[Score]) -> Figure:
+def scores_figure(scores: Sequence[SchemeScore]) -> Figure:
     """RMSE with its interval, and how many runs each point rests on."""
     along = main_axis(scores)
     ticks = list(dict.fromkeys(str(score.point.get(along, score.scheme)) for score in scores))
     numeric = all(_is_number(score.point.get(along)) for score in scores)
-    groups: dict[tuple[str, str], list[Score]] = {}
+    groups: dict[tuple[str, str], list[SchemeScore]] = {}
     for score in scores:
         groups.setdefault((score.scheme, _others(score.point, along)), []).append(score)
     kinds = list(dict.fromkeys(others for _, others in groups))
@@ -61,7 +61,7 @@ def scores_figure(scores: Sequence[Score]) -> Figure:
     return figure
 
 
-def main_axis(scores: Sequence[Score]) -> str:
+def main_axis(scores: Sequence[SchemeScore]) -> str:
     """The first axis of numbers, else the first one but that of the schemes; empty without any."""
     keys = [key for key in scores[0].point if key != "schemes"]
     numbers = [key for key in keys if _is_number(scores[0].point[key])]
@@ -73,7 +73,7 @@ def _others(point: Mapping[str, Any], along: str) -> str:
     return ", ".join(f"{key.rpartition('.')[2]} = {value}" for key, value in kept.items())
 
 
-def _place(score: Score, along: str, ticks: Sequence[str], numeric: bool) -> float:
+def _place(score: SchemeScore, along: str, ticks: Sequence[str], numeric: bool) -> float:
     return float(score.point[along]) if numeric else float(ticks.index(str(score.point.get(along, score.scheme))))  # type: ignore[arg-type]
 
 

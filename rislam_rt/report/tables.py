@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
     from rislam_rt.channel.compare import PathReport, Validation
     from rislam_rt.design import Design
-    from rislam_rt.studies.pipeline_sweep import Score
+    from rislam_rt.studies.pipeline_sweep import SchemeScore
 
 
 def print_summary(summary: Mapping[str, Any]) -> None:
@@ -149,7 +149,7 @@ def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"], t
     _show(title, table)
 
 
-def print_sweep(scores: Sequence["Score"]) -> None:
+def print_sweep(scores: Sequence["SchemeScore"]) -> None:
     """One line a point of the axes and a scheme."""
     keys = [key.rpartition(".")[2] for key in scores[0].point if key != "schemes"]
     table = Table(*keys, "scheme", "agent RMSE", "95 %", "runs", "diverged", "failed")

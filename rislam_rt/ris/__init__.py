@@ -1,7 +1,7 @@
 """Floor 3: physics of the panel. Pure functions of geometry; the channel and the agent's belief both call them."""
 
 from rislam_rt.ris.element import element_gain_area, element_pattern
-from rislam_rt.ris.imperfect import (
+from rislam_rt.ris.impairments import (
     PanelErrors,
     PanelTolerance,
     draw_panel,

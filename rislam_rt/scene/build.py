@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rislam_rt.errors import RislamError
-from rislam_rt.scene.rooms import ROOMS
+from rislam_rt.scene.built_in_rooms import ROOMS
 from rislam_rt.scene.templates import new_scene
 
 

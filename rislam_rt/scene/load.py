@@ -10,7 +10,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import Material, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, Shade, join_panels
+from rislam_rt.model import Material, Occluder, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, join_panels
 from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
 from rislam_rt.scene.findings import Fault, Faults, Finding, panel_key, raise_errors
@@ -23,11 +23,11 @@ from rislam_rt.scene.schema import (
     LimitsSection,
     MaterialSection,
     MeshesSection,
+    OccluderSection,
     ReflectorSection,
     RisSection,
     ScattererSection,
     SceneSpec,
-    ShadeSection,
     read_spec,
 )
 from rislam_rt.scene.solids import solid_mesh
@@ -128,17 +128,17 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
             scatterers.append(_scatterer(scatterer, shelf))
         except Fault as fault:
             findings.append(fault.at(str(file), f"scatterer[{number}].mesh ({scatterer.name})"))
-    shades = []
+    occluders = []
     for number, shade in enumerate(spec.shade):
         try:
             mesh = shelf.mesh(shade.mesh, shade)
-            shades.append(Shade(mesh.vertices, mesh.faces, shade.name))
+            occluders.append(Occluder(mesh.vertices, mesh.faces, shade.name))
         except Fault as fault:
             findings.append(fault.at(str(file), f"shade[{number}].mesh ({shade.name})"))
     panels = _panels(spec.ris, str(file), findings)
     try:
         if not (findings and spec.agent.random_walk):  # which needs the whole room
-            surfaces = _surfaces(reflectors, [*shades, *(s.shade for s in scatterers if s.shade)])
+            surfaces = _surfaces(reflectors, [*occluders, *(s.shade for s in scatterers if s.shade)])
             agent, shelf.contents["trajectory"] = build_motion(spec.agent, file.parent, surfaces)
     except Fault as fault:
         findings.append(fault.at(str(file), "agent"))
@@ -148,13 +148,13 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
         return SceneDraft(str(file), None, findings, bounds)
     ris = join_panels(panels)
     digest = _digest(content, shelf.contents)
-    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(shades))
+    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(occluders))
     return SceneDraft(str(file), scene, [], bounds)
 
 
-def _surfaces(reflectors: Sequence[Reflector], shades: Sequence[Shade]) -> Floats:
+def _surfaces(reflectors: Sequence[Reflector], occluders: Sequence[Occluder]) -> Floats:
     """(T, 3, 3) [m] of all that stands in an agent's way."""
-    return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in shades)])
+    return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in occluders)])
 
 
 class MeshFiles:
@@ -166,7 +166,7 @@ class MeshFiles:
         self.reader = MeshReader()
         self.faces = 0
 
-    def mesh(self, place: str, section: ReflectorSection | ScattererSection | ShadeSection) -> Mesh:
+    def mesh(self, place: str, section: ReflectorSection | ScattererSection | OccluderSection) -> Mesh:
         """The mesh `file` or `file#node`, placed as its section says, or else all meshes of the scene."""
         name, _, node = place.partition("#")
         if name not in self.contents:
@@ -218,7 +218,7 @@ def _scatterer(section: ScattererSection, shelf: MeshFiles) -> Scatterer:
         mesh = shelf.mesh(section.mesh, section)
     elif section.shadow:
         mesh = solid_mesh(position, radius or 0.0, height, axis)
-    shade = None if mesh is None else Shade(mesh.vertices, mesh.faces)
+    shade = None if mesh is None else Occluder(mesh.vertices, mesh.faces)
     return Scatterer(section.name, position, rcs, radius, law, height, axis, shade)
 
 

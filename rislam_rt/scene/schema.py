@@ -1,7 +1,6 @@
 """`scene.toml`: the keys, their types and ranges. Unknown keys are refused; all bad fields are found at once."""
 
 import unicodedata
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -9,6 +8,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from rislam_rt.scene.findings import Fault, Faults, one_line
 from rislam_rt.shipped import shipped_rooms
+from rislam_rt.spelling import did_you_mean, nearest
 from rislam_rt.toml import parse_toml
 
 MAX_SCENE_BYTES = 4_000_000
@@ -91,7 +91,7 @@ class ReflectorSection(SceneSection):
     origin: Vector | None = None
 
 
-class ShadeSection(SceneSection):
+class OccluderSection(SceneSection):
     """A mesh that hides what lies behind it and reflects nothing: clutter too small or too round to be a mirror."""
 
     name: Name
@@ -241,7 +241,7 @@ class SceneSpec(SceneSection):
     name: Name
     reflector: Annotated[list[ReflectorSection], Field(min_length=1, max_length=10_000)]
     scatterer: list[ScattererSection] = []
-    shade: Annotated[list[ShadeSection], Field(max_length=10_000)] = []
+    shade: Annotated[list[OccluderSection], Field(max_length=10_000)] = []
     meshes: MeshesSection = MeshesSection()
     ris: Annotated[list[RisSection], BeforeValidator(_listed), Field(max_length=100)] = []
     """`[ris]` for one panel, `[[ris]]` for several."""
@@ -258,7 +258,7 @@ class SceneSpec(SceneSection):
         return self
 
     @model_validator(mode="after")
-    def _panels_told_apart(self) -> "SceneSpec":
+    def _panels_distinct(self) -> "SceneSpec":
         names = [panel.name for panel in self.ris]
         if len(set(names)) < len(names):
             raise ValueError(f"ris.name: {', '.join(names)} received; give every panel a name of its own")
@@ -312,9 +312,9 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
         The file cannot be read or its content is not a scene.
     """
     if not path.is_file():
-        near = get_close_matches(path.parent.name, shipped_rooms(), 1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        raise Fault("no such scene file", f"{hint}give a scene folder, its scene.toml, or the name of a built-in room")
+        hint = did_you_mean(nearest(path.parent.name, shipped_rooms()))
+        wanted = f"{hint} give a scene folder, its scene.toml, or the name of a built-in room".lstrip()
+        raise Fault("no such scene file", wanted)
     try:
         with path.open("rb") as file:
             content = file.read(MAX_SCENE_BYTES + 1)
@@ -333,8 +333,8 @@ def _remark(item: Any, lone_panel: bool) -> str:
     if item["type"] == "missing":
         return f"{place}: missing"
     if item["type"] == "extra_forbidden":
-        near = get_close_matches(str(item["loc"][-1]), _known_keys(), n=1)
-        return f"{place}: unknown key" + (f" (did you mean '{near[0]}'?)" if near else "")
+        hint = did_you_mean(nearest(str(item["loc"][-1]), _known_keys()))
+        return f"{place}: unknown key" + (f" ({hint})" if hint else "")
     message = item["msg"].removeprefix("Value error, ")
     if item["type"] == "string_pattern_mismatch":
         message = "give letters and digits of any script, '_', '-' and '.' only, and not dots alone"
@@ -344,7 +344,7 @@ def _remark(item: Any, lone_panel: bool) -> str:
 
 
 def _known_keys() -> list[str]:
-    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, ShadeSection, MeshesSection,
+    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, OccluderSection, MeshesSection,
                 RisSection, AgentSection, WalkSection, LimitsSection)  # fmt: skip
     return [key for section in sections for key in section.model_fields]
 

@@ -6,10 +6,11 @@ from pathlib import Path
 from textwrap import fill
 
 from rislam_rt.errors import SceneError
+from rislam_rt.scene.built_in_rooms import ROOMS, RoomFiles
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
-from rislam_rt.scene.rooms import ROOMS, RoomFiles
-from rislam_rt.scene.write import toml_bytes, write_files
+from rislam_rt.scene.write import write_files
+from rislam_rt.toml import toml_bytes
 
 
 def new_scene(template: str, folder: str | Path, *, overwrite: bool = False) -> Path:

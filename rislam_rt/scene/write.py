@@ -1,8 +1,6 @@
 """From a `Scene` to a scene folder, whole or not at all."""
 
-import json
 import os
-import re
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -18,6 +16,7 @@ from rislam_rt.scene.file_names import safe_name
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
 from rislam_rt.scene.solids import solid_mesh
+from rislam_rt.toml import toml_bytes
 
 TRAJECTORY_FILE = "path.tum"
 
@@ -40,8 +39,8 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
     files = {mesh_file(r.name): ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
     for scatterer in scene.scatterers:
         if scatterer.shade is not None and not _has_own_shadow(scatterer):
-            files[_shade_file(scatterer)] = ply_bytes(scatterer.shade.vertices, scatterer.shade.faces)
-    for shade in scene.shades:
+            files[_occluder_file(scatterer)] = ply_bytes(scatterer.shade.vertices, scatterer.shade.faces)
+    for shade in scene.occluders:
         files[mesh_file(shade.name)] = ply_bytes(shade.vertices, shade.faces)
     agent = _agent_table(scene.agent)
     if "trajectory" in agent:
@@ -72,24 +71,13 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
         folder.parent.mkdir(parents=True, exist_ok=True)
         staged = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
         try:
-            _stage(files, staged)
+            _write_staged(files, staged)
             _publish(staged, folder, files)
         finally:
             shutil.rmtree(staged, ignore_errors=True)
     except OSError as error:
         raise StoreError(f"{folder}: cannot be written ({error.strerror}); check permissions and free space") from None
     return folder
-
-
-def toml_bytes(table: Mapping[str, Any]) -> bytes:
-    """A scene table as TOML: plain keys first, then (lists of) tables; numbers so that they read back equal."""
-    lines = [f"{key} = {toml_value(value)}" for key, value in table.items() if not _is_table(value)]
-    for key, value in table.items():
-        for section in value if isinstance(value, list) and _is_table(value) else [value]:
-            if isinstance(section, Mapping):
-                lines += ["", f"[[{key}]]" if isinstance(value, list) else f"[{key}]"]
-                lines += [f"{name} = {toml_value(item)}" for name, item in section.items()]
-    return ("\n".join(lines) + "\n").encode()
 
 
 def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
@@ -102,7 +90,7 @@ def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def _stage(files: Mapping[str, bytes], staged: Path) -> None:
+def _write_staged(files: Mapping[str, bytes], staged: Path) -> None:
     for name, content in files.items():
         target = staged / name
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -122,35 +110,13 @@ def _publish(staged: Path, folder: Path, files: Mapping[str, bytes]) -> None:
         (staged / name).replace(folder / name)
 
 
-def _is_table(value: Any) -> bool:
-    return isinstance(value, Mapping) or (isinstance(value, list) and bool(value) and isinstance(value[0], Mapping))
-
-
-def toml_value(value: Any) -> str:
-    """A value as TOML; tables inline, numbers so that they read back equal."""
-    if isinstance(value, str):
-        # TOML's strings are JSON's, but for DEL.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, bool | int | np.integer):
-        return str(value).lower()
-    if isinstance(value, float):
-        return repr(float(value))
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_toml_key(key)} = {toml_value(item)}" for key, item in value.items()) + " }"
-    return "[" + ", ".join(toml_value(item) for item in value) + "]"
-
-
-def _toml_key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else str(toml_value(key))
-
-
 def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
     table: dict[str, Any] = {"name": scene.name}
     table["reflector"] = [
         {"name": r.name, "mesh": mesh_file(r.name), "material": _material_table(r.material)} for r in scene.reflectors
     ]
     table["scatterer"] = [_scatterer_table(scatterer) for scatterer in scene.scatterers]
-    table["shade"] = [{"name": shade.name, "mesh": mesh_file(shade.name)} for shade in scene.shades]
+    table["shade"] = [{"name": shade.name, "mesh": mesh_file(shade.name)} for shade in scene.occluders]
     panels = [_panel_table(panel) for panel in scene.panels]
     table["ris"] = panels[0] if len(panels) == 1 else panels
     table["agent"] = agent
@@ -178,7 +144,7 @@ def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
     ):
         table["rcs_m2"] = scatterer.rcs
     if scatterer.shade is not None:
-        table |= {"shadow": True} if _has_own_shadow(scatterer) else {"mesh": _shade_file(scatterer)}
+        table |= {"shadow": True} if _has_own_shadow(scatterer) else {"mesh": _occluder_file(scatterer)}
     return table
 
 
@@ -191,7 +157,7 @@ def _has_own_shadow(scatterer: Scatterer) -> bool:
     return np.array_equal(mesh.vertices, shade.vertices) and np.array_equal(mesh.faces, shade.faces)
 
 
-def _shade_file(scatterer: Scatterer) -> str:
+def _occluder_file(scatterer: Scatterer) -> str:
     return mesh_file(scatterer.name)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.information import amplitude_std
-from rislam_rt.model import Body, RisCode, Suspect
+from rislam_rt.model import Body, PanelCandidate, RisCode
 from rislam_rt.slam.book import Book
 from rislam_rt.slam.expect import Belief
 from rislam_rt.slam.identity import (
@@ -78,7 +78,7 @@ def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None) -> Tracks
     return tracks._replace(log_grid=log_grid, log_ris=log_ris)
 
 
-def find_suspect(tracks: Tracks, book: Book, moments: Moments, body: Body, panel: int = 0) -> Suspect | None:
+def find_suspect(tracks: Tracks, book: Book, moments: Moments, body: Body, panel: int = 0) -> PanelCandidate | None:
     """The landmark or track that is the likeliest to be a panel; None if nothing is likelier the panel than not.
 
     A track that seems to come from behind a mirror may be the panel over walls: aiming there would miss it.
@@ -98,5 +98,5 @@ def find_suspect(tracks: Tracks, book: Book, moments: Moments, body: Body, panel
         return None
     best = int(np.argmax(odds))
     if best < len(points):
-        return Suspect(moments.features[points[best]], int(book.hits[points[best]]), panel)
-    return Suspect(spots[best - len(points)], int(tracks.length[rows[best - len(points)]]), panel)
+        return PanelCandidate(moments.features[points[best]], int(book.hits[points[best]]), panel)
+    return PanelCandidate(spots[best - len(points)], int(tracks.length[rows[best - len(points)]]), panel)

@@ -76,7 +76,7 @@ def _fig4a(content: Mapping[str, Any] | None) -> list[Claim]:
     for claim in claims:
         held = {element: int(own["holds_at"][claim]) for element, own in content["elements"].items()}
         text = ", ".join(f"at {count} of {places} places with element pattern {name}" for name, count in held.items())
-        verdict = _verdict([count == places for count in held.values()], any(held.values()))
+        verdict = _judgement([count == places for count in held.values()], any(held.values()))
         reason = "Gain of the direct path over the panel; the optimum over all codes is known exactly and is near."
         found.append(Claim(f"gain of the panel: {claim}", where, text, verdict, reason))
     return found
@@ -90,7 +90,7 @@ def _lowest(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
     text = (
         f"lower, interval above 0, in {len(above)} of {len(known)} pairs of SNR and benchmark; higher in {len(below)}"
     )
-    verdict = _verdict([len(above) == len(known)], bool(above)) if known else "not known"
+    verdict = _judgement([len(above) == len(known)], bool(above)) if known else "not known"
     reason = "" if len(above) == len(known) else f"No telling or worse: {_pairs(known, above)}. {_bounds(known, above)}"
     return Claim(f"lowest error of all schemes at every SNR ({case})", "Fig. 4(b)", text, verdict, reason)
 
@@ -103,7 +103,7 @@ def _share(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
         held.append(least["gain"] >= LEAST_GAIN)
         value, low, high = (100 * least[name] for name in ("gain", "gain_low", "gain_high"))
         rows.append(f"{snr:g} dB: {value:.0f} % ({low:.0f} to {high:.0f}) over {least['over']}")
-    verdict = _verdict(held, any(held)) if held else "not known"
+    verdict = _judgement(held, any(held)) if held else "not known"
     limits = [
         f"{snr:g} dB {100 * min(gain['bound_gain'] for gain in own):.0f} %"
         for snr, own in _by_snr(gains)
@@ -125,7 +125,7 @@ def _metres(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
         f"{gain['lower_by_high_m']:.3f})"
         for gain in own
     )
-    verdict = _verdict(held, any(held)) if held else "not known"
+    verdict = _judgement(held, any(held)) if held else "not known"
     reason = "The difference is a matter of scale: it grows with the motion's acceleration and the start's errors."
     return Claim(f"error about 0.1 m lower than without a panel ({case})", "Fig. 4(b)", text, verdict, reason)
 
@@ -138,7 +138,7 @@ def _with_snr(case: str, entries: Sequence[Mapping[str, Any]]) -> list[Claim]:
     steps = [after["rmse_m"] <= before["rmse_m"] for before, after in pairwise(own)]
     text = ", ".join(f"{entry['snr_db']:g} dB: {entry['rmse_m']:.3f} m" for entry in own)
     reason = "At high SNR what is left is the start's own error, which no measurement of unknown landmarks removes."
-    return [Claim(f"error falls as the SNR grows ({case})", "Fig. 4(b)", text, _verdict(steps, any(steps)), reason)]
+    return [Claim(f"error falls as the SNR grows ({case})", "Fig. 4(b)", text, _judgement(steps, any(steps)), reason)]
 
 
 def _fig4c(content: Mapping[str, Any] | None) -> list[Claim]:
@@ -181,7 +181,7 @@ def _bounds(known: Sequence[Mapping[str, Any]], above: Sequence[Mapping[str, Any
     return f"There the bounds differ by {100 * min(limits):.0f} to {100 * max(limits):.0f} %."
 
 
-def _verdict(held: Sequence[bool], some: bool) -> str:
+def _judgement(held: Sequence[bool], some: bool) -> str:
     if all(held):
         return "reproduced"
     return "reproduced in part" if some else "not reproduced"

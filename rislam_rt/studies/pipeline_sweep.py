@@ -45,7 +45,7 @@ class _File(Section):
     sweep: SweepSection = SweepSection()
 
 
-class Score(NamedTuple):
+class SchemeScore(NamedTuple):
     """One scheme at one point of the axes, over all repetitions."""
 
     point: Mapping[str, Value]
@@ -172,7 +172,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     return {**_split(told, times=False), "timing": _split(summary, times=True)}
 
 
-def score_rows(rows: Sequence[Row]) -> list[Score]:
+def score_rows(rows: Sequence[Row]) -> list[SchemeScore]:
     """Scores in the order of the axes; failures are counted, never dropped."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
@@ -186,12 +186,12 @@ def score_rows(rows: Sequence[Row]) -> list[Score]:
             rmse = tuple(float(score["rmse_m"]) for score in ended)
             diverged = sum(bool(score["diverged"]) for score in ended)
             scores.append(
-                Score(point, scheme, rmse, _interval(rmse), diverged, len(group) - len(ended) - missing, missing)
+                SchemeScore(point, scheme, rmse, _interval(rmse), diverged, len(group) - len(ended) - missing, missing)
             )
     return scores
 
 
-def write_scores(scores: Sequence[Score], folder: Path) -> None:
+def write_scores(scores: Sequence[SchemeScore], folder: Path) -> None:
     """`scores.csv` and `scores.json` beside the table of the cells.
 
     Raises

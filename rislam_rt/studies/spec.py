@@ -14,7 +14,7 @@ Depth = Annotated[int, Field(ge=0, le=4)]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
 
 
-class RoomSection(Section):
+class ComparedRoomSection(Section):
     """One room of a comparison."""
 
     scene: str
@@ -46,7 +46,7 @@ class CompareSpec(StudySpec):
     """Which study the file is."""
     poses: Annotated[int, Field(ge=1, le=100_000)] = 200
     """Random poses in each room."""
-    rooms: Annotated[list[RoomSection], Field(min_length=1)]
+    rooms: Annotated[list[ComparedRoomSection], Field(min_length=1)]
     """The rooms: `scene`, `depth`, `picture`."""
 
     @model_validator(mode="after")

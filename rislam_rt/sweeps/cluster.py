@@ -6,18 +6,18 @@ from importlib import import_module
 from typing import Any
 
 from rislam_rt.errors import ConfigError, SetupError
-from rislam_rt.sweeps.work import LOST, Outcome, Task
-from rislam_rt.sweeps.worker_pool import Crew, Run
+from rislam_rt.sweeps.work import LOST, CellOutcome, Task
+from rislam_rt.sweeps.worker_pool import Run, WorkerPool
 
 CONNECT_SECONDS = 3
 """How long to wait for the scheduler, which is there already: it only has to answer."""
 
-_CREW = Crew()
+_CREW = WorkerPool()
 """Of the Dask worker that this module is imported in."""
 
 
 @contextmanager
-def crew_there(address: str, limit: float | None) -> Iterator[tuple[Run, int]]:
+def cluster_pool(address: str, limit: float | None) -> Iterator[tuple[Run, int]]:
     """Workers of the cluster at `address`, as many at a time as it has threads, and that number.
 
     Its machines need this package and the cell's function, importable, and the folders that the settings name.
@@ -41,7 +41,7 @@ def crew_there(address: str, limit: float | None) -> Iterator[tuple[Run, int]]:
         cause = " ".join(str(error).split())[:120]
         raise SetupError(f"--dask {address}: no scheduler answers ({cause}); start one, or mend the address") from None
 
-    def run(tasks: Iterable[tuple[str, Task]]) -> Iterator[tuple[str, Outcome]]:
+    def run(tasks: Iterable[tuple[str, Task]]) -> Iterator[tuple[str, CellOutcome]]:
         futures = {client.submit(do_cell, task, limit, key=f"cell-{name}"): name for name, task in tasks}
         for future in distributed.as_completed(futures, loop=client.loop):
             yield futures[future], _outcome(future, address)
@@ -57,12 +57,12 @@ def do_cell(task: Task, limit: float | None) -> tuple[Any, ...]:
     return tuple(_CREW.do(Task(*task), limit))
 
 
-def _outcome(future: Any, address: str) -> Outcome:
+def _outcome(future: Any, address: str) -> CellOutcome:
     """What the cluster says. It tries a cell whose machine is lost on others, and gives up after some."""
     if future.status == "finished":
-        return Outcome(*future.result())
+        return CellOutcome(*future.result())
     if future.status == "error":
-        return Outcome(cause=LOST, message=f"its Dask worker was lost ({type(future.exception()).__name__})")
+        return CellOutcome(cause=LOST, message=f"its Dask worker was lost ({type(future.exception()).__name__})")
     raise SetupError(f"--dask {address}: the scheduler has gone; start it again, the same command goes on from here")
 
 

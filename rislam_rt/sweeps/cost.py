@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from rislam_rt.sweeps.axes import Cell
 
 
-class Cost(NamedTuple):
+class SweepCost(NamedTuple):
     """Of the cells that are left."""
 
     cells: int
@@ -16,23 +16,25 @@ class Cost(NamedTuple):
     """Time until all are done [s], so many at a time."""
 
 
-def estimate_cost(left: Sequence[Cell], known: Sequence[Mapping[str, Any]], width: int) -> Cost:
+def estimate_cost(left: Sequence[Cell], known: Sequence[Mapping[str, Any]], width: int) -> SweepCost:
     """Time for the cells that are left, `width` at a time: the mean of those at the most similar points that ever ran.
 
     Similar is who has the most values of the axes in common: if the number of particles is an axis, cells with as many
     particles tell more than the others.
     """
     if not left:
-        return Cost(0, None, 0.0)
+        return SweepCost(0, None, 0.0)
     if not known:
-        return Cost(len(left), None, None)
+        return SweepCost(len(left), None, None)
     points: dict[str, tuple[Mapping[str, Any], int]] = {}
     for cell in left:
         key = repr(cell.point)
         points[key] = cell.point, points.get(key, (cell.point, 0))[1] + 1
     each = [(_similar(point, known), count) for point, count in points.values()]
     total = sum(seconds * count for seconds, count in each)
-    return Cost(len(left), total / len(left), max(total / min(width, len(left)), max(seconds for seconds, _ in each)))
+    return SweepCost(
+        len(left), total / len(left), max(total / min(width, len(left)), max(seconds for seconds, _ in each))
+    )
 
 
 def _similar(point: Mapping[str, Any], known: Sequence[Mapping[str, Any]]) -> float:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.sweeps.axes import Cell, Sweep, build_cells
-from rislam_rt.sweeps.cost import Cost, estimate_cost
+from rislam_rt.sweeps.cost import SweepCost, estimate_cost
 from rislam_rt.sweeps.store import (
     DONE,
     MISSING,
@@ -22,8 +22,8 @@ from rislam_rt.sweeps.store import (
     write_cell,
     write_table,
 )
-from rislam_rt.sweeps.work import LOST, Outcome, Task, find_function
-from rislam_rt.sweeps.worker_pool import Run, crew_here
+from rislam_rt.sweeps.work import LOST, CellOutcome, Task, find_function
+from rislam_rt.sweeps.worker_pool import Run, local_pool
 
 TABLE_SECONDS = 1.0
 """Least time between two writings of the growing table."""
@@ -32,7 +32,7 @@ TABLE_SHARE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Effort:
+class SweepOptions:
     """How to run, which never changes what comes out."""
 
     jobs: int = 1
@@ -53,25 +53,25 @@ class Effort:
             raise ConfigError(f"--time-limit: {self.time_limit:g} received; give a positive number of seconds")
 
 
-class Told(NamedTuple):
+class SweepProgress(NamedTuple):
     """Where a sweep stands: given when its cost is known, and after every cell."""
 
     done: int
     """Cells that ended well, in this run or before."""
     failed: int
     total: int
-    cost: Cost
+    cost: SweepCost
     """Of what is left."""
     last: Row | None
     """The cell that just ended."""
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class SweepReport:
     """All cells in their order."""
 
     rows: tuple[Row, ...]
-    cost: Cost
+    cost: SweepCost
     """Of what is left, if the sweep was to stop at the estimate."""
 
     @property
@@ -83,11 +83,11 @@ class Report:
 def run_sweep(
     sweep: Sweep,
     folder: Path,
-    effort: Effort | None = None,
+    effort: SweepOptions | None = None,
     *,
-    tell: Callable[[Told], None] | None = None,
+    tell: Callable[[SweepProgress], None] | None = None,
     grow: Callable[[Sequence[Row]], None] | None = None,
-) -> Report:
+) -> SweepReport:
     """Do all cells that are not there yet and leave one file for each in `folder`.
 
     Whenever it is stopped, and however, another call goes on from the cells that are there; the files are the same,
@@ -109,7 +109,7 @@ def run_sweep(
     SetupError
         Dask is asked for and not there.
     """
-    effort = effort or Effort()
+    effort = effort or SweepOptions()
     find_function(sweep.function)
     cells = build_cells(sweep)
     with ExitStack() as stack:
@@ -127,16 +127,16 @@ def run_sweep(
                     board.take(ident, outcome)
         else:
             board.show(None)
-    return Report(tuple(board.rows.values()), board.cost())
+    return SweepReport(tuple(board.rows.values()), board.cost())
 
 
-def _hire(stack: ExitStack, effort: Effort) -> tuple[Run, int]:
+def _hire(stack: ExitStack, effort: SweepOptions) -> tuple[Run, int]:
     """Who does the cells, and how many at a time."""
     if effort.dask is None:
-        return stack.enter_context(crew_here(effort.jobs, effort.time_limit)), effort.jobs
-    from rislam_rt.sweeps.cluster import crew_there
+        return stack.enter_context(local_pool(effort.jobs, effort.time_limit)), effort.jobs
+    from rislam_rt.sweeps.cluster import cluster_pool
 
-    return stack.enter_context(crew_there(effort.dask, effort.time_limit))
+    return stack.enter_context(cluster_pool(effort.dask, effort.time_limit))
 
 
 def _shares(board: "_Board") -> Iterator[list[tuple[str, Task]]]:
@@ -157,9 +157,9 @@ class _Board:
         self,
         sweep: Sweep,
         folder: Path,
-        effort: Effort,
+        effort: SweepOptions,
         cells: Sequence[Cell],
-        tell: Callable[[Told], None] | None,
+        tell: Callable[[SweepProgress], None] | None,
         grow: Callable[[Sequence[Row]], None] | None,
     ) -> None:
         self.sweep, self.folder, self.effort, self.tell, self.grow = sweep, folder, effort, tell, grow
@@ -172,9 +172,9 @@ class _Board:
         self.width = effort.jobs
         self.timings = read_timings(folder)
         self.due = 0.0
-        self.known: tuple[float, Cost] | None = None
+        self.known: tuple[float, SweepCost] | None = None
 
-    def take(self, ident: str, outcome: Outcome) -> None:
+    def take(self, ident: str, outcome: CellOutcome) -> None:
         """A cell has ended."""
         cell = self.rows[ident].cell
         self.rows[ident] = row = write_cell(self.folder, cell, self.sweep.label, outcome)
@@ -185,7 +185,7 @@ class _Board:
             self.write()
         self.show(row)
 
-    def cost(self) -> Cost:
+    def cost(self) -> SweepCost:
         """Of what is left, worked out anew at most once in `TABLE_SECONDS`."""
         if self.known is None or self.known[1].seconds is None or not self.left or monotonic() >= self.known[0]:
             left = [self.rows[ident].cell for ident in self.left]
@@ -198,7 +198,7 @@ class _Board:
             states = [row.state for row in self.rows.values()]
             done = states.count(DONE)
             failed = len(states) - done - sum(row.cell.ident in self.left for row in self.rows.values())
-            self.tell(Told(done, failed, len(states), self.cost(), last))
+            self.tell(SweepProgress(done, failed, len(states), self.cost(), last))
 
     def write(self) -> None:
         """Bring the table up to date."""

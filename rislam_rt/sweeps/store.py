@@ -20,7 +20,7 @@ from rislam_rt.storage.lock import LOCK_FILE, hold
 from rislam_rt.storage.seal import read_sealed, seal
 from rislam_rt.sweeps.axes import Cell, Sweep
 from rislam_rt.sweeps.record import flatten, json_bytes
-from rislam_rt.sweeps.work import Outcome
+from rislam_rt.sweeps.work import CellOutcome
 
 SWEEP_FILE = "sweep.json"
 """The folder's marker."""
@@ -114,7 +114,7 @@ def write_sweep(folder: Path, sweep: Sweep) -> None:
     write_atomic(folder / SWEEP_FILE, json_bytes(seal(about)))
 
 
-def write_cell(folder: Path, cell: Cell, function: str, outcome: Outcome) -> Row:
+def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) -> Row:
     """Put a cell's file in place, whole.
 
     Raises
@@ -140,7 +140,7 @@ def read_row(folder: Path, cell: Cell) -> Row:
     return Row(cell, MISSING, "", {})
 
 
-def append_timing(folder: Path, cell: Cell, outcome: Outcome) -> None:
+def append_timing(folder: Path, cell: Cell, outcome: CellOutcome) -> None:
     """Remember how long a cell took, and where; losing a line costs nothing but an estimate."""
     line = {
         "ident": cell.ident,

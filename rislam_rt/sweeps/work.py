@@ -1,6 +1,6 @@
 """The life of a worker: an interpreter that does one cell after another, told and telling in lines of JSON.
 
-`main` takes a `Task` a line on its standard input and gives an `Outcome` a line on its standard output. It ends with
+`main` takes a `Task` a line on its standard input and gives a `CellOutcome` a line on its standard output. It ends with
 its input, in the middle of a cell if need be: nobody is left to hear the result.
 """
 
@@ -29,7 +29,7 @@ class Task(NamedTuple):
     seed: int
 
 
-class Outcome(NamedTuple):
+class CellOutcome(NamedTuple):
     """What became of a cell: plain data, ready for the wire."""
 
     result: Mapping[str, Any] | None = None
@@ -46,7 +46,7 @@ class Outcome(NamedTuple):
     """What the function itself says of its times."""
 
 
-def attempt(task: Task) -> Outcome:
+def attempt(task: Task) -> CellOutcome:
     """Do one cell; an exception is an outcome."""
     begin, cpu = perf_counter(), process_time()
     result, cause, message, timing = None, "", "", None
@@ -58,7 +58,9 @@ def attempt(task: Task) -> Outcome:
         result = found
     except BaseException as error:  # SystemExit too: a library must not end the worker without a word
         cause, message = RAISED, one_line(error)
-    return Outcome(result, cause, message, perf_counter() - begin, process_time() - cpu, os.uname().nodename, timing)
+    return CellOutcome(
+        result, cause, message, perf_counter() - begin, process_time() - cpu, os.uname().nodename, timing
+    )
 
 
 def find_function(name: str) -> Any:

@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from itertools import islice
 from time import monotonic
 
-from rislam_rt.sweeps.work import DIED, HUNG, LOST, Outcome, Task
+from rislam_rt.sweeps.work import DIED, HUNG, LOST, CellOutcome, Task
 
-Run = Callable[[Iterable[tuple[str, Task]]], Iterator[tuple[str, Outcome]]]
+Run = Callable[[Iterable[tuple[str, Task]]], Iterator[tuple[str, CellOutcome]]]
 """Does tasks and gives their outcomes as they come, each with its name."""
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "RISLAM_RT_THREADS")
@@ -28,7 +28,7 @@ LOOK_SECONDS = 1.0
 """Longest time between two looks at whether a worker lives."""
 
 
-class Worker:
+class CellWorker:
     """One interpreter, started fresh (never a fork: numerical libraries keep threads); it does cells one by one."""
 
     def __init__(self) -> None:
@@ -42,7 +42,7 @@ class Worker:
         )
         self.fresh = True
 
-    def do(self, task: Task, limit: float | None) -> Outcome:
+    def do(self, task: Task, limit: float | None) -> CellOutcome:
         """One cell, stopped after `limit` [s]; the start of the interpreter does not count."""
         if self.fresh and self._hear(None) is None:
             return self._dead(0.0)
@@ -56,10 +56,10 @@ class Worker:
             line = self._hear(limit)
         except TimeoutError:
             self.stop()
-            return Outcome(
+            return CellOutcome(
                 cause=HUNG, message=f"not done after {limit:g} s, its time limit", seconds=monotonic() - begin
             )
-        return self._dead(monotonic() - begin) if line is None else Outcome(*json.loads(line))
+        return self._dead(monotonic() - begin) if line is None else CellOutcome(*json.loads(line))
 
     def _say(self, line: bytes) -> None:
         assert self.process.stdin is not None
@@ -87,14 +87,14 @@ class Worker:
             line += part
         return line
 
-    def _dead(self, seconds: float) -> Outcome:
+    def _dead(self, seconds: float) -> CellOutcome:
         code = self.process.wait()
         self.stop()
         if code >= 0:
-            return Outcome(cause=DIED, message=f"its process ended with exit code {code}", seconds=seconds)
+            return CellOutcome(cause=DIED, message=f"its process ended with exit code {code}", seconds=seconds)
         name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
         cause = LOST if -code in FROM_OUTSIDE else DIED
-        return Outcome(cause=cause, message=f"its process was killed by {name}", seconds=seconds)
+        return CellOutcome(cause=cause, message=f"its process was killed by {name}", seconds=seconds)
 
     def stop(self) -> None:
         """End it at once."""
@@ -110,20 +110,20 @@ class Worker:
         return self.process.poll() is None
 
 
-class Crew:
+class WorkerPool:
     """Workers of this process; as many as cells are done at a time."""
 
     def __init__(self) -> None:
-        self.idle: list[Worker] = []
-        self.busy: list[Worker] = []
+        self.idle: list[CellWorker] = []
+        self.busy: list[CellWorker] = []
         self.over = False
 
-    def do(self, task: Task, limit: float | None) -> Outcome:
+    def do(self, task: Task, limit: float | None) -> CellOutcome:
         """One cell, by an idle worker or a new one."""
-        worker = self.idle.pop() if self.idle else Worker()
+        worker = self.idle.pop() if self.idle else CellWorker()
         if not worker.alive:
             worker.stop()
-            worker = Worker()
+            worker = CellWorker()
         self.busy.append(worker)
         if self.over:
             worker.process.kill()
@@ -147,16 +147,16 @@ class Crew:
 
 
 @contextmanager
-def crew_here(jobs: int, limit: float | None) -> Iterator[Run]:
+def local_pool(jobs: int, limit: float | None) -> Iterator[Run]:
     """Workers on this machine, `jobs` at a time. Leaving ends them, in the middle of their cells if need be."""
-    crew = Crew()
+    workers = WorkerPool()
     pool = ThreadPoolExecutor(jobs, initializer=_leave_interrupts)
 
-    def run(tasks: Iterable[tuple[str, Task]]) -> Iterator[tuple[str, Outcome]]:
-        waiting, running = iter(tasks), dict[Future[Outcome], str]()
+    def run(tasks: Iterable[tuple[str, Task]]) -> Iterator[tuple[str, CellOutcome]]:
+        waiting, running = iter(tasks), dict[Future[CellOutcome], str]()
         while True:
             for name, task in islice(waiting, jobs - len(running)):
-                running[pool.submit(crew.do, task, limit)] = name
+                running[pool.submit(workers.do, task, limit)] = name
             if not running:
                 return
             for future in wait(running, return_when=FIRST_COMPLETED).done:
@@ -165,9 +165,9 @@ def crew_here(jobs: int, limit: float | None) -> Iterator[Run]:
     try:
         yield run
     finally:
-        crew.break_off()
+        workers.break_off()
         pool.shutdown(cancel_futures=True)
-        crew.dismiss()
+        workers.dismiss()
 
 
 def _leave_interrupts() -> None:

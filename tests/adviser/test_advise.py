@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from rislam_rt.adviser.advice import advise
-from rislam_rt.adviser.budget import Link, Survey, at_rows, link_budget, survey
+from rislam_rt.adviser.budget import LandmarkLink, Survey, at_rows, link_budget, survey
 from rislam_rt.adviser.codes import aimed_codes, under
 from rislam_rt.adviser.cost import COUNTED, cost_words, trace_cost
 from rislam_rt.adviser.coverage import panel_coverage
-from rislam_rt.adviser.hearing import hear
-from rislam_rt.adviser.remedies import HEARD, enough_elements, lack_db, remedies, verdict, weak_places
+from rislam_rt.adviser.detection import forecast_detection
+from rislam_rt.adviser.remedies import HEARD, detection_label, enough_elements, lack_db, remedies, weak_places
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import measure
-from rislam_rt.model import PathKind, RisPanel, Scene, Shade
+from rislam_rt.model import Occluder, PathKind, RisPanel, Scene
 from rislam_rt.model.ris import join_panels
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.specification.spec import Settings, build_settings
@@ -28,7 +28,7 @@ def settings(*changed: str) -> Settings:
     return build_settings(load_spec(ROOT / "pipelines" / "trace_then_slam.toml", changed))
 
 
-def look(scene: Scene, *changed: str, places: int = 5) -> tuple[Survey, dict[tuple[str, str], Link]]:
+def look(scene: Scene, *changed: str, places: int = 5) -> tuple[Survey, dict[tuple[str, str], LandmarkLink]]:
     looked = survey(scene, settings(*changed), places)
     return looked, {(link.landmark, link.code): link for link in link_budget(looked, rng=np.random.default_rng(1))}
 
@@ -51,7 +51,7 @@ def test_the_chance_of_being_heard_is_the_share_of_the_receivers_own_draws(paper
     paths = under(looked.paths, paper.ris.spec, aimed_codes(looked.paths, paper.ris.spec, looked.settings.radio))
     for place in range(3):
         heading = float(looked.scene.agent.heading[place])
-        said, count = hear(paths, place, heading, looked.settings).probability, np.zeros(2)
+        said, count = forecast_detection(paths, place, heading, looked.settings).probability, np.zeros(2)
         for _ in range(draws):
             _, truth = measure(paths, place, heading, looked.settings.radio, looked.settings.receiver, rng=rng)
             owner = paths.landmark[truth.path[truth.path >= 0]]
@@ -110,7 +110,7 @@ def test_what_hides_and_reflects_nothing_is_named(paper: Scene) -> None:
     box = np.array([[x, y, z] for x in (1.7, 2.3) for y in (0.7, 1.3) for z in (0.7, 1.3)])
     quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
     faces = np.array([face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))])
-    _, links = look(replace(paper, shades=(Shade(box, faces, "crate"),)))
+    _, links = look(replace(paper, occluders=(Occluder(box, faces, "crate"),)))
     assert set(links["sphere", ""].reason) == {"shaded by 'crate'"}
 
 
@@ -125,7 +125,7 @@ def test_what_lacks_is_what_would_do(paper: Scene) -> None:
     faint, links = look(paper, "radio.reference_snr_db=-12")
     link = links["ris", "aimed"]
     lack = lack_db(link)
-    assert verdict(link) != "heard"
+    assert detection_label(link) != "heard"
     assert lack > 0.0
     weak = weak_places(link)
     _, less = look(paper, f"radio.reference_snr_db={-12 + lack + 0.1}")

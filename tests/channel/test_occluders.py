@@ -10,15 +10,15 @@ from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.occluders import build_occluders
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import triangle_planes
-from rislam_rt.model import PathKind, RadioConfig, Scatterer, Shade
+from rislam_rt.model import Occluder, PathKind, RadioConfig, Scatterer
 from rislam_rt.scene.solids import cylinder_mesh, sphere_mesh
 
 RADIO = RadioConfig()
 CENTER = np.array([2.0, 1.0, 1.0])
-BALL = Scatterer("ball", CENTER, 0.3, 0.3, shade=Shade(*sphere_mesh(CENTER, 0.3)))
+BALL = Scatterer("ball", CENTER, 0.3, 0.3, shade=Occluder(*sphere_mesh(CENTER, 0.3)))
 POST = Scatterer(
     "post", np.array([4.0, 3.2, 1.5]), 0.1, 0.25, "constant", 2.9, np.array([0.0, 0.0, 1.0]),
-    Shade(*cylinder_mesh(np.array([4.0, 3.2, 1.5]), 0.25, 2.9, np.array([0.0, 0.0, 1.0]))),
+    Occluder(*cylinder_mesh(np.array([4.0, 3.2, 1.5]), 0.25, 2.9, np.array([0.0, 0.0, 1.0]))),
 )  # fmt: skip
 
 
@@ -43,50 +43,50 @@ def clipped(start, end, scatterer):
 @pytest.mark.parametrize("scatterer", [BALL, POST], ids=lambda s: s.name)
 def test_crossings_of_convex_solids(rooms, scatterer):
     rng = np.random.default_rng(3)
-    shades = build_occluders(shaded(rooms, scatterer))
+    occluders = build_occluders(shaded(rooms, scatterer))
     start = scatterer.position + 2.0 * unit(rng.normal(size=(20_000, 3)))
     start[:10_000] *= [1.0, 1.0, 3.0]
     end = scatterer.position + rng.normal(size=(20_000, 3)) * [0.6, 0.6, 1.0]
     normal, offset = triangle_planes(scatterer.shade.triangles)
     outside = ((end @ normal.T > offset).any(axis=1)) & ((start @ normal.T > offset).any(axis=1))
     start, end = start[outside], end[outside]
-    hides = shades.hides(start, end)
+    hides = occluders.hides(start, end)
     np.testing.assert_array_equal(hides, clipped(start, end, scatterer))
     assert 0.05 < hides.mean() < 0.9
-    assert not shades.hides(start, end, spared=0).any()
-    np.testing.assert_array_equal(shades.hides(end, start), hides)
+    assert not occluders.hides(start, end, spared=0).any()
+    np.testing.assert_array_equal(occluders.hides(end, start), hides)
 
 
 def test_no_ray_slips_through_a_seam(rooms):
     """Through vertices and edge midpoints of the near side, exactly at the middle."""
-    shades = build_occluders(shaded(rooms, BALL))
+    occluders = build_occluders(shaded(rooms, BALL))
     triangles = BALL.shade.triangles
     aims = np.concatenate([triangles.reshape(-1, 3), ((triangles + np.roll(triangles, 1, axis=1)) / 2).reshape(-1, 3)])
     start = CENTER + 3.0 * (aims - CENTER)
-    assert shades.hides(start, CENTER - 2.0 * (aims - CENTER)).all()
-    assert shades.hides(start, np.broadcast_to(CENTER, start.shape)).all()
+    assert occluders.hides(start, CENTER - 2.0 * (aims - CENTER)).all()
+    assert occluders.hides(start, np.broadcast_to(CENTER, start.shape)).all()
 
 
 def test_margin_is_the_distance_from_the_outline(rooms):
     """Of a sphere: radius against the line's distance from the centre; the mesh is within 2 % of the radius."""
-    shades, rng = build_occluders(shaded(rooms, BALL)), np.random.default_rng(5)
+    occluders, rng = build_occluders(shaded(rooms, BALL)), np.random.default_rng(5)
     for _ in range(200):
         direction = unit(rng.normal(size=3))
         aside = unit(np.cross(direction, rng.normal(size=3)))
         miss = rng.uniform(0.0, 0.6)
         start, end = CENTER + miss * aside - 2.0 * direction, CENTER + miss * aside + 2.0 * direction
-        margin = shades.margin(start, end, 0)
+        margin = occluders.margin(start, end, 0)
         assert margin == pytest.approx(miss - 0.3, abs=0.02 * 0.3)
-        assert (margin < 0.0) == shades.hides(start[None], end[None])[0]
+        assert (margin < 0.0) == occluders.hides(start[None], end[None])[0]
     # a segment that ends before the ball is clear of it by that much
-    short = shades.margin(CENTER - [2.0, 0.0, 0.0], CENTER - [0.5, 0.0, 0.0], 0)
+    short = occluders.margin(CENTER - [2.0, 0.0, 0.0], CENTER - [0.5, 0.0, 0.0], 0)
     assert short > 0.2
 
 
 def test_scenes_without_shades_have_none(rooms):
-    shades = build_occluders(rooms.paper())
-    assert len(shades) == 0
-    assert not shades.hides(np.zeros((3, 3)), np.ones((3, 3))).any()
+    occluders = build_occluders(rooms.paper())
+    assert len(occluders) == 0
+    assert not occluders.hides(np.zeros((3, 3)), np.ones((3, 3))).any()
 
 
 @pytest.fixture(scope="module")
@@ -184,7 +184,7 @@ def test_the_tracer_sees_the_same_shadows(rooms, refine):
 def test_a_shade_alone_hides_like_a_scatterers_and_is_no_landmark(rooms):
     """Against the same shade about a scatterer: the same paths, those of that scatterer apart; both channels agree."""
     owned = shaded(rooms, BALL)
-    alone = replace(owned, scatterers=(), shades=(replace(BALL.shade, name="heap"),))
+    alone = replace(owned, scatterers=(), occluders=(replace(BALL.shade, name="heap"),))
     poses = random_poses(alone, 20, rng=np.random.default_rng(5))
     with_ball, without = (ImageSourceChannel(scene, RADIO, 2).paths(poses) for scene in (owned, alone))
     assert alone.landmarks == ("ris",)
@@ -197,5 +197,5 @@ def test_a_shade_alone_hides_like_a_scatterers_and_is_no_landmark(rooms):
         )
     ]  # fmt: skip
     assert keys[0] == keys[1]
-    assert len(keys[1]) < ImageSourceChannel(replace(alone, shades=()), RADIO, 2).paths(poses).valid.sum()
+    assert len(keys[1]) < ImageSourceChannel(replace(alone, occluders=()), RADIO, 2).paths(poses).valid.sum()
     assert compare_channels(alone, RADIO, poses=20, depth=2, rng=np.random.default_rng(6), refine=True).passed

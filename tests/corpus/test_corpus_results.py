@@ -15,7 +15,7 @@ from rislam_rt.pipeline.store.run_folder import open_run, read_run
 from rislam_rt.scene import load_scene
 from rislam_rt.sweeps import Sweep, build_cells
 from rislam_rt.sweeps.store import DONE, MISSING, read_row, write_cell
-from rislam_rt.sweeps.work import Outcome
+from rislam_rt.sweeps.work import CellOutcome
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -77,7 +77,7 @@ def test_run(case: dict[str, str], sound: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("what", CELLS)
 def test_cell(what: str, tmp_path: Path) -> None:
     cell = build_cells(Sweep("math:hypot", base={"cycles": 3}))[0]
-    write_cell(tmp_path, cell, "math:hypot", Outcome({"rmse_m": 0.125}))
+    write_cell(tmp_path, cell, "math:hypot", CellOutcome({"rmse_m": 0.125}))
     assert read_row(tmp_path, cell).state == DONE
     file = next((tmp_path / "cells").iterdir())
     data = file.read_bytes()

@@ -8,7 +8,7 @@ import pytest
 from rislam_rt.arrays import Complexes
 from rislam_rt.design import exact_code
 from rislam_rt.design.beam_sweep import HOLD, LOOK_ROUND, SETTLED, search_code, sweep_codes
-from rislam_rt.model import RisCode, RisSpec, Suspect, empty_map
+from rislam_rt.model import PanelCandidate, RisCode, RisSpec, empty_map
 from rislam_rt.ris import leg_response
 
 PLACES = 300
@@ -62,7 +62,7 @@ def test_a_suspect_is_held_then_aimed_at_and_then_doubted(make_belief, make_spec
     last = RisCode(rng.integers(4, size=(6, 6)), 4)
 
     def sent(hits: int, number: int) -> np.ndarray:
-        belief = replace(blind, suspects=(Suspect(place, hits),))
+        belief = replace(blind, suspects=(PanelCandidate(place, hits),))
         return search_code(belief, spec, radio, number, last).index
 
     for number in range(LOOK_ROUND):

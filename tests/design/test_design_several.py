@@ -10,7 +10,7 @@ from rislam_rt.design import design_code, designer, exact_code, problem_from_bel
 from rislam_rt.design.beam_sweep import search_code
 from rislam_rt.design.objective import build_objective
 from rislam_rt.design.truth import problem_from_arrays
-from rislam_rt.model import RisCode, RisSpecs, Suspect
+from rislam_rt.model import PanelCandidate, RisCode, RisSpecs
 from rislam_rt.ris import leg_response, panel_gain
 
 AGENT = np.array([1.8, 2.4, 0.6])
@@ -91,7 +91,7 @@ def test_a_panel_not_yet_found_looks_for_itself(both, radio, rng):
     belief, sheets = both
     half = belief.map.ris_probability.copy()
     half[0] = 0.4
-    suspect = Suspect(np.array([2.0, 1.0, 1.0]), 5, panel=1)
+    suspect = PanelCandidate(np.array([2.0, 1.0, 1.0]), 5, panel=1)
     partly = replace(belief, map=replace(belief.map, ris_probability=half), suspects=(suspect,))
     found = design_code(
         partly, sheets, radio, method="exact", rng=rng, number=3, last=RisCode(np.zeros((1, 48), int), 4)

@@ -19,7 +19,7 @@ from rislam_rt.design.beam_sweep import LOOK_ROUND, SETTLED, beam_phases, search
 from rislam_rt.design.coordinate import _first_changes, _rank_by_slope, _rank_by_value
 from rislam_rt.errors import ConfigError, GeometryError
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import RisCode, Suspect, empty_map
+from rislam_rt.model import PanelCandidate, RisCode, empty_map
 
 POSITION = np.array([1.2, 2.1, 0.5])
 
@@ -161,7 +161,7 @@ def test_a_settled_suspect_is_doubted_beam_by_beam(make_belief, make_spec, radio
     belief = replace(
         make_belief(POSITION, rng),
         map=empty_map(),
-        suspects=(Suspect(np.array([3.0, 3.0, 3.0]), SETTLED),),
+        suspects=(PanelCandidate(np.array([3.0, 3.0, 3.0]), SETTLED),),
     )
     last = RisCode(np.zeros((6, 6), dtype=np.int64), 4)
     for turn in (1, 5, len(beams) + 3):

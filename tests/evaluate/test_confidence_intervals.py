@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.evaluate import bootstrap, bootstrap_ratio, rms_over_runs
+from rislam_rt.evaluate import bootstrap, bootstrap_ratio, median_over_runs, rms_over_runs
 
 
 def test_interval_of_a_normal_mean_is_the_textbook_one():
@@ -43,3 +43,11 @@ def test_equal_samples_have_no_width_and_one_is_no_sample():
     assert bootstrap(np.full(5, 0.3), rng=np.random.default_rng(0)) == pytest.approx((0.3, 0.3, 0.3))
     with pytest.raises(ConfigError, match="at least 2"):
         bootstrap(np.ones(1), rng=np.random.default_rng(0))
+
+
+def test_a_median_that_no_single_run_moves_still_has_a_width():
+    interval = bootstrap(
+        np.array([1.0, 1.0, 1.0, 1.0, 5.0, 6.0, 7.0]), rng=np.random.default_rng(0), statistic=median_over_runs
+    )
+    assert interval.value == interval.lower == 1.0
+    assert 5.0 <= interval.upper <= 7.0

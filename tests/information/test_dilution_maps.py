@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.information import (
-    Outcome,
-    dilution,
-    position_bound,
-    position_error_map,
-    position_information,
-    vertex_gradient,
-)
+from rislam_rt.information import Outcome, position_bound, position_error_map, position_information, vertex_gradient
 from rislam_rt.model import Body, PathKind, RadioConfig, Trajectory
 from rislam_rt.scene import load_scene
 
@@ -67,10 +60,3 @@ def test_options_of_the_map(scene):
     # the paper's gradient all but cancels for a small baseline: it promises far less
     paper = position_error_map(paths, motion.tx, motion.rx, RADIO, mode="paper").variance
     assert (paper > plain).all()
-
-
-def test_dilution_by_hand():
-    gradient = np.array([[[2.0, 0.0], [0.0, 2.0], [1.0, 1.0]]])
-    heard = np.array([[True, True, False]])
-    assert dilution(gradient, heard).rms[0] == pytest.approx(np.sqrt(0.5))
-    assert dilution(gradient, np.array([[True, False, False]])).outcome[0] == Outcome.UNOBSERVABLE

@@ -5,7 +5,7 @@ import pytest
 
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.walls import build_walls
-from rislam_rt.information import build_landmark_model
+from rislam_rt.information import LinearMeasurements, build_landmark_model, fewer_rows
 from rislam_rt.information.accuracy import cosine_information, range_information
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.scene import load_scene
@@ -59,3 +59,16 @@ def test_a_path_without_a_landmark_sees_no_point(model):
     assert (model.tx_point[direct] == -1).all()
     assert (model.rx_point[direct] == -1).all()
     assert (model.tx_point[~direct] >= 0).all()
+
+
+def test_fewer_rows_hold_the_same_information():
+    rng = np.random.default_rng(2)
+    rows = LinearMeasurements(rng.standard_normal((50, 3)), rng.standard_normal((50, 4)), rng.uniform(0.1, 2.0, 50))
+    short = fewer_rows(rows)
+    assert len(short.information) == 7
+    for first, second in ((rows, short), (rows, fewer_rows(short))):
+        matrices = [
+            (m := np.concatenate([r.agent, r.unknown], axis=1)).T @ (r.information[:, None] * m)
+            for r in (first, second)
+        ]
+        np.testing.assert_allclose(*matrices, atol=1e-12)

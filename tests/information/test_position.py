@@ -1,4 +1,4 @@
-"""Position information, equivalent information, priors: by hand, by inversion of the joint matrix, and as outcomes."""
+"""Position information and priors: by hand, and as outcomes."""
 
 import numpy as np
 import pytest
@@ -7,14 +7,11 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.information import (
     Outcome,
     amplitude_std,
-    equivalent_information,
     measurement_std,
     position_bound,
     position_information,
     prior_from_covariance,
-    prior_from_particles,
     range_information,
-    uncertain_range_information,
 )
 from rislam_rt.model import RadioConfig
 
@@ -58,63 +55,6 @@ def test_adding_a_path_never_hurts_and_rotation_does_not_matter():
     np.testing.assert_allclose(turned, all_four, rtol=1e-9)
 
 
-def test_equivalent_information_inverts_to_the_joint_bound():
-    rng = np.random.default_rng(1)
-    agent, nuisance = rng.normal(size=(5, 9, 2)), rng.normal(size=(5, 9, 4))
-    weight, prior = rng.exponential(size=(5, 9)), np.diag([0.3, 0.0, 2.0, 0.0])
-    reduced = equivalent_information(agent, nuisance, weight, prior)
-    assert (reduced.outcome == Outcome.OK).all()
-    both = np.concatenate([agent, nuisance], axis=-1)
-    joint = np.swapaxes(both * weight[..., None], 1, 2) @ both
-    joint[:, 2:, 2:] += prior
-    np.testing.assert_allclose(np.linalg.inv(reduced.information), np.linalg.inv(joint)[:, :2, :2], rtol=1e-8)
-
-
-def test_equivalent_information_between_known_and_useless():
-    rng = np.random.default_rng(2)
-    agent, nuisance, weight = rng.normal(size=(6, 2)), rng.normal(size=(6, 3)), np.ones(6)
-    own = agent.T @ agent
-    certain = equivalent_information(agent, nuisance, weight, 1e12 * np.eye(3)).information
-    np.testing.assert_allclose(certain, own, rtol=1e-9)
-    unknown = equivalent_information(agent, nuisance, weight, np.zeros((3, 3))).information
-    assert (np.linalg.eigvalsh(own - unknown) > 0).all()
-    # an unknown that no measurement sees costs nothing, and is said
-    blind = equivalent_information(agent, np.zeros((6, 3)), weight, np.zeros((3, 3)))
-    np.testing.assert_allclose(blind.information, own, rtol=1e-12)
-    assert blind.outcome == Outcome.DEGENERATE
-    # one landmark seen by one path alone teaches nothing of the agent
-    lone = equivalent_information(agent[:1], nuisance[:1], weight[:1], np.zeros((3, 3)))
-    np.testing.assert_allclose(lone.information, 0.0, atol=1e-12)
-
-
-def test_a_clock_offset_costs_one_common_range():
-    gradient = np.array([[1.0, 0.0], [-0.5, 0.8], [-0.5, -0.8]])
-    unknown = equivalent_information(gradient, np.ones((3, 1)), np.ones(3), np.zeros((1, 1))).information
-    centred = gradient - gradient.mean(axis=0)
-    np.testing.assert_allclose(unknown, centred.T @ centred, atol=1e-12)
-
-
-def test_uncertain_landmark_is_the_equivalent_of_one_path():
-    rng = np.random.default_rng(3)
-    gradient, landmark, covariance = rng.normal(size=2), rng.normal(size=3), np.diag([0.1, 0.2, 0.05])
-    weight = np.array(5.0)
-    short = uncertain_range_information(weight, landmark, covariance) * np.outer(gradient, gradient)
-    long = equivalent_information(gradient[None], landmark[None], weight[None], np.linalg.inv(covariance)).information
-    np.testing.assert_allclose(short, long, rtol=1e-10)
-
-
-def test_prior_of_a_cloud_and_of_its_covariance():
-    rng = np.random.default_rng(4)
-    covariance = np.array([[0.04, 0.01], [0.01, 0.02]])
-    cloud = rng.multivariate_normal([3.0, 1.0], covariance, size=100_000)
-    # 1e5 draws: a variance is known to 0.45 %
-    np.testing.assert_allclose(prior_from_particles(cloud), np.linalg.inv(covariance), rtol=0.03, atol=0.3)
-    np.testing.assert_allclose(prior_from_covariance(covariance), np.linalg.inv(covariance), rtol=1e-12)
-    weight = np.where(cloud[:, 0] > 3.0, 0.0, -np.inf)
-    half = prior_from_particles(cloud, weight)
-    np.testing.assert_allclose(half, prior_from_particles(cloud[cloud[:, 0] > 3.0]), rtol=1e-9)
-
-
 def test_priors_of_many_covariances_are_those_of_each():
     root = np.random.default_rng(5).normal(size=(4, 2, 2))
     covariance = 0.01 * root @ root.swapaxes(1, 2) + 1e-4 * np.eye(2)
@@ -123,8 +63,8 @@ def test_priors_of_many_covariances_are_those_of_each():
     np.testing.assert_allclose(prior_from_covariance(skew), np.linalg.inv(covariance), rtol=1e-9)
 
 
-def test_a_collapsed_cloud_is_still_finite():
-    prior = prior_from_particles(np.ones((10, 2)))
+def test_a_collapsed_belief_is_still_finite():
+    prior = prior_from_covariance(np.zeros((2, 2)))
     np.testing.assert_allclose(prior, 1e8 * np.eye(2), rtol=1e-12, atol=1e-6)
     assert np.isfinite(prior_from_covariance(np.array([[1.0, 1.0], [1.0, 1.0]]))).all()
 

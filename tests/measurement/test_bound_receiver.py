@@ -7,7 +7,7 @@ from scipy.special import ive
 
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
-from rislam_rt.measurement import ReceiverConfig, detection_probability, measure, path_std, twin
+from rislam_rt.measurement import ReceiverConfig, detection_probability, measure, path_std, phase_reversed
 from rislam_rt.model import PathKind, RadioConfig, RisCode, RxArray
 
 RADIO = RadioConfig()
@@ -190,9 +190,9 @@ def test_components_come_by_delay_and_same_seed_same_result(make_paths, make_gai
 
 def test_twin_is_half_a_turn_and_needs_an_even_panel():
     code = RisCode(np.array([[0, 1], [2, 3]]), 4)
-    np.testing.assert_allclose(np.exp(-1j * twin(code).xi), -np.exp(-1j * code.xi), atol=1e-15)
+    np.testing.assert_allclose(np.exp(-1j * phase_reversed(code).xi), -np.exp(-1j * code.xi), atol=1e-15)
     with pytest.raises(ConfigError, match="even number"):
-        twin(RisCode(np.array([[0, 1]]), 3))
+        phase_reversed(RisCode(np.array([[0, 1]]), 3))
 
 
 @pytest.mark.parametrize(

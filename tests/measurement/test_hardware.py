@@ -22,7 +22,7 @@ from rislam_rt.measurement.received import direct_gain
 from rislam_rt.measurement.signal import convert, to_tones
 from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.run import set_stage
+from rislam_rt.pipeline.run import prepare_setup
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
@@ -37,7 +37,7 @@ def rng(seed=0):
 @pytest.fixture(scope="module")
 def stage():
     spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", ["channel=image_source", "cycles=30", "depth=1"])
-    return set_stage(load_scene(ROOT / "scenes" / "paper_room"), spec, rng=rng(1))
+    return prepare_setup(load_scene(ROOT / "scenes" / "paper_room"), spec, rng=rng(1))
 
 
 def signal(seed=1, power=1e-6):

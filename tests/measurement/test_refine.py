@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rislam_rt.measurement import refine as refinement
-from rislam_rt.measurement.inner_products import waves_at
-from rislam_rt.measurement.positive_definite import inverse, solve
-from rislam_rt.measurement.refine import (
+from rislam_rt.measurement.estimation import refine as refinement
+from rislam_rt.measurement.estimation.inner_products import waves_at
+from rislam_rt.measurement.estimation.positive_definite import inverse, solve
+from rislam_rt.measurement.estimation.refine import (
     LeastSquaresFit,
     accuracy,
     contribution,
@@ -16,8 +16,8 @@ from rislam_rt.measurement.refine import (
     refine,
     residual,
 )
+from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding
 from rislam_rt.measurement.signal import add_noise
-from rislam_rt.measurement.sounding import Sounding, build_sounding
 from rislam_rt.model import RadioConfig
 
 PLANE = build_sounding(128, RadioConfig())

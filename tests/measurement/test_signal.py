@@ -5,6 +5,8 @@ import pytest
 
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.measurement import ReceiverConfig
+from rislam_rt.measurement.estimation.sounding import build_sounding
+from rislam_rt.measurement.estimation.spherical_waves import correlate_waves, wave_signals
 from rislam_rt.measurement.received import receive
 from rislam_rt.measurement.signal import (
     add_noise,
@@ -15,8 +17,6 @@ from rislam_rt.measurement.signal import (
     to_tones,
     tones,
 )
-from rislam_rt.measurement.sounding import build_sounding
-from rislam_rt.measurement.spherical_waves import correlate_waves, wave_signals
 from rislam_rt.model import PathKind, Paths, RadioConfig, RxArray
 
 RADIO = RadioConfig()

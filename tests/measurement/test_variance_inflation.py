@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from rislam_rt.measurement import ReceiverConfig, measure
-from rislam_rt.measurement.inner_products import waves_at
-from rislam_rt.measurement.refine import accuracy, fit_amplitudes, refine
+from rislam_rt.measurement.estimation.inner_products import waves_at
+from rislam_rt.measurement.estimation.refine import accuracy, fit_amplitudes, refine
+from rislam_rt.measurement.estimation.sounding import build_sounding
 from rislam_rt.measurement.signal import add_noise
-from rislam_rt.measurement.sounding import build_sounding
 from rislam_rt.measurement.variance_inflation import UNSEEN, crowding, mirror_variance, peak_bias, unmirrored
 from rislam_rt.model import PathKind, RadioConfig, RxArray
 

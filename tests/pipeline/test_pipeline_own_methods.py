@@ -15,7 +15,7 @@ from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.own_methods import load_own, own_code, own_digests
 from rislam_rt.shipped import find_pipeline
 from rislam_rt.studies.pipeline_sweep import slam_sweep
-from rislam_rt.sweeps import Effort, run_sweep
+from rislam_rt.sweeps import SweepOptions, run_sweep
 
 FAULTS = """
 import sys
@@ -138,7 +138,7 @@ def test_a_channel_takes_the_place_of_ours() -> None:
 def test_in_a_sweep_on_workers(tmp_path: Path) -> None:
     settings = [*QUICK, 'schemes=["mine:DeadReckoning", "no_ris"]']
     sweep = slam_sweep(find_pipeline("trace_then_slam"), settings, ["radio.reference_snr_db=0,30"], repeat=1)
-    report = run_sweep(sweep, tmp_path / "sweep", Effort(jobs=2))
+    report = run_sweep(sweep, tmp_path / "sweep", SweepOptions(jobs=2))
     assert not report.failed
     assert len(report.rows) == 2
     assert all(set(row.result["schemes"]) == {"mine:DeadReckoning", "no_ris"} for row in report.rows)

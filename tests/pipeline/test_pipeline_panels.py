@@ -10,7 +10,7 @@ from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.dataset import dataset_to_paths, dataset_to_scheme, paths_to_dataset, scheme_to_dataset
 from rislam_rt.pipeline.design_at import design_at, design_table
-from rislam_rt.pipeline.long.join import join_schemes, thinned_scheme
+from rislam_rt.pipeline.long.join import join_schemes, subsampled_scheme
 from rislam_rt.pipeline.recordings.inputs import dataset_to_inputs, inputs_to_dataset
 from rislam_rt.pipeline.scores.summary import landmark_scores, landmark_track
 from rislam_rt.report.code_pictures import draw_run_codes
@@ -71,7 +71,7 @@ def test_which_panel_is_kept_in_the_files(result):
     assert given.panel.num_elements == 100
     for one, other in zip(given.measurements, scheme.given.inputs.measurements, strict=True):
         np.testing.assert_array_equal(one.panel, other.panel)
-    few = thinned_scheme(scheme, np.array([3, 29]))
+    few = subsampled_scheme(scheme, np.array([3, 29]))
     np.testing.assert_array_equal(few.panel, scheme.panel[[3, 29]])
     twice = join_schemes([scheme, scheme], [result.paths, result.paths])
     np.testing.assert_array_equal(twice.panel, np.concatenate([scheme.panel, scheme.panel]))

@@ -10,7 +10,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import check_run
-from rislam_rt.pipeline.walk import without_panel
+from rislam_rt.pipeline.scheme_simulation import without_panel
 
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
 

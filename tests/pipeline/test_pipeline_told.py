@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from rislam_rt import slam
 from rislam_rt.model import PathKind
-from rislam_rt.pipeline import load_spec, told
+from rislam_rt.pipeline import assumed_model, load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
-from rislam_rt.pipeline.run import set_stage
-from rislam_rt.pipeline.specification.mistold import ToldSection
+from rislam_rt.pipeline.run import prepare_setup
+from rislam_rt.pipeline.specification.mismatch import AssumedSection
 from rislam_rt.pipeline.specification.spec import build_settings
 
 ROOT = Path(__file__).parents[2]
@@ -104,7 +104,7 @@ def _same(one: Any, other: Any) -> bool:
 
 def test_every_error_changes_what_it_says_and_nothing_else(overhear):
     """One by one: what an estimator gets differs from the default run in the named quantities alone."""
-    assert set(WRONG) == set(ToldSection.model_fields)
+    assert set(WRONG) == set(AssumedSection.model_fields)
     estimated = ('slam.heading="estimated"',)
     plain = {extra: overhear(*extra) for extra in ((), estimated)}
     for name, (value, changed) in WRONG.items():
@@ -127,7 +127,7 @@ def test_by_default_all_is_told_as_it_is(overhear, room, short_spec):
 
 def test_the_page_lists_every_error():
     page = PAGE.read_text()
-    missing = [name for name in (*ToldSection.model_fields, "heading_std_deg") if f"`{name}`" not in page]
+    missing = [name for name in (*AssumedSection.model_fields, "heading_std_deg") if f"`{name}`" not in page]
     assert not missing
 
 
@@ -135,8 +135,8 @@ def test_a_start_that_errs_more_than_is_told(room):
     """Errors of many draws, over the deviation that is told: three, within five standard errors of 600 values."""
     settings = SimpleNamespace(slam=SimpleNamespace(height="estimated", heading="estimated"))
     start = load_spec(PIPELINE, ["start.heading_std_deg=1.0", "start.position_std_m=0.02"]).start
-    section, rng = ToldSection(start_scale=3.0), np.random.default_rng(1)
-    draws = [told.tell_start(room.agent, 0.0, start, section, settings, rng=rng) for _ in range(200)]
+    section, rng = AssumedSection(start_scale=3.0), np.random.default_rng(1)
+    draws = [assumed_model.tell_start(room.agent, 0.0, start, section, settings, rng=rng) for _ in range(200)]
     assert {(prior.position_std, prior.heading_std) for prior in draws} == {(0.02, float(np.radians(1.0)))}
     shift = np.array([prior.position - room.agent.position[0] for prior in draws]) / 0.02
     assert np.std(shift) == pytest.approx(3.0, abs=5.0 * 3.0 / np.sqrt(2 * 600))
@@ -146,20 +146,20 @@ def test_a_start_that_errs_more_than_is_told(room):
 
 def test_a_panel_told_tilted_stays_a_panel(room):
     spec = room.ris.spec
-    wrong = told.tell_panel(spec, ToldSection(panel_tilt_deg=7.0, panel_turn_deg=11.0))
+    wrong = assumed_model.tell_panel(spec, AssumedSection(panel_tilt_deg=7.0, panel_turn_deg=11.0))
     assert np.degrees(np.arccos(wrong.normal @ spec.normal)) == pytest.approx(7.0, abs=1e-9)
     frame = np.stack([wrong.right, wrong.up, wrong.normal])
     np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
-    turned = told.tell_panel(spec, ToldSection(panel_turn_deg=11.0))
+    turned = assumed_model.tell_panel(spec, AssumedSection(panel_turn_deg=11.0))
     assert np.degrees(np.arccos(turned.up @ spec.up)) == pytest.approx(11.0, abs=1e-9)
 
 
 def test_a_leaning_body_hears_from_where_its_array_looks(room):
     """Arrivals from the vertices of the paths, turned by scipy's rotations into the array's own frame."""
     spec = load_spec(PIPELINE, ["channel=image_source", "cycles=3", "told.tilt_deg=4.0"])
-    stage = set_stage(room, spec, rng=np.random.default_rng(1))
+    stage = prepare_setup(room, spec, rng=np.random.default_rng(1))
     motion = stage.scene.agent
-    heard = told.deceive(stage.paths, motion, spec.told, rng=np.random.default_rng(2))
+    heard = assumed_model.perceived_paths(stage.paths, motion, spec.told, rng=np.random.default_rng(2))
     level = stage.paths.arrival
     for cycle in range(3):
         # the front rises by 4 degrees: about y in the right-handed sense it would sink
@@ -178,7 +178,10 @@ def test_a_clock_of_its_own_shifts_and_drifts(room):
     spec = load_spec(
         PIPELINE, ["channel=image_source", "cycles=5", "told.clock_offset_ns=2.0", "told.clock_drift_ns_s=3.0"]
     )
-    stage = set_stage(room, spec, rng=np.random.default_rng(1))
-    late = told.deceive(stage.paths, stage.scene.agent, spec.told, rng=np.random.default_rng(2)).tau - stage.paths.tau
+    stage = prepare_setup(room, spec, rng=np.random.default_rng(1))
+    late = (
+        assumed_model.perceived_paths(stage.paths, stage.scene.agent, spec.told, rng=np.random.default_rng(2)).tau
+        - stage.paths.tau
+    )
     expected = 1e-9 * (2.0 + 3.0 * 0.1 * np.arange(5))[:, None] * stage.paths.valid
     np.testing.assert_allclose(late, expected, rtol=0.0, atol=1e-22)  # float64 of delays below 1e-7 s

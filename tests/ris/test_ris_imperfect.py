@@ -26,7 +26,7 @@ def test_a_perfect_panel_does_nothing_wrong(panels):
     code = RisCode(rng().integers(4, size=(2, 6, 6)), 4)
     for errors in (perfect_panel(panels.spec()), draw_panel(panels.spec(), PanelTolerance(), rng=rng())):
         np.testing.assert_array_equal(errors.weight, np.ones((6, 6)))
-        np.testing.assert_array_equal(errors.settle(code).index, code.index)
+        np.testing.assert_array_equal(errors.applied(code).index, code.index)
 
 
 def test_the_same_seed_draws_the_same_panel_and_kinds_do_not_mix(panels):
@@ -75,7 +75,7 @@ def test_mean_gain_of_a_focused_panel(panels, tolerance):
         errors = draw_panel(panels.spec(), tolerance, rng=child)
         code = RisCode(child.integers(4, size=(6, 6)), 4)
         field = np.exp(1j * code.xi)  # what the code was chosen for
-        power.append(np.abs(np.mean(field * errors.weight * np.exp(-1j * errors.settle(code).xi))) ** 2)
+        power.append(np.abs(np.mean(field * errors.weight * np.exp(-1j * errors.applied(code).xi))) ** 2)
     coherent, scattered = mean_power_shares(tolerance)
     error = np.std(power) / np.sqrt(len(power))
     assert np.mean(power) == pytest.approx(coherent + scattered / 36, abs=4 * error)
@@ -98,7 +98,7 @@ def test_stuck_elements_keep_their_level_in_every_cycle():
     stuck = np.array([[-1, 2], [0, -1]])
     errors = PanelErrors(np.ones((2, 2)), np.zeros((2, 2)), np.zeros((2, 2), dtype=bool), stuck)
     code = RisCode(np.full((5, 2, 2), 3), 4)
-    np.testing.assert_array_equal(errors.settle(code).index, np.tile([[3, 2], [0, 3]], (5, 1, 1)))
+    np.testing.assert_array_equal(errors.applied(code).index, np.tile([[3, 2], [0, 3]], (5, 1, 1)))
 
 
 def test_quantising_is_exact_where_levels_agree_and_never_off_by_more_than_half_a_step():

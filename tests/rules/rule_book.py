@@ -2,16 +2,18 @@
 
 import ast
 import re
-from collections.abc import Iterator
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = "rislam_rt"
 
 FLOORS = {
-    0: ("errors", "constants", "arrays", "backend", "shipped", "toml"),
+    0: ("errors", "constants", "arrays", "backend", "shipped", "spelling", "toml"),
     1: ("geometry", "storage"),
     2: ("model",),
     3: ("scene", "ris", "waveform"),
@@ -49,6 +51,10 @@ RANDOM_TYPES = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG
 VAGUE_NAMES = {"util", "utils", "helper", "helpers", "manager", "managers", "handler", "handlers", "common", "misc"}
 MAX_FILE_LINES = 400
 MAX_FUNCTION_LINES = 60
+MAX_FOLDER_LINES = 2500
+"""Of a folder's own files, those of its sub-folders not counted."""
+BEING_REBUILT = {"slam", "slam/window"}
+"""Folders that may still be crowded, or import in a circle; each goes from here as it is done."""
 
 REGISTRIES = tuple(
     name + "." + domain
@@ -178,6 +184,37 @@ def size_breaches(source: Source) -> Iterator[str]:
             length = (body[-1].end_lineno or 0) - body[0].lineno + 1 if body else 0
             if length > MAX_FUNCTION_LINES:
                 yield f"{source.path}:{node.lineno}: {node.name} has {length} lines"
+
+
+def crowded_folders(sources: Sequence[Source]) -> Iterator[str]:
+    """Folders whose own files have over 2500 lines together."""
+    lines: Counter[str] = Counter()
+    for source in sources:
+        lines[source.path.rpartition("/")[0]] += source.text.count("\n")
+    yield from (f"{folder or '.'}: {count} lines" for folder, count in lines.items() if count > MAX_FOLDER_LINES)
+
+
+def circular_folders(sources: Sequence[Source]) -> Iterator[str]:
+    """Folders whose files and sub-folders import each other in a circle: then no order of them has every arrow down.
+
+    A sub-folder counts as one with all that is in it, an import within a function as any other.
+    """
+    paths = {source.path.removesuffix(".py").removesuffix("/__init__"): source.path for source in sources}
+    arrows: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for source in sources:
+        for _, module in imported_modules(source):
+            target = module.removeprefix(f"{PACKAGE}.").replace(".", "/") if module.startswith(f"{PACKAGE}.") else ""
+            while target and target not in paths:
+                target = target.rpartition("/")[0]
+            if target and paths[target] != source.path:
+                above, below = source.path.split("/"), paths[target].split("/")
+                depth = next(n for n, (a, b) in enumerate(zip(above, below, strict=False)) if a != b)
+                arrows["/".join(above[:depth])][above[depth]].add(below[depth])
+    for folder, children in arrows.items():
+        try:
+            TopologicalSorter(children).prepare()
+        except CycleError as error:
+            yield f"{folder or '.'}: a circle of imports, {' <- '.join(error.args[1])}"
 
 
 def docstring_breaches(source: Source) -> Iterator[str]:

@@ -89,6 +89,34 @@ def test_what_is_allowed_passes(rule: Callable[[Source], Iterator[str]], path: s
     assert not list(rule(Source(path, text)))
 
 
+def test_no_folder_is_crowded() -> None:
+    crowded = {line.partition(":")[0] for line in rules.crowded_folders(rules.package_sources())}
+    assert crowded <= rules.BEING_REBUILT
+    full = [Source("a/b.py", "x = 1\n" * 2000), Source("a/c.py", "x = 1\n" * 501), Source("a/d/e.py", "x = 1\n" * 2500)]
+    assert list(rules.crowded_folders(full)) == ["a: 2501 lines"]
+
+
+def test_no_folder_imports_in_a_circle() -> None:
+    circles = list(rules.circular_folders(rules.package_sources()))
+    assert {line.partition(":")[0] for line in circles} <= rules.BEING_REBUILT, circles
+
+
+@pytest.mark.parametrize(
+    ("texts", "circle"),
+    [
+        ({"a/b.py": "from rislam_rt.a import c", "a/c.py": "from rislam_rt.a.d import e", "a/d.py": ""}, False),
+        ({"a/b.py": "from rislam_rt.a import c", "a/c.py": "def f():\n    from rislam_rt.a.b import e"}, True),
+        ({"a/b/c.py": "from rislam_rt.a.d import e", "a/d.py": "from rislam_rt.a.b.f import g", "a/b/f.py": ""}, True),
+        ({"a/__init__.py": "from rislam_rt.a.b import c", "a/b.py": "from rislam_rt.a import c"}, True),
+        ({"a/b/c.py": "from rislam_rt.a.d import e", "a/d.py": "from rislam_rt.b.f import g", "b/f.py": ""}, False),
+        ({"a.py": "from rislam_rt.b.c import d", "b/c.py": "import rislam_rt.a"}, True),
+    ],
+)
+def test_a_circle_is_noticed(texts: dict[str, str], circle: bool) -> None:
+    found = list(rules.circular_folders([Source(path, text) for path, text in texts.items()]))
+    assert bool(found) == circle, found
+
+
 def test_every_folder_stands_on_a_floor() -> None:
     present = {source.folder for source in rules.package_sources()} - {"__init__"}
     assert present <= set(rules.FLOOR_OF)

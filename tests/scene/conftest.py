@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rislam_rt.scene.rooms import ROOMS
+from rislam_rt.scene.built_in_rooms import ROOMS
 from rislam_rt.scene.templates import room_files
 
 

@@ -11,9 +11,9 @@ import pytest
 from rislam_rt.errors import SceneError
 from rislam_rt.model import Body, RadioConfig, Reflector, RisPanel, RxArray, Scatterer, Scene, Trajectory
 from rislam_rt.scene import check_scene, load_scene
+from rislam_rt.scene.built_in_rooms.shapes import block, box_walls, grid, joined
 from rislam_rt.scene.check.mesh_queries import components, ray_hits, sphere_directions, touching, winding
 from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.rooms.shapes import block, box_walls, grid, joined
 
 Change = Callable[[Scene], Scene]
 

@@ -5,8 +5,8 @@ import pytest
 
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene import load_scene
+from rislam_rt.scene.built_in_rooms.shapes import block, box_walls, quad
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.rooms.shapes import block, box_walls, quad
 from rislam_rt.scene.suggested_motion import free_ways, suggest_agent
 
 

@@ -9,9 +9,9 @@ from rislam_rt.geometry.plane_segmentation import planar_groups
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.scene import check_scene, load_scene
 from rislam_rt.scene.build import main
+from rislam_rt.scene.built_in_rooms import ROOMS
 from rislam_rt.scene.check.mesh_queries import crossings
 from rislam_rt.scene.meshes import parse_mesh
-from rislam_rt.scene.rooms import ROOMS
 from rislam_rt.scene.templates import room_files
 
 SCENES = Path(__file__).parents[2] / "scenes"

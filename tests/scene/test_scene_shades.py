@@ -10,11 +10,11 @@ from scipy.spatial import ConvexHull
 
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import triangle_planes
-from rislam_rt.model import RadioConfig, RisPanel, Scatterer, Scene, Shade
+from rislam_rt.model import Occluder, RadioConfig, RisPanel, Scatterer, Scene
 from rislam_rt.scene import check_scene, load_scene, write_scene
+from rislam_rt.scene.built_in_rooms.shapes import block
 from rislam_rt.scene.check.mesh_queries import ray_hits, sphere_directions, winding
 from rislam_rt.scene.meshes import Mesh, ply_bytes
-from rislam_rt.scene.rooms.shapes import block
 from rislam_rt.scene.solids import cylinder_mesh, sphere_mesh
 
 CENTER = np.array([2.0, 1.0, 1.0])
@@ -126,7 +126,7 @@ def paper() -> Scene:
 
 
 def with_shade(scene: Scene, mesh: Mesh, at: np.ndarray = CENTER) -> Scene:
-    return replace(scene, scatterers=(Scatterer("ball", at, 0.01, shade=Shade(mesh.vertices, mesh.faces)),))
+    return replace(scene, scatterers=(Scatterer("ball", at, 0.01, shade=Occluder(mesh.vertices, mesh.faces)),))
 
 
 def remarks(scene: Scene) -> list[str]:
@@ -183,10 +183,10 @@ def test_cylinders_are_for_the_far_field() -> None:
         Scatterer("ball", CENTER, np.pi * 0.05**2, 0.05, "mie"),
         Scatterer("post", CENTER, np.pi * 0.05 * 0.3 / 2, 0.05, "cylinder", 0.3, TILTED),
         Scatterer("post", CENTER, 0.02, 0.05, "constant", 0.3, TILTED),
-        Scatterer("ball", CENTER, 0.02, shade=Shade(*block([1.9, 0.9, 0.9], [2.1, 1.1, 1.1]))),
-        Scatterer("ball", CENTER, np.pi * 0.05**2, 0.05, shade=Shade(*sphere_mesh(CENTER, 0.05))),
+        Scatterer("ball", CENTER, 0.02, shade=Occluder(*block([1.9, 0.9, 0.9], [2.1, 1.1, 1.1]))),
+        Scatterer("ball", CENTER, np.pi * 0.05**2, 0.05, shade=Occluder(*sphere_mesh(CENTER, 0.05))),
         Scatterer(
-            "post", CENTER, 0.02, 0.05, "constant", 0.3, TILTED, Shade(*cylinder_mesh(CENTER, 0.05, 0.3, TILTED))
+            "post", CENTER, 0.02, 0.05, "constant", 0.3, TILTED, Occluder(*cylinder_mesh(CENTER, 0.05, 0.3, TILTED))
         ),
     ],
     ids=["mie", "cylinder", "cylinder with rcs", "mesh", "own shadow", "cylinder shadow"],
@@ -218,17 +218,17 @@ def test_records_refuse_what_makes_no_sense() -> None:
     with pytest.raises(SceneError, match="give a unit vector"):
         Scatterer("s", CENTER, 1.0, 0.1, "cylinder", 0.2, np.array([0.0, 0.0, 2.0]))
     with pytest.raises(SceneError, match="shade: the mesh has no faces"):
-        Shade(np.zeros((3, 3)), np.zeros((0, 3), dtype=int))
+        Occluder(np.zeros((3, 3)), np.zeros((0, 3), dtype=int))
 
 
 def test_shades_alone_are_written_read_and_checked(room: Path, tmp_path: Path) -> None:
     scene = load_scene(room)
-    heap = Shade(*block([2.9, 2.9, 0.2], [3.1, 3.1, 0.4]), name="heap")
-    again = load_scene(write_scene(replace(scene, shades=(heap,)), tmp_path / "again"))
-    assert [shade.name for shade in again.shades] == ["heap"]
-    assert np.array_equal(again.shades[0].triangles, heap.triangles)
-    around = Shade(*block([0.2, 0.2, 0.1], [1.0, 1.0, 0.9]), name="heap")
-    inside = [f.line for f in check_scene(replace(scene, shades=(around,)))]
+    heap = Occluder(*block([2.9, 2.9, 0.2], [3.1, 3.1, 0.4]), name="heap")
+    again = load_scene(write_scene(replace(scene, occluders=(heap,)), tmp_path / "again"))
+    assert [shade.name for shade in again.occluders] == ["heap"]
+    assert np.array_equal(again.occluders[0].triangles, heap.triangles)
+    around = Occluder(*block([0.2, 0.2, 0.1], [1.0, 1.0, 0.9]), name="heap")
+    inside = [f.line for f in check_scene(replace(scene, occluders=(around,)))]
     assert any("the agent is inside it at or after cycle 0" in line and "shade[0]" in line for line in inside)
-    twice = [f.line for f in check_scene(replace(scene, shades=(replace(heap, name="floor"),)))]
+    twice = [f.line for f in check_scene(replace(scene, occluders=(replace(heap, name="floor"),)))]
     assert any("called 'floor'" in line for line in twice)

@@ -9,7 +9,7 @@ import pytest
 from rislam_rt.errors import SceneError, StoreError
 from rislam_rt.model import Scene
 from rislam_rt.scene import load_scene, new_scene, write_scene
-from rislam_rt.scene.rooms import ROOMS
+from rislam_rt.scene.built_in_rooms import ROOMS
 from rislam_rt.scene.write import write_files
 
 SCENES = Path(__file__).parents[2] / "scenes"

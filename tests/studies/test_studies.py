@@ -15,7 +15,7 @@ from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.pipeline import PipelineSpec, load_spec
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.report.certificate import draw_certificate
-from rislam_rt.report.fig4a import claims, fig4a_csv, fig4a_page, verdict
+from rislam_rt.report.fig4a import claims, fig4a_csv, fig4a_page, findings_of
 from rislam_rt.report.style import to_png
 from rislam_rt.scene import load_scene
 from rislam_rt.studies import CompareSpec, Fig4aSpec, load_any
@@ -173,18 +173,18 @@ def test_table_says_what_the_curves_say(room, tiny, curves):
     np.testing.assert_allclose([float(row["exact_db"]) for row in rows[4:]], curves.curves["energy"].exact, atol=1e-4)
     page = fig4a_page(curves, tiny, room.name, None)
     assert "![" not in page
-    assert all(line in page for line in verdict(curves, "tang"))
+    assert all(line in page for line in findings_of(curves, "tang"))
 
 
 def test_verdict_names_the_distances_where_an_order_fails(curves):
     below = curves._replace(sphere=np.full(4, -1e3))
-    assert "- random codes (RMS) above the sphere: at all 4 places" in verdict(below, "tang")
+    assert "- random codes (RMS) above the sphere: at all 4 places" in findings_of(below, "tang")
     middle = curves.curves["tang"].random.middle
     mixed = curves._replace(sphere=middle + np.array([1.0, 1.0, -1.0, -1.0]))
     line = f"at 2 of 4 places; it fails from {curves.distance[1]:.2f} m to {curves.distance[0]:.2f} m"
-    assert any(line in text for text in verdict(mixed, "tang"))
+    assert any(line in text for text in findings_of(mixed, "tang"))
     above = curves._replace(sphere=np.zeros(4))
-    assert "- optimised above the sphere: at none of 4 places" in verdict(above, "tang")
+    assert "- optimised above the sphere: at none of 4 places" in findings_of(above, "tang")
 
 
 def test_compare_writes_the_page_of_its_functions(run, tmp_path):

@@ -72,7 +72,7 @@ def slow_sweep():
 
 if __name__ == "__main__":
     # In a process of its own, for tests that kill it: FOLDER JOBS
-    from rislam_rt.sweeps import Effort, run_sweep
+    from rislam_rt.sweeps import SweepOptions, run_sweep
 
     folder, jobs = Path(sys.argv[1]), int(sys.argv[2])
-    run_sweep(slow_sweep(), folder, Effort(jobs=jobs), tell=lambda told: print(told.done, flush=True))
+    run_sweep(slow_sweep(), folder, SweepOptions(jobs=jobs), tell=lambda told: print(told.done, flush=True))

@@ -16,7 +16,7 @@ import pytest
 import sweep_cells
 
 from rislam_rt.errors import ConfigError, ResultError, SetupError
-from rislam_rt.sweeps import Axis, Effort, Sweep, build_cells, parse_axis, run_sweep
+from rislam_rt.sweeps import Axis, Sweep, SweepOptions, build_cells, parse_axis, run_sweep
 from rislam_rt.sweeps.cost import estimate_cost
 from rislam_rt.sweeps.store import read_row
 
@@ -147,7 +147,7 @@ def test_table_has_every_cell_in_order(whole):
 def test_two_workers_give_the_same_bytes_and_tables_grow(whole, tmp_path):
     sizes, told = [], []
     run_sweep(
-        DRAW, tmp_path, Effort(jobs=2), tell=told.append,
+        DRAW, tmp_path, SweepOptions(jobs=2), tell=told.append,
         grow=lambda rows: sizes.append(sum(row.state == "done" for row in rows)),
     )  # fmt: skip
     assert written(tmp_path) == written(whole[0])
@@ -202,7 +202,7 @@ def test_a_changed_value_is_not_taken_over(whole, tmp_path):
         file.write_bytes(content[:place] + other + content[place + 1 :])
         changed += 1
     told = []
-    run_sweep(DRAW, folder, Effort(jobs=2), tell=told.append)
+    run_sweep(DRAW, folder, SweepOptions(jobs=2), tell=told.append)
     assert sum(one.last is not None for one in told) == changed == 12
     assert written(folder) == written(whole[0])
 
@@ -218,7 +218,7 @@ def test_a_folder_with_another_sweep_json_is_refused(text, tmp_path):
 def test_trouble_is_recorded_and_the_rest_goes_on(tmp_path):
     kinds = ("good", "abort", "orphan", "segfault", "leave", "exit", "hang", "raise", "object", "list", "names", "fine")
     sweep = Sweep("sweep_cells:misbehave", (Axis("kind", kinds),))
-    report = run_sweep(sweep, tmp_path, Effort(jobs=2, time_limit=3.0))
+    report = run_sweep(sweep, tmp_path, SweepOptions(jobs=2, time_limit=3.0))
     found = {row.cell.point["kind"]: (row.state, row.message) for row in report.rows}
     assert found == {
         "good": ("done", ""),
@@ -255,15 +255,15 @@ def test_retry_does_failed_cells_again(tmp_path):
     sweep = Sweep("sweep_cells:misbehave", (Axis("kind", ("raise",)),))
     run_sweep(sweep, tmp_path)
     told = []
-    run_sweep(sweep, tmp_path, Effort(retry=True), tell=told.append)
+    run_sweep(sweep, tmp_path, SweepOptions(retry=True), tell=told.append)
     assert [row.last.state for row in told if row.last] == ["raised"]
 
 
 def test_estimate_does_one_cell_at_most(tmp_path):
-    report = run_sweep(DRAW, tmp_path, Effort(only_estimate=True))
+    report = run_sweep(DRAW, tmp_path, SweepOptions(only_estimate=True))
     assert [row.state for row in report.rows].count("done") == 1
     assert report.cost.cells == 11
-    again = run_sweep(DRAW, tmp_path, Effort(only_estimate=True))
+    again = run_sweep(DRAW, tmp_path, SweepOptions(only_estimate=True))
     assert [row.state for row in again.rows].count("done") == 1
 
 
@@ -288,7 +288,7 @@ def test_two_sweeps_do_not_share_a_folder(tmp_path):
 @pytest.mark.parametrize("bad", [{"jobs": 0}, {"time_limit": 0.0}, {"time_limit": float("nan")}])
 def test_bad_effort_is_told(bad):
     with pytest.raises(ConfigError, match="received; give"):
-        Effort(**bad)
+        SweepOptions(**bad)
 
 
 def start(folder, jobs):
@@ -304,7 +304,7 @@ def start(folder, jobs):
 def tell_of(folder):
     """What the rest of the slow sweep tells."""
     told = []
-    run_sweep(sweep_cells.slow_sweep(), folder, Effort(jobs=2), tell=told.append)
+    run_sweep(sweep_cells.slow_sweep(), folder, SweepOptions(jobs=2), tell=told.append)
     return told
 
 
@@ -350,9 +350,9 @@ def test_dask_gives_the_same_bytes(whole, tmp_path):
     ) as cluster:
         address = cluster.scheduler_address
         assert address.startswith("tcp://127.0.0.1:")
-        run_sweep(DRAW, tmp_path / "out", Effort(dask=address))
+        run_sweep(DRAW, tmp_path / "out", SweepOptions(dask=address))
         kinds = Sweep("sweep_cells:misbehave", (Axis("kind", ("good", "abort", "hang")),))
-        report = run_sweep(kinds, tmp_path / "kinds", Effort(dask=address, time_limit=1.0))
+        report = run_sweep(kinds, tmp_path / "kinds", SweepOptions(dask=address, time_limit=1.0))
     assert written(tmp_path / "out") == written(whole[0])
     assert [row.state for row in report.rows] == ["done", "died", "hung"]
 
@@ -362,4 +362,4 @@ def test_no_scheduler_is_one_line(tmp_path, monkeypatch):
 
     monkeypatch.setattr(cluster, "CONNECT_SECONDS", 0.2)
     with pytest.raises(SetupError, match=r"^--dask tcp://127\.0\.0\.1:9: no scheduler answers [^\n]*$"):
-        run_sweep(DRAW, tmp_path, Effort(dask="tcp://127.0.0.1:9"))
+        run_sweep(DRAW, tmp_path, SweepOptions(dask="tcp://127.0.0.1:9"))

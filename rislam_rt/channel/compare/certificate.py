@@ -243,13 +243,13 @@ class DifferenceExplainer:
 
     def _unshaded(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
         """No shade stands across segment `number`; the far end's own does not hide it."""
-        shades, found = self.facets.shades, []
-        for shade, landmark in enumerate(shades.landmark):
+        occluders, found = self.facets.occluders, []
+        for shade, landmark in enumerate(occluders.landmark):
             last = number == len(leg.walls) and landmark != ALONE
             if last and np.array_equal(leg.points[-1], self.scene.landmark_positions[landmark]):
                 continue
-            margin = shades.margin(leg.points[number], leg.points[number + 1], shade)
-            text = f"shade of {shades.names[shade]}, {abs(margin):.2e} m {'in' if margin < 0 else 'out'}side"
+            margin = occluders.margin(leg.points[number], leg.points[number + 1], shade)
+            text = f"shade of {occluders.names[shade]}, {abs(margin):.2e} m {'in' if margin < 0 else 'out'}side"
             found.append(ExistenceCondition("occluded", text, margin, float(leg.shift[number])))
         return found
 

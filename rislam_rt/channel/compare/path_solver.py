@@ -47,7 +47,7 @@ def compare_with_path_solver(
 
     alone = tuple(s for s in scene.scatterers if s.shade is None)
     hiding = tuple(replace(s.shade, name=s.name) for s in scene.scatterers if s.shade is not None)
-    scene = replace(scene, ris=None, scatterers=alone, shades=(*scene.shades, *hiding))
+    scene = replace(scene, ris=None, scatterers=alone, occluders=(*scene.occluders, *hiding))
     solved = solve_file(file, scene, radio, trajectory, depth, samples)
     exact = ImageSourceChannel(scene, radio, depth).paths(trajectory)
     report = compare_paths(solved, exact, scene, trajectory, radio=radio, shortest_segment=SHORTEST_SEGMENT)

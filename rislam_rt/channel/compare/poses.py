@@ -27,7 +27,7 @@ def random_poses(
         Too little of the room's bounding box is free.
     """
     facets = build_facets(build_walls(scene))
-    surfaces = np.concatenate([facets.corners, facets.shades.triangles])
+    surfaces = np.concatenate([facets.corners, facets.occluders.triangles])
     free = np.zeros((0, 3))
     for _ in range(_ROUNDS):
         batch = rng.uniform(scene.bounds[0], scene.bounds[1], size=(2 * count + 64, 3))
@@ -61,7 +61,7 @@ def _reachable(facets: WallFacets, start: Floats, points: Floats) -> Booleans:
         rows = np.flatnonzero(~reached)
         origin = np.broadcast_to(station, (len(rows), 3))
         walled = facets.hidden_by(origin, points[rows], walls, np.full(len(rows), -1)) >= 0
-        free = rows[~walled & ~facets.shades.hides(origin, points[rows])]
+        free = rows[~walled & ~facets.occluders.hides(origin, points[rows])]
         reached[free] = True
         stations += list(points[free])
     return reached

@@ -134,7 +134,7 @@ class PathReport:
         return not self.unexplained and not self.num_breaches
 
     @property
-    def proof_limits(self) -> dict[str, float]:
+    def explanation_limits(self) -> dict[str, float]:
         """The weakest proof of each reason: the largest length or distance [m] it rests on."""
         return {r: max(path.size for path in self.one_sided if path.reason == r) for r in self.explained}
 
@@ -154,7 +154,7 @@ class PathReport:
             "num_breaches": self.num_breaches,
             "breaches": [breach._asdict() for breach in self.breaches],
             "limits": {quantity: self._nearest(*pair) for quantity, pair in self.judged.items()},
-            "proof_limits_m": self.proof_limits,
+            "proof_limits_m": self.explanation_limits,
             "matched_by_kind": {k.name: int(np.sum(self.kind == k)) for k in PathKind if np.any(self.kind == k)},
             "percentiles": {
                 "length_error_m": _percentiles(self.length_error),

@@ -50,7 +50,7 @@ class WallFacets:
     """(W,) of `Walls.plane`."""
     over: tuple[Integers, ...]
     """(W,) of `Walls.over`."""
-    shades: Occluders
+    occluders: Occluders
     """What hides but is no wall."""
 
     def __len__(self) -> int:
@@ -180,7 +180,7 @@ def build_facets(walls: Walls) -> WallFacets:
         rectangles=bounding_rectangles(corners, first, walls.normal, walls.offset),
         plane=walls.plane,
         over=walls.over,
-        shades=walls.shades,
+        occluders=walls.occluders,
     )
 
 

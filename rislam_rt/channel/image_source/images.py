@@ -128,7 +128,7 @@ def _visible(
         keep[rows[blocker >= 0]] = False
         rows = np.flatnonzero(keep)
         own = landmark if segment == bounces else -1
-        keep[rows] = ~facets.shades.hides(points[rows, segment], points[rows, segment + 1], own)
+        keep[rows] = ~facets.occluders.hides(points[rows, segment], points[rows, segment + 1], own)
     return rays.only(keep)
 
 

@@ -62,10 +62,10 @@ class TracedChannel:
         self.antennas = antennas or radio.antennas
         self.walls = build_walls(scene)
         self._sides = wall_sides(self.walls)
-        shades = {n: s.shade.triangles for n, s in enumerate(scene.scatterers) if s.shade is not None}
-        if scene.shades:
-            shades[ALONE] = np.concatenate([shade.triangles for shade in scene.shades])
-        self.tracer_scene = build_tracer_scene(self.walls, radio.carrier, room_center(scene), shades)
+        occluders = {n: s.shade.triangles for n, s in enumerate(scene.scatterers) if s.shade is not None}
+        if scene.occluders:
+            occluders[ALONE] = np.concatenate([shade.triangles for shade in scene.occluders])
+        self.tracer_scene = build_tracer_scene(self.walls, radio.carrier, room_center(scene), occluders)
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Every path of every cycle, with the panel at level 0."""
@@ -76,7 +76,7 @@ class TracedChannel:
             panel, behind, front = self.scene.panel_number(number), -1, None
             if panel >= 0:
                 behind, front = self.walls.hosts[panel], self.scene.panels[panel].spec.normal
-            spared = number if number in self.tracer_scene.shades else -1
+            spared = number if number in self.tracer_scene.occluders else -1
             for from_rx, device in ((False, tx), (True, rx)):
                 problems.append(LegQuery(device, point[None], heading, from_rx, False, behind, front, spared))
         (direct, *legs), complete = self._trace(problems)
@@ -89,7 +89,7 @@ class TracedChannel:
         """The same paths under another code, without tracing again."""
         return rephase(paths, code)
 
-    def extra_paths(self, trajectory: Trajectory, config: DiffuseConfig) -> DiffusePaths:
+    def diffuse_paths(self, trajectory: Trajectory, config: DiffuseConfig) -> DiffusePaths:
         """Diffuse scattering and diffraction, if switched on: paths without an analytic twin, apart from `paths`."""
         return trace_diffuse_paths(self.scene, self.radio, trajectory, config)
 

@@ -114,7 +114,7 @@ def trace_diffuse_paths(
     if config.scattering > 0.0 or config.diffraction or own:
         start_tracer()
         origin = room_center(scene)
-        tracer_scene = _rough_stage(scene, radio.carrier, origin, config.scattering)
+        tracer_scene = _scattering_scene(scene, radio.carrier, origin, config.scattering)
         for cycle, (tx, rx) in enumerate(zip(trajectory.tx - origin, trajectory.rx - origin, strict=True)):
             solved.append(_solve(tracer_scene, tx, rx, origin, config, config.scattering > 0.0 or own))
             cycles.append(np.full(len(solved[-1].kind), cycle))
@@ -123,7 +123,7 @@ def trace_diffuse_paths(
     return DiffusePaths(np.concatenate(cycles), **columns._replace(gain=columns.gain * antennas)._asdict())
 
 
-def _rough_stage(scene: Scene, carrier: float, origin: Floats, scattering: float) -> Any:
+def _scattering_scene(scene: Scene, carrier: float, origin: Floats, scattering: float) -> Any:
     """The room with scattering walls; corners of one material are joined, so that their edges are known."""
     import sionna.rt as rt
 
@@ -141,7 +141,7 @@ def _rough_stage(scene: Scene, carrier: float, origin: Floats, scattering: float
         if scatterer.shade is not None:
             mesh = build_mesh(f"shade-{scatterer.name}", scatterer.shade.triangles - origin)
             objects.append(rt.SceneObject(mesh, f"shade-{scatterer.name}", radio_material=absorber))
-    for index, shade in enumerate(scene.shades):
+    for index, shade in enumerate(scene.occluders):
         mesh = build_mesh(f"shade-alone-{index}", shade.triangles - origin)
         objects.append(rt.SceneObject(mesh, f"shade-alone-{index}", radio_material=absorber))
     for number, material in enumerate(dict.fromkeys(walls.material)):

@@ -46,7 +46,7 @@ def length_gradients(
         raise TraceError("path lengths: a gradient was asked for where there is no path; ask where `valid` holds")
     tx, rx = _tx_legs(channel, trajectory, paths, cycle, path), _rx_legs(channel, trajectory, paths, cycle, path)
     landmark = paths.landmark[path]
-    spared = np.where(np.isin(landmark, list(channel.tracer_scene.shades)), landmark, -1)
+    spared = np.where(np.isin(landmark, list(channel.tracer_scene.occluders)), landmark, -1)
     gradient = np.zeros((len(path), 3))
     for shade in np.unique(spared):
         every, joined = np.flatnonzero(spared == shade), np.flatnonzero((spared == shade) & (landmark >= 0))

@@ -19,7 +19,7 @@ from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import inside_any
 from rislam_rt.model import Material
 
-NO_SHADE = -1
+NO_OCCLUDER = -1
 """Key of the view with everything in it."""
 
 
@@ -65,7 +65,7 @@ class TracerScene:
     wall_boxes: WallBoxes
     views: dict[int, mi.Scene]
     """Everything (`NO_SHADE`), and for each scatterer with a shade everything but that shade."""
-    shades: dict[int, mi.Scene]
+    occluders: dict[int, mi.Scene]
     """The shade of each scatterer that has one, alone."""
 
     @property
@@ -104,12 +104,12 @@ class TracerScene:
         return inside_any(points, self.walls.triangles[self.walls.wall_of_triangle == wall], SURFACE_TOLERANCE)
 
 
-def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, shades: Mapping[int, Floats]) -> TracerScene:
-    """Put walls and shades into a scene of the tracer at the carrier [Hz]: meshes about `origin`, faces in order.
+def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, occluders: Mapping[int, Floats]) -> TracerScene:
+    """Put walls and occluders into a scene of the tracer at the carrier [Hz]: meshes about `origin`, faces in order.
 
     Parameters
     ----------
-    shades
+    occluders
         Triangles (T, 3, 3) [m] of what hides and reflects nothing, by the number of its scatterer, or `ALONE`.
 
     Raises
@@ -130,7 +130,7 @@ def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, shades: Map
     absorber = rt.AbsorberRadioMaterial("shade")
     dark = {
         number: rt.SceneObject(build_mesh(f"shade-{number}", part - origin), f"shade-{number}", radio_material=absorber)
-        for number, part in shades.items()
+        for number, part in occluders.items()
     }
     try:
         scene.add([*objects, *dark.values()])
@@ -140,7 +140,7 @@ def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, shades: Map
     removable = [number for number in dark if number != ALONE]  # the others are nobody's own
     views = {number: _part([*objects, *(o for n, o in dark.items() if n != number)]) for number in removable}
     alone = {number: _part([shade]) for number, shade in dark.items()}
-    views = {NO_SHADE: scene.mi_scene} | views
+    views = {NO_OCCLUDER: scene.mi_scene} | views
     return _numbered(scene, origin, walls, ids, members, (radio_materials, material_of_wall), views, alone)
 
 
@@ -157,7 +157,7 @@ def _numbered(
     members: list[Integers],
     materials: tuple[tuple[rt.RadioMaterialBase, ...], Integers],
     views: dict[int, mi.Scene],
-    shades: dict[int, mi.Scene],
+    occluders: dict[int, mi.Scene],
 ) -> TracerScene:
     """Number the triangles of all shapes (M,) and pick each wall's largest."""
     order = np.argsort(ids)
@@ -184,7 +184,7 @@ def _numbered(
         *materials,
         _wall_boxes(walls, origin),
         views,
-        shades,
+        occluders,
     )
 
 

@@ -23,7 +23,7 @@ from rislam_rt.channel.traced.buffer import fill_buffer, read_vertices, turned_v
 from rislam_rt.channel.traced.candidate_indices import CandidateIndices
 from rislam_rt.channel.traced.float32_limits import SEGMENT_LIMIT
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
-from rislam_rt.channel.traced.tracer_scene import NO_SHADE, TracerScene, as_points
+from rislam_rt.channel.traced.tracer_scene import NO_OCCLUDER, TracerScene, as_points
 from rislam_rt.errors import TraceError
 
 
@@ -51,7 +51,7 @@ def visible_rows(
     far: Floats,
     device: Floats,
     rows: CandidateIndices,
-    spared: int = NO_SHADE,
+    spared: int = NO_OCCLUDER,
 ) -> tuple[CandidateIndices, Floats]:
     """The candidates that exist, and their bounce points (N, D, 3) [m] from device to far end.
 
@@ -74,13 +74,13 @@ def visible_rows(
     dr.eval()
     keep = _confirmed(tracer_scene, candidates, traced)
     rows, vertices = rows.only(keep), read_vertices(tracer_scene, traced, keep, candidates[keep])
-    if spared == NO_SHADE:
+    if spared == NO_OCCLUDER:
         return rows, vertices
-    clear = _clear_of_shade(tracer_scene, spared, candidates[keep], device[rows.device], vertices)
+    clear = _clear_of_occluder(tracer_scene, spared, candidates[keep], device[rows.device], vertices)
     return rows.only(clear), vertices[clear]
 
 
-def _clear_of_shade(
+def _clear_of_occluder(
     tracer_scene: TracerScene, spared: int, sequences: Integers, device: Floats, vertices: Floats
 ) -> Integers:
     """Legs whose segments up to the last bounce miss a scatterer's shade."""
@@ -89,7 +89,7 @@ def _clear_of_shade(
     for bounce, wall in enumerate(sequences.T):
         point = np.where((wall != NO_WALL)[:, None], vertices[:, bounce], last)
         ray = spawn_ray_to(as_points(last - tracer_scene.origin), as_points(point - tracer_scene.origin))
-        clear &= ~np.array(tracer_scene.shades[spared].ray_test(ray), dtype=np.bool_)
+        clear &= ~np.array(tracer_scene.occluders[spared].ray_test(ray), dtype=np.bool_)
         last = point
     return np.flatnonzero(clear)
 

@@ -61,13 +61,13 @@ def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> Schem
     )
 
 
-def thinned_paths(paths: Paths, rows: Integers) -> Paths:
+def subsampled_paths(paths: Paths, rows: Integers) -> Paths:
     """Some cycles alone."""
     names = ("valid", "tau", "departure", "arrival", "gain", "vertices")
     return replace(paths, **{name: getattr(paths, name)[rows] for name in names}, ris=None)
 
 
-def thinned_scheme(scheme: SchemeResult, rows: Integers) -> SchemeResult:
+def subsampled_scheme(scheme: SchemeResult, rows: Integers) -> SchemeResult:
     """Some cycles alone."""
     names = ("time", "position", "velocity", "heading", "covariance", "sent", "applied", "gain", "component_path",
              "component_landmark", "held", "landmark_position", "ris_probability", "seconds", "panel")  # fmt: skip

@@ -18,7 +18,7 @@ from rislam_rt.pipeline.long.slices import (
     run_slices,
     slice_bounds,
     slice_files,
-    thin_scheme,
+    subsample_scheme,
 )
 from rislam_rt.pipeline.long.tally import Tally
 from rislam_rt.pipeline.run import Progress, library_versions, panel_warnings, set_scene
@@ -111,7 +111,7 @@ def gather_long(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) 
         for part in read_parts(folder, name, scene, run):
             tally.add(part)
         scores[name] = tally.scores()
-        motion, paths, schemes[name] = thin_scheme(folder, name, scene, run)
+        motion, paths, schemes[name] = subsample_scheme(folder, name, scene, run)
     if paths is None:
         raise ResultError(f"{folder}: a run without schemes; run again with another --out")
     stride = -(-len(scene.agent) // SHOWN)

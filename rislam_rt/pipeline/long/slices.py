@@ -25,14 +25,14 @@ from rislam_rt.pipeline.dataset import (
     seal_dataset,
     write_dataset,
 )
-from rislam_rt.pipeline.long.join import join_paths, join_schemes, thinned_paths, thinned_scheme
+from rislam_rt.pipeline.long.join import join_paths, join_schemes, subsampled_paths, subsampled_scheme
 from rislam_rt.pipeline.record import given_to_dataset
-from rislam_rt.pipeline.room.extras import trace_clutter
+from rislam_rt.pipeline.room.diffuse_clutter import trace_diffuse_clutter
 from rislam_rt.pipeline.run import Progress, build_channel
+from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.seeds import Seeds
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.specification.spec import PipelineSpec
-from rislam_rt.pipeline.walk import Walk
 
 SLICE = 1000
 """Cycles of a slice. With the paper's room a cycle holds 0.1 MB while it is traced: 0.1 GB a slice."""
@@ -41,7 +41,7 @@ SHOWN = 2000
 FOLDER, PATHS_FILE = "slices", "paths.nc"
 
 
-class Part(NamedTuple):
+class SlicePart(NamedTuple):
     """One slice of one scheme, as it was written."""
 
     motion: Trajectory
@@ -82,14 +82,16 @@ def run_slices(
     """
     radio = build_radio(spec.radio)
     channel = build_channel(spec.channel, scene, radio, spec.depth)
-    walk, seconds, cycles = Walk(name, scene, body, spec, seeds), 0.0, len(scene.agent)
+    walk, seconds, cycles = SchemeSimulation(name, scene, body, spec, seeds), 0.0, len(scene.agent)
     for number, (first, last) in enumerate(slice_bounds(cycles)):
         begin = perf_counter()
         paths = channel.paths(scene.agent[first : min(last + walk.foresight, cycles)])
-        extras = trace_clutter(scene, radio, scene.agent[first : min(last + walk.foresight, cycles)], spec.extras)
+        extras = trace_diffuse_clutter(
+            scene, radio, scene.agent[first : min(last + walk.foresight, cycles)], spec.extras
+        )
         seconds += perf_counter() - begin
         part = walk.lead(paths, first, last, tell, extras)
-        own = paths if walk.foresight == 0 else thinned_paths(paths, np.arange(last - first))
+        own = paths if walk.foresight == 0 else subsampled_paths(paths, np.arange(last - first))
         for file, data in (
             (slice_file(folder, number, PATHS_FILE), paths_to_dataset(own, scene.agent[first:last])),
             (slice_file(folder, number, f"scheme_{name}.nc"), scheme_to_dataset(part)),
@@ -109,7 +111,7 @@ def slice_files(name: str, cycles: int) -> list[str]:
     ]
 
 
-def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Part]:
+def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[SlicePart]:
     """The slices of a scheme in the order of time, one at a time.
 
     Raises
@@ -129,10 +131,10 @@ def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Part
         scheme = dataset_to_scheme(found[1])
         if scheme.scheme != name:
             raise ResultError(f"{file}: holds scheme '{scheme.scheme[:40]}'; run again with another --out")
-        yield Part(scene.agent[first:last], dataset_to_paths(found[0]), scheme)
+        yield SlicePart(scene.agent[first:last], dataset_to_paths(found[0]), scheme)
 
 
-def thin_scheme(folder: Path, name: str, scene: Scene, run: str) -> tuple[Trajectory, Paths, SchemeResult]:
+def subsample_scheme(folder: Path, name: str, scene: Scene, run: str) -> tuple[Trajectory, Paths, SchemeResult]:
     """Every n-th cycle of a scheme, at most `SHOWN` in all, for figures."""
     stride = -(-len(scene.agent) // SHOWN)
     paths, schemes, at = [], [], 0
@@ -140,8 +142,8 @@ def thin_scheme(folder: Path, name: str, scene: Scene, run: str) -> tuple[Trajec
         rows = np.arange((-at) % stride, len(part.motion), stride)
         at += len(part.motion)
         if len(rows):
-            paths.append(thinned_paths(part.paths, rows))
-            schemes.append(thinned_scheme(part.scheme, rows))
+            paths.append(subsampled_paths(part.paths, rows))
+            schemes.append(subsampled_scheme(part.scheme, rows))
         last_map = part.scheme.map
     joined = replace(join_schemes(schemes, paths), map=last_map)
     return scene.agent[::stride], join_paths(paths), joined

@@ -11,7 +11,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import association_fractions, position_errors
 from rislam_rt.model import NOTHING, STEPS, Scene
-from rislam_rt.pipeline.long.slices import Part
+from rislam_rt.pipeline.long.slices import SlicePart
 from rislam_rt.pipeline.scores.summary import (
     has_diverged,
     landmark_track,
@@ -43,7 +43,7 @@ class Tally:
         self.map: Any = None
         self.panel = False
 
-    def add(self, part: Part) -> None:
+    def add(self, part: SlicePart) -> None:
         """Count one slice."""
         scheme, truth = part.scheme, part.motion.position
         errors = position_errors(scheme.position, truth)
@@ -89,7 +89,7 @@ class Tally:
             "seconds": float(self.seconds.sum()),
         }
 
-    def _count_landmarks(self, part: Part) -> None:
+    def _count_landmarks(self, part: SlicePart) -> None:
         track = landmark_track(self.scene, part.scheme)
         self.landmark_square += np.nansum(track.error**2, axis=0)
         self.held += (track.column >= 0).sum(axis=0)
@@ -114,7 +114,7 @@ class Tally:
                 found[name]["cycles_identified"] = int(self.identified[number])
         return found
 
-    def _count_components(self, part: Part) -> None:
+    def _count_components(self, part: SlicePart) -> None:
         """How often each label met each landmark or image."""
         scheme = part.scheme
         shown = scheme.component_path != NOTHING

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, RisSpec
 from rislam_rt.model.ris import join_sheets
-from rislam_rt.pipeline.dataset import AXES, Entry, names_of, told
+from rislam_rt.pipeline.dataset import AXES, Entry, attributes_of, names_of
 from rislam_rt.slam import StartPrior
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def inputs_to_dataset(inputs: Inputs, **about: Any) -> "xr.Dataset":
             values[f"panel_{name}"] = np.array([getattr(sheet, name) for sheet in sheets])
         values["panel_shape"] = np.array([(sheet.rows, sheet.cols) for sheet in sheets])
         attributes |= {"panel_levels": inputs.panel.levels, "panel_element": [sheet.element for sheet in sheets]}
-    content = {name: (INPUTS[name][0], value, told(INPUTS[name])) for name, value in values.items()}
+    content = {name: (INPUTS[name][0], value, attributes_of(INPUTS[name])) for name, value in values.items()}
     coords: dict[str, Any] = {name: AXES[name] for name in ("xyz", "cosine")}
     coords["component"] = np.arange(values["tau"].shape[1])  # so that files join along time
     return xr.Dataset(content, coords, {"Conventions": "CF-1.11", **attributes, **about})

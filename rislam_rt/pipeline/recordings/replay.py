@@ -8,11 +8,11 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SlamEstimate, empty_map
+from rislam_rt.pipeline.assumed_model import tell_settings
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
-from rislam_rt.pipeline.told import tell_settings
 from rislam_rt.slam import StartPrior
 from rislam_rt.toml import put_dotted
 
@@ -28,7 +28,7 @@ class Answers(NamedTuple):
     """CPU time [s] of a cycle, step and estimate."""
 
 
-class Report(NamedTuple):
+class ReplayDiagnostics(NamedTuple):
     """What is read of an estimator's diagnostics."""
 
     landmark: Integers
@@ -71,7 +71,10 @@ def answers_from_arrays(
     ]
     none = [np.full(len(m), -1) for m in inputs.measurements]
     said = np.zeros(cycles, dtype=np.bool_) if lost is None else lost
-    infos = [Report(np.asarray(own), "diverged" if s else "ok") for own, s in zip(landmark or none, said, strict=True)]
+    infos = [
+        ReplayDiagnostics(np.asarray(own), "diverged" if s else "ok")
+        for own, s in zip(landmark or none, said, strict=True)
+    ]
     return Answers(tuple(estimates), tuple(infos), 0.0)
 
 

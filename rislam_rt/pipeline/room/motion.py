@@ -37,7 +37,7 @@ def draw_motion(scene: Scene, sigma_a: float, *, rng: np.random.Generator) -> Tr
     if sigma_a == 0.0 or len(motion) < 2:
         return motion
     walls = build_walls(scene)
-    surfaces = np.concatenate([walls.triangles, walls.shades.triangles])
+    surfaces = np.concatenate([walls.triangles, walls.occluders.triangles])
     clearance = min(CLEARANCE, float(distance_to_triangles(motion.position, surfaces).min()))
     low, high = scene.bounds[:, :2] + clearance * np.array([[1.0], [-1.0]])
     for _ in range(MAX_BATCHES):

@@ -54,7 +54,7 @@ def _scatterers(scene: Scene, count: int, *, rng: np.random.Generator) -> tuple[
     """The scene's first `count`, or all and spheres at random places of its bounding box, clear of everything."""
     found = list(scene.scatterers[:count])
     walls = build_walls(scene)
-    surfaces = np.concatenate([walls.triangles, walls.shades.triangles])
+    surfaces = np.concatenate([walls.triangles, walls.occluders.triangles])
     low, high = scene.bounds
     low = np.array([low[0], low[1], float(scene.agent.position[:, 2].max()) + ABOVE])
     others = scene.landmark_positions

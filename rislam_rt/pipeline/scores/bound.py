@@ -1,38 +1,33 @@
 """The posterior bound of a scheme in a run: what no estimator could beat with the same room, codes and noise."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats
-from rislam_rt.channel.walls import Walls, build_walls
+from rislam_rt.channel.walls import build_walls
 from rislam_rt.information import (
     LandmarkModel,
     LinearMeasurements,
     MotionPrior,
     WallSpread,
+    assumed_std,
     build_landmark_model,
-    plane_tangents,
+    fewer_rows,
+    heard_paths,
     posterior_bound,
 )
+from rislam_rt.information.heard_paths import SILENT
 from rislam_rt.measurement import build_sensor, expected_distortion
 from rislam_rt.measurement.received import HORIZON_MARGIN
-from rislam_rt.model import PathKind, Paths, Scene, SensorModel, detection_probability
+from rislam_rt.model import PathKind, Paths, Scene
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings, build_settings
 
-SILENT = 1e-4
-"""Information over that at the detection threshold below which a path counts as not heard."""
 NO_ROWS = LinearMeasurements(np.zeros((0, 3)), np.zeros((0, 0)), np.zeros(0))
 """A cycle in which nothing is heard."""
-FLOOR_TILT, UPRIGHT_TILT = 0.05, 0.01
-"""Standard deviations [rad] that the project's filter takes for granted: of the floor from level, and, with wall
-returns in the map, of upright walls from upright."""
-LEVEL, UPRIGHT = 0.99, 0.03
-"""Vertical part of a wall's normal above which it counts as level, and below which as upright."""
 
 
 class SchemeBound(NamedTuple):
@@ -80,7 +75,9 @@ def bound_problem(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Ma
     )  # fmt: skip
     rows = [fewer_rows(r) for r in model.rows(SILENT * sensor.threshold, angles=estimator.angles, use_vt=use_vt)]
     heard = frozenset(scene.landmarks[number] for number in audible.landmark if number >= 0)
-    return BoundProblem(rows, model, prior_std(model, scene, upright=use_vt), motion, heard)
+    return BoundProblem(
+        rows, model, assumed_std(model, float(scene.agent.position[:, 2].min()), upright=use_vt), motion, heard
+    )
 
 
 def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Mapping[str, Any]) -> SchemeBound:
@@ -91,7 +88,7 @@ def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Map
     probability of its detection (the information reduction factor of Niu, Willett and Bar-Shalom, 2001); which path
     each component is counts as known, and paths as resolved. A scheme of delays alone has no angles, and one that holds
     every mirror image as a point of its own has no walls. Of walls nothing is known beforehand but what the filter
-    takes for granted (`FLOOR_TILT`, `UPRIGHT_TILT`).
+    takes for granted (`information.assumed_std`).
 
     Parameters
     ----------
@@ -105,12 +102,12 @@ def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Map
     problem = bound_problem(scene, paths, gain, scheme, config)
     model, motion = problem.model, problem.motion
     bound = posterior_bound(problem.rows, scene.agent.time, motion, problem.unknown_std)
-    agent = position_rms(bound.agent, motion.axes)
+    agent = bound.rms
     if model is None:
         return SchemeBound(agent, {}, {})
     landmarks = {name: error for name, error in model.landmark_error(bound.last).items() if name in problem.heard}
     walls = build_walls(scene)
-    middle = np.array([wall_surface(walls, number)[0] for number in range(len(walls))]).reshape(-1, 3)
+    middle = np.array([walls.surface(number)[0] for number in range(len(walls))]).reshape(-1, 3)
     return SchemeBound(agent, landmarks, model.wall_error(bound.last, middle))
 
 
@@ -127,71 +124,3 @@ def over_distortion(paths: Paths, settings: Settings) -> Complexes:
     power = np.sum(heard**2, axis=1)
     extra = expected_distortion(hardware, radio, receiver, power, np.sum(np.abs(paths.gain[:, direct]) ** 2, axis=1))
     return np.asarray(paths.gain * np.sqrt(radio.noise_psd / (radio.noise_psd + extra))[:, None])
-
-
-def prior_std(model: LandmarkModel, scene: Scene, *, upright: bool) -> Floats:
-    """(U,) standard deviations beforehand: the floor is nearly level and, if `upright`, walls that are upright so."""
-    std = model.prior_std()
-    height = float(scene.agent.position[:, 2].min())
-    for wall in np.flatnonzero(model.wall_column >= 0):
-        normal, tilts = model.wall_normal[wall], model.wall_column[wall] + np.arange(2)
-        if abs(normal[2]) > LEVEL and model.wall_offset[wall] / normal[2] < height:
-            std[tilts] = FLOOR_TILT
-        elif upright and abs(normal[2]) < UPRIGHT:
-            lean = int(np.argmax(np.abs([tangent[2] for tangent in plane_tangents(normal)])))
-            std[tilts[lean]] = UPRIGHT_TILT
-    return std
-
-
-def wall_surface(walls: Walls, number: int) -> tuple[Floats, Floats]:
-    """Centroid (3,) of a wall and the share (T,) of each of its triangles in its area."""
-    triangles = walls.triangles[walls.wall_of_triangle == number]
-    edges = triangles[:, 1:] - triangles[:, :1]
-    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
-    weight = area / area.sum()
-    return weight @ triangles.mean(axis=1), weight
-
-
-def position_rms(agent: Floats, axes: int) -> Floats:
-    """(K,) from covariances (K, 2 D, 2 D) of position and velocity."""
-    return np.asarray(np.sqrt(np.einsum("kii->k", agent[:, :axes, :axes])))
-
-
-def fewer_rows(rows: LinearMeasurements) -> LinearMeasurements:
-    """At most as many measurements as there are unknowns, with the same information: the factor R of a QR."""
-    weighted = np.sqrt(rows.information)[:, None] * np.concatenate([rows.agent, rows.unknown], axis=1)
-    if len(weighted) <= weighted.shape[1]:
-        return rows
-    factor = np.asarray(np.linalg.qr(weighted, mode="r"))
-    return LinearMeasurements(factor[:, :3], factor[:, 3:], np.ones(len(factor)))
-
-
-def heard_paths(paths: Paths, sensor: SensorModel, *, use_vt: bool) -> Paths:
-    """The columns that are reported in some cycle, with their gains times the root of the detection probability.
-
-    Information is proportional to the SNR, so that it comes out times that probability.
-    """
-    snr = sensor.radio.integrated_snr(paths.gain)
-    detected = _detected(snr, sensor.threshold)
-    heard = paths.valid & (snr * detected >= SILENT * sensor.threshold)
-    heard &= (paths.tau >= sensor.window[0]) & (paths.tau <= sensor.window[1])
-    if sensor.radio.array.pattern == "upper":
-        heard &= paths.arrival[..., 2] >= 0.0
-    wanted = paths.landmark >= 0
-    if use_vt:
-        wanted |= paths.kind == PathKind.VT
-    kept = heard.any(axis=0) & wanted
-    gain = np.where(heard, paths.gain * np.sqrt(detected), 0.0)[:, kept]
-    identity = {
-        name: getattr(paths, name)[kept] for name in ("kind", "landmark", "tx_walls", "rx_walls", "num_vertices")
-    }
-    course = {name: getattr(paths, name)[:, kept] for name in ("valid", "tau", "departure", "arrival", "vertices")}
-    return replace(paths, **identity, **course, gain=gain, ris=None)
-
-
-def _detected(snr: Floats, threshold: float) -> Floats:
-    """Probability of detection, read off a table over 40 dB about the threshold: 0 below it, 1 above."""
-    decibel = np.linspace(-20.0, 20.0, 401)
-    table = detection_probability(threshold * 10.0 ** (decibel / 10.0), threshold)
-    with np.errstate(divide="ignore"):
-        return np.interp(10.0 * np.log10(snr / threshold), decibel, table, left=0.0, right=1.0)

@@ -20,7 +20,7 @@ from rislam_rt.evaluate import (
 from rislam_rt.model import NOTHING, STEPS, MapEstimate, PathKind, Paths, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.scores.bound import SchemeBound, scheme_bound, wall_surface
+from rislam_rt.pipeline.scores.bound import SchemeBound, scheme_bound
 
 DIVERGED = 0.5
 """Position error [m] that no run may reach unless the bound is of that size: a fraction of the room."""
@@ -193,7 +193,7 @@ def wall_scores(scene: Scene, estimate: MapEstimate, least: SchemeBound | None =
         normal, offset = estimate.wall_normal[row], estimate.wall_offset[row]
         cosine = abs(float(normal @ walls.normal[number]))
         sine = float(np.linalg.norm(np.cross(normal, walls.normal[number])))
-        middle, _ = wall_surface(walls, number)
+        middle, _ = walls.surface(number)
         scores[name] = {
             "rmse_m": surface_rms(walls, number, normal, offset),
             "angle_deg": float(np.degrees(np.arctan2(sine, cosine))),
@@ -223,7 +223,7 @@ def surface_rms(walls: Walls, number: int, normal: Floats, offset: float) -> flo
 
     The distance is linear in the point: over a triangle its mean square is (sum of squares + square of the sum) / 12.
     """
-    _, weight = wall_surface(walls, number)
+    _, weight = walls.surface(number)
     distance = walls.triangles[walls.wall_of_triangle == number] @ normal - offset
     square = (np.sum(distance**2, axis=1) + np.sum(distance, axis=1) ** 2) / 12.0
     return float(np.sqrt(weight @ square))

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from copy import deepcopy
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_args
 
@@ -14,6 +13,7 @@ from rislam_rt.pipeline.specification.radio import RadioSection, build_radio
 from rislam_rt.pipeline.specification.section import Section
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.shipped import shipped_pipelines
+from rislam_rt.spelling import did_you_mean, nearest
 from rislam_rt.toml import MAX_LEVELS, parse_toml
 
 MAX_BYTES = 1_000_000
@@ -146,8 +146,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 def _near_pipeline(path: Path) -> str:
     known = shipped_pipelines()
-    near = get_close_matches(path.stem, known, n=1)
-    return f"did you mean '{near[0]}'?" if near else f"give one, or a built-in one: {', '.join(known)}"
+    return did_you_mean(nearest(path.stem, known)) or f"give one, or a built-in one: {', '.join(known)}"
 
 
 def _override(table: dict[str, Any], setting: str) -> str:
@@ -197,23 +196,22 @@ def _remark(item: Any, model: type[BaseModel]) -> str:
         return f"{place}: missing; add it"
     if item["type"] == "extra_forbidden":
         near = _near_key([str(part) for part in item["loc"]], model)
-        return f"{place}: unknown key; " + (f"did you mean '{near}'?" if near else "remove it or mend its name")
+        return f"{place}: unknown key; {did_you_mean(near) or 'remove it or mend its name'}"
     message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
     if isinstance(item["input"], dict):
         return f"{place}: {message}" if place else message
     return f"{place}: {str(item['input'])[:60]!r} received; {message[:1].lower()}{message[1:]}"
 
 
-def _near_key(words: list[str], model: type[BaseModel]) -> str | None:
+def _near_key(words: list[str], model: type[BaseModel]) -> list[str]:
     """What an unknown key was meant to be: one of the same table, or else the key of that name of another."""
     keys = _keys(model)
     table = ".".join(word for word in words[:-1] if not word.isdigit())
     own = [key.rpartition(".")[2] for key in keys if key.rpartition(".")[0] == table]
-    near = get_close_matches(words[-1], own, n=1)
-    if near:
-        return near[0]
+    if near := nearest(words[-1], own):
+        return near
     names = {key.rpartition(".")[2]: key for key in reversed(keys)}  # of several tables the first
-    return names.get(words[-1])
+    return [names[words[-1]]] if words[-1] in names else []
 
 
 def _keys(section: type[BaseModel], above: str = "") -> list[str]:

@@ -6,7 +6,6 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import is_dataclass, replace
-from difflib import get_close_matches
 from functools import cache
 from typing import Any, Literal, NamedTuple, get_args, get_origin
 
@@ -17,6 +16,7 @@ from pydantic.fields import FieldInfo
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.specification.section import Choices
 from rislam_rt.pipeline.specification.spec import RECORDS
+from rislam_rt.spelling import did_you_mean, nearest
 
 UNITS = {
     "_m_s2": "m/s^2",
@@ -87,10 +87,8 @@ def explain(settings: list[Setting], key: str) -> Setting:
 
 
 def _near(key: str, keys: list[str]) -> str:
-    near = get_close_matches(key, keys, n=3, cutoff=0.5) or [
-        one for one in keys if get_close_matches(key.rpartition(".")[2], [one.rpartition(".")[2]], cutoff=0.6)
-    ]
-    return f"did you mean {' or '.join(near[:3])}?" if near else "`rislam-rt config` lists them all"
+    ends = [one for one in keys if nearest(key.rpartition(".")[2], [one.rpartition(".")[2]])]
+    return did_you_mean(nearest(key, keys, 3) or ends[:3]) or "`rislam-rt config` lists them all"
 
 
 def _setting(model: type[BaseModel], name: str, field: FieldInfo, prefix: str) -> Setting:

@@ -12,8 +12,8 @@ from rislam_rt.measurement import HardwareConfig, ReceiverConfig, build_sensor
 from rislam_rt.model import RadioConfig, SensorModel
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
-from rislam_rt.pipeline.specification.extras import ExtrasSection
-from rislam_rt.pipeline.specification.mistold import ToldSection
+from rislam_rt.pipeline.specification.diffuse import DiffuseSection
+from rislam_rt.pipeline.specification.mismatch import AssumedSection
 from rislam_rt.pipeline.specification.radio import RadioSection, build_radio, linear
 from rislam_rt.pipeline.specification.section import (
     Choices,
@@ -219,11 +219,11 @@ class PipelineSpec(Section):
     budget: BudgetSection = BudgetSection()
     control: ControlSection = ControlSection()
     room: RoomSection = RoomSection()
-    extras: ExtrasSection = ExtrasSection()
+    extras: DiffuseSection = DiffuseSection()
     panel: PanelSection = PanelSection()
     motion: MotionSection = MotionSection()
     start: StartSection = StartSection()
-    told: ToldSection = ToldSection()
+    told: AssumedSection = AssumedSection()
     slam: SlamSection = SlamSection()
     bp_slam: BpSlamSection = BpSlamSection()
     channel_slam: ChannelSlamSection = ChannelSlamSection()
@@ -241,7 +241,7 @@ class PipelineSpec(Section):
         return self
 
     @model_validator(mode="after")
-    def _antennas_told(self) -> "PipelineSpec":
+    def _antennas_assumed(self) -> "PipelineSpec":
         if not self.radio.antennas.plain and not self.told.antennas:
             raise ValueError(
                 "radio.tx_pattern, rx_pattern, *_polarization: others than isotropic and vertical ones received, which "

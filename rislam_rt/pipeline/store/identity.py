@@ -24,7 +24,7 @@ NO_NUMBERS = ("cli", "report")
 """Folders of the package that decide how numbers are shown, and none of them."""
 
 
-class Identity(NamedTuple):
+class RunIdentity(NamedTuple):
     """All that a run's numbers depend on: runs of one identity have one result."""
 
     content: Mapping[str, Any]
@@ -53,9 +53,9 @@ class Identity(NamedTuple):
         return "it has settings that this version does not know"
 
 
-def run_identity(spec: PipelineSpec, scene: Scene) -> Identity:
+def run_identity(spec: PipelineSpec, scene: Scene) -> RunIdentity:
     """The identity of a run of the main job; where its room lies and how it is described are no part of it."""
-    return Identity(
+    return RunIdentity(
         {
             "schema": SCHEMA,
             "config": spec.model_dump(mode="json", exclude={"description", "scene"}),

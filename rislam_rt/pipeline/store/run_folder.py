@@ -28,12 +28,13 @@ from rislam_rt.pipeline.dataset import (
     seal_dataset,
 )
 from rislam_rt.pipeline.record import given_to_dataset
-from rislam_rt.pipeline.store.identity import Identity
+from rislam_rt.pipeline.store.identity import RunIdentity
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.write import scene_files, toml_bytes, tum_bytes
+from rislam_rt.scene.write import scene_files, tum_bytes
 from rislam_rt.storage.files import TEMPORARY, make_folders, remove_empty, remove_temporaries, write_atomic
 from rislam_rt.storage.lock import LOCK_FILE, hold
 from rislam_rt.storage.seal import file_digest, read_sealed, seal
+from rislam_rt.toml import toml_bytes
 
 RUN_FILE, PATHS_FILE, SUMMARY_FILE = "run.json", "paths.nc", "summary.json"
 RUNNING, DONE = "running", "done"
@@ -45,7 +46,7 @@ OWN_FOLDERS = ("", "figures", "scene", "scene/meshes")
 class RunFolder(MutableMapping[str, SchemeResult]):
     """Schemes of a run that is under way, on disk. One that is not as it was written counts as not there."""
 
-    def __init__(self, folder: Path, identity: Identity, files: Mapping[str, str] | None = None) -> None:
+    def __init__(self, folder: Path, identity: RunIdentity, files: Mapping[str, str] | None = None) -> None:
         """`files`: SHA-256 by name of what was written before."""
         self.folder, self.identity, self.files = folder, identity, dict(files or {})
 
@@ -155,7 +156,7 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         self.files[name] = hashlib.sha256(content).hexdigest()
 
 
-def find_run(folder: Path, identity: Identity) -> dict[str, Any] | None:
+def find_run(folder: Path, identity: RunIdentity) -> dict[str, Any] | None:
     """What the marker of a folder says; None if there is no folder, or nothing in it.
 
     Raises
@@ -201,7 +202,7 @@ def read_marker(folder: Path) -> dict[str, Any]:
 
 
 @contextmanager
-def open_run(folder: Path, identity: Identity) -> Iterator[RunFolder]:
+def open_run(folder: Path, identity: RunIdentity) -> Iterator[RunFolder]:
     """The folder of a run, to be gone on with or begun; nobody else writes there meanwhile.
 
     Raises

@@ -22,13 +22,13 @@ def room_data(scene: Scene) -> dict[str, Any]:
     """Everything of a room but what moves."""
     way = scene.agent.position
     walls, left_out = _walls(scene)
-    meshes = [*scene.shades, *(s.shade for s in scene.scatterers if s.shade is not None)]
-    shades = np.concatenate([np.zeros((0, 3, 3)), *(mesh.triangles for mesh in meshes)])
+    meshes = [*scene.occluders, *(s.shade for s in scene.scatterers if s.shade is not None)]
+    occluders = np.concatenate([np.zeros((0, 3, 3)), *(mesh.triangles for mesh in meshes)])
     return {
         "bounds": rounded(scene.bounds),
         "walls": walls,
         "left_out": left_out,
-        "shades": rounded(shades[:MOST_TRIANGLES]),
+        "shades": rounded(occluders[:MOST_TRIANGLES]),
         "panels": [_panel(panel) for panel in scene.panels],
         "scatterers": [{"name": s.name, "position": rounded(s.position)} for s in scene.scatterers],
         "track": rounded(way[spread(len(way), WAY_POINTS)]),

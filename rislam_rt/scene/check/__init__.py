@@ -4,7 +4,7 @@ from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.scene.check.agent import agent_errors, agent_warnings
 from rislam_rt.scene.check.materials import material_errors
 from rislam_rt.scene.check.meshes import face_errors, mesh_warnings, name_errors, scatterer_errors
-from rislam_rt.scene.check.occluder_check import cylinder_warnings, shade_errors, shade_face_errors
+from rislam_rt.scene.check.occluders import cylinder_warnings, occluder_errors, occluder_face_errors
 from rislam_rt.scene.check.panel import panel_errors, panel_warnings
 from rislam_rt.scene.check.triangle_array import build_triangle_array
 from rislam_rt.scene.check.walls import wall_findings
@@ -16,9 +16,9 @@ __all__ = ["find_errors", "find_warnings", "material_errors"]
 def find_errors(scene: Scene, file: str) -> list[Finding]:
     """What makes a scene unusable. Damaged meshes hide the rest, which could not be computed."""
     room = build_triangle_array(scene, file)
-    return [*name_errors(room), *face_errors(room), *shade_face_errors(room)] or [
+    return [*name_errors(room), *face_errors(room), *occluder_face_errors(room)] or [
         *scatterer_errors(room),
-        *shade_errors(room),
+        *occluder_errors(room),
         *panel_errors(room),
         *agent_errors(room),
     ]

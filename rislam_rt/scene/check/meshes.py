@@ -13,7 +13,7 @@ from rislam_rt.scene.findings import Finding
 def name_errors(room: TriangleArray) -> Iterator[Finding]:
     """Two parts of one name."""
     names = [r.name for r in room.scene.reflectors] + list(room.scene.landmarks)
-    names += [shade.name for shade in room.scene.shades]
+    names += [shade.name for shade in room.scene.occluders]
     for name, count in Counter(names).items():
         if count > 1:
             yield room.error("name", f"{count} parts are called '{name}'", "give every part a name of its own")

@@ -6,16 +6,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.scene.built_in_rooms.shapes import joined, quad
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.floor_plan import FloorPlan, Opening
 from rislam_rt.scene.importing.materials import MaterialAssignment
-from rislam_rt.scene.importing.mesh_simplification import as_mesh
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.polygons import inside_loop, triangulate
-from rislam_rt.scene.importing.region_groups import numbered, plain_name
+from rislam_rt.scene.importing.regions.mesh_simplification import as_mesh
+from rislam_rt.scene.importing.regions.region_groups import numbered, plain_name
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.rooms.shapes import joined, quad
 
 SAME_LINE = 5e-3
 """[m] Walls whose lines are nearer than this are one."""

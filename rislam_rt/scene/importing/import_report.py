@@ -5,15 +5,15 @@ from typing import Any
 
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.plane_segmentation import planar_regions
-from rislam_rt.scene.importing.flat_regions import FlatRegions
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.surfaces import SortedSurfaces, Surface
+from rislam_rt.scene.importing.regions.flat_regions import FlatRegions
+from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface
 from rislam_rt.scene.meshes import Mesh
 
 
 def account(
     facets: FlatRegions, found: SortedSurfaces, surfaces: list[Surface], unseen: float, reflectors: dict[str, Any],
-    shades: dict[str, Mesh], options: ImportOptions, *, scanned: bool,
+    occluders: dict[str, Mesh], options: ImportOptions, *, scanned: bool,
 ) -> list[str]:  # fmt: skip
     """What became of the mesh, in numbers."""
     walls = sum(
@@ -21,11 +21,11 @@ def account(
         for mesh, _ in reflectors.values()
     )
     total, waves = float(facets.area.sum()), found.narrow / options.wavelength
-    triangles = sum(len(mesh.faces) for mesh in shades.values())
+    triangles = sum(len(mesh.faces) for mesh in occluders.values())
     mirror = sum(s.area for s in surfaces)
     remarks = [
         f"{len(facets.mesh.faces)} triangles, {total:.4g} m^2: {walls} walls of {mirror:.4g} m^2 in {len(reflectors)} "
-        f"reflectors, {len(shades)} shades of {triangles} triangles",
+        f"reflectors, {len(occluders)} occluders of {triangles} triangles",
         f"walls are within {max(1e3 * max(s.error for s in surfaces), 0.01):.2g} mm of the mesh",
     ]
     if found.shading:

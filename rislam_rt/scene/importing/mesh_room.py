@@ -6,22 +6,28 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.scene.built_in_rooms.shapes import joined
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.importing.flat_regions import FlatRegions, find_facets, weld
 from rislam_rt.scene.importing.free_space import find_free, is_seen
 from rislam_rt.scene.importing.import_report import account
 from rislam_rt.scene.importing.materials import MaterialAssignment, itu_by_word
-from rislam_rt.scene.importing.mesh_simplification import as_mesh
 from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.placement import place_parts
-from rislam_rt.scene.importing.region_groups import RegionGroup, find_pieces, numbered, place_free_name, wall_name
+from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, find_facets, weld
+from rislam_rt.scene.importing.regions.mesh_simplification import as_mesh
+from rislam_rt.scene.importing.regions.region_groups import (
+    RegionGroup,
+    find_pieces,
+    numbered,
+    place_free_name,
+    wall_name,
+)
+from rislam_rt.scene.importing.regions.round_surfaces import find_round
+from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface, sort_regions
 from rislam_rt.scene.importing.room_draft import RoomDraft
-from rislam_rt.scene.importing.round_surfaces import find_round
-from rislam_rt.scene.importing.scan_room import looks_scanned, sort_scan
-from rislam_rt.scene.importing.surfaces import SortedSurfaces, Surface, sort_regions
+from rislam_rt.scene.importing.scans.scan_room import looks_scanned, sort_scan
 from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.rooms.shapes import joined
 
 
 def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
@@ -57,13 +63,13 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
     surfaces, unseen = _seen(found)
     palette = MaterialAssignment(options.materials, options.rest)
     reflectors = _reflectors(surfaces, pieces, parts, palette)
-    shades = _shades(found, pieces, list(reflectors))
+    occluders = _occluders(found, pieces, list(reflectors))
     if palette.unused():
         names = ", ".join([*reflectors, *sorted({p.material for p in parts if p.material})][:12])
         raise Fault(f"--material {palette.unused()[0]}: nothing has that name", f"give one of: {names}")
-    said = account(facets, found, surfaces, unseen, reflectors, shades, options, scanned=bool(about))
+    said = account(facets, found, surfaces, unseen, reflectors, occluders, options, scanned=bool(about))
     remarks = [*notes, *about, *said]
-    return RoomDraft(reflectors, shades, remarks + palette.remarks())
+    return RoomDraft(reflectors, occluders, remarks + palette.remarks())
 
 
 def _seen(found: SortedSurfaces) -> tuple[list[Surface], float]:
@@ -107,7 +113,7 @@ def _reflectors(
     return found
 
 
-def _shades(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str]) -> dict[str, Mesh]:
+def _occluders(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str]) -> dict[str, Mesh]:
     """Clutter by the piece that it belongs to."""
     by_piece: dict[int, list[Floats]] = {}
     for clutter in found.clutter:

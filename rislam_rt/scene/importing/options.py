@@ -24,7 +24,7 @@ class ImportOptions:
     curved: str = "shade"
     """`shade` or `planes`: what cylinders become."""
     max_walls: int = 150
-    """Where a file has more, the smallest become shades: the image sources' time grows with walls."""
+    """Where a file has more, the smallest become occluders: the image sources' time grows with walls."""
     scan: bool | None = None
     """Whether the mesh is a scan, with noise and holes; None: as it looks."""
     fill: float = 1.0

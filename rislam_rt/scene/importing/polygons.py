@@ -67,12 +67,12 @@ def simplify_loop(loop: list[int], points: Floats, kept: Booleans, tolerance: fl
     for begin, end in zip(anchors, [*anchors[1:], anchors[0] + len(loop)], strict=True):
         chain = [loop[i % len(loop)] for i in range(begin, end + 1)]
         turned = chain[0] > chain[-1]
-        chain = _thin(chain[::-1] if turned else chain, points, tolerance)
+        chain = _drop_slivers(chain[::-1] if turned else chain, points, tolerance)
         thinned += (chain[::-1] if turned else chain)[:-1]
     return thinned
 
 
-def _thin(chain: list[int], points: Floats, tolerance: float) -> list[int]:
+def _drop_slivers(chain: list[int], points: Floats, tolerance: float) -> list[int]:
     keep, stack = {0, len(chain) - 1}, [(0, len(chain) - 1)]
     while stack:
         low, high = stack.pop()

@@ -8,12 +8,12 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import triangle_planes
+from rislam_rt.scene.built_in_rooms.room import BASELINE, CYCLES, RoomFiles, panel, reflector
 from rislam_rt.scene.check.mesh_queries import ray_hits
 from rislam_rt.scene.file_names import safe_name
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.free_space import FreeSpace, find_free
 from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.rooms.room import BASELINE, CYCLES, RoomFiles, panel, reflector
 
 FROM_EDGE = 0.1
 """[m] The panel measures 9 cm: so far it keeps off the edges of its host."""
@@ -25,13 +25,13 @@ class RoomDraft:
 
     reflectors: dict[str, tuple[Mesh, dict[str, Any]]]
     """Mesh and table of the material."""
-    shades: dict[str, Mesh] = field(default_factory=dict)
+    occluders: dict[str, Mesh] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
 
     @property
     def triangles(self) -> Floats:
         """(T, 3, 3) [m] of all that stands in the room."""
-        meshes = [mesh for mesh, _ in self.reflectors.values()] + list(self.shades.values())
+        meshes = [mesh for mesh, _ in self.reflectors.values()] + list(self.occluders.values())
         return np.concatenate([mesh.vertices[mesh.faces] for mesh in meshes])
 
 
@@ -53,12 +53,12 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, li
     agent = {"start": start.round(4).tolist(), "velocity": ((end - start) / 60.0).round(6).tolist(), **CYCLES}
     table: dict[str, Any] = {"name": name}
     table["reflector"] = [_reflector(key, material) for key, (_, material) in draft.reflectors.items()]
-    table["shade"] = [{"name": key, "mesh": f"meshes/{safe_name(key)}.ply"} for key in draft.shades]
+    table["shade"] = [{"name": key, "mesh": f"meshes/{safe_name(key)}.ply"} for key in draft.occluders]
     ris, about = propose_panel(draft, free)
     table |= {"ris": ris} if ris else {}
     table["agent"] = agent | BASELINE
     meshes = {safe_name(key): mesh for key, (mesh, _) in draft.reflectors.items()}
-    meshes |= {safe_name(key): mesh for key, mesh in draft.shades.items()}
+    meshes |= {safe_name(key): mesh for key, mesh in draft.occluders.items()}
     length = float(np.linalg.norm(end - start))
     remarks = [
         *draft.remarks,

@@ -8,7 +8,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError, SceneError
-from rislam_rt.model import Body, Material, Reflector, RisPanel, Scene, Shade, Trajectory
+from rislam_rt.model import Body, Material, Occluder, Reflector, RisPanel, Scene, Trajectory
 from rislam_rt.scene.check import find_errors
 from rislam_rt.scene.findings import Fault, raise_errors
 from rislam_rt.scene.importing.free_space import FreeSpace
@@ -75,17 +75,17 @@ def scene_of_xml(path: Path, name: str, within: Sequence[float] = ()) -> tuple[S
     if not reflectors:
         raise SceneError(f"{path}: nothing in it reflects; give a scene with radio materials")
     own = {SHADE_OF + s.name for s in whole.scatterers} if whole else set()
-    shades = tuple(
-        Shade(p.mesh.vertices, p.mesh.faces, p.name) for p in found.parts if p.material is None and p.name not in own
+    occluders = tuple(
+        Occluder(p.mesh.vertices, p.mesh.faces, p.name) for p in found.parts if p.material is None and p.name not in own
     )
     if whole is not None:
         notes.append(f"agent, panel and {len(whole.scatterers)} scatterers are those of the {SCENE_FILE} beside it")
-        return replace(whole, name=name, reflectors=reflectors, shades=shades, digest=""), notes
-    agent = _motion(path, reflectors, shades)
-    panel, about = _panel(reflectors, shades, agent)
+        return replace(whole, name=name, reflectors=reflectors, occluders=occluders, digest=""), notes
+    agent = _motion(path, reflectors, occluders)
+    panel, about = _panel(reflectors, occluders, agent)
     way = float(np.linalg.norm(agent.position[-1] - agent.position[0]))
     notes.append(f"proposed way: {way:.2g} m in {agent.time[-1]:.0f} s, to be edited in [agent]; {about}")
-    return Scene(name, reflectors, (), panel, agent, "", shades), notes
+    return Scene(name, reflectors, (), panel, agent, "", occluders), notes
 
 
 def _window(within: Sequence[float]) -> Floats | None:
@@ -105,20 +105,22 @@ def _exact(read: Material, exact: Material | None) -> Material:
     return read
 
 
-def _panel(reflectors: Sequence[Reflector], shades: Sequence[Shade], agent: Trajectory) -> tuple[RisPanel | None, str]:
+def _panel(
+    reflectors: Sequence[Reflector], occluders: Sequence[Occluder], agent: Trajectory
+) -> tuple[RisPanel | None, str]:
     """A panel like the paper's above or beside the way, where there is a place for one, and words on it."""
     draft = RoomDraft(
         {r.name: (Mesh(r.vertices, r.faces), {}) for r in reflectors},
-        {s.name: Mesh(s.vertices, s.faces) for s in shades},
+        {s.name: Mesh(s.vertices, s.faces) for s in occluders},
     )
     way = agent.position[[0, -1]]
     table, about = propose_panel(draft, FreeSpace(way, way, 0.0, 0.0))
     return (build_panel(RisSection(**table)) if table else None), about
 
 
-def _motion(path: Path, reflectors: Sequence[Reflector], shades: Sequence[Shade]) -> Trajectory:
+def _motion(path: Path, reflectors: Sequence[Reflector], occluders: Sequence[Occluder]) -> Trajectory:
     try:
-        table = suggest_agent(np.concatenate([r.triangles for r in reflectors] + [s.triangles for s in shades]))
+        table = suggest_agent(np.concatenate([r.triangles for r in reflectors] + [s.triangles for s in occluders]))
     except Fault as fault:
         raise SceneError(fault.at(str(path), "").line) from None
     body = Body(np.array(table["tx_offset_m"]), np.array(table["rx_offset_m"]))

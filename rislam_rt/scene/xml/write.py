@@ -54,7 +54,7 @@ def xml_bytes(scene: Scene) -> bytes:
     """The scene file: one `<shape>` a reflector or shade, one `<bsdf>` a material."""
     root = Element("scene", {"version": "2.1.0"})
     shapes: list[tuple[str, Material | None]] = [(r.name, r.material) for r in scene.reflectors]
-    shapes += [(shade.name, None) for shade in scene.shades]
+    shapes += [(shade.name, None) for shade in scene.occluders]
     shapes += [(SHADE_OF + s.name, None) for s in scene.scatterers if s.shade is not None]
     names = {m: f"{_word(m)}-{number}" for number, m in enumerate(dict.fromkeys(material for _, material in shapes))}
     root.extend(material_element(material, name) for material, name in names.items())

@@ -10,12 +10,12 @@ from rislam_rt.slam.window.context import Context, resolve
 from rislam_rt.slam.window.digest import Digest, digest
 from rislam_rt.slam.window.expect import Clusters, Expected
 from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.gauss import HEAD
 from rislam_rt.slam.window.guesses import BESIDE, known_features
 from rislam_rt.slam.window.kinds import NEW, Verdict, judge, wanted
 from rislam_rt.slam.window.learn import seed
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.retract import behind, release
+from rislam_rt.slam.window.steps import HEAD
 
 NEAR = np.array([0.3, 0.15, 0.15])
 """Gap in length [m] and cosines up to which a return of the map is weighed as a track's explanation."""

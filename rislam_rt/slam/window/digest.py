@@ -12,9 +12,10 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.tracks import PANEL
-from rislam_rt.slam.window.gauss import HEAD, TURN, Window, now, pose_design, poses
+from rislam_rt.slam.window.gauss import Window, now, pose_covariance, poses
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log
+from rislam_rt.slam.window.steps import TURN
 
 TOGETHER = 10.0
 """Measurements over which the pull of neighbours keeps its sign."""
@@ -113,12 +114,9 @@ def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: 
 
 def heading_roots(window: Window) -> Floats:
     """(K, H) square root of the covariance of the headings, in its three strongest directions; H = 0 if known."""
-    if TURN not in window.axes:
+    if not window.turns:
         return np.zeros((window.num_poses, 0))
-    size = len(window.head)
-    motion = np.concatenate([np.arange(HEAD), np.arange(size, len(window.covariance))])
-    rows = pose_design(window.step, window.axes)[:, TURN]
-    value, vector = np.linalg.eigh(rows @ window.covariance[np.ix_(motion, motion)] @ rows.T)
+    value, vector = np.linalg.eigh(pose_covariance(window, TURN))
     return np.asarray(vector[:, -3:] * np.sqrt(np.maximum(value[-3:], 0.0)))
 
 

@@ -12,10 +12,13 @@ from rislam_rt.arrays import Floats
 from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window import egomotion, gauss
 from rislam_rt.slam.window.egomotion import Rates
+from rislam_rt.slam.window.factor import inverse
 from rislam_rt.slam.window.gauss import Quadratic, Window
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log
 from rislam_rt.slam.window.look import Look
+from rislam_rt.slam.window.motion import LADDER
+from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.tracks import CYCLE
 
 RATE = 1e-4
@@ -30,20 +33,20 @@ LOG_JUMP = np.log(RATE) + 2.0 * np.log(CELL / JUMP)
 """Log probability of a jump to one certain place."""
 FEWEST = 3
 """Pairs without which nothing is told of a jump."""
-CUT, NEW = 0.7, 0.1
-"""Shares of the components that continue nothing after a jump, and else."""
+CUT, END = 0.7, 0.1
+"""Shares of the tracks that end with a jump, and else."""
 PAIRS = 60
 """Pairs of returns and components of which a jump is asked."""
 ALIKE = 0.1
 """Difference of cosines, and of log amplitudes in units of ten times that, within which a component may be a return."""
 
 
-def advance(log_odds: float, score: float, heard: int, fresh: int) -> float:
+def advance(log_odds: float, score: float, followed: int, kept: int) -> float:
     """Log odds of being lost, a cycle on: one that the map explains better than strangers do by `score`.
 
-    Of `heard` components `fresh` ones continue nothing: if those are many, the agent may be elsewhere all at once.
+    Of `followed` tracks `kept` ones go on. They need no pose: if many end at once, the agent may be elsewhere.
     """
-    burst = fresh * np.log(CUT / NEW) + (heard - fresh) * np.log((1.0 - CUT) / (1.0 - NEW))
+    burst = (followed - kept) * np.log(CUT / END) + kept * np.log((1.0 - CUT) / (1.0 - END))
     rate = 1.0 / (1.0 + np.exp(-SURE - max(burst, 0.0)))
     lost = 1.0 / (1.0 + np.exp(-log_odds))
     lost = min(lost + (1.0 - lost) * rate, 1.0 - 1e-9)
@@ -69,11 +72,10 @@ def jump(view: Look, glance: Glance) -> Floats:
 def shifted(window: Window, by: Floats) -> Window:
     """The window with the last pose elsewhere, its velocity as it was: for a look, not for a solution."""
     accel, dt = window.accel.copy(), window.step[-2:]
-    flat = window.axes < 3
     # what one step gives to the velocity the next one takes back
     size = dt[0] * (0.5 * dt[0] + dt[1]) - 0.5 * dt[0] * dt[1]
-    accel[-2, flat] += by[window.axes[flat]] / size
-    accel[-1, flat] -= by[window.axes[flat]] / size * dt[0] / dt[1]
+    accel[-2, :3] += by / size
+    accel[-1, :3] -= by / size * dt[0] / dt[1]
     return window._replace(accel=accel)
 
 
@@ -83,10 +85,10 @@ def landed(window: Window, by: Floats) -> Window:
         window = gauss.slide(window)
     head, size = window.head.copy(), len(window.head)
     head[:3] += by
-    covariance = gauss.inverse(window.prior.hessian)
+    covariance = inverse(window.prior.hessian)
     covariance[[0, 1], [0, 1]] += JUMP**2
-    slots = window.slots._replace(middle=np.concatenate([head[[0, 1, 2, 6]], head[gauss.HEAD :]])[None])
-    prior = Quadratic(gauss.inverse(covariance), np.zeros(size), head)
+    slots = window.slots._replace(middle=np.concatenate([head[[0, 1, 2, 6]], head[HEAD:]])[None])
+    prior = Quadratic(inverse(covariance), np.zeros(size), head)
     return window._replace(head=head, prior=prior, slots=slots, covariance=covariance)
 
 
@@ -133,10 +135,11 @@ def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
 
 
 def with_free_compass(window: Window, std: float) -> Window:
-    """Before anything is born: with an offset of the compass within `std` [rad]."""
-    hessian = window.prior.hessian.copy()
+    """Before anything is born: with an offset of the compass within `std` [rad], which turns as little as may be."""
+    hessian, still = window.prior.hessian.copy(), ((0, 0), (0, 1))
     hessian[6, 6] = std**-2.0
-    return _begun(window, window.head, hessian)
+    precision = np.pad(window.precision, still, constant_values=LADDER[0] ** -2.0)
+    return _begun(window._replace(accel=np.pad(window.accel, still), precision=precision), window.head, hessian)
 
 
 def _begun(window: Window, head: Floats, hessian: Floats) -> Window:

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.forms import UNKNOWN
+from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, unique_forms
 
 WALK = 1.0
@@ -72,7 +72,7 @@ def rates(log: Log, heading: Floats, step: float) -> Rates:
     weight = 1.0 / log.std[rows, 0] ** 2
 
     def total(value: Floats) -> Floats:
-        return np.bincount(which, value, count)
+        return np.asarray(np.bincount(which, value, count), dtype=np.float64)
 
     s, sx, sxx = total(weight), total(weight * x), total(weight * x**2)
     sy, sxy = total(weight * log.seen[rows, 0]), total(weight * x * log.seen[rows, 0])

@@ -12,8 +12,8 @@ from rislam_rt.slam.identity import point_amplitude
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.forms import enumerate_forms, forms_of, possible_legs
-from rislam_rt.slam.window.gauss import HEAD
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.steps import HEAD
 
 LEVEL = 0.02
 """Third direction cosine down to which returns are heard: those of upright walls arrive level."""
@@ -183,7 +183,9 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
             first = members[np.argmax(strength[members])]
             partner[leader] = first
             total[leader] += power[members].sum()
-        others = np.setdiff1d((around[leader] & (strength <= strength[leader])).nonzero()[0], [partner[leader]])
+        beside = around[leader] & (strength <= strength[leader])
+        beside[partner[leader]] &= partner[leader] < 0
+        others = beside.nonzero()[0]
         ratio = power[others] / power[leader] * clear[others]
         disturbance[leader] = (0.5 * ratio[:, None] * (expected.seen[others] - expected.seen[leader]) ** 2).sum(axis=0)
     leader = np.concatenate([(~taken).nonzero()[0], taken.nonzero()[0]])

@@ -11,54 +11,24 @@ from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of,
 from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.returns import TX
 from rislam_rt.slam.tracks import Glance
-from rislam_rt.slam.window import doubt, gauss, motion, tracks
+from rislam_rt.slam.window import doubt, gauss, motion, recovery, tracks
 from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.book import Book, empty_book, idents, image_ident
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, conditioned_share
 from rislam_rt.slam.window.gauss import Window
-from rislam_rt.slam.window.learn import Sights, learn, no_sights
+from rislam_rt.slam.window.learn import learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.look import Look, echoes, look
 from rislam_rt.slam.window.retract import condemned, release
+from rislam_rt.slam.window.state import WindowState
+from rislam_rt.slam.window.steps import TURN
 from rislam_rt.slam.window.suspect import weigh_tracks
 from rislam_rt.slam.window.tracks import Tracks
 
 REFRESH = 5
 """Cycles between two re-linearisations of the whole window."""
-
-
-class WindowState(NamedTuple):
-    """All that the filter knows."""
-
-    cycle: int
-    config: SlamConfig
-    window: Window
-    book: Book
-    log: Log
-    tracks: Tracks
-    sights: Sights
-    gait: Floats
-    """(2, L) probabilities of the liveliness of the step before the window's first, across and upwards; (3, L) with
-    the rate of turn, where the heading is not known."""
-    level: Floats
-    """(2, L) or (3, L) of the last step's, filtered."""
-    heading: Floats
-    """(K,) [rad] that the compass told; where it is not asked, what offsets are against."""
-    shift: Floats
-    """(3,) [m] standard deviation of the start's position: what no measurement tells."""
-    scene: Scene
-    doubt: float
-    """Log odds that the agent is lost: that the map explains nothing of what is heard (see `doubt`)."""
-    asked: bool
-    """Whether the first tracks told that the start is another."""
-    turned: float
-    """[rad] by which the compass was found to be wrong."""
-    codes: tuple[RisCode | None, ...]
-    """(K,) as the agent believes they were applied."""
-    passed: Floats
-    """(P, 3) [m] positions that left the window, each with the hindsight of its whole length."""
 
 
 def init(
@@ -68,12 +38,12 @@ def init(
     """The start prior, and an empty map."""
     free = np.array([1.0, 1.0, float(config.height == "estimated")])
     offset = start.heading_std if config.heading == "estimated" else 0.0
-    axes = np.arange(3) if config.heading == "known" else np.append(np.arange(3), gauss.TURN)
+    turns = config.heading != "known"
     std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [offset]])
-    window = gauss.begin(start.position, start.velocity, axes, std)
+    window = gauss.begin(start.position, start.velocity, std, turns=turns)
     scene = Scene(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
-    lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if gauss.TURN in axes else ()))
+    lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if turns else ()))
     gait = np.stack([motion.first_gait(level) for level in lively])
     return WindowState(
         0, config, window, empty_book(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_sights(),
@@ -127,7 +97,7 @@ def step(
     state = state._replace(tracks=followed.tracks, log=followed.log)
     jumped = state.doubt == 0.0
     if len(expected.seen) and len(glance.seen):
-        state = state._replace(doubt=doubt.advance(state.doubt, view.score, len(glance.seen), followed.fresh))
+        state = state._replace(doubt=doubt.advance(state.doubt, view.score, followed.followed, followed.kept))
     if min(book.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, poses, scene, code))
     sights, book = learn(
@@ -136,7 +106,7 @@ def step(
     state = state._replace(sights=sights, book=book)
     landmark[free[pick]] = np.where(used, _names(state.book, expected, groups, row), REMOVED)
 
-    state, wrong = _ask(state)
+    state, wrong = recovery.ask(state)
     context = Context(
         state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle, state.sights, state.codes
     )  # fmt: skip
@@ -152,48 +122,9 @@ def step(
     )  # fmt: skip
     outcome = _outcome(len(measurement), len(state.book.ident), wrong or jumped or state.doubt >= 0.0)
     if doubt.is_lost(state.doubt) and len(state.book.ident):
-        state = _restart(state)
+        state = recovery.restart(state)
     info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome)
     return state._replace(cycle=state.cycle + 1), info
-
-
-def _ask(state: WindowState) -> tuple[WindowState, bool]:
-    """Whether the picture moves as the agent is told; before anything is born, the start as the tracks would have it."""
-    if len(state.level) > 2 or len(state.heading) != state.window.num_poses:
-        return state, False
-    if len(state.book.ident):
-        if state.cycle % doubt.PAST == 0:
-            lively = float(np.sqrt(motion.expected_variance(state.level[0])))
-            odds = doubt.ask_picture(state.window, state.log, state.heading, lively)
-            state = state._replace(doubt=float(np.clip(state.doubt + odds, doubt.SURE, -doubt.SURE)))
-        return state, False
-    told = None if state.asked else doubt.ask_tracks(state.window, state.log, state.heading)
-    if told is None or told.log_odds <= 0.0:
-        return state, False
-    state = state._replace(asked=True)
-    if not told.is_compass:
-        return state._replace(window=doubt.with_velocity(state.window, told.velocity, told.std)), True
-    window = doubt.with_free_compass(state.window, told.std / np.linalg.norm(told.velocity))
-    turned = state.turned + told.turn
-    return state._replace(window=window, heading=state.heading + told.turn, turned=turned), True
-
-
-def _restart(state: WindowState) -> WindowState:
-    """The pose that is kept, with what it may be off by beside it, and nothing else."""
-    window = state.window
-    mean, covariance = gauss.now(window)
-    lively = np.sqrt(motion.expected_variance(state.level))[[0, 0, 1]]
-    std = np.sqrt(np.concatenate([np.full(3, 1e-10), np.diag(covariance)[3:6] + lively**2, [covariance[6, 6]]]))
-    away = doubt.JUMP * np.array([1.0, 1.0, float(state.config.height == "estimated")])
-    fresh = gauss.begin(mean[:3], mean[3:6], window.axes, std)
-    if gauss.TURN in window.axes:
-        fresh = fresh._replace(head=mean[:gauss.HEAD])
-    return state._replace(
-        window=fresh, book=empty_book(state.scene.num_panels)._replace(next_ident=state.book.next_ident),
-        log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), sights=no_sights(), gait=state.level,
-        heading=state.heading[-1:], shift=np.hypot(state.shift, away), doubt=0.0, asked=False,
-        codes=state.codes[-1:], passed=np.concatenate([state.passed, gauss.poses(window)[:-1, :3]]),
-    )  # fmt: skip
 
 
 def _move(state: WindowState, dt: float, heading: float) -> WindowState:
@@ -202,12 +133,11 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         return state._replace(heading=np.array([heading]))
     window, gait, headings, passed = state.window, state.gait, state.heading, state.passed
     while window.num_poses >= LEVELS.window:
-        gait = np.stack([smoothed[1][0] for smoothed in _liveliness(window, gait)])
+        gait = motion.forward(gait, _likelihoods(window, 1)[:, 0], LEVELS.stay)
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = gauss.slide(window), headings[1:]
     level = state.level @ motion.transition(LEVELS.stay)
-    columns = COLUMNS[: len(window.axes)]
-    window = gauss.extend(window, dt, np.array([motion.prior_precision(level[group], group == 2) for group in columns]))
+    window = gauss.extend(window, dt, _precisions(level))
     return state._replace(window=window, gait=gait, heading=np.append(headings, heading), passed=passed)
 
 
@@ -250,36 +180,34 @@ def _notice(
         by = doubt.jump(best, glance)
         view = view_of(doubt.shifted(state.window, by)) if by.any() else best
         if view.score + doubt.LOG_JUMP > max(best.score, doubt.SURE):
-            return _landed(state, by), view
+            return recovery.landed(state, by), view
     return state._replace(window=window), best
 
 
-def _landed(state: WindowState, by: Floats) -> WindowState:
-    """After a jump: the last pose alone, with the map; held for lost until the next cycle agrees."""
-    passed = np.concatenate([state.passed, gauss.poses(state.window)[:-1, :3]])
-    return state._replace(
-        window=doubt.landed(state.window, by), gait=state.level, heading=state.heading[-1:], codes=state.codes[-1:],
-        passed=passed, doubt=0.0,
-    )  # fmt: skip
-
-
-GROUPS = (np.array([0, 1]), np.array([2]), np.array([gauss.TURN]))
+GROUPS = (np.array([0, 1]), np.array([2]), np.array([TURN]))
 """Axes that are as lively as each other: an agent that turns does not climb."""
 COLUMNS = np.array([0, 0, 1, 2])
 """Group of each axis."""
 
 
-def _liveliness(window: Window, gait: Floats) -> list[tuple[Floats, Floats]]:
-    """Posterior and filtered probabilities (K - 1, L) of each group's levels."""
-    size, free = len(window.head), len(window.axes)
-    count = len(window.accel)
-    block = window.covariance[size:, size:].reshape(count, free, count, free)[np.arange(count), :, np.arange(count)]
-    found = []
-    for group, before in zip(GROUPS[: len(gait)], gait, strict=True):
-        inside = block[:, group[:, None], group]
-        like = motion.log_likelihood(window.accel[:, group], inside, window.precision[:, group[0]])
-        found.append(motion.smooth(before, like, LEVELS.stay))
-    return found
+def _likelihoods(window: Window, count: int) -> Floats:
+    """Log likelihoods (N, K, L) of the levels of the N groups' first K steps."""
+    size, free = len(window.head), window.accel.shape[1]
+    every = np.arange(count)
+    inside = window.covariance[size : size + count * free, size : size + count * free]
+    block = inside.reshape(count, free, count, free)[every, :, every]
+    return np.stack([
+        motion.log_likelihood(
+            window.accel[:count, group], block[:, group[:, None], group], window.precision[:count, group[0]]
+        )
+        for group in GROUPS[: free - 1]
+    ])  # fmt: skip
+
+
+def _precisions(levels: Floats) -> Floats:
+    """(..., A) prior precisions of accelerations whose groups have levels (N, ..., L)."""
+    each = [motion.prior_precision(level, group == 2) for group, level in enumerate(levels)]
+    return np.stack([each[group] for group in COLUMNS[: len(levels) + 1]], axis=-1)
 
 
 def _explain(
@@ -322,7 +250,7 @@ def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
     last = np.array([window.num_poses - 1])
     window, found = renew(window, log, book, body, state.heading, last, even=True)
     nis = float(np.sum(found.left**2))
-    window = gauss.solve(window)
+    window = gauss.solve(window, spread=False)
     slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else last
     window, left = renew(window, log, book, body, state.heading, slots)
     window = gauss.weigh_holds(gauss.solve(window))
@@ -334,12 +262,10 @@ def liven(state: WindowState) -> WindowState:
     window = state.window
     if not len(window.accel):
         return state
-    found = _liveliness(window, state.gait)
-    columns = COLUMNS[: len(window.axes)]
-    fresh = np.stack([motion.prior_precision(found[group][0], group == 2) for group in columns], axis=1)
+    posterior, level = motion.smooth(state.gait, _likelihoods(window, len(window.accel)), LEVELS.stay)
+    fresh = _precisions(posterior)
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
-    level = np.stack([filtered[-1] for _, filtered in found])
     return state._replace(window=window._replace(precision=precision), level=level)
 
 
@@ -350,8 +276,10 @@ DAMPING = 0.3
 class _Followed(NamedTuple):
     tracks: Tracks
     log: Log
-    fresh: int
-    """Components that continue nothing."""
+    followed: int
+    """Tracks of the last cycle..."""
+    kept: int
+    """...and those among them that go on."""
 
 
 def _follow(
@@ -362,6 +290,7 @@ def _follow(
     length = np.maximum(state.tracks.mean[:, 0, 0], 0.5) if len(state.tracks.ident) else np.ones(1)
     drift = np.array([2.0 * bend + speed**2, 0.1, 0.1]) if len(length) else np.zeros(3)
     found = tracks.advance(state.tracks, dt, turn, drift)
+    late = found.last == state.cycle - 1
     rows, picks = tracks.match(found, glance, free, state.cycle)
     found = tracks.extend(found, rows, glance, picks, state.cycle)
     spare = np.setdiff1d(free, picks)
@@ -373,7 +302,8 @@ def _follow(
     base = len(state.log.cycle) - len(glance.seen)
     track = state.log.track.copy()
     track[base + picks], track[base + spare] = found.ident[rows], fresh
-    return _Followed(found.keep(tracks.alive(found, state.cycle)), state.log._replace(track=track), len(spare))
+    found = found.keep(tracks.alive(found, state.cycle))
+    return _Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()))
 
 
 def _names(book: Book, expected: Expected, groups: Clusters, row: Integers) -> Integers:

@@ -21,13 +21,8 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-
-HEAD = 7
-"""Numbers of the head before the features: position, velocity, offset of the compass."""
-TURN = 3
-"""Axis of the rate of turn, after those of the room."""
-POSE = 4
-"""Numbers of a pose that measurements depend on: position, offset of the compass."""
+from rislam_rt.slam.window.factor import factorise, inverse
+from rislam_rt.slam.window.steps import FIRST, HEAD, POSE, TURN, basis, carry_on, latest, starts
 
 
 class Quadratic(NamedTuple):
@@ -74,13 +69,11 @@ class Window(NamedTuple):
     head: Floats
     """(7 + 3F,)."""
     accel: Floats
-    """(K - 1, A) [m/s^2] over the steps between the poses, along the free axes; of `TURN`, rates [rad/s]."""
+    """(K - 1, A) [m/s^2] over the steps between the poses, along the room's axes; of `TURN`, rates [rad/s]."""
     precision: Floats
     """(K - 1, A) [s^4/m^2] of each acceleration's prior (see `motion`)."""
     step: Floats
     """(K - 1,) [s]."""
-    axes: Integers
-    """(A,) axes that move freely; `TURN` where the heading does."""
     prior: Quadratic
     """On the head."""
     slots: Quadratic
@@ -99,32 +92,29 @@ class Window(NamedTuple):
         """(F, 3) [m]."""
         return self.head[HEAD:].reshape(-1, 3)
 
+    @property
+    def turns(self) -> bool:
+        """Whether the heading moves freely: A is 4, and else 3."""
+        return self.accel.shape[1] > TURN
 
-def begin(position: Floats, velocity: Floats, axes: Integers, std: Floats) -> Window:
+
+def begin(position: Floats, velocity: Floats, std: Floats, *, turns: bool = False) -> Window:
     """One pose, no features; `std` (7,) of the head's numbers, 0 for what is held."""
     head = np.concatenate([position, velocity, [0.0]])
     information = np.diag(np.maximum(std, 1e-6) ** -2.0)
     prior = Quadratic(information, np.zeros(HEAD), head)
     slots = Quadratic(np.zeros((1, POSE, POSE)), np.zeros((1, POSE)), np.concatenate([position, [0.0]])[None])
-    none = np.zeros(0)
+    none = np.zeros((0, 3 + turns))
     return Window(
-        head,
-        none.reshape(0, len(axes)),
-        none.reshape(0, len(axes)),
-        none,
-        axes,
-        prior,
-        slots,
-        np.diag(np.maximum(std, 1e-6) ** 2),
-        no_holds(),
-    )
+        head, none, none, np.zeros(0), prior, slots, np.diag(np.maximum(std, 1e-6) ** 2), no_holds(),
+    )  # fmt: skip
 
 
 def begin_with(
-    position: Floats, velocity: Floats, axes: Integers, std: Floats, features: Floats, covariance: Floats
+    position: Floats, velocity: Floats, std: Floats, features: Floats, covariance: Floats, *, turns: bool
 ) -> Window:
     """One pose, and features (3F,) known beforehand, with a covariance (3F, 3F)."""
-    alone, count = begin(position, velocity, axes, std), len(features)
+    alone, count = begin(position, velocity, std, turns=turns), len(features)
     spread = scipy.linalg.block_diag(alone.covariance, covariance)
     information = scipy.linalg.block_diag(alone.prior.hessian, inverse(covariance))
     head, size = np.concatenate([alone.head, features]), POSE + count
@@ -134,66 +124,56 @@ def begin_with(
     return alone._replace(head=head, prior=prior, slots=slots, covariance=spread)
 
 
-def pose_design(step: Floats, axes: Integers) -> Floats:
-    """(K, 4, 7 + (K - 1) A): poses as a linear function of the head's first seven numbers and the accelerations."""
-    count, free = len(step) + 1, len(axes)
-    time = np.concatenate([[0.0], np.cumsum(step)])
-    design = np.zeros((count, POSE, HEAD + len(step) * free))
-    for axis in range(3):
-        design[:, axis, axis], design[:, axis, 3 + axis] = 1.0, time
-    design[:, 3, 6] = 1.0
-    lag = time[:, None] - time[1:]
-    after = np.arange(count)[:, None] > np.arange(len(step))
-    reach = np.where(after, 0.5 * step**2 + step * lag, 0.0)
-    for place, axis in enumerate(axes):
-        design[:, axis, HEAD + place :: free] = np.where(after, step, 0.0) if axis == TURN else reach
-    return design
+def _basis(window: Window) -> Floats:
+    """(A, K, K + 1) (see `steps.basis`)."""
+    return basis(window.step.tobytes(), window.turns)
 
 
 def poses(window: Window) -> Floats:
     """(K, 4) positions [m] and compass offsets [rad]."""
-    motion = np.concatenate([window.head[:HEAD], window.accel.ravel()])
-    return np.asarray(pose_design(window.step, window.axes) @ motion)
-
-
-def velocity_design(window: Window) -> Floats:
-    """(3, 7 + (K - 1) A): the last velocity as a linear function of the motion's numbers."""
-    design = np.zeros((3, HEAD + window.accel.size))
-    design[:, 3:6] = np.eye(3)
-    for place, axis in enumerate(window.axes):
-        if axis != TURN:
-            design[axis, HEAD + place :: len(window.axes)] = window.step
-    return design
+    free = window.accel.shape[1]
+    numbers = np.concatenate([window.head[[0, 1, 2, 6]][:free, None], np.zeros((free, 1)), window.accel.T], axis=1)
+    numbers[:3, 1] = window.head[3:6]
+    found = np.full((window.num_poses, POSE), window.head[6])
+    found[:, :free] = (_basis(window) @ numbers[..., None])[..., 0].T
+    return found
 
 
 def now(window: Window) -> tuple[Floats, Floats]:
     """Mean (7 + 3F,) and covariance of the last pose, its velocity, the compass offset, and the features."""
-    count, size = HEAD, len(window.head)
-    total = size + window.accel.size
-    design = np.zeros((size, total))
-    motion = np.concatenate([np.arange(count), np.arange(size, total)])
-    last = pose_design(window.step, window.axes)[-1]
-    design[:3, motion], design[3:6, motion], design[6, motion] = last[:3], velocity_design(window), last[3]
-    design[HEAD:size, HEAD:size] = np.eye(size - HEAD)
-    mean = design @ np.concatenate([window.head, window.accel.ravel()])
-    return mean, design @ window.covariance @ design.T
+    size, whole = len(window.head), window.covariance
+    design = latest(window.step.tobytes(), window.turns)
+    start, later = design[:, :HEAD], design[:, HEAD:]
+    mean = window.head.copy()
+    mean[:HEAD] = start @ mean[:HEAD] + later @ window.accel.ravel()
+    rows = start @ whole[:HEAD] + later @ whole[size:]
+    covariance = whole[:size, :size].copy()
+    covariance[:HEAD, HEAD:] = rows[:, HEAD:size]
+    covariance[HEAD:, :HEAD] = rows[:, HEAD:size].T
+    covariance[:HEAD, :HEAD] = rows[:, :HEAD] @ start.T + rows[:, size:] @ later.T
+    return mean, covariance
+
+
+def pose_covariance(window: Window, axis: int) -> Floats:
+    """(K, K) covariance of all poses along one axis."""
+    along, size, free = _basis(window)[axis], len(window.head), window.accel.shape[1]
+    rate = [] if axis == TURN else [3 + axis]
+    rows = np.concatenate([[FIRST[axis]], rate, np.arange(size + axis, len(window.covariance), free)]).astype(np.int64)
+    used = along if rate else np.delete(along, 1, axis=1)
+    return np.asarray(used @ window.covariance[np.ix_(rows, rows)] @ used.T)
 
 
 def extend(window: Window, dt: float, precision: Floats) -> Window:
     """One more pose, a step of `dt` [s] on, with the prior precisions (A,) of the step's acceleration."""
-    free, features = len(window.axes), len(window.head) - HEAD
-    step = np.append(window.step, dt)
-    accel = np.concatenate([window.accel, np.zeros((1, free))])
-    size = POSE + features
-    blank = Quadratic(np.zeros((1, size, size)), np.zeros((1, size)), np.zeros((1, size)))
-    slots = Quadratic(*(np.concatenate(pair) for pair in zip(window.slots, blank, strict=True)))
+    free = len(precision)
+    slots = Quadratic(*(np.concatenate([field, np.zeros((1, *field.shape[1:]))]) for field in window.slots))
     covariance = np.zeros((len(window.covariance) + free,) * 2)
     covariance[:-free, :-free] = window.covariance
     covariance[-free:, -free:] = np.diag(1.0 / precision)
     return window._replace(
-        accel=accel,
+        accel=np.concatenate([window.accel, np.zeros((1, free))]),
         precision=np.concatenate([window.precision, precision[None]]),
-        step=step,
+        step=np.append(window.step, dt),
         slots=slots,
         covariance=covariance,
     )
@@ -201,41 +181,30 @@ def extend(window: Window, dt: float, precision: Floats) -> Window:
 
 def slide(window: Window) -> Window:
     """Marginalise the oldest pose, at the present estimate."""
-    size, free = len(window.head), len(window.axes)
+    size, free = len(window.head), window.accel.shape[1]
     first = np.concatenate([[0, 1, 2, 6], np.arange(HEAD, size)])
     hessian, gradient = window.prior.hessian.copy(), window.prior.slope(window.head)
     oldest = Quadratic(*(field[0] for field in window.slots))
     hessian[np.ix_(first, first)] += oldest.hessian
     gradient[first] += oldest.slope(window.head[first])
     # the next pose and the acceleration in between, instead of the oldest pose
-    dt, accel = window.step[0], window.accel[0]
+    dt, accel = float(window.step[0]), window.accel[0]
     change = np.eye(size, size + free)
-    change[:3, 3:6] = -dt * np.eye(3)
-    for place, axis in enumerate(window.axes):
-        if axis == TURN:
-            change[6, size + place] = -dt
-        else:
-            change[axis, size + place], change[3 + axis, size + place] = 0.5 * dt**2, -dt
+    back = carry_on(-dt, free)
+    change[:HEAD, :HEAD], change[:HEAD, size:] = back[:, :HEAD], back[:, HEAD:]
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
     steep[size:] += window.precision[0] * accel
     gain = np.linalg.solve(wide[size:, size:], wide[size:, :size]).T
-    head = window.head.copy()
-    head[:3] += dt * head[3:6]
-    moves = window.axes != TURN
-    head[window.axes[moves]] += 0.5 * dt**2 * accel[moves]
-    head[3 + window.axes[moves]] += dt * accel[moves]
-    head[6] += dt * accel[~moves].sum()
     left = wide[:size, :size] - gain @ wide[size:, :size]
+    carry = carry_on(dt, free)
+    head = window.head.copy()
+    head[:HEAD] = carry @ np.concatenate([head[:HEAD], accel])
     prior = Quadratic(0.5 * (left + left.T), steep[:size] - gain @ steep[size:], head)
-    back = np.eye(size + window.accel.size)
-    back[:3, 3:6] = dt * np.eye(3)
-    for place, axis in enumerate(window.axes):
-        if axis == TURN:
-            back[6, size + place] = dt
-        else:
-            back[axis, size + place], back[3 + axis, size + place] = 0.5 * dt**2, dt
-    covariance = back @ window.covariance @ back.T
+    moved = np.concatenate([np.arange(HEAD), np.arange(size, size + free)])
+    covariance = window.covariance.copy()
+    covariance[:HEAD] = carry @ covariance[moved]
+    covariance[:, :HEAD] = covariance[:, moved] @ carry.T
     kept = np.concatenate([np.arange(size), np.arange(size + free, len(covariance))])
     return window._replace(
         head=head,
@@ -248,41 +217,56 @@ def slide(window: Window) -> Window:
     )
 
 
-def solve(window: Window) -> Window:
-    """One Gauss-Newton step on the present quadratics, and the covariance there."""
-    size, features = len(window.head), len(window.head) - HEAD
-    total = size + window.accel.size
-    motion = np.concatenate([np.arange(HEAD), np.arange(size, total)])
-    design = pose_design(window.step, window.axes)
-    place = design @ np.concatenate([window.head[:HEAD], window.accel.ravel()])
-    spot = np.concatenate([place, np.broadcast_to(window.head[HEAD:], (len(place), features))], axis=1)
-    slope, slots = window.slots.slope(spot), window.slots.hessian
-    tall = design.reshape(-1, len(motion))
-    hessian, gradient = np.zeros((total, total)), np.zeros(total)
-    hessian[np.ix_(motion, motion)] = tall.T @ (slots[:, :POSE, :POSE] @ design).reshape(tall.shape)
-    cross = tall.T @ slots[:, :POSE, POSE:].reshape(POSE * len(place), features)
-    hessian[motion, HEAD:size] = cross
-    hessian[HEAD:size, motion] = cross.T
-    hessian[HEAD:size, HEAD:size] = slots[:, POSE:, POSE:].sum(axis=0)
-    gradient[motion] = tall.T @ slope[:, :POSE].ravel()
-    gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
-    hessian[:size, :size] += window.prior.hessian
-    gradient[:size] += window.prior.slope(window.head)
-    for feature, pull, information in zip(*_pulls(window), strict=True):
-        own = slice(HEAD + 3 * feature, HEAD + 3 * feature + 3)
-        hessian[own, own] += information
-        gradient[own] += pull
-    free = window.precision.ravel()
-    at = np.arange(size, total)
-    hessian[at, at] += free
-    gradient[at] += free * window.accel.ravel()
-    covariance = inverse(hessian)
-    change = -covariance @ gradient
+def solve(window: Window, *, spread: bool = True) -> Window:
+    """One Gauss-Newton step on the present quadratics, and the covariance there (the old one, without `spread`)."""
+    size = len(window.head)
+    hessian, gradient = _normal(window)
+    if spread:
+        covariance = inverse(hessian)
+        change = -covariance @ gradient
+    else:
+        covariance, change = window.covariance, -factorise(hessian).solve(gradient)
     return window._replace(
         head=window.head + change[:size],
         accel=window.accel + change[size:].reshape(window.accel.shape),
         covariance=covariance,
     )
+
+
+def _normal(window: Window) -> tuple[Floats, Floats]:
+    """Hessian and gradient of all that is known, by the head and the accelerations."""
+    size, (steps, free) = len(window.head), window.accel.shape
+    place = poses(window)
+    spot = np.concatenate([place, np.broadcast_to(window.head[HEAD:], (len(place), size - HEAD))], axis=1)
+    slope, slots = window.slots.slope(spot), window.slots.hessian
+    hessian, gradient = np.zeros((size + steps * free,) * 2), np.zeros(size + steps * free)
+    # axis by axis: a pose's place along one does not hang on the accelerations along the others
+    along, start = _basis(window), starts(free)
+    back = np.swapaxes(along, 1, 2)
+    inner = back[:, None] @ (np.moveaxis(slots[:, :free, :free], 0, 2)[..., None] * along)
+    inner = np.moveaxis(inner, 2, 0).swapaxes(2, 3)
+    cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape((steps + 2) * free, size - HEAD)
+    pull = (back @ slope[:, :free].T[..., None])[..., 0].T.ravel()
+    many, edge = len(start), 2 * free
+    hessian[start[:, None], start] = inner[:2, :, :2].reshape(edge, edge)[:many, :many]
+    hessian[start, size:] = inner[:2, :, 2:].reshape(edge, steps * free)[:many]
+    hessian[size:, start] = hessian[start, size:].T
+    hessian[size:, size:] = inner[2:, :, 2:].reshape(steps * free, steps * free)
+    hessian[start, HEAD:size], hessian[size:, HEAD:size] = cross[:many], cross[edge:]
+    hessian[HEAD:size, start], hessian[HEAD:size, size:] = cross[:many].T, cross[edge:].T
+    hessian[HEAD:size, HEAD:size] = slots[:, POSE:, POSE:].sum(axis=0)
+    gradient[start], gradient[size:] = pull[:many], pull[edge:]
+    gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
+    hessian[:size, :size] += window.prior.hessian
+    gradient[:size] += window.prior.slope(window.head)
+    for feature, force, information in zip(*_pulls(window), strict=True):
+        own = slice(HEAD + 3 * feature, HEAD + 3 * feature + 3)
+        hessian[own, own] += information
+        gradient[own] += force
+    at = np.arange(size, len(hessian))
+    hessian[at, at] += window.precision.ravel()
+    gradient[at] += (window.precision * window.accel).ravel()
+    return hessian, gradient
 
 
 def _pulls(window: Window) -> tuple[Integers, Floats, Floats]:
@@ -312,19 +296,6 @@ def weigh_holds(window: Window) -> Window:
     log_right = -0.5 * (cavity - holds.aim) ** 2 / spread - 0.5 * np.log(2.0 * np.pi * spread)
     odds = np.clip(holds.log_odds + log_right, -30.0, 30.0)
     return window._replace(holds=holds._replace(probability=1.0 / (1.0 + np.exp(-odds))))
-
-
-def inverse(matrix: Floats) -> Floats:
-    """Of a symmetric positive matrix, scaled to a unit diagonal first; damped where rounding made it indefinite."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-30))
-    scaled = matrix * scale * scale[:, None]
-    for damping in (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3):
-        factor, bad = scipy.linalg.lapack.dpotrf(scaled + damping * np.eye(len(scaled)), lower=1)
-        if not bad:
-            break
-    inside, _ = scipy.linalg.lapack.dpotri(factor, lower=1)
-    full = np.tril(inside) + np.tril(inside, -1).T
-    return np.asarray(full * scale * scale[:, None])
 
 
 def add_feature(window: Window, place: Floats, holds: Holds, ridge: float = 1e-6) -> Window:

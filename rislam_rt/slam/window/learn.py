@@ -10,9 +10,10 @@ from rislam_rt.slam.returns import NONE, TX, Poses
 from rislam_rt.slam.tracks import UNTOLD, Glance
 from rislam_rt.slam.window.book import Book, learn_ratio
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene
-from rislam_rt.slam.window.gauss import HEAD, Window
+from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.panel import Sight, gains, spread_places, weigh
+from rislam_rt.slam.window.steps import HEAD
 
 
 class Sights(NamedTuple):

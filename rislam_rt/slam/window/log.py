@@ -11,8 +11,9 @@ from rislam_rt.slam.returns import linearise
 from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.gauss import POSE, TURN, Quadratic, Window, poses
+from rislam_rt.slam.window.gauss import Quadratic, Window, poses
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.steps import POSE
 
 
 class Log(NamedTuple):
@@ -94,8 +95,7 @@ def residuals(log: Log, window: Window, book: Book, body: Body, heading: Floats,
     distinct, column = unique_forms(every)
     returns = compile_forms(book.rows(distinct))
     linear = linearise(returns, features, book.anchor, ends)
-    turns = TURN in window.axes or window.prior.hessian[6, 6] < 1e11
-    by_heading = linear.by_heading(ends, place[:, :3]) if turns else None
+    by_heading = linear.by_heading(ends, place[:, :3]) if window.turns else None
     count, size = len(rows), POSE + features.size
 
     def pick(at: Integers, which: Integers) -> tuple[Floats, Floats]:

@@ -14,9 +14,10 @@ from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance
 from rislam_rt.slam.window import gauss
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, cluster, expect
-from rislam_rt.slam.window.gauss import HEAD, Window
+from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.learn import Sights, recall, visible
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.steps import HEAD
 
 
 class Look(NamedTuple):

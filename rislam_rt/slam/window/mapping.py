@@ -12,8 +12,9 @@ from rislam_rt.slam.moments import even_draws, poses_of, square_root
 from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window import gauss
 from rislam_rt.slam.window.book import Book, image_ident
-from rislam_rt.slam.window.filter import WindowState, init
-from rislam_rt.slam.window.gauss import HEAD
+from rislam_rt.slam.window.filter import init
+from rislam_rt.slam.window.state import WindowState
+from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.suspect import find_suspect
 
 
@@ -73,7 +74,7 @@ def revisit(
     features = mean[HEAD:].reshape(-1, 3)
     spread = covariance[HEAD:, HEAD:] + shift_covariance(features, state.book, state.shift)
     std = np.concatenate([np.maximum(fresh.shift, 1e-5), np.sqrt(np.diag(fresh.window.covariance))[3:HEAD]])
-    window = gauss.begin_with(start.position, start.velocity, fresh.window.axes, std, mean[HEAD:], spread)
+    window = gauss.begin_with(start.position, start.velocity, std, mean[HEAD:], spread, turns=fresh.window.turns)
     book = state.book._replace(hidden=np.zeros(state.book.hidden.shape))
     return fresh._replace(window=window, book=book, shift=np.zeros(3))
 

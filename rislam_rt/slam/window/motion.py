@@ -6,6 +6,8 @@ propagation, Minka 2001) gives each level a likelihood; forward-backward gives i
 is the step's prior in the next solution.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from rislam_rt.arrays import Floats
@@ -21,6 +23,7 @@ def first_gait(sigma_a: float) -> Floats:
     return np.asarray(weight / weight.sum())
 
 
+@lru_cache(maxsize=4)
 def transition(stay: float) -> Floats:
     """(L, L): a step is as lively as the one before, or else more often a little different than much."""
     count = len(LADDER)
@@ -45,22 +48,28 @@ def log_likelihood(accel: Floats, spread: Floats, precision: Floats) -> Floats:
     return np.asarray(0.5 * (gain - np.log(total)).sum(axis=-1))
 
 
+def forward(before: Floats, log_like: Floats, stay: float) -> Floats:
+    """Probabilities (N, L) of the levels of N chains after one more step with log likelihoods (N, L)."""
+    message = (before @ transition(stay)) * np.exp(log_like - log_like.max(axis=1, keepdims=True))
+    return np.asarray(message / message.sum(axis=1, keepdims=True))
+
+
 def smooth(before: Floats, log_like: Floats, stay: float) -> tuple[Floats, Floats]:
-    """Posterior probabilities (K, L) of the levels, and those filtered forward (K, L)."""
-    move = transition(stay)
-    like = np.exp(log_like - log_like.max(axis=1, keepdims=True))
-    count = len(like)
-    forward, back = np.empty(like.shape), np.ones(like.shape)
-    message = before
+    """Posterior probabilities (N, K, L) of the levels of N chains, and the last step's (N, L), filtered."""
+    move, (chains, count, levels) = transition(stay), log_like.shape
+    like = np.exp(log_like - log_like.max(axis=2, keepdims=True))
+    # all chains at once, forward and backward: what comes in, and what goes on with each step's own likelihood
+    ways = np.concatenate([np.tile(move, (chains, 1, 1)), np.tile(move.T, (chains, 1, 1))])
+    both = np.concatenate([like, like[:, ::-1]]).swapaxes(0, 1)[:, :, None]
+    coming, message = np.empty((count, 2 * chains, 1, levels)), np.ones((2 * chains, 1, levels))
+    message[:chains, 0] = before
     for row in range(count):
-        message = (message @ move) * like[row]
-        message = message / message.sum()
-        forward[row] = message
-    for row in range(count - 2, -1, -1):
-        message = move @ (like[row + 1] * back[row + 1])
-        back[row] = message / message.sum()
-    posterior = forward * back
-    return posterior / posterior.sum(axis=1, keepdims=True), forward
+        coming[row] = message @ ways
+        message = coming[row] * both[row]
+        message /= message.sum(axis=2, keepdims=True)
+    ahead, back = coming[:, :chains, 0], coming[::-1, chains:, 0]
+    posterior = np.swapaxes(ahead * like.swapaxes(0, 1) * back, 0, 1)
+    return posterior / posterior.sum(axis=2, keepdims=True), message[:chains, 0]
 
 
 def expected_precision(posterior: Floats) -> Floats:

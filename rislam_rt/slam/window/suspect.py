@@ -3,16 +3,16 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.model import RisCode, Suspect
+from rislam_rt.model import PanelCandidate, RisCode
 from rislam_rt.slam.moments import even_draws
 from rislam_rt.slam.returns import Poses, reflect
 from rislam_rt.slam.suspect import DEEP, DISMISSAL, PATIENCE, places
 from rislam_rt.slam.tracks import OTHER
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.expect import Scene
-from rislam_rt.slam.window.gauss import HEAD
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.panel import DRAWS, Sight, gains, weigh
+from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.tracks import Tracks
 
 LOG_FEW = np.log(LEVELS.panels)
@@ -37,7 +37,9 @@ def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: Scene, code: R
     return tracks._replace(**tracks.identity.put(rows, fresh)._asdict())
 
 
-def find_suspect(tracks: Tracks, book: Book, mean: Floats, cycle: int, poses: Poses, panel: int = 0) -> Suspect | None:
+def find_suspect(
+    tracks: Tracks, book: Book, mean: Floats, cycle: int, poses: Poses, panel: int = 0
+) -> PanelCandidate | None:
     """The point or track that is the likeliest to be a panel; None if nothing is likelier the panel than not.
 
     A track that seems to come from behind a wall may be the panel over that wall: aiming there would miss it.
@@ -60,5 +62,5 @@ def find_suspect(tracks: Tracks, book: Book, mean: Floats, cycle: int, poses: Po
         return None
     best = int(np.argmax(odds))
     if best < len(points):
-        return Suspect(features[points[best]], int(book.hits[points[best]]), panel)
-    return Suspect(spots[best - len(points)], int(tracks.hits[rows[best - len(points)]]), panel)
+        return PanelCandidate(features[points[best]], int(book.hits[points[best]]), panel)
+    return PanelCandidate(spots[best - len(points)], int(tracks.hits[rows[best - len(points)]]), panel)

@@ -11,7 +11,7 @@ from rislam_rt.pipeline.run import Progress
 from rislam_rt.slam.classify import Network
 from rislam_rt.studies.classifier.gather import Examples
 from rislam_rt.studies.classifier.score import (
-    Score,
+    ClassifierScore,
     f1,
     importance,
     mean_over_rooms,
@@ -31,7 +31,7 @@ class Training(NamedTuple):
 
     network: Network
     sets: Sets
-    scores: dict[str, dict[str, Score]]
+    scores: dict[str, dict[str, ClassifierScore]]
     """By named room (and `ALL`, `DRAWN`, `RANDOM`), by rule."""
     mean: dict[str, Floats]
     """Mean (3,) over the test rooms' F1 with its interval, by rule."""

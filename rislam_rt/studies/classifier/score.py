@@ -23,7 +23,7 @@ Rule = Callable[[Examples], Booleans]
 """Which examples are kept."""
 
 
-class Score(NamedTuple):
+class ClassifierScore(NamedTuple):
     """Of one rule on one set of examples; clutter counts in `clutter_kept` alone."""
 
     f1: float
@@ -60,7 +60,7 @@ def odds_over_life(examples: Examples, network: Network) -> Floats:
     return found
 
 
-def score(examples: Examples, rule: Rule, coverage: float, *, rng: np.random.Generator) -> Score:
+def score(examples: Examples, rule: Rule, coverage: float, *, rng: np.random.Generator) -> ClassifierScore:
     """F1 with its interval by resampling walks, which are independent of each other as single cycles are not."""
     kept = rule(examples)
     labelled, tables = examples.labelled, _tables(examples, kept)
@@ -69,7 +69,7 @@ def score(examples: Examples, rule: Rule, coverage: float, *, rng: np.random.Gen
     low, high = np.percentile(_f1(tables[draws].sum(axis=1)), [tail, 100.0 - tail])
     hit, false, missed, right = tables.sum(axis=0)
     clutter = kept[~labelled]
-    return Score(
+    return ClassifierScore(
         float(_f1(tables.sum(axis=0)[None])[0]),
         float(low),
         float(high),

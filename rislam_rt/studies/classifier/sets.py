@@ -13,9 +13,9 @@ from rislam_rt.model import RadioConfig, Scene, Trajectory
 from rislam_rt.pipeline.run import Progress, build_channel
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.scene.random_rooms import draw_room
+from rislam_rt.scene.random_rooms.box_rooms import random_room
 from rislam_rt.studies.classifier.codes import AIMED, POLICIES, set_codes
 from rislam_rt.studies.classifier.gather import Examples, gather_walk, join
-from rislam_rt.studies.classifier.random_rooms import random_room
 from rislam_rt.studies.classifier.spec import LEARNT_FIRST, ClassifierSpec, build_receiver
 from rislam_rt.studies.classifier.walks import random_walk
 

@@ -9,7 +9,7 @@ from rislam_rt.pipeline.specification.radio import RadioSection
 from rislam_rt.pipeline.specification.section import Count, Positive, Section
 from rislam_rt.pipeline.specification.spec import ReceiverSection
 from rislam_rt.scene.random_rooms import CYCLES
-from rislam_rt.studies.spec import RoomSection, StudySpec
+from rislam_rt.studies.spec import ComparedRoomSection, StudySpec
 
 LEARNT_FIRST = 1_000_000
 """Drawn rooms from this number on are learnt from; those below it never are."""
@@ -28,7 +28,7 @@ def build_receiver(section: ReceiverSection) -> ReceiverConfig:
     return ReceiverConfig(**section.model_dump())
 
 
-class TestedRoom(RoomSection):
+class TestedRoom(ComparedRoomSection):
     """One room, for testing alone; `picture` has no meaning here."""
 
     depth: Annotated[int, Field(ge=0, le=4)] = 2

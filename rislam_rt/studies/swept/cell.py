@@ -10,7 +10,7 @@ import numpy as np
 
 from rislam_rt.measurement import paper_snr_db
 from rislam_rt.model import SlamResult
-from rislam_rt.pipeline.run import Stage, prepare_channel, result_of, run_scheme, set_stage
+from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, result_of, run_scheme
 from rislam_rt.pipeline.scores.summary import summarise_scheme
 from rislam_rt.pipeline.specification.read import Table, build_spec
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
@@ -30,7 +30,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     spec = cell_spec(settings)
     prepare_channel(spec.channel)
     scene = load_scene(Path(settings["beside"]) / str(settings["scene"]))
-    stage = set_stage(scene, spec, rng=np.random.default_rng(seed))
+    stage = prepare_setup(scene, spec, rng=np.random.default_rng(seed))
     schemes: dict[str, Any] = {}
     timing: dict[str, Any] = {"trace_seconds": stage.seconds}
     for name in spec.schemes:
@@ -66,7 +66,7 @@ def _scores(result: SlamResult, name: str) -> dict[str, Any]:
     return summarise_scheme(result, result.schemes[name])
 
 
-def _paper_snr(stage: Stage, spec: PipelineSpec) -> float:
+def _paper_snr(stage: RunSetup, spec: PipelineSpec) -> float:
     """SNR [dB] as the paper has it, of the mean power at some twenty places of the way, panel at level 0."""
     settings, rows = build_settings(spec), np.arange(len(stage.scene.agent))
     rows = rows[:: max(1, len(rows) // 20)]

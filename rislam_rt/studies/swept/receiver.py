@@ -14,7 +14,7 @@ from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.measurement import FrontEnd, measure
 from rislam_rt.model import PathKind, Paths, Trajectory
 from rislam_rt.pipeline.room.front_end import prepare_front_end
-from rislam_rt.pipeline.run import prepare_channel, set_stage
+from rislam_rt.pipeline.run import prepare_channel, prepare_setup
 from rislam_rt.pipeline.signals import panel_codes
 from rislam_rt.pipeline.specification.spec import Settings, build_settings
 from rislam_rt.ris import rephase
@@ -33,7 +33,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     begin, spec = process_time(), cell_spec(settings)
     prepare_channel(spec.channel)
     scene = load_scene(Path(settings["beside"]) / str(settings["scene"]))
-    stage = set_stage(scene, spec, rng=np.random.default_rng(seed))
+    stage = prepare_setup(scene, spec, rng=np.random.default_rng(seed))
     made, motion = build_settings(spec), stage.scene.agent
     build = np.random.default_rng(stage.seeds.hardware)
     front_end = prepare_front_end(stage.paths, motion, stage.body, made, rng=build)

@@ -11,7 +11,7 @@ import numpy as np
 
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.recordings.replay import Recorder
-from rislam_rt.pipeline.run import Stage, prepare_channel, run_scheme, set_stage
+from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, run_scheme
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.scene.random_rooms import RandomRoom, draw_room
@@ -36,10 +36,10 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     """
     spec = cell_spec(settings)
     prepare_channel(spec.channel)
-    room, stage = find_stage(int(settings["room"]), trace_key(spec))
+    room, stage = find_setup(int(settings["room"]), trace_key(spec))
     schemes: dict[str, Any] = {}
     timing: dict[str, Any] = {"trace_seconds": stage.seconds}
-    keep = Keep(str(settings.get("save", "nothing")), Path(settings.get("data", ".")), cell_label(settings))
+    keep = KeptOutputs(str(settings.get("save", "nothing")), Path(settings.get("data", ".")), cell_label(settings))
     for asked in spec.schemes:
         try:
             schemes[asked], timing[asked] = _run(scheme_here(asked, room), stage, spec, room_traits(room), keep)
@@ -48,7 +48,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     return {"traits": room_traits(room), "schemes": schemes, "timing": timing}
 
 
-class Keep(NamedTuple):
+class KeptOutputs(NamedTuple):
     """What is left of a run beside its scores."""
 
     what: str
@@ -59,7 +59,7 @@ class Keep(NamedTuple):
 
 
 def _run(
-    name: str, stage: Stage, spec: PipelineSpec, traits: Mapping[str, Any], keep: Keep
+    name: str, stage: RunSetup, spec: PipelineSpec, traits: Mapping[str, Any], keep: KeptOutputs
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Scores and times of one scheme."""
     recorder = Recorder(ESTIMATORS[SCHEMES[name].estimator])
@@ -99,11 +99,11 @@ def trace_key(spec: PipelineSpec) -> str:
 
 
 @lru_cache(maxsize=2)
-def find_stage(seed: int, key: str) -> tuple[RandomRoom, Stage]:
+def find_setup(seed: int, key: str) -> tuple[RandomRoom, RunSetup]:
     """A room, its true motion and its paths; the last ones are kept, as cells of one room follow each other."""
     spec = PipelineSpec.model_validate({**json.loads(key), "name": "trace", "schemes": ["no_ris"]})
     room = draw_room(seed)
-    return room, set_stage(room.scene, spec, rng=np.random.default_rng(seed))
+    return room, prepare_setup(room.scene, spec, rng=np.random.default_rng(seed))
 
 
 def room_traits(room: RandomRoom) -> dict[str, Any]:

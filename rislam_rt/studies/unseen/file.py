@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rislam_rt.errors import RislamError, StoreError
-from rislam_rt.pipeline.dataset import Entry, read_dataset, told, write_dataset
+from rislam_rt.pipeline.dataset import Entry, attributes_of, read_dataset, write_dataset
 from rislam_rt.pipeline.recordings.inputs import Inputs, dataset_to_inputs, inputs_to_dataset
 from rislam_rt.studies.unseen.truth import Truth
 
@@ -89,7 +89,7 @@ def recording_to_dataset(recording: Recording) -> "xr.Dataset":
     for name, entry in TRUTH.items():
         value = getattr(truth, name)
         plain = value.astype(np.int8) if value.dtype == np.bool_ else value
-        content[f"true_{name}"] = (entry[0], plain, told(entry))
+        content[f"true_{name}"] = (entry[0], plain, attributes_of(entry))
     return data.assign(content)
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from rislam_rt.model import RisCode, Scene, SchemeResult
 from rislam_rt.pipeline.dataset import write_dataset
-from rislam_rt.pipeline.run import Stage
+from rislam_rt.pipeline.run import RunSetup
+from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.pipeline.signals import SignalsSpec, build_signals
 from rislam_rt.pipeline.specification.spec import PipelineSpec
-from rislam_rt.pipeline.walk import without_panel
 from rislam_rt.ris import rephase
 from rislam_rt.scene import write_scene
 from rislam_rt.studies.unseen.file import Recording, write_recording
@@ -44,7 +44,7 @@ def save_room(scene: Scene, traits: Mapping[str, Any], folder: Path) -> None:
 
 
 def save_signals(
-    stage: Stage, result: SchemeResult, spec: PipelineSpec, traits: Mapping[str, Any], folder: Path, label: str
+    stage: RunSetup, result: SchemeResult, spec: PipelineSpec, traits: Mapping[str, Any], folder: Path, label: str
 ) -> None:
     """Samples of the received signal under the codes that were applied, as `<room>/<label>_signals.nc`.
 

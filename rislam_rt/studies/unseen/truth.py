@@ -10,7 +10,7 @@ from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.information import posterior_bound
 from rislam_rt.model import PathKind, Paths, Scene, SchemeResult
-from rislam_rt.pipeline.scores.bound import bound_problem, position_rms, wall_surface
+from rislam_rt.pipeline.scores.bound import bound_problem
 from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings, build_settings
 
 
@@ -89,7 +89,7 @@ def run_bounds(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineS
     told = problem.motion.acceleration
     motion = replace(problem.motion, acceleration=float(np.sqrt(np.mean(push**2))) if len(push) else told)
     found = [
-        position_rms(posterior_bound(problem.rows, time, law, problem.unknown_std).agent, axes)
+        posterior_bound(problem.rows, time, law, problem.unknown_std).rms
         for law in (motion, replace(motion, start_position=0.0))
     ]
     return found[0], found[1]
@@ -137,7 +137,7 @@ def _surfaces(walls: Walls, group: Integers) -> tuple[Floats, Floats, Floats]:
     merged = replace(walls, wall_of_triangle=group[walls.wall_of_triangle])
     for number in range(count):
         normal[number] = walls.normal[int(np.argmax(group == number))]
-        middle[number], weight = wall_surface(merged, number)
+        middle[number], weight = merged.surface(number)
         corner: Any = walls.triangles[merged.wall_of_triangle == number] - middle[number]
         total = corner.sum(axis=1)
         square = np.einsum("tci,tcj->tij", corner, corner) + np.einsum("ti,tj->tij", total, total)

@@ -12,7 +12,7 @@ from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.errors import TraceError
 from rislam_rt.model import RadioConfig
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.rooms import ROOMS
+from rislam_rt.scene.built_in_rooms import ROOMS
 from rislam_rt.scene.xml import scene_of_xml, sionna_scenes, write_xml
 
 RADIO = RadioConfig()
@@ -24,7 +24,7 @@ def as_written(name: str, folder: Path):
     write_xml(room, folder)
     (folder / "scene.toml").unlink()
     read, _ = scene_of_xml(folder / "scene.xml", name)
-    return replace(read, scatterers=room.scatterers, shades=room.shades, agent=room.agent)
+    return replace(read, scatterers=room.scatterers, occluders=room.occluders, agent=room.agent)
 
 
 def round_trip(scene, file: Path, poses: int, depth: int = 2):

@@ -14,7 +14,7 @@ RADIO = RadioConfig()
 
 def test_switches_off_add_nothing(rooms):
     channel, trajectory = TracedChannel(rooms.paper(), RADIO, 1), rooms.at([1.3, 2.1, 0.8])
-    extras = channel.extra_paths(trajectory, DiffuseConfig())
+    extras = channel.diffuse_paths(trajectory, DiffuseConfig())
     assert len(extras) == 0
     assert extras.source == "traced, no analytic twin"
 

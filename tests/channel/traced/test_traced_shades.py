@@ -9,7 +9,7 @@ import pytest
 from rislam_rt.channel.compare.match import named_identity
 from rislam_rt.channel.traced import TracedChannel
 from rislam_rt.channel.traced.gradient import length_gradients
-from rislam_rt.model import PathKind, RadioConfig, Shade
+from rislam_rt.model import Occluder, PathKind, RadioConfig
 from rislam_rt.scene.solids import sphere_mesh
 
 RADIO = RadioConfig()
@@ -22,7 +22,7 @@ def rooms_and_paths(rooms):
     bare = rooms.paper()
     other = replace(bare.scatterers[0], name="other", position=np.array([4.5, 3.5, 1.4]))
     bare = replace(bare, scatterers=(bare.scatterers[0], other))
-    shade = Shade(*sphere_mesh(bare.scatterers[0].position, RADIUS))
+    shade = Occluder(*sphere_mesh(bare.scatterers[0].position, RADIUS))
     dark = replace(bare, scatterers=(replace(bare.scatterers[0], shade=shade), other))
     trajectory = rooms.at([[1.3, 2.1, 0.8], [0.8, 0.5, 1.1], [3.1, 1.2, 0.9], [2.1, 0.4, 2.2]])
     return [(scene, TracedChannel(scene, RADIO, 2).paths(trajectory)) for scene in (bare, dark)], trajectory

@@ -10,7 +10,7 @@ from rislam_rt.measurement import Clutter, ReceiverConfig, measure
 from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.long import slices
-from rislam_rt.pipeline.run import run_scheme, set_stage
+from rislam_rt.pipeline.run import prepare_setup, run_scheme
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import find_pipeline
 
@@ -21,7 +21,7 @@ ROUGH = ["cycles=6", "depth=1", "schemes=['optimized']", "room.scattering=0.3", 
 @pytest.fixture(scope="module")
 def stage():
     spec = load_spec(PIPELINE, ROUGH)
-    return set_stage(load_scene("paper_room"), spec, rng=np.random.default_rng(7)), spec
+    return prepare_setup(load_scene("paper_room"), spec, rng=np.random.default_rng(7)), spec
 
 
 def lead(stage, spec):
@@ -41,7 +41,7 @@ def test_what_walls_scatter_is_heard_and_has_no_name(stage):
 def test_rough_walls_reflect_less(stage):
     rough, _ = stage
     smooth = load_spec(PIPELINE, ROUGH[:3])
-    plain = set_stage(load_scene("paper_room"), smooth, rng=np.random.default_rng(7))
+    plain = prepare_setup(load_scene("paper_room"), smooth, rng=np.random.default_rng(7))
     bounces = (plain.paths.tx_walls >= 0).sum(axis=1) + (plain.paths.rx_walls >= 0).sum(axis=1)
     np.testing.assert_allclose(
         np.abs(rough.paths.gain), np.abs(plain.paths.gain) * np.sqrt(1.0 - 0.09) ** bounces, rtol=2e-6
@@ -97,4 +97,4 @@ def test_every_receiver_hears_it(stage, estimator):
 def test_what_nobody_could_trace_is_refused(settings, words):
     spec = load_spec(PIPELINE, ["cycles=2", *settings])
     with pytest.raises(ConfigError, match=words):
-        set_stage(load_scene("paper_room"), spec, rng=np.random.default_rng(7))
+        prepare_setup(load_scene("paper_room"), spec, rng=np.random.default_rng(7))

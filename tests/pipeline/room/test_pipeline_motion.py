@@ -10,7 +10,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.room.motion import CLEARANCE, draw_motion, draw_walks
-from rislam_rt.pipeline.run import cut_scene, set_stage
+from rislam_rt.pipeline.run import cut_scene, prepare_setup
 from rislam_rt.pipeline.specification.spec import build_settings
 
 PIPELINE = Path(__file__).parents[3] / "pipelines" / "trace_then_slam.toml"
@@ -55,11 +55,11 @@ def test_too_much_acceleration_for_the_room_is_refused(room):
 
 def test_every_seed_has_a_motion_of_its_own_and_keeps_it(room):
     spec = load_spec(PIPELINE, ["channel=image_source", "cycles=20", "depth=0", "motion.sigma_a_m_s2=0.1"])
-    one, again, other = (set_stage(room, spec, rng=np.random.default_rng(seed)) for seed in (1, 1, 2))
+    one, again, other = (prepare_setup(room, spec, rng=np.random.default_rng(seed)) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one.scene.agent.position, again.scene.agent.position)
     np.testing.assert_array_equal(one.paths.tau, again.paths.tau)
     assert (one.scene.agent.position != other.scene.agent.position).any()
-    still = set_stage(
+    still = prepare_setup(
         room, spec.model_copy(update={"motion": load_spec(PIPELINE).motion}), rng=np.random.default_rng(1)
     )
     np.testing.assert_array_equal(still.scene.agent.position, cut_scene(room, 20).agent.position)

@@ -10,7 +10,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.room.scene_overrides import ABOVE, APART, OFF_WALLS, change_room
-from rislam_rt.pipeline.run import check_run, set_stage
+from rislam_rt.pipeline.run import check_run, prepare_setup
 from rislam_rt.pipeline.specification.spec import RoomSection
 from rislam_rt.scene import load_scene
 
@@ -63,7 +63,7 @@ def test_the_run_goes_on_in_the_changed_room(room):
     spec = load_spec(
         PIPELINE, ["channel=image_source", "cycles=3", "depth=0", "room.panel_rows=4", "room.scatterers=3"]
     )
-    stage = set_stage(room, spec, rng=np.random.default_rng(1))
+    stage = prepare_setup(room, spec, rng=np.random.default_rng(1))
     assert stage.paths.landmarks == stage.scene.landmarks
     assert len(stage.scene.landmarks) == 4
     assert stage.paths.ris.tx.shape[2:] == (4, 6)

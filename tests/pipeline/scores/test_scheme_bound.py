@@ -7,23 +7,25 @@ import pytest
 from scipy.stats import ncx2
 
 from rislam_rt.channel.walls import build_walls
-from rislam_rt.information import MotionPrior, build_landmark_model, plane_tangents, posterior_bound
-from rislam_rt.information.landmark_model import LinearMeasurements
+from rislam_rt.information import (
+    MotionPrior,
+    assumed_std,
+    build_landmark_model,
+    heard_paths,
+    plane_tangents,
+    posterior_bound,
+)
+from rislam_rt.information.prior import FLOOR_TILT, UPRIGHT_TILT
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.run import set_stage
+from rislam_rt.pipeline.run import prepare_setup
+from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.pipeline.scores.bound import (
-    FLOOR_TILT,
-    UPRIGHT_TILT,
-    fewer_rows,
-    heard_paths,
     over_distortion,
-    prior_std,
     scheme_bound,
 )
 from rislam_rt.pipeline.scores.summary import map_score, summarise
 from rislam_rt.pipeline.specification.spec import build_settings
-from rislam_rt.pipeline.walk import without_panel
 
 PIPELINE = Path(__file__).parents[3] / "pipelines" / "trace_then_slam.toml"
 SHORT = ["channel=image_source", "cycles=40", "depth=1"]
@@ -33,7 +35,7 @@ SEEN = "radio.reference_snr_db=60.0"
 
 @pytest.fixture(scope="module")
 def stage(room):
-    return set_stage(room, load_spec(PIPELINE, SHORT), rng=np.random.default_rng(1))
+    return prepare_setup(room, load_spec(PIPELINE, SHORT), rng=np.random.default_rng(1))
 
 
 def bound(stage, scheme, *settings, gain=None):
@@ -51,7 +53,7 @@ def test_it_is_the_recursion_over_all_paths_times_their_detection_probability(st
     model = build_landmark_model(
         stage.paths.with_gain(gain), motion, stage.scene.landmark_positions, walls.normal, walls.offset, settings.radio
     )
-    beforehand = prior_std(model, stage.scene, upright=False)
+    beforehand = assumed_std(model, float(stage.scene.agent.position[:, 2].min()), upright=False)
     expected = posterior_bound(model.rows(1e-6), motion.time, MotionPrior(), beforehand).rms
     # the table of probabilities has steps of 0.1 dB, and paths of less than 1e-3 in SNR are left out
     np.testing.assert_allclose(bound(stage, "random"), expected, rtol=2e-3)
@@ -120,7 +122,7 @@ def test_what_the_filter_takes_for_granted_is_in_the_bound(stage):
         build_settings(load_spec(PIPELINE, SHORT)).radio,
     )  # fmt: skip
     for upright in (False, True):
-        std = prior_std(model, stage.scene, upright=upright)
+        std = assumed_std(model, float(stage.scene.agent.position[:, 2].min()), upright=upright)
         tilts = {w: std[model.wall_column[n] + np.arange(2)] for n, w in enumerate(walls.names)}
         np.testing.assert_array_equal(tilts["floor"], FLOOR_TILT)
         np.testing.assert_array_equal(tilts["ceiling"], 0.5)
@@ -147,19 +149,6 @@ def test_landmarks_and_walls_have_bounds_where_they_are_heard(stage):
         assert loud.walls[name].distance < quiet.walls[name].distance
     assert all(loud.landmarks[name] < quiet.landmarks.get(name, np.inf) for name in loud.landmarks)
     assert (dict(silent.landmarks), dict(silent.walls)) == ({}, {})
-
-
-def test_fewer_rows_hold_the_same_information():
-    rng = np.random.default_rng(2)
-    rows = LinearMeasurements(rng.standard_normal((50, 3)), rng.standard_normal((50, 4)), rng.uniform(0.1, 2.0, 50))
-    short = fewer_rows(rows)
-    assert len(short.information) == 7
-    for first, second in ((rows, short), (rows, fewer_rows(short))):
-        matrices = [
-            (m := np.concatenate([r.agent, r.unknown], axis=1)).T @ (r.information[:, None] * m)
-            for r in (first, second)
-        ]
-        np.testing.assert_allclose(*matrices, atol=1e-12)
 
 
 def test_summary_holds_the_bound_and_the_map_score(short_result):

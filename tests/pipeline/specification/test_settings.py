@@ -60,7 +60,7 @@ def test_one_setting_is_found_by_its_last_name() -> None:
     assert explain(list(SETTINGS.values()), "name").key == "name"
     with pytest.raises(ConfigError, match=r"give one of slam\.sigma_a"):
         explain(list(SETTINGS.values()), "sigma_a")
-    with pytest.raises(ConfigError, match=r"did you mean radio\.carrier_ghz"):
+    with pytest.raises(ConfigError, match=r"did you mean 'radio\.carrier_ghz'"):
         explain(list(SETTINGS.values()), "carier_ghz")
 
 

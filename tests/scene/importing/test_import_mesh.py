@@ -47,7 +47,7 @@ def test_every_format_gives_the_same_room(
     assert len(by_name["floor"].faces) <= 3  # of 8; the cabinet touches its edge in a corner
     # the cabinet stands on the floor and at the wall: four of its faces are left; the table has two that are wide
     assert [len(build_walls(_only(scene, name))) for name in ("cabinet", "table_top")] == [4, 2]
-    assert "column_clutter" in [shade.name for shade in scene.shades]
+    assert "column_clutter" in [shade.name for shade in scene.occluders]
     assert scene.ris is not None
     assert scene.ris.host == "ceiling"
 
@@ -55,13 +55,13 @@ def test_every_format_gives_the_same_room(
 def _only(scene: Scene, name: str) -> Scene:
     from dataclasses import replace
 
-    return replace(scene, reflectors=tuple(r for r in scene.reflectors if r.name == name), shades=(), ris=None)
+    return replace(scene, reflectors=tuple(r for r in scene.reflectors if r.name == name), occluders=(), ris=None)
 
 
 def test_a_cylinder_keeps_its_shadow_or_becomes_planes(mesh_file: Callable[..., Path]) -> None:
     file = mesh_file(".glb", 1.0, "y")
     shading, remarks = imported(file)
-    shade = next(s for s in shading.shades if s.name == "column_clutter")
+    shade = next(s for s in shading.occluders if s.name == "column_clutter")
     girth = np.unique(np.round(shade.vertices[:, :2], 9), axis=0)
     angle = np.argsort(np.arctan2(*(girth - girth.mean(axis=0)).T))
     around = np.linalg.norm(np.diff(girth[np.append(angle, angle[0])], axis=0), axis=1).sum()

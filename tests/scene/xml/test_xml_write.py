@@ -10,7 +10,7 @@ from rislam_rt.cli.new import is_xml
 from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.model import Material
 from rislam_rt.scene import check_scene, load_scene
-from rislam_rt.scene.rooms import ROOMS
+from rislam_rt.scene.built_in_rooms import ROOMS
 from rislam_rt.scene.xml import new_from_xml, read_xml, write_xml
 
 
@@ -18,7 +18,7 @@ def same(a, b) -> bool:
     """Whether two rooms are one, but for their names."""
     meshes = all(
         np.array_equal(x.vertices, y.vertices) and np.array_equal(x.faces, y.faces)
-        for x, y in zip((*a.reflectors, *a.shades), (*b.reflectors, *b.shades), strict=True)
+        for x, y in zip((*a.reflectors, *a.occluders), (*b.reflectors, *b.occluders), strict=True)
     )
     walls = [(r.name, r.material) for r in a.reflectors] == [(r.name, r.material) for r in b.reflectors]
     agent = np.abs(a.agent.tx - b.agent.tx).max() < 1e-8 and np.array_equal(
@@ -64,7 +64,7 @@ def test_own_materials_and_shades_come_back(tmp_path):
     own = Material(permittivity=4.5, conductivity=0.05, thickness=0.07, scattering=0.25)
     shade = replace(room.scatterers[0].shade, name="screen")
     changed = replace(room.reflectors[0], material=own)
-    write_xml(replace(room, reflectors=(changed, *room.reflectors[1:]), shades=(shade,)), tmp_path / "out")
+    write_xml(replace(room, reflectors=(changed, *room.reflectors[1:]), occluders=(shade,)), tmp_path / "out")
     (tmp_path / "out" / "scene.toml").unlink()
     parts = {part.name: part.material for part in read_xml(tmp_path / "out" / "scene.xml").parts}
     assert parts[changed.name] == own

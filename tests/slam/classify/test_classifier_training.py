@@ -7,10 +7,10 @@ import pytest
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind
+from rislam_rt.scene.random_rooms.box_rooms import random_room
 from rislam_rt.slam.classify import FEATURES, Network, blend, classify
 from rislam_rt.studies import ClassifierSpec, load_any
 from rislam_rt.studies.classifier.gather import CLUTTER, OVER_RX, OVER_TX, Examples
-from rislam_rt.studies.classifier.random_rooms import random_room
 from rislam_rt.studies.classifier.run import balance
 from rislam_rt.studies.classifier.score import (
     by_value,

@@ -10,7 +10,7 @@ from rislam_rt import slam
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import ReceiverConfig, measure, with_reference_snr
 from rislam_rt.model import RadioConfig, SensorModel
-from rislam_rt.pipeline.walk import without_panel
+from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam.window import gauss, motion
-from rislam_rt.slam.window.gauss import HEAD, POSE, Holds, Quadratic
+from rislam_rt.slam.window.gauss import Holds, Quadratic
+from rislam_rt.slam.window.steps import HEAD, POSE
 
 DT, CYCLES, SIGMA_A = 0.1, 12, 0.5
 
@@ -18,7 +19,7 @@ def _sighting(rng):
 
 def _filtered(sightings, start, std, keep):
     """The window's answer, at most `keep` poses long."""
-    window = gauss.begin(start[:3], start[3:6], np.arange(3), std)
+    window = gauss.begin(start[:3], start[3:6], std)
     nothing = Holds(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), *(np.zeros(0) for _ in range(4)))
     window = gauss.add_feature(window, np.ones(3), nothing, ridge=1.0)
     for cycle, (rows, value, weight) in enumerate(sightings):
@@ -82,7 +83,7 @@ def test_a_linear_window_is_the_batch_and_loses_nothing_when_it_slides(keep):
 
 def test_a_belief_about_a_wall_gives_way_to_what_contradicts_it():
     rng = np.random.default_rng(4)
-    window = gauss.begin(np.zeros(3), np.zeros(3), np.arange(3), np.full(7, 1e-3))
+    window = gauss.begin(np.zeros(3), np.zeros(3), np.full(7, 1e-3))
     hold = Holds(
         np.zeros(1, dtype=np.int64), np.array([[0.0, 0.0, 1.0]]), np.zeros(1), np.full(1, 0.05),
         np.array([np.log(9.0) + np.log(5.0)]), np.full(1, 0.5),
@@ -113,9 +114,14 @@ def test_levels_of_acceleration_are_those_of_all_sequences_weighed():
             weight *= move[path[step - 1], path[step]] * np.exp(log_like[step, path[step]])
         for step in range(4):
             total[step, path[step]] += weight
-    posterior, forward = motion.smooth(before, log_like, 0.9)
+    (posterior,), (forward,) = motion.smooth(before[None], log_like[None], 0.9)
     np.testing.assert_allclose(posterior, total / total.sum(axis=1, keepdims=True), rtol=1e-10)
-    np.testing.assert_allclose(forward[-1], posterior[-1], rtol=1e-10)
+    np.testing.assert_allclose(forward, posterior[-1], rtol=1e-10)
+    # one step at a time, the last step's are the same
+    message = before[None]
+    for like in log_like:
+        message = motion.forward(message, like[None], 0.9)
+    np.testing.assert_allclose(message[0], forward, rtol=1e-10)
 
 
 def test_the_likelihood_of_a_level_is_that_of_the_measured_acceleration():
@@ -137,7 +143,7 @@ def test_a_heading_that_turns_is_filtered_as_a_batch_does(keep):
     rng, rate = np.random.default_rng(11), 0.3
     seen, weight = 0.1 * rng.standard_normal(CYCLES), rng.uniform(10.0, 1e3, CYCLES)
     std = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.2])
-    window = gauss.begin(np.zeros(3), np.zeros(3), np.arange(4), std)
+    window = gauss.begin(np.zeros(3), np.zeros(3), std, turns=True)
     for cycle in range(CYCLES):
         if cycle:
             while window.num_poses >= keep:

@@ -17,7 +17,7 @@ from rislam_rt.pipeline.run import run_scheme
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.studies.unseen import Recorder, build_truth, score_run
-from rislam_rt.studies.unseen.cell import find_stage, scheme_here, trace_key
+from rislam_rt.studies.unseen.cell import find_setup, scheme_here, trace_key
 
 CYCLES = 80
 
@@ -103,7 +103,7 @@ def _run(case: Case, estimator: Estimator | None) -> dict[str, Any]:
         "motion": {"sigma_a_m_s2": 0.01}, "start": {"velocity_std_m_s": 0.03}, "slam": case.settings,
     }  # fmt: skip
     spec = PipelineSpec.model_validate(content)
-    room, stage = find_stage(case.room, trace_key(spec))
+    room, stage = find_setup(case.room, trace_key(spec))
     name = scheme_here(case.scheme, room)
     recorder = Recorder(estimator or ESTIMATORS[SCHEMES[name].estimator])
     result = run_scheme(name, stage, spec, lambda *_: None, recorder.estimator)

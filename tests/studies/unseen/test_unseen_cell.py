@@ -17,7 +17,7 @@ from rislam_rt.studies.unseen import (
     replay,
     score_run,
 )
-from rislam_rt.studies.unseen.cell import find_stage, run_cell
+from rislam_rt.studies.unseen.cell import find_setup, run_cell
 from rislam_rt.sweeps import build_cells
 
 RUN = {
@@ -34,9 +34,9 @@ def cell(room: int, **more: Any) -> dict[str, Any]:
 
 def test_a_cell_gives_the_same_again_and_traces_a_room_once() -> None:
     first = cell(WITH_PANEL)
-    before = find_stage.cache_info().misses
+    before = find_setup.cache_info().misses
     second = cell(WITH_PANEL)
-    assert find_stage.cache_info().misses == before
+    assert find_setup.cache_info().misses == before
     assert first["schemes"] == second["schemes"]
     assert first["schemes"]["random"]["ran"] == "random"
     assert cell(WITHOUT)["schemes"]["random"]["ran"] == "no_ris"

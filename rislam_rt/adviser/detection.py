@@ -1,0 +1,62 @@
+"""What the receiver would make of the paths at one place: the chance that it reports each landmark, without noise."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.measurement import Received, receive
+from rislam_rt.measurement.bound import NEGLIGIBLE
+from rislam_rt.measurement.components import NoiselessComponents, audible, merge, single
+from rislam_rt.measurement.slot_motion import split
+from rislam_rt.model import Paths, SensorModel
+from rislam_rt.pipeline.specification.spec import Settings
+
+
+class DetectionForecast(NamedTuple):
+    """L landmarks at one place under one code."""
+
+    probability: Floats
+    """(L,) that at least one component comes from the landmark."""
+    snr: Floats
+    """(L,) of the strongest path on the side that the array hears, linear, over all antennas; 0 without one."""
+    covered: Integers
+    """(L,) column of the stronger path that the landmark's strongest one comes out as; -1 if it comes out itself."""
+
+
+def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Settings) -> DetectionForecast:
+    """The landmarks of one cycle as the receiver of these settings reports them.
+
+    The same steps as a run's receiver: what the array hears, the two captures of alternated codes, paths that cannot be
+    resolved joined, detection by Marcum's function; errors and false components left out, motion within the slot too.
+    """
+    radio, sensor = settings.radio, settings.sensor
+    received = receive(paths, cycle, heading, radio, settings.receiver)
+    count = len(paths.landmarks)
+    missed, strongest, covered = np.ones(count), np.zeros(count), np.full(count, -1)
+    for capture in split(received, settings.receiver):
+        snr, owner = radio.integrated_snr(capture.gain), paths.landmark[capture.path]
+        loud = audible(capture, snr > NEGLIGIBLE * sensor.threshold)
+        parts = merge(loud, sensor) if settings.receiver.merge else single(loud)
+        inside = (parts.tau >= sensor.window[0]) & (parts.tau <= sensor.window[1])
+        chance = sensor.detection_probability(radio.integrated_snr(parts.gain)) * inside
+        of_part = paths.landmark[parts.path]
+        np.multiply.at(missed, of_part[of_part >= 0], 1.0 - chance[of_part >= 0])
+        for landmark in range(count):
+            own = np.flatnonzero(owner == landmark)
+            row = int(own[np.argmax(snr[own])]) if len(own) else -1
+            if row >= 0 and snr[row] > strongest[landmark]:
+                strongest[landmark] = snr[row]
+                covered[landmark] = _cover(loud, int(capture.path[row]), parts, sensor)
+    return DetectionForecast(1.0 - missed, strongest, covered)
+
+
+def _cover(loud: Received, path: int, parts: NoiselessComponents, sensor: SensorModel) -> int:
+    """The strongest path that a path is joined to and that leads its component; -1 if it leads one, or is not loud."""
+    row = np.flatnonzero(loud.path == path)
+    if path in parts.path or not len(row):
+        return -1
+    leaders = np.flatnonzero(np.isin(loud.path, parts.path))
+    points = np.column_stack([loud.tau, loud.direction[:, :2]])
+    near = leaders[sensor.may_merge(points[leaders] - points[row])]
+    return int(loud.path[near[np.argmax(np.abs(loud.gain[near]))]]) if len(near) else -1

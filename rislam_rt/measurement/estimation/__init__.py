@@ -1,0 +1,1 @@
+"""Components from samples: found one by one over a dictionary of delays and angles, then refined together."""

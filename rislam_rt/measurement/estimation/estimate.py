@@ -1,0 +1,184 @@
+"""The waveform estimator: delays, cosines and amplitudes of all paths in one sounding, without a grid.
+
+Newtonised orthogonal matching pursuit (Mamandipoor, Ramasamy and Madhow 2016) over three parameters: find peaks in the
+residual, refine all paths found so far, repeat until the residual holds no peak above the threshold. Its cyclic
+single-path refinements are replaced by joint Gauss-Newton steps, which also part paths inside one resolution cell; a
+path that its neighbours could explain as well as noise could is taken out again.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats
+from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, into_range, pick_peaks
+from rislam_rt.measurement.estimation.refine import (
+    Accuracy,
+    LeastSquaresFit,
+    accuracy,
+    fit_amplitudes,
+    part,
+    pick,
+    refine,
+    refine_some,
+    residual,
+    without_idle,
+)
+from rislam_rt.measurement.estimation.sounding import Sounding
+
+BATCH = 16
+"""Most paths that are added between two refinements."""
+ROUNDS = 40
+"""Most rounds of search; each but the last adds a path."""
+SEARCH_STEPS = 2
+"""Refinements a round: enough for the residual of the next one."""
+KNOWN_STEPS = 3
+"""Most refinements of paths that were known beforehand: a cycle moves them by less than a tenth of a cell."""
+FINAL_STEPS = 12
+FINAL_TOLERANCE = 0.03
+"""Noise energy that the last step may leave in each path: a quarter of a standard deviation of one parameter."""
+TRIAL_STEPS = 6
+"""Most refinements of the other paths after one was taken out, before the costs are compared."""
+TOUCHED = 1.0
+"""Energy over N0 that a new path takes from an old one's signal, from which on the old one is refined with it."""
+COUPLED = 0.1
+"""Correlation of two signals from which on one can stand in for the other's loss."""
+SLACK = 0.1
+"""How far (B tau, u, v) may leave the window and the sky during the search, so that paths on the edge do not stick."""
+NOTHING = np.zeros((0, 3))
+
+
+class Estimate(NamedTuple):
+    """P paths found in one sounding, with the noise normalised to one."""
+
+    fit: LeastSquaresFit
+    accuracy: Accuracy
+
+
+def estimate_paths(
+    sounding: Sounding,
+    grid: MatchedFilterGrid,
+    samples: Complexes,
+    threshold: float,
+    window: tuple[float, float],
+    most: int,
+    known: Floats = NOTHING,
+) -> Estimate:
+    """All paths in samples (L, M) whose noise has unit variance.
+
+    Parameters
+    ----------
+    threshold
+        On the measured SNR `L M |alpha|^2` of a path, linear; see `false_alarms` for the rate that it stands for.
+    window
+        First and last delay, in resolution cells.
+    most
+        Largest number of paths.
+    known
+        (Q, 3) where paths are likely to be, such as those of the last sounding: the search begins with them. Each has
+        to prove itself like any other.
+    """
+    fit = fit_amplitudes(sounding, known[:most], samples)
+    if len(known):
+        fit = refine(sounding, fit, samples, steps=KNOWN_STEPS)
+        fit = drop(sounding, fit, samples, threshold, window)
+    for _ in range(ROUNDS):
+        room = min(BATCH, most - len(fit.parameters))
+        fresh = pick_peaks(sounding, grid, residual(fit, samples), threshold, window, room)
+        if not len(fresh):
+            break
+        grown = fit_amplitudes(sounding, np.concatenate([fit.parameters, fresh]), samples)
+        # From nothing, every round moves all paths; where most were known, only those that a new one touches.
+        local = _touched(grown, len(fresh), samples.size) if len(known) else np.ones(len(grown.parameters), dtype=bool)
+        grown = _refine_some(sounding, grown, samples, local)
+        grown = drop(sounding, grown, samples, threshold, window)
+        if grown.cost >= fit.cost - threshold:
+            break
+        fit = grown
+    return _finish(sounding, fit, samples, threshold, window)
+
+
+def _finish(
+    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
+) -> Estimate:
+    """All paths refined to the end, those taken out that the others can stand in for."""
+    fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
+    fit, bound = prune(sounding, drop(sounding, fit, samples, threshold, window), samples, threshold)
+    final = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
+    return Estimate(final, bound if final is fit else accuracy(final))
+
+
+def _touched(fit: LeastSquaresFit, fresh: int, num_samples: int) -> Booleans:
+    """(P,) the last so many paths, and those which would lose more than noise if they did not give way to them."""
+    energy = np.abs(fit.amplitude[-fresh:]) ** 2 / num_samples
+    touched = np.any(np.abs(fit.inner.signal[:, -fresh:]) ** 2 * energy > TOUCHED, axis=1)
+    touched[-fresh:] = True
+    return touched
+
+
+def _refine_some(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, chosen: Booleans) -> LeastSquaresFit:
+    """Refine the chosen paths (P,) for the next search, the others held."""
+    if chosen.all():
+        return refine(sounding, fit, samples, steps=SEARCH_STEPS)
+    return refine_some(sounding, fit, samples, np.flatnonzero(chosen), steps=SEARCH_STEPS)
+
+
+def drop(
+    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
+) -> LeastSquaresFit:
+    """Without the paths that left the window or the sky, and those whose loss alone costs less than the threshold."""
+    keep = _inside(fit.parameters, window)
+    if not keep.all():
+        fit = pick(sounding, fit, keep, samples)
+    keep = without_idle(fit, threshold)
+    return fit if keep.all() else pick(sounding, fit, keep, samples)
+
+
+def prune(
+    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float
+) -> tuple[LeastSquaresFit, Accuracy]:
+    """Without the paths that their neighbours, refined, can stand in for; and the bound of what is left.
+
+    Noise alone lowers the cost by its highest peak when a path is added, so the threshold is the one of the search.
+    Only paths whose amplitude is uncertain by more than that are tried, the most uncertain first.
+    """
+    tried = np.zeros((0, 3))
+    while True:
+        bound = accuracy(fit)
+        certainty = np.abs(fit.amplitude) ** 2 / bound.amplitude**2
+        doubtful = np.flatnonzero((certainty < threshold) & ~_among(fit.parameters, tried))
+        for row in doubtful[np.argsort(certainty[doubtful])]:
+            rest = _neighbours_instead(sounding, fit, samples, int(row), fit.cost + threshold)
+            if rest is not None:
+                fit = fit_amplitudes(sounding, rest, samples)
+                break
+            tried = np.concatenate([tried, fit.parameters[row : row + 1]])
+        else:
+            return fit, bound
+
+
+def _neighbours_instead(
+    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, row: int, enough: float
+) -> Floats | None:
+    """Parameters (P - 1, 3) without a path, its neighbours refined, if the cost stays below `enough`."""
+    near = np.flatnonzero(np.abs(fit.inner.signal[row]) > COUPLED * sounding.num_samples)
+    whole, local = part(sounding, fit, near, samples)
+    others = near != row
+    trial = pick(sounding, whole, others, local)
+    trial = refine(sounding, trial, local, steps=TRIAL_STEPS, enough=enough)
+    if trial.cost >= enough:
+        return None
+    rest = fit.parameters.copy()
+    rest[near[others]] = trial.parameters
+    return np.delete(rest, row, axis=0)
+
+
+def _inside(parameters: Floats, window: tuple[float, float]) -> Booleans:
+    """Whether parameters (P, 3) stayed within the window and the sky, or near enough."""
+    return np.all(np.abs(parameters - into_range(parameters, window)) <= SLACK, axis=-1)
+
+
+def _among(parameters: Floats, marked: Floats) -> Booleans:
+    """Which of the parameters (P, 3) are marked (Q, 3), or have moved little since."""
+    apart = np.abs(parameters[:, None] - marked)
+    return np.any(np.all(apart < SLACK, axis=-1), axis=1)

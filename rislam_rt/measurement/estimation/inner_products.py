@@ -1,0 +1,103 @@
+"""Signals of many paths, products over tones, rows and columns, and their inner products, which are all real.
+
+Every inner product of signals or of their derivatives is a product of three small ones, so that the P x P matrices of P
+paths cost little. Tones and elements lie evenly about their middles: an inner product over one axis is a sum of
+cosines, half the axis says all, and real matrices do.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.measurement.estimation.sounding import Sounding, tone_response
+
+
+class PathSignals(NamedTuple):
+    """Signals of P paths, products over tones, rows and columns."""
+
+    parameters: Floats
+    """(P, 3) of (B tau, u, v)."""
+    delay: Complexes
+    """(M, P)."""
+    row: Complexes
+    """(R, P)."""
+    col: Complexes
+    """(C, P)."""
+
+    def take(self, rows: Booleans | Integers) -> "PathSignals":
+        """Some of the paths."""
+        return PathSignals(self.parameters[rows], self.delay[:, rows], self.row[:, rows], self.col[:, rows])
+
+    @property
+    def antennas(self) -> Complexes:
+        """(L, P)."""
+        return (self.row[:, None] * self.col).reshape(len(self.row) * len(self.col), -1)
+
+    def correlate(self, sounding: Sounding, samples: Complexes) -> Complexes:
+        """(4, P) `a^H y` and `d^H y`, d the derivatives by the three parameters, of samples (L, M)."""
+        count = len(samples)
+        beams = np.concatenate([samples, samples * sounding.frequency]) @ self.delay.conj()
+        antennas = self.antennas.conj()
+        fields = (antennas * beams.reshape(2, count, -1)).reshape(2, len(self.row), len(self.col), -1)
+        by_row = fields.sum(axis=2)
+        matched, steep = by_row.sum(axis=1)
+        seen = np.stack([matched, steep, -(sounding.row @ by_row[0]), -(sounding.col @ fields[0].sum(axis=0))])
+        seen[1:] *= 2j * np.pi
+        return seen
+
+    def sum(self, amplitude: Complexes) -> Complexes:
+        """Samples (L, M) of all paths with amplitudes (P,)."""
+        return np.asarray((self.antennas * amplitude) @ self.delay.T)
+
+
+class InnerProducts(NamedTuple):
+    """Inner products of P signals `a` and their derivatives `d`."""
+
+    signal: Floats
+    """(P, P) `a_i^H a_j`."""
+    mixed: Floats
+    """(P, 3, P) `a_i^H d_j`."""
+    slope: Floats
+    """(3, P, 3, P) `d_i^H d_j`."""
+
+    def take(self, keep: Booleans | Integers) -> "InnerProducts":
+        """Some of the paths."""
+        return InnerProducts(self.signal[keep][:, keep], self.mixed[keep][..., keep], self.slope[:, keep][..., keep])
+
+
+def waves_at(sounding: Sounding, parameters: Floats) -> PathSignals:
+    """Signals of paths at parameters (P, 3)."""
+    delay, u, v = parameters.T
+    row, col = (np.exp(2j * np.pi * np.multiply.outer(x, c)) for x, c in ((sounding.row, u), (sounding.col, v)))
+    return PathSignals(parameters, tone_response(sounding.frequency, delay), row, col)
+
+
+def inner_of(sounding: Sounding, waves: PathSignals) -> InnerProducts:
+    """All inner products, parameter by parameter."""
+    (f0, f1, f2), (x0, x1, x2), (y0, y1, y2) = (
+        _axis_products(wave, place)
+        for wave, place in (
+            (waves.delay, -sounding.frequency),
+            (waves.row, sounding.row),
+            (waves.col, sounding.col),
+        )
+    )
+    count = len(f0)
+    fx, fy, xy = f0 * x0, f0 * y0, x0 * y0
+    mixed, slope = np.empty((count, 3, count)), np.empty((3, count, 3, count))
+    mixed[:, 0], mixed[:, 1], mixed[:, 2] = f1 * xy, x1 * fy, y1 * fx
+    slope[0, :, 0], slope[1, :, 1], slope[2, :, 2] = f2 * xy, x2 * fy, y2 * fx
+    for a, b, value in ((0, 1, f1 * x1.T * y0), (0, 2, f1 * y1.T * x0), (1, 2, x1 * y1.T * f0)):
+        slope[b, :, a], slope[a, :, b] = value, value.T
+    return InnerProducts(fx * y0, mixed, slope)
+
+
+def _axis_products(wave: Complexes, place: Floats) -> tuple[Floats, Floats, Floats]:
+    """(P, P) along one axis of the signals (n, P), of signals and derivatives, and of derivatives."""
+    count, size = wave.shape
+    half = wave[: count // 2] if count % 2 == 0 else wave
+    flat = np.concatenate([half, (2j * np.pi * place[: len(half)])[:, None] * half], axis=1)
+    stacked = np.concatenate([flat.real, flat.imag])
+    product = stacked.T @ stacked * (1.0 if len(half) == count else 2.0)
+    return product[:size, :size], product[:size, size:], product[size:, size:]

@@ -1,0 +1,99 @@
+"""One scheme on its way through the cycles of a run, led through all of them at once or slice by slice."""
+
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import replace
+
+import numpy as np
+
+from rislam_rt.channel.doppler import doppler_shift
+from rislam_rt.measurement import FrontEnd
+from rislam_rt.model import Body, PathKind, Paths, Scene, SchemeResult
+from rislam_rt.pipeline.assumed_model import perceived_paths, tell_belief
+from rislam_rt.pipeline.code_policies import build_designer
+from rislam_rt.pipeline.control import open_link
+from rislam_rt.pipeline.cycle import Agent, Cycle, CycleGenerators, GroundTruth, RunContext, run_cycle
+from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
+from rislam_rt.pipeline.record import gather, given_of
+from rislam_rt.pipeline.room.diffuse_clutter import received_clutter
+from rislam_rt.pipeline.room.front_end import prepare_front_end
+from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.pipeline.seeds import Seeds, child
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.ris import draw_panel
+
+Tell = Callable[[str, int, int], None]
+
+
+class SchemeSimulation:
+    """Agent, generators and panel of one scheme between two slices; nothing in it grows with the cycles done.
+
+    Cycle k draws from generators of its own, so that the numbers are the same however the run is cut.
+    """
+
+    def __init__(
+        self, name: str, scene: Scene, body: Body, spec: PipelineSpec, seeds: Seeds, estimator: Estimator | None = None
+    ) -> None:
+        self.scheme, self.name, self.seeds = SCHEMES[name], name, seeds
+        self.motion, self.body = scene.agent, body
+        self.front_end: FrontEnd | None = None
+        panel = scene.ris.spec if scene.ris is not None and self.scheme.panel else None
+        settings = build_settings(spec, 1 if panel is None else len(panel.panels))
+        compass, self.sway = (child(seeds.told, number) for number in range(2))
+        start = np.random.default_rng(seeds.start)
+        told = tell_belief(self.motion, body, panel, spec, settings, start=start, compass=compass)
+        self.faults, designer = None, None
+        if panel is not None:
+            self.faults = draw_panel(panel, spec.panel.tolerance, rng=np.random.default_rng(seeds.panel))
+            designer = build_designer(self.scheme, panel, spec, settings, told)
+        estimator = estimator or ESTIMATORS[self.scheme.estimator]
+        self.means = RunContext(panel, designer, estimator, spec, settings, told)
+        self.filter_rng, self.design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
+        config = estimator.config(told.settings)
+        state = estimator.init(
+            told.start, told.body, told.panel, told.settings.sensor, config, rng=self.filter_rng
+        )  # fmt: skip
+        self.agent = Agent(state, open_link(panel) if panel is not None else None)
+
+    @property
+    def foresight(self) -> int:
+        """Cycles beyond the last one whose paths a slice needs: a design on the truth looks as far as the delay."""
+        return self.means.spec.control.delay_cycles if self.scheme.on_truth else 0
+
+    def lead(self, paths: Paths, first: int, last: int, tell: Tell, extras: Paths | None = None) -> SchemeResult:
+        """Cycles `first` to `last` (not included); `paths` begin at `first` and may go on beyond `last`, and so do the
+        `extras` that are heard with them.
+        """
+        if self.means.panel is None:
+            paths = without_panel(paths)
+        spec, motion = self.means.spec, self.motion[first : first + paths.num_cycles]
+        shift = doppler_shift(paths, motion, self.means.settings.radio.wavelength)
+        clutter, twin = None, deepcopy(self.sway)  # one array hears both
+        if extras is not None:
+            extras = perceived_paths(extras, motion, spec.told, rng=twin, since=float(self.motion.time[0]))
+            clutter = received_clutter(extras, motion, self.means.settings.radio)
+        heard = perceived_paths(paths, motion, spec.told, rng=self.sway, since=float(self.motion.time[0]))
+        if first == 0:
+            build = np.random.default_rng(self.seeds.hardware)
+            self.front_end = prepare_front_end(heard, motion, self.body, self.means.settings, rng=build)
+        room = GroundTruth(heard, self.motion, shift, self.faults, first, self.front_end, clutter)
+        cycles: list[Cycle] = []
+        tell(self.name, first, len(self.motion))
+        for cycle in range(first, last):
+            control, noise = (child(seed, cycle) for seed in (self.seeds.control, self.seeds.noise))
+            rng = CycleGenerators(self.design_rng, control, noise, self.filter_rng)
+            self.agent, outcome = run_cycle(self.agent, room, cycle, self.means, rng=rng)
+            cycles.append(outcome)
+            tell(self.name, cycle + 1, len(self.motion))
+        given = given_of(self.means.told, first, cycles, self.seeds.filter)
+        levels = self.means.panel.levels if self.means.panel is not None else 0
+        found = gather(self.name, self.motion.time[first:last], cycles, levels, given)
+        # a slice does not know what later ones tell of its end
+        whole = first == 0 and last == len(self.motion)
+        return replace(found, smoothed=self.means.estimator.smoothed(self.agent.state)) if whole else found
+
+
+def without_panel(paths: Paths) -> Paths:
+    """The paths of a plain wall where the panel hangs: identities stay, panel paths are never there."""
+    panel = np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS))
+    return replace(paths, valid=paths.valid & ~panel, gain=np.where(panel, 0.0, paths.gain), ris=None)

@@ -1,0 +1,126 @@
+"""What a real panel does wrong: elements weak, dead, out of phase or stuck, and commands that arrive damaged."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, freeze
+from rislam_rt.errors import ConfigError
+from rislam_rt.model.ris import DataSheet, RisCode
+
+FREE = -1
+"""Level of an element that is not stuck."""
+
+
+@dataclass(frozen=True, slots=True)
+class PanelTolerance:
+    """How far the elements of a panel stray; all zero: a perfect panel."""
+
+    amplitude_std: float = 0.0
+    """Standard deviation of an element's amplitude about that of the data sheet, relative; at least 0 remains."""
+    phase_std: float = 0.0
+    """Standard deviation [rad] of an element's own phase offset (normal)."""
+    dead: float = 0.0
+    """Probability that an element reflects nothing."""
+    stuck: float = 0.0
+    """Probability that an element stays at a level of its own, whatever the code."""
+
+    def __post_init__(self) -> None:
+        for name in ("amplitude_std", "phase_std"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0.0):
+                raise ConfigError(f"panel.{name}: {value} received; give a number of 0 or more")
+        for name in ("dead", "stuck"):
+            _check_probability(f"panel.{name}", getattr(self, name))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PanelErrors:
+    """The panel as it came out of the factory, element by element (N, M); of several all elements, (1, E)."""
+
+    amplitude: Floats
+    """Factor on the data sheet's amplitude, 0 or more."""
+    phase: Floats
+    """[rad] added to the element's phase shift."""
+    dead: Booleans
+    """True where an element reflects nothing."""
+    stuck: Any
+    """Level at which an element stays, `FREE` where it obeys."""
+
+    def __post_init__(self) -> None:
+        shape = np.shape(self.amplitude)
+        freeze(self, "amplitude", np.float64, (None, None))
+        for name, dtype in (("phase", np.float64), ("dead", np.bool_), ("stuck", np.int64)):
+            freeze(self, name, dtype, shape)
+        if (self.amplitude < 0.0).any():
+            raise ConfigError(f"panel.amplitude: {self.amplitude.min()} received; give factors of 0 or more")
+
+    @property
+    def weight(self) -> Complexes:
+        """What each element (N, M) does to its signal beside its commanded phase, for `rephase` and `panel_gain`."""
+        return np.where(self.dead, 0.0, self.amplitude) * np.exp(-1j * self.phase)
+
+    def applied(self, code: RisCode) -> RisCode:
+        """The code (..., N, M) that the elements take on: stuck ones keep their level."""
+        return RisCode(np.where(self.stuck == FREE, code.index, self.stuck), code.levels)
+
+
+def perfect_panel(spec: DataSheet) -> PanelErrors:
+    """A panel that does what its data sheet says, or several."""
+    shape = spec.rows, spec.cols
+    return PanelErrors(np.ones(shape), np.zeros(shape), np.zeros(shape, dtype=np.bool_), np.full(shape, FREE))
+
+
+def draw_panel(spec: DataSheet, tolerance: PanelTolerance, *, rng: np.random.Generator) -> PanelErrors:
+    """A panel, or several, with errors drawn independently for each element.
+
+    Every kind of error has a draw of its own, so that changing one tolerance leaves the other errors as they are.
+    """
+    shape = spec.rows, spec.cols
+    amplitude = np.maximum(1.0 + tolerance.amplitude_std * rng.standard_normal(shape), 0.0)
+    phase = tolerance.phase_std * rng.standard_normal(shape)
+    dead = rng.random(shape) < tolerance.dead
+    level = rng.integers(spec.levels, size=shape)
+    return PanelErrors(amplitude, phase, dead, np.where(rng.random(shape) < tolerance.stuck, level, FREE))
+
+
+def mean_power_shares(tolerance: PanelTolerance) -> tuple[float, float]:
+    """What a panel focused on one path keeps of its power in the mean over panels: (coherent, scattered) shares.
+
+    With element weights w of mean m and mean square s, the expected gain of a panel of N elements is
+    `m^2 + (s - m^2) / N` of the perfect one (Ruze); the first number is m^2, the second s - m^2. Stuck elements at
+    a random level add nothing to the mean. Amplitudes are taken as normal, without the cut at 0.
+    """
+    alive = 1.0 - tolerance.dead
+    mean = alive * (1.0 - tolerance.stuck) * np.exp(-(tolerance.phase_std**2) / 2.0)
+    square = alive * (1.0 + tolerance.amplitude_std**2)
+    return float(mean**2), float(square - mean**2)
+
+
+def flip_bits(code: RisCode, probability: float, *, rng: np.random.Generator) -> RisCode:
+    """The code as it arrives over a link that turns each bit of each level over with a probability.
+
+    A level travels as a plain binary number of log2(H) bits.
+
+    Raises
+    ------
+    ConfigError
+        H is not a power of two, or the probability is outside [0, 1].
+    """
+    _check_probability("panel.bit_flip", probability)
+    bits = int(code.levels).bit_length() - 1
+    if code.levels != 1 << bits:
+        raise ConfigError(f"ris.levels: {code.levels} received; bit errors need a power of two")
+    flipped: Integers = (rng.random((*code.index.shape, bits)) < probability) @ (1 << np.arange(bits))
+    return RisCode(code.index ^ flipped, code.levels)
+
+
+def quantise(code: RisCode, levels: int) -> RisCode:
+    """The nearest code of a panel with fewer phase levels; half-way cases go to the even one."""
+    return RisCode(np.rint(code.index * (levels / code.levels)).astype(np.int64) % levels, levels)
+
+
+def _check_probability(name: str, value: float) -> None:
+    if not 0.0 <= value <= 1.0:
+        raise ConfigError(f"{name}: {value} received; give a probability from 0 to 1")

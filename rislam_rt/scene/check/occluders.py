@@ -1,0 +1,78 @@
+"""Scene check, the part of scatterers that hide things: sound meshes, nothing inside but their own centre."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.model import Occluder, RadioConfig
+from rislam_rt.scene.check.mesh_queries import crossings, winding
+from rislam_rt.scene.check.triangle_array import TriangleArray, without_area
+from rislam_rt.scene.findings import Finding
+
+
+def occluder_face_errors(room: TriangleArray) -> Iterator[Finding]:
+    """Faces without area."""
+    for field, _, shade in _occluders(room):
+        bad = without_area(shade.triangles)
+        if bad.any():
+            message = f"{int(bad.sum())} faces without area, the first is face {int(np.argmax(bad))}"
+            yield room.error(field, message, "remove degenerate faces from the mesh")
+
+
+def occluder_errors(room: TriangleArray) -> Iterator[Finding]:
+    """A mesh that is not about its own scatterer, that encloses another landmark, or that the agent runs into."""
+    marks, motion = room.scene.landmark_positions, room.scene.agent
+    for field, number, shade in _occluders(room):
+        inside = _inside(marks, shade)
+        if number is not None and not inside[number]:
+            message = f"it does not enclose the scatterer's position {marks[number].tolist()}"
+            yield room.error(field, message, "give a closed mesh in the room's frame, about the position")
+            continue
+        if number is not None:
+            inside[number] = False
+        if inside.any():
+            message = f"'{room.scene.landmarks[int(np.argmax(inside))]}' lies inside it, where no ray reaches it"
+            yield room.error(field, message, "move one of the two")
+        for part, points in (("the agent", motion.position), ("Tx", motion.tx), ("Rx", motion.rx)):
+            cycle = _enters(points, shade)
+            if cycle is not None:
+                yield room.error(field, f"{part} is inside it at or after cycle {cycle}", "keep the agent away from it")
+                break
+
+
+def cylinder_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
+    """A cylinder whose far field the agent is not in: its cross-section is one for plane waves."""
+    motion = room.scene.agent
+    for number, scatterer in enumerate(room.scene.scatterers):
+        if scatterer.law != "cylinder" or scatterer.height is None:
+            continue
+        limit = 2.0 * scatterer.height**2 / radio.wavelength
+        nearest = min(float(np.linalg.norm(p - scatterer.position, axis=-1).min()) for p in (motion.tx, motion.rx))
+        if nearest < limit:
+            message = f"the agent comes within {nearest:.3g} m, its far field begins at 2 h^2 / lambda = {limit:.3g} m"
+            yield room.warning(
+                f"scatterer[{number}].height_m ({scatterer.name})", message, "take a shorter one, or give 'rcs_m2'"
+            )
+
+
+def _occluders(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:
+    """Field and shade of every scatterer that has one, with its number, and of those that stand alone."""
+    for number, scatterer in enumerate(room.scene.scatterers):
+        if scatterer.shade is not None:
+            yield f"scatterer[{number}].mesh ({scatterer.name})", number, scatterer.shade
+    for number, shade in enumerate(room.scene.occluders):
+        yield f"shade[{number}].mesh ({shade.name})", None, shade
+
+
+def _inside(points: Floats, shade: Occluder) -> Booleans:
+    """Which points (N, 3) a shade encloses."""
+    return np.array([abs(winding(point, shade.triangles)) > 0.5 for point in points], dtype=np.bool_)
+
+
+def _enters(points: Floats, shade: Occluder) -> int | None:
+    """The first cycle of a track (K, 3) that begins inside, or after which the track crosses the mesh."""
+    if _inside(points[:1], shade)[0]:
+        return 0
+    cycles, _ = crossings(points[:-1], points[1:], shade.triangles)
+    return int(cycles.min()) if len(cycles) else None

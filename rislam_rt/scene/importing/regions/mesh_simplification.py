@@ -1,0 +1,123 @@
+"""Fewer triangles: flat regions by their outlines, clutter by cells, each with how far it is off [m]."""
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.triangles import distance_to_edges
+from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
+from rislam_rt.scene.importing.regions.flat_regions import FlatRegions
+from rislam_rt.scene.importing.regions.round_surfaces import across
+from rislam_rt.scene.meshes import Mesh
+
+
+def corners_kept(facets: FlatRegions, label: Integers) -> Booleans:
+    """(V,) corners where three regions (numbered by `label` (R,)) meet, or two at an open edge: none may be moved."""
+    faces, mine = facets.mesh.faces, label[facets.region]
+    pairs = np.unique(np.column_stack([faces.ravel(), np.repeat(mine, 3)]), axis=0)
+    count = np.bincount(pairs[:, 0], minlength=len(facets.mesh.vertices))
+    ends = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    edges, uses = np.unique(ends, axis=0, return_counts=True)
+    count[np.unique(edges[uses == 1])] += 1
+    return count >= 3
+
+
+def region_mesh(facets: FlatRegions, regions: Integers, kept: Booleans, tolerance: float) -> tuple[Mesh, float]:
+    """One flat mesh of regions in one plane, and its largest error [m].
+
+    Outlines are thinned within a tolerance [m] and filled anew; where an outline crosses itself the triangles stay as
+    they are.
+    """
+    faces, points = facets.faces_of(regions), facets.mesh.vertices
+    normal, offset = facets.normal[regions[0]], float(facets.offset[regions[0]])
+    turned = facets.normal[facets.region[np.isin(facets.region, regions)]] @ normal < 0.0
+    faces = np.where(turned[:, None], faces[:, ::-1], faces)
+    height = points[faces] @ normal - offset
+    off = float(np.abs(height).max())
+    filled, moved = _filled(faces, points, normal, kept, tolerance)
+    if filled is None:
+        used, compact = np.unique(faces, return_inverse=True)
+        return Mesh(_onto(points[used], normal, offset), compact.reshape(-1, 3)), off
+    return Mesh(_onto(filled.vertices, normal, offset), filled.faces), float(np.hypot(off, moved))
+
+
+def _onto(points: Floats, normal: Floats, offset: float) -> Floats:
+    """Points in a plane, moved only where rounding does not explain that they are off it."""
+    height = points @ normal - offset
+    return points - height[:, None] * normal if np.abs(height).max() > 1e-6 else points
+
+
+def _filled(
+    faces: Integers, points: Floats, normal: Floats, kept: Booleans, tolerance: float
+) -> tuple[Mesh | None, float]:
+    """The thinned outlines as a mesh, and how far the farthest corner is off them [m]."""
+    u, v = across(normal)
+    flat = points @ np.stack([u, v], axis=-1)
+    drawn = outline_loops(faces)
+    loops = [simplify_loop(loop, points, kept, tolerance) for loop in drawn]
+    moved = max(_off_loop(points[a], points[b]) for a, b in zip(drawn, loops, strict=True)) if drawn else 0.0
+    loops = [loop for loop in loops if len(loop) > 2 and abs(signed_area(flat[loop])) > tolerance**2]
+    outer = [loop for loop in loops if signed_area(flat[loop]) > 0.0]
+    holes = [loop for loop in loops if signed_area(flat[loop]) < 0.0]
+    owner = [_around(flat[hole], [flat[loop] for loop in outer]) for hole in holes]
+    if not outer or None in owner:
+        return None, 0.0
+    corners: list[int] = []
+    found: list[Integers] = []
+    for number, loop in enumerate(outer):
+        mine = [hole for hole, parent in zip(holes, owner, strict=True) if parent == number]
+        triangles = triangulate(flat[loop], [flat[hole] for hole in mine])
+        if triangles is None:
+            return None, 0.0
+        found.append(triangles + len(corners))
+        corners += [*loop, *(corner for hole in mine for corner in hole)]
+    used, compact = np.unique(np.array(corners)[np.concatenate(found)], return_inverse=True)
+    return Mesh(points[used], compact.reshape(-1, 3)), moved
+
+
+def _off_loop(corners: Floats, loop: Floats) -> float:
+    """Largest distance [m] of corners (n, 3) from a closed loop (m, 3)."""
+    edges = np.stack([loop, np.roll(loop, -1, axis=0)], axis=1)
+    return float(distance_to_edges(corners, edges).max())
+
+
+def _around(hole: Floats, outers: list[Floats]) -> int | None:
+    """The smallest outer loop around a hole."""
+    around = [k for k, outer in enumerate(outers) if _holds(outer, hole)]
+    return min(around, key=lambda k: signed_area(outers[k])) if around else None
+
+
+def _holds(outer: Floats, hole: Floats) -> bool:
+    """Whether a loop (n, 2) holds the middle of another's first edge."""
+    return inside_loop(outer, 0.5 * (hole[0] + hole[1]))
+
+
+def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:
+    """Clutter (T, 3, 3) with the corners of each cell [m] joined in their mean, and how far the farthest moved [m].
+
+    What shrinks to a line or a point is gone: it was finer than a cell. Rossignac and Borrel 1993.
+    """
+    corners = triangles.reshape(-1, 3)
+    low = corners.min(axis=0)
+    _, box = np.unique(np.floor((corners - low) / cell + 0.5).astype(np.int64), axis=0, return_inverse=True)
+    box = box.ravel()
+    count = np.bincount(box)
+    mean = np.stack([np.bincount(box, corners[:, i]) for i in range(3)], axis=-1) / count[:, None]
+    faces = box.reshape(-1, 3)
+    distinct = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    _, single = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    faces = faces[np.intersect1d(np.flatnonzero(distinct), single)]
+    moved = float(np.linalg.norm(corners - mean[box], axis=1).max())
+    return mean[faces][has_area(mean[faces])], moved
+
+
+def has_area(triangles: Floats) -> Booleans:
+    """Which triangles (T, 3, 3) are more than a line: higher than a tenth of a millimetre."""
+    edge = np.roll(triangles, -1, axis=1) - triangles
+    height = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
+    return np.asarray(height > 1e-4 * np.linalg.norm(edge, axis=-1).max(axis=1))
+
+
+def as_mesh(triangles: Floats) -> Mesh:
+    """Triangles (T, 3, 3) with shared corners."""
+    vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    return Mesh(vertices, index.reshape(-1, 3).astype(np.int64))

@@ -1,0 +1,162 @@
+"""Which flat regions belong together, and what to call them: the shell of the room, and each thing in it."""
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.constants import COPLANAR_OFFSET
+from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions, bounds_of, connected
+
+SPAN = 0.6
+"""A piece that spans this share of the room along two axes is its shell."""
+TOUCH = 5e-3
+"""[m] Things whose boxes are nearer than this are one."""
+UPRIGHT, LEVEL = np.sin(np.radians(15.0)), np.cos(np.radians(15.0))
+"""Largest and smallest vertical component of a wall's and a floor's normal."""
+
+_NAMELESS = re.compile(
+    r"(?i)(mesh|object|obj|node|geometry|geom|cube|plane|cylinder|sphere|circle|default|group|scene|root|world|solid|"
+    r"polygon|shape|model|untitled|material|mat|surface|part|element|layer|g|o)?[\W_\d]*"
+)
+_SHELL = re.compile(r"(?i)(^|[^a-z])(walls?|floors?|ceilings?|roof|wand|boden|decke)([^a-z]|$)")
+
+
+class RegionGroup(NamedTuple):
+    """Regions that are one thing."""
+
+    name: str
+    node: str
+    regions: Integers
+    shell: bool
+
+
+def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
+    """All pieces, the shell first; `nodes` are the node names of the mesh's parts.
+
+    A node with a name of its own is one piece; whatever has none is parted into what hangs together.
+    """
+    part = np.zeros(len(facets.area), dtype=np.int64)
+    part[facets.region] = facets.mesh.part
+    node = np.array([plain_name(nodes[p]) for p in range(len(nodes))], dtype=object)[part]
+    box = bounds_of(facets, np.arange(len(part)))
+    shell: list[int] = []
+    others: list[RegionGroup] = []
+    whole = node == ""
+    for name in sorted(set(node) - {""}):
+        regions = np.flatnonzero(node == name)
+        if _SHELL.search(name):
+            shell += regions.tolist()
+        elif _is_shell(bounds_of(facets, regions), box):
+            whole[regions] = True  # a whole room under one name
+        else:
+            others.append(RegionGroup(name, name, regions, False))
+    loose = np.flatnonzero(whole)
+    things: list[Integers] = []
+    for component in np.unique(facets.component[loose]):
+        regions = loose[facets.component[loose] == component]
+        if _is_shell(bounds_of(facets, regions), box):
+            shell += regions.tolist()
+        else:
+            things.append(regions)
+    inset = [_continues(facets, regions, np.array(shell, dtype=np.int64)) for regions in things]
+    shell += [int(r) for regions, flush in zip(things, inset, strict=True) if flush for r in regions]
+    things = [regions for regions, flush in zip(things, inset, strict=True) if not flush]
+    for regions in _touching(facets, things):
+        bounds = bounds_of(facets, regions)
+        if _is_shell(bounds, box):  # walls that were drawn apart
+            shell += regions.tolist()
+        else:
+            others.append(RegionGroup(kind_by_shape(bounds, box), "", regions, False))
+    return [RegionGroup("", "", np.array(sorted(shell), dtype=np.int64), True), *others]
+
+
+def _continues(facets: FlatRegions, regions: Integers, shell: Integers) -> bool:
+    """Whether a thing is one flat region in the plane of a wall that it touches: the piece above a door."""
+    if len(regions) != 1:
+        return False
+    normal, offset = facets.normal[regions[0]], facets.offset[regions[0]]
+    along = facets.normal[shell] @ normal
+    near = shell[
+        (np.abs(along) > np.cos(FLAT_ANGLE)) & (np.abs(along * facets.offset[shell] - offset) < COPLANAR_OFFSET)
+    ]
+    low, high = bounds_of(facets, regions)
+    boxes = (bounds_of(facets, near[k : k + 1]) for k in range(len(near)))
+    return any(bool(((box[0] <= high + TOUCH) & (box[1] >= low - TOUCH)).all()) for box in boxes)
+
+
+def _touching(facets: FlatRegions, things: list[Integers]) -> list[Integers]:
+    """Things whose boxes touch, together: a seat and its legs are a chair."""
+    if not things:
+        return []
+    low, high = np.stack([bounds_of(facets, regions) for regions in things], axis=1)
+    near = ((low[:, None] <= high + TOUCH) & (high[:, None] >= low - TOUCH)).all(axis=-1)
+    group = connected(np.argwhere(near), len(things))
+    return [
+        np.concatenate([things[i] for i in np.flatnonzero(group == number)]) for number in range(int(group.max()) + 1)
+    ]
+
+
+def plain_name(name: str) -> str:
+    """A node's name as a wall's name: `Office Chair.002` is `office_chair_002`; empty if it says nothing."""
+    if _NAMELESS.fullmatch(name):
+        return ""
+    plain = re.sub(r"[^\w.\-]+", "_", name.strip(), flags=re.UNICODE).strip("_.-").lower()
+    return re.sub(r"_+", "_", plain.replace(".", "_"))[:48]
+
+
+def place_free_name(name: str) -> str:
+    """The same, empty too where it says no more than that it is a wall, floor or ceiling."""
+    plain = plain_name(name)
+    return "" if re.fullmatch(r"(walls?|floors?|ceilings?|roof|wand|boden|decke)?[_\d]*", plain) else plain
+
+
+def kind_by_shape(bounds: Floats, room: Floats) -> str:
+    """What a thing is called by its size and place; a name, nothing that is computed with."""
+    size, floor = bounds[1] - bounds[0], float(room[0, 2])
+    bottom, top = float(bounds[0, 2]) - floor, float(bounds[1, 2]) - floor
+    longest, shortest = float(size[:2].max()), float(size[:2].min())
+    if size[2] > 0.85 * float(room[1, 2] - room[0, 2]):
+        return "column" if longest < 1.0 and shortest > 0.5 * longest else "partition"
+    if size[2] <= 0.12 and 0.5 < bottom < 1.3 and shortest > 0.3:
+        return "table_top"
+    if bottom < 0.05:
+        if 0.6 < top < 1.0 and shortest > 0.6:
+            return "table"
+        if 0.6 < top < 1.3 and longest < 0.8:
+            return "chair"
+        return "cabinet" if top > 1.0 else "object"
+    return "seat" if size[2] < 0.15 and 0.3 < top < 0.6 else "hanging" if bottom > 1.8 else "object"
+
+
+def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
+    """Where a region of the shell is: `floor`, `ceiling`, `wall_north` (y grows to the north, x to the east)."""
+    center, height = room.mean(axis=0), float(room[1, 2] - room[0, 2])
+    if abs(normal[2]) >= LEVEL:
+        share = (float(middle[2]) - float(room[0, 2])) / height if height else 0.0
+        return "floor" if share < 0.2 else "ceiling" if share > 0.8 else "table_top" if share < 0.5 else "level"
+    outward = normal * (1.0 if (middle - center) @ normal >= 0.0 else -1.0)
+    eighth = int(np.round(np.degrees(np.arctan2(outward[1], outward[0])) / 45.0)) % 8
+    side = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")[eighth]
+    return f"wall_{side}" if abs(normal[2]) <= UPRIGHT else f"slope_{side}"
+
+
+def numbered(names: list[str]) -> list[str]:
+    """Names made different: the second of one name gets `_2`, and so on."""
+    taken: set[str] = set()
+    found = []
+    for name in names:
+        number, unique = 1, name
+        while unique in taken:
+            number += 1
+            unique = f"{name}_{number}"
+        taken.add(unique)
+        found.append(unique)
+    return found
+
+
+def _is_shell(bounds: Floats, room: Floats) -> bool:
+    size = room[1] - room[0]
+    share = (bounds[1] - bounds[0]) / np.where(size > 0.0, size, 1.0)
+    return int((share >= SPAN).sum()) >= 2

@@ -1,0 +1,218 @@
+"""From flat regions to surfaces that reflect and clutter that shades."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.constants import COPLANAR_OFFSET
+from rislam_rt.geometry.triangles import distance_to_triangles
+from rislam_rt.scene.importing.options import ImportOptions
+from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions
+from rislam_rt.scene.importing.regions.mesh_simplification import clustered, corners_kept, has_area, region_mesh
+from rislam_rt.scene.importing.regions.region_groups import RegionGroup
+from rislam_rt.scene.importing.regions.round_surfaces import RoundPatch, prism
+from rislam_rt.scene.meshes import Mesh
+
+RESTING = 5e-3
+"""[m] A face this near a wall of the shell, on the far side of its thing, stands on it: nobody sees it."""
+MAX_SHADE_FACES = 3000
+"""Shades are tested against every segment of every path; cells grow until no more triangles are left."""
+OUTLINE = 0.125
+"""[wavelengths] Outlines of flat regions are thinned within this."""
+SAGITTA = 0.25
+"""[wavelengths] Flat sides keep within this of the cylinder that they stand for; half of it where they reflect."""
+
+
+class Surface(NamedTuple):
+    """A flat mesh that reflects."""
+
+    piece: int
+    part: int
+    """Part of the file, for its names."""
+    normal: Floats
+    mesh: Mesh
+    area: float
+    error: float
+    """[m]."""
+
+
+class ClutterMesh(NamedTuple):
+    """Triangles (T, 3, 3) [m] of a piece that shade."""
+
+    piece: int
+    triangles: Floats
+
+
+class SortedSurfaces(NamedTuple):
+    """A mesh as what reflects and what shades."""
+
+    surfaces: list[Surface]
+    clutter: list[ClutterMesh]
+    shade_error: float
+    """[m]."""
+    cell: float
+    """[m] of the cells in which corners of clutter were joined."""
+    narrow: float
+    """[m] width below which regions shade."""
+    shading: float
+    """[m^2] of regions that shade."""
+    gone: float
+    """[m^2] of regions that are neither: faces that rest on walls, things smaller than the detail."""
+    cylinders: list[tuple[float, int, float]]
+    """Radius [m], flat sides and error [m] of each."""
+
+
+def sort_regions(
+    facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], options: ImportOptions
+) -> SortedSurfaces:
+    """Decide for every region whether it reflects, shades or goes."""
+    owner = np.zeros(len(facets.area), dtype=np.int64)
+    for number, piece in enumerate(pieces):
+        owner[piece.regions] = number
+    rounded = np.zeros(len(owner), dtype=np.bool_)
+    for found in rounds:
+        # as planes, cylinders get sides of their own; of other round things the sides that are drawn are taken
+        rounded[found.regions] = found.radius > 0.0 or options.curved == "shade"
+    part = np.zeros(len(owner), dtype=np.int64)
+    part[facets.region] = facets.mesh.part
+    mirror, narrow = _mirrors(facets, rounded, options)
+    resting = _resting(facets, pieces, mirror)
+    mirror &= ~resting
+    group = _coplanar(facets, pieces[0].regions, mirror, part)
+    label = group.copy()
+    for number, found in enumerate(rounds):
+        if rounded[found.regions[0]]:
+            label[found.regions] = len(owner) + number
+    kept = corners_kept(facets, label)
+    surfaces = []
+    for number in np.unique(group[mirror]):
+        regions = np.flatnonzero((group == number) & mirror)
+        first = int(regions[0])
+        mesh, error = region_mesh(facets, regions, kept, OUTLINE * options.wavelength)
+        area = float(facets.area[regions].sum())
+        surfaces.append(Surface(int(owner[first]), int(part[first]), facets.normal[first], mesh, area, error))
+    return _with_clutter(facets, pieces, rounds, surfaces, mirror, resting, narrow, options)
+
+
+def _mirrors(facets: FlatRegions, rounded: Booleans, options: ImportOptions) -> tuple[Booleans, float]:
+    """Which regions reflect like planes, and the width [m] from which on they do."""
+    flat = ~rounded & (facets.residual <= OUTLINE * options.wavelength)
+    width = np.minimum(facets.width, np.sqrt(facets.area))
+    narrow = options.narrow
+    chosen = np.sort(width[flat & (width >= narrow)])
+    if len(chosen) > options.max_walls:
+        narrow = float(chosen[-options.max_walls])
+    return flat & (width >= narrow), narrow
+
+
+def _resting(facets: FlatRegions, pieces: list[RegionGroup], mirror: Booleans) -> Booleans:
+    """Regions of things that lie on walls of the shell, their thing rising from there."""
+    resting = np.zeros(len(mirror), dtype=np.bool_)
+    walls = pieces[0].regions[mirror[pieces[0].regions]]
+    corners = facets.mesh.vertices[facets.mesh.faces]
+    for piece in pieces[1:]:
+        chosen = np.isin(facets.region, piece.regions)
+        region, points = facets.region[chosen], corners[chosen]
+        height = np.einsum("fci,wi->fcw", points, facets.normal[walls]) - facets.offset[walls]
+        rises = np.abs(height).max(axis=(0, 1)) > 2.0 * RESTING
+        one_side = (height.min(axis=(0, 1)) > -RESTING) | (height.max(axis=(0, 1)) < RESTING)
+        near = np.abs(height).max(axis=1) < RESTING
+        on = np.zeros(len(points), dtype=np.bool_)
+        for wall in np.flatnonzero(rises & one_side & near.any(axis=0)):
+            rows = np.flatnonzero(near[:, wall])
+            solid = facets.mesh.vertices[facets.faces_of(walls[wall : wall + 1])]
+            on[rows] |= distance_to_triangles(points[rows].mean(axis=1), solid) < RESTING
+        resting[np.setdiff1d(np.unique(region), np.unique(region[~on]))] = True
+    return resting
+
+
+def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Integers) -> Integers:
+    """Number (R,) of the wall each region belongs to: those of the shell in one plane and of one part are one."""
+    group = np.arange(len(mirror))
+    rows = shell[mirror[shell]]
+    for place, i in enumerate(rows):
+        if group[i] != i:
+            continue
+        later = rows[place + 1 :]
+        turn = np.linalg.norm(np.cross(facets.normal[later], facets.normal[i]), axis=1)
+        sign = np.sign(facets.normal[later] @ facets.normal[i])
+        apart = np.abs(sign * facets.offset[later] - facets.offset[i])
+        same = (turn < 0.1 * FLAT_ANGLE) & (part[later] == part[i]) & (group[later] == later)
+        for j in later[same & (apart < 10.0 * COPLANAR_OFFSET)]:
+            corners = facets.mesh.vertices[facets.faces_of(np.array([j]))]
+            if np.abs(corners @ facets.normal[i] - facets.offset[i]).max() < COPLANAR_OFFSET:
+                group[j] = i
+    return group
+
+
+def _with_clutter(
+    facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], surfaces: list[Surface], mirror: Booleans,
+    resting: Booleans, narrow: float, options: ImportOptions,
+) -> SortedSurfaces:  # fmt: skip
+    """Cylinders as prisms and all else that does not reflect in cells."""
+    wavelength, cylinders, prisms = options.wavelength, [], []
+    rest = ~mirror & ~resting
+    owner = {int(region): number for number, piece in enumerate(pieces) for region in piece.regions}
+    part = np.zeros(len(mirror), dtype=np.int64)
+    part[facets.region] = facets.mesh.part
+    for found in rounds:
+        if found.radius < wavelength or found.along[1] - found.along[0] < narrow or resting[found.regions].all():
+            continue
+        sagitta = SAGITTA * wavelength * (0.5 if options.curved == "planes" else 1.0)
+        mesh, error = prism(found, sagitta)
+        first = int(found.regions[0])
+        thing = owner[first]
+        cylinders.append((found.radius, len(mesh.faces) // 2, error))
+        rest[found.regions] = False
+        if options.curved == "planes":
+            area = float(facets.area[found.regions].sum())
+            surfaces.append(Surface(thing, int(part[first]), facets.normal[first], mesh, area, error))
+        else:
+            prisms.append(ClutterMesh(thing, mesh.vertices[mesh.faces]))
+    gone = float(facets.area[resting].sum())
+    raw, planes = [], _shell_planes(surfaces)
+    for number, piece in enumerate(pieces):
+        regions = piece.regions[rest[piece.regions]]
+        triangles = off_planes(facets.mesh.vertices[facets.faces_of(regions)], planes)
+        if len(triangles) and np.ptp(triangles.reshape(-1, 3), axis=0).max() >= narrow:
+            raw.append(ClutterMesh(number, triangles))
+        else:
+            gone += float(facets.area[regions].sum())
+            rest[regions] = False
+    thin, error, cell = in_cells(raw, wavelength)
+    shading = float(facets.area[rest].sum()) + sum(surface_area(clutter.triangles) for clutter in prisms)
+    thin = [ClutterMesh(c.piece, off_planes(c.triangles, planes)) for c in (*prisms, *thin)]
+    thin = [clutter for clutter in thin if len(clutter.triangles)]
+    return SortedSurfaces(surfaces, thin, error, cell, narrow, shading, gone, cylinders)
+
+
+def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], float, float]:
+    """Clutter thinned in cells of one size, the smallest with which it is few enough."""
+    while True:
+        found = [(clutter.piece, *clustered(clutter.triangles, cell)) for clutter in raw]
+        if sum(len(triangles) for _, triangles, _ in found) <= MAX_SHADE_FACES:
+            break
+        cell *= np.sqrt(2.0)
+    error = max((moved for _, triangles, moved in found if len(triangles)), default=0.0)
+    return [ClutterMesh(piece, triangles) for piece, triangles, _ in found], error, cell
+
+
+def _shell_planes(surfaces: list[Surface]) -> list[tuple[Floats, float]]:
+    return [
+        (s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in surfaces if s.piece == 0 and len(s.mesh.faces) < 200
+    ]
+
+
+def off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats:
+    """Triangles (T, 3, 3) without those that lie flat on a wall of the shell."""
+    keep = has_area(triangles)
+    for normal, offset in planes:
+        keep &= np.abs(triangles @ normal - offset).max(axis=1) > RESTING
+    return triangles[keep]
+
+
+def surface_area(triangles: Floats) -> float:
+    """Area [m^2] of triangles (T, 3, 3)."""
+    edge = triangles[:, 1:] - triangles[:, :1]
+    return 0.5 * float(np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1).sum())

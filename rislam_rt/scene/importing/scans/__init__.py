@@ -1,0 +1,1 @@
+"""Rooms from scans: levels, an outline that is straight, and what stands in it."""

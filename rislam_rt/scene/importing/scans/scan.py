@@ -1,0 +1,180 @@
+"""Planes in a scanned mesh: noise estimated from the mesh itself, planes fitted in the order of their area."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.spatial import cKDTree
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.angles import unit
+from rislam_rt.scene.importing.regions.flat_regions import Welded, connected
+
+SPACING = 0.04
+"""[m] One point of the mesh is looked at in every cube of this size."""
+NEIGHBOURS = 30
+"""Points for the normal at each: a patch some 12 cm wide."""
+SMOOTHING = 3
+"""Times that the direction in which corners face is averaged over their neighbours."""
+LEAN = np.cos(np.radians(30.0))
+"""A point belongs to a plane whose normal is this near its own."""
+ALIKE = np.cos(np.radians(1.0))
+"""Two parts of one wall are parallel within this."""
+LEAST_AREA = 0.3
+"""[m^2] Smaller planes are clutter."""
+GAP = 0.3
+"""[m] A scan's holes up to this wide part no plane."""
+NARROWEST = 0.25
+"""[m] Narrower planes are strips of something round, or clutter."""
+ROUND = 1.3
+"""Where the residual is more than this many times the noise, the surface is not flat."""
+WIDTHS = 3.0
+"""Standard deviations of the noise within which a point belongs to a plane."""
+MAX_PLANES = 60
+_SEEDS, _SCORED = 200, 6000
+
+
+class PointCloud(NamedTuple):
+    """N points of a mesh, thinned."""
+
+    points: Floats
+    normal: Floats
+    """(N, 3) of a small patch about each."""
+    area: Floats
+    """(N,) [m^2] that each stands for."""
+    noise: float
+    """[m] standard deviation of points off the patches about them, their median."""
+
+
+class ScanPlane(NamedTuple):
+    """A plane and the points that it explains."""
+
+    normal: Floats
+    offset: float
+    members: Integers
+    residual: float
+    """[m] root mean square distance of its points."""
+    area: float
+    """[m^2]."""
+    width: float
+    """[m] Short side of the rectangle with the same second moments."""
+
+
+def downsample_mesh(mesh: Welded) -> PointCloud:
+    """The cloud of a welded mesh: one corner for every cube and side, with the normal of the patch about it.
+
+    Both faces of a thin board stay apart where the mesh says which side is which.
+    """
+    facing, share = _facing(mesh)
+    side = np.argmax(np.abs(facing), axis=1)
+    side = 2 * side + (np.take_along_axis(facing, side[:, None], axis=1)[:, 0] < 0.0)
+    key = np.column_stack([np.floor(mesh.vertices / SPACING).astype(np.int64), side])
+    _, first, box = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    points, facing, count = mesh.vertices[first], facing[first], min(NEIGHBOURS, len(first))
+    area = np.asarray(np.bincount(box.ravel(), share), dtype=np.float64)
+    # neighbours in place and facing: a turn of a right angle counts as much as four cubes
+    space = np.concatenate([points, 4.0 * SPACING * facing], axis=1)
+    near = points[cKDTree(space).query(space, count)[1].reshape(len(points), count)]
+    near = near - near.mean(axis=1, keepdims=True)
+    values, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near) / count)
+    normal = vectors[:, :, 0]
+    normal *= np.where(np.einsum("ni,ni->n", normal, facing) < 0.0, -1.0, 1.0)[:, None]
+    # three of the patch's degrees of freedom went into its own plane
+    noise = np.sqrt(np.maximum(values[:, 0], 0.0) * count / max(count - 3, 1))
+    return PointCloud(points, normal, area, float(np.median(noise)))
+
+
+def _facing(mesh: Welded) -> tuple[Floats, Floats]:
+    """(V, 3) where each corner faces, smoothed over its neighbours, and the area (V,) [m^2] that it stands for."""
+    triangles = mesh.vertices[mesh.faces]
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    share, facing = np.zeros(len(mesh.vertices)), np.zeros((len(mesh.vertices), 3))
+    np.add.at(share, mesh.faces, np.linalg.norm(cross, axis=1)[:, None] / 6.0)
+    for corner in range(3):
+        np.add.at(facing, mesh.faces[:, corner], cross)
+    rows = mesh.faces.ravel()
+    ones = np.ones(len(rows))
+    touch = coo_matrix((ones, (rows, np.repeat(np.arange(len(mesh.faces)), 3))), shape=(len(facing), len(mesh.faces)))
+    around = (touch @ touch.T).tocsr()
+    for _ in range(SMOOTHING):
+        facing = unit(np.asarray(around @ facing))
+    return facing, share
+
+
+def find_planes(cloud: PointCloud) -> list[ScanPlane]:
+    """Planes of a cloud, the largest first.
+
+    In every round planes through some patches are scored by the area that lies on them (RANSAC with the normals that
+    the patches have: Schnabel, Wahl and Klein, Computer Graphics Forum 2007); the best is fitted to what it explains
+    and hangs together, and that is taken out.
+    """
+    free = np.ones(len(cloud.points), dtype=np.bool_)
+    found: list[ScanPlane] = []
+    reach = WIDTHS * max(cloud.noise, 1e-3)
+    while len(found) < MAX_PLANES:
+        plane = _best_plane(cloud, free, reach)
+        if plane is None:
+            break
+        free[plane.members] = False
+        if plane.area >= LEAST_AREA and plane.residual <= ROUND * max(cloud.noise, 1e-3) and plane.width >= NARROWEST:
+            found.append(plane)
+    return sorted(found, key=lambda plane: -plane.area)
+
+
+def _best_plane(cloud: PointCloud, free: Booleans, reach: float) -> ScanPlane | None:
+    rows = np.flatnonzero(free)
+    if cloud.area[rows].sum() < LEAST_AREA:
+        return None
+    seeds = rows[np.linspace(0, len(rows) - 1, min(_SEEDS, len(rows))).astype(int)]
+    looked = rows[:: max(1, len(rows) // _SCORED)]
+    normal = cloud.normal[seeds]
+    apart = np.abs(cloud.points[looked] @ normal.T - np.einsum("si,si->s", cloud.points[seeds], normal))
+    alike = cloud.normal[looked] @ normal.T > LEAN
+    score = cloud.area[looked] @ ((apart < 2.0 * reach) & alike)
+    best = int(np.argmax(score))
+    if score[best] * len(rows) / len(looked) < LEAST_AREA:
+        return None
+    plane, offset, members = normal[best], float(cloud.points[seeds[best]] @ normal[best]), seeds[best : best + 1]
+    for width in (3.0 * reach, 1.5 * reach, reach, reach):
+        height = cloud.points[rows] @ plane - offset
+        on = rows[(np.abs(height) < width) & (cloud.normal[rows] @ plane > LEAN)]
+        if len(on) < 4:
+            break
+        groups = _hanging_together(cloud, on)
+        members = groups[0]
+        plane, offset = _fit(cloud.points[members], cloud.area[members], plane)
+    else:
+        members = np.concatenate([members, *(g for g in groups[1:] if _fits(cloud, g, plane, offset))])
+    height = cloud.points[members] @ plane - offset
+    weight = cloud.area[members]
+    residual = float(np.sqrt((weight * height**2).sum() / max(weight.sum(), 1e-12)))
+    local = cloud.points[members] - weight @ cloud.points[members] / max(weight.sum(), 1e-12)
+    spread = np.linalg.eigvalsh(np.einsum("n,ni,nj->ij", weight, local, local) / max(weight.sum(), 1e-12))
+    return ScanPlane(plane, offset, members, residual, float(weight.sum()), float(np.sqrt(12.0 * max(spread[1], 0.0))))
+
+
+def _hanging_together(cloud: PointCloud, rows: Integers) -> list[Integers]:
+    """Groups of points over gaps of up to `GAP`: the largest first, then others of at least `LEAST_AREA`."""
+    cells, box = np.unique(np.floor(cloud.points[rows] / (0.5 * GAP)).astype(np.int64), axis=0, return_inverse=True)
+    near = cKDTree(cells).query_pairs(1.8, output_type="ndarray")
+    label = connected(near, len(cells))[box.ravel()]
+    size = np.bincount(label, cloud.area[rows])
+    order = np.argsort(-size, kind="stable")
+    return [rows[label == k] for k in order if size[k] >= LEAST_AREA or k == order[0]]
+
+
+def _fits(cloud: PointCloud, rows: Integers, plane: Floats, offset: float) -> bool:
+    """Whether points apart from those that a plane was fitted to lie on it too, with no lean or step of their own."""
+    height = cloud.points[rows] @ plane - offset
+    own, _ = _fit(cloud.points[rows], cloud.area[rows], plane)
+    noise = max(cloud.noise, 1e-3)
+    return bool(abs(height.mean()) < 0.5 * noise and height.std() < 1.1 * noise and own @ plane > ALIKE)
+
+
+def _fit(points: Floats, weight: Floats, side: Floats) -> tuple[Floats, float]:
+    """Plane of least weighted squares through points (N, 3), its normal on the side of `side`."""
+    middle = weight @ points / weight.sum()
+    local = points - middle
+    normal = np.linalg.eigh(np.einsum("n,ni,nj->ij", weight, local, local))[1][:, 0]
+    normal = normal * (1.0 if normal @ side >= 0.0 else -1.0)
+    return normal, float(normal @ middle)

@@ -1,0 +1,101 @@
+"""Rooms drawn at random, in memory: what a classifier learns from, so that every named room stays unseen."""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.geometry.angles import unit
+from rislam_rt.model import Material, Occluder, Reflector, RisPanel, RisSpec, Scatterer, Scene, Trajectory
+from rislam_rt.scene.built_in_rooms.shapes import block, hexahedron
+from rislam_rt.scene.solids import sphere_mesh
+
+SIZE, HEIGHT = (3.5, 9.0), (2.3, 4.0)
+"""Ranges of a room's sides and height [m]."""
+TILTED, TILT = 0.4, 0.08
+"""Share of rooms whose planes all lean, and standard deviation of their normals then."""
+FURNISHED = 0.4
+"""Share of rooms with a reflecting block on the floor."""
+REFLECTION, RADIUS = (0.3, 0.95), (0.03, 0.3)
+"""Ranges of reflection coefficients, and of scatterer radii [m] (log-uniform)."""
+ALIKE, SLABS = 0.35, 0.35
+"""Shares of rooms of one reflection coefficient, and of slabs of building materials; in the others every wall has its
+own coefficient."""
+THICKNESS = {"concrete": 0.2, "brick": 0.12, "plasterboard": 0.025, "chipboard": 0.02, "marble": 0.03, "glass": 0.008,
+             "plywood": 0.02, "wood": 0.03, "metal": 0.005}  # fmt: skip
+"""ITU materials and thicknesses [m], which vary by a factor of 0.6 to 1.6."""
+SHADING = 0.5
+"""Share of scatterers above 0.1 m of radius that hide what lies behind them."""
+PANEL, CEILING_PANEL, ELEMENTS = 0.8, 0.5, (4, 16)
+"""Share of rooms with a panel, of panels in the ceiling (the others are on a wall); range of elements along a side."""
+MAX_SCATTERERS = 4
+MARGIN = 0.5
+"""Least distance [m] of a scatterer's or the panel's centre from the walls of an upright room."""
+
+
+def random_room(name: str, *, rng: np.random.Generator) -> Scene:
+    """A room with walls, perhaps a block, one to four spheres, and perhaps a panel; the agent stands at a corner."""
+    size = np.array([*rng.uniform(*SIZE, size=2), rng.uniform(*HEIGHT)])
+    corners = _corners(size, TILT if rng.uniform() < TILTED else 0.0, rng)
+    meshes = hexahedron(corners)
+    if rng.uniform() < FURNISHED:
+        low = rng.uniform(0.45, 0.7, size=2) * size[:2]
+        high = np.minimum(low + rng.uniform(0.4, 1.5, size=2), 0.88 * size[:2])
+        meshes["block"] = block([*low, 0.03 * size[2]], [*high, rng.uniform(0.3, 0.6) * size[2]])
+    materials = _materials(len(meshes), rng)
+    reflectors = tuple(
+        Reflector(key, mesh.vertices, mesh.faces, material)
+        for (key, mesh), material in zip(meshes.items(), materials, strict=True)
+    )
+    spheres = tuple(_sphere(f"sphere_{k}", size, rng) for k in range(rng.integers(1, MAX_SCATTERERS + 1)))
+    panel = _panel(corners, size, rng) if rng.uniform() < PANEL else None
+    start = np.array([0.18, 0.18, 0.35]) * size
+    agent = Trajectory(np.zeros(1), start[None], np.zeros((1, 3)), np.zeros(1))
+    return Scene(name, reflectors, spheres, panel, agent)
+
+
+def _corners(size: Floats, tilt: float, rng: np.random.Generator) -> Floats:
+    """Corners (2, 2, 2, 3): each the common point of three planes, so that all faces are flat."""
+    normal = np.concatenate([np.eye(3), np.eye(3)]).reshape(2, 3, 3)
+    normal = unit(normal + tilt * rng.standard_normal((2, 3, 3)))
+    point = np.stack([0.5 * size * (1.0 - np.eye(3)), 0.5 * size * (1.0 + np.eye(3))])
+    corners = np.empty((2, 2, 2, 3))
+    axes = np.arange(3)
+    for index in np.ndindex(2, 2, 2):
+        planes = normal[list(index), axes]
+        corners[index] = np.linalg.solve(planes, np.sum(planes * point[list(index), axes], axis=1))
+    return corners
+
+
+def _materials(count: int, rng: np.random.Generator) -> list[Material]:
+    kind = rng.uniform()
+    if kind < ALIKE:
+        return count * [Material(reflection=float(rng.uniform(*REFLECTION)))]
+    if kind < ALIKE + SLABS:
+        names = rng.choice(sorted(THICKNESS), size=count)
+        return [Material(itu=str(n), thickness=THICKNESS[str(n)] * float(rng.uniform(0.6, 1.6))) for n in names]
+    return [Material(reflection=float(rng.uniform(*REFLECTION))) for _ in range(count)]
+
+
+def _sphere(name: str, size: Floats, rng: np.random.Generator) -> Scatterer:
+    radius = float(np.exp(rng.uniform(*np.log(RADIUS))))
+    center = rng.uniform([MARGIN, MARGIN, 0.15 * size[2]], [*(size[:2] - MARGIN), 0.8 * size[2]])
+    shade = None
+    if radius > 0.1 and rng.uniform() < SHADING:
+        mesh = sphere_mesh(center, radius)
+        shade = Occluder(mesh.vertices, mesh.faces)
+    return Scatterer(name, center, float(np.pi * radius**2), radius, shade=shade)
+
+
+def _panel(corners: Floats, size: Floats, rng: np.random.Generator) -> RisPanel:
+    """In the ceiling or in the upper half of a wall, its front into the room."""
+    host, (a, b, c) = "ceiling", (corners[0, 0, 1], corners[1, 0, 1], corners[0, 1, 1])
+    share = rng.uniform(0.25, 0.75, size=2)
+    if rng.uniform() >= CEILING_PANEL:
+        axis, side = rng.integers(2, size=2)
+        wall, share[1] = np.moveaxis(corners, axis, 0)[side], rng.uniform(0.5, 0.85)
+        host, (a, b, c) = f"wall_{'xy'[axis]}{side}", (wall[0, 0], wall[1, 0], wall[0, 1])
+    normal = unit(np.cross(c - a, b - a))
+    center = a + share[0] * (b - a) + share[1] * (c - a)
+    normal = normal if (0.5 * size - center) @ normal > 0.0 else -normal
+    elements = int(rng.integers(ELEMENTS[0], ELEMENTS[1] + 1))
+    spec = RisSpec(elements, elements, np.array([0.015, 0.015]), normal, unit(c - a - ((c - a) @ normal) * normal))
+    return RisPanel(spec, center, host)

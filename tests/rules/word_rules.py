@@ -1,0 +1,62 @@
+"""The words of the glossary, and where in the package a name is not one of the field's."""
+
+import ast
+import re
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Iterator
+
+from rule_book import ROOT, Source
+
+GLOSSARY = ROOT / "docs" / "glossary.md"
+
+NOT_YET = "slam/"
+"""The one folder that exceptions may name."""
+
+
+def listed(section: str, text: str | None = None) -> dict[str, str]:
+    """Words of a section's table and what stands in their place."""
+    page = GLOSSARY.read_text(encoding="utf-8") if text is None else text
+    body = page.partition(f"\n## {section}\n")[2].partition("\n## ")[0]
+    rows = [line.strip("|").split("|") for line in body.splitlines() if line.startswith("|")][2:]
+    return {word.strip(): good.strip() for words, good in rows for word in words.split(",")}
+
+
+def words_of(name: str) -> list[str]:
+    """The words of an identifier in lower case: `_PathTruth` and `path_truth` are `path`, `truth`."""
+    return [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)]
+
+
+def names_of(source: Source) -> Iterator[tuple[str, str, bool]]:
+    """Place, name, and whether the name is one of a class or a file."""
+    for part in source.path.removesuffix(".py").split("/"):
+        yield source.path, part, True
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.ClassDef | ast.FunctionDef):
+            yield f"{source.path}:{node.lineno}", node.name, isinstance(node, ast.ClassDef)
+
+
+def word_breaches(source: Source, exceptions: Collection[str] = ()) -> Iterator[str]:
+    """Names with a word that is not the field's."""
+    if source.path in exceptions:
+        return
+    parts, wholes = listed("Not the field's words"), listed("Not alone")
+    for place, name, is_whole in names_of(source):
+        words = words_of(name)
+        for word in words:
+            if word in parts:
+                yield f"{place}: '{name}': say {parts[word]} (docs/glossary.md)"
+        if is_whole and words and "_".join(words) in wholes:
+            yield f"{place}: '{name}' alone: say {wholes['_'.join(words)]} (docs/glossary.md)"
+
+
+def doubled_classes(sources: Iterable[Source], exceptions: Collection[str] = ()) -> Iterator[str]:
+    """Class names that stand twice; an exception may stand outside `slam/` once."""
+    places = defaultdict(list)
+    for source in sources:
+        for node in ast.walk(source.tree):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places[node.name].append(source.path)
+    for name, files in places.items():
+        counted = [file for file in files if name not in exceptions or not file.startswith(NOT_YET)]
+        if len(counted) > 1:
+            yield f"class {name} stands in {', '.join(files)}"
