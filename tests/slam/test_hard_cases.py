@@ -67,3 +67,30 @@ def test_faults_would_be_noticed() -> None:
     assert hard._not_covariance(np.array([[[1.0, 0.1], [0.0, 1.0]]]))
     assert hard._not_covariance(np.full((1, 2, 2), np.nan))
     assert not hard._not_covariance(np.diag([1.0, 0.0])[None])
+
+
+def _led(kind: str, seed: int, most: int = 12) -> ModuleType:
+    """What the window filter makes of a case at its default settings."""
+    case = hard.draw_case(kind, seed, "window", most=most)
+    return hard.run_case(case._replace(config=hard.SlamConfig(filter="window", use_vt=True)))
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("speed wrong by 0.3 m/s", 2), ("compass wrong by 0.5 rad", 6)])
+def test_a_start_told_wrong_is_said_and_mended(kind: str, seed: int) -> None:
+    verdict = _led(kind, seed)
+    assert verdict.said
+    assert not verdict.lost
+    assert verdict.outcomes[-1] == "ok"
+    assert verdict.drift < 0.03  # a second at the wrong speed is 0.3 m
+
+
+def test_a_jump_is_said_and_landed_from() -> None:
+    verdict = _led("jump of the agent", 3, 30)
+    assert verdict.said
+    assert not verdict.lost
+    assert verdict.drift < 0.05
+    assert verdict.std < 0.1
+
+
+def test_nothing_wrong_is_not_called_lost() -> None:
+    assert not _led("nothing wrong", 4, 20).said

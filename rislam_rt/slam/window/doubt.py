@@ -25,8 +25,8 @@ RATE = 1e-4
 """Probability that a cycle is the one in which the agent is lost: once in 1000 s."""
 SURE = float(np.log(RATE))
 """Log odds of an agent that is tracked for certain, but for the last cycle."""
-JUMP = 1.0
-"""Standard deviation [m] of an agent's place after it was lost, and of a jump."""
+JUMP = egomotion.WALK
+"""Standard deviation [m] of an agent's place after it was lost, and of a jump: as far as it walks in a second."""
 CELL = 0.01
 """Distance [m] within which two places are one: as far as a cycle's returns tell."""
 LOG_JUMP = np.log(RATE) + 2.0 * np.log(CELL / JUMP)
@@ -128,9 +128,10 @@ PAST = 10
 
 
 def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
-    """Before anything is born: with another level velocity, within `std` [m/s], at its start."""
+    """Before anything is born: with another level velocity at its start, within `std` [m/s] or what was told."""
     head, hessian = window.head.copy(), window.prior.hessian.copy()
-    head[3:5], hessian[[3, 4], [3, 4]] = velocity[:2], std**-2.0
+    # the tracks will be asked again, as features: their word is not to count twice
+    head[3:5], hessian[[3, 4], [3, 4]] = velocity[:2], np.minimum(hessian[[3, 4], [3, 4]], std**-2.0)
     return _begun(window, head, hessian)
 
 

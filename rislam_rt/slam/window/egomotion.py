@@ -135,7 +135,7 @@ class _Settled(NamedTuple):
 
 
 def _starts(found: Rates, told: Floats) -> Floats:
-    """(S, 3) velocities from which to look for agreement: those on which two tracks agree, and what is told."""
+    """(S, 2) velocities from which to look for agreement: those on which two tracks agree, and what is told."""
     first, second = np.triu_indices(len(found.rate), 1)
     pair = np.stack([found.toward[first], found.toward[second]], axis=1)
     aim = np.stack([found.rate[first], found.rate[second]], axis=1) - pair[..., 2] * told[2]
@@ -143,15 +143,23 @@ def _starts(found: Rates, told: Floats) -> Floats:
     fine = np.abs(det) > 0.5
     x = (aim[:, 0] * pair[:, 1, 1] - aim[:, 1] * pair[:, 0, 1])[fine] / det[fine]
     y = (aim[:, 1] * pair[:, 0, 0] - aim[:, 0] * pair[:, 1, 0])[fine] / det[fine]
-    every = np.stack([x, y, np.full(len(x), told[2])], axis=1)
-    every = every[np.hypot(x, y) < 3.0 * WALK]
-    left = (found.rate - every @ found.toward.T) ** 2 / found.variance
-    order = np.argsort(-(left < 9.0).sum(axis=1), kind="stable")[:MOST]
-    return np.concatenate([told[None, :2], every[order, :2]])
+    every = np.stack([x, y], axis=1)[np.hypot(x, y) < 3.0 * WALK]
+    level, cell = _agreement(found, every, told[2])[0].sum(axis=1), np.round(every / NEAR)
+    order = np.argsort(-level, kind="stable")
+    _, first = np.unique(cell[order], axis=0, return_index=True)
+    return np.concatenate([told[None, :2], every[order[np.sort(first)[:MOST]]]])
 
 
-MOST = 8
-"""Velocities that are looked at closely."""
+NEAR, MOST = 0.01, 8
+"""Difference [m/s] up to which velocities are one to look at, and how many are looked at closely."""
+
+
+def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Floats]:
+    """Log likelihoods (S, T) of the tracks under level velocities (S, 2), and the shares by which they agree."""
+    left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
+    close = np.log1p(-APART) - 0.5 * left**2 / found.variance - 0.5 * np.log(2.0 * np.pi * found.variance)
+    either = np.logaddexp(close, np.log(APART) - np.log(4.0 * WALK))
+    return either, np.exp(close - either)
 
 
 def _settle(found: Rates, start: Floats, climb: float) -> _Settled:
@@ -159,10 +167,8 @@ def _settle(found: Rates, start: Floats, climb: float) -> _Settled:
     flat, rate = found.toward[:, :2], found.rate - found.toward[:, 2] * climb
     v, prior = start.copy(), np.eye(2) / (3.0 * WALK) ** 2
     for last in (False,) * 6 + (True,):
-        left = rate - v @ flat.T
-        close = np.log1p(-APART) - 0.5 * left**2 / found.variance - 0.5 * np.log(2.0 * np.pi * found.variance)
-        either = np.logaddexp(close, np.log(APART) - np.log(4.0 * WALK))
-        weight = np.exp(close - either) / found.variance
+        either, share = _agreement(found, v, climb)
+        weight = share / found.variance
         normal = np.einsum("st,ti,tj->sij", weight, flat, flat) + prior
         if last:
             break
