@@ -18,6 +18,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.geometry.angles import unit
+from rislam_rt.geometry.mirror_chain import mirror_chain
 from rislam_rt.information import (
     LinearMeasurements,
     MotionPrior,
@@ -27,7 +28,7 @@ from rislam_rt.information import (
     posterior_bound,
 )
 from rislam_rt.information.heard_paths import SILENT
-from rislam_rt.information.landmark_model import LandmarkModel, mirror_chain
+from rislam_rt.information.landmark_model import LandmarkModel
 from rislam_rt.information.position import range_information
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import PathKind, SlamResult

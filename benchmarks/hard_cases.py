@@ -117,10 +117,11 @@ def _stretch(paths: Paths, cycles: slice) -> Paths:
 def _settings(engine: str, rng: np.random.Generator) -> SlamConfig:
     """Every option that the filter has, at random; the first draw of three is the default."""
     if rng.uniform() < 0.4:
-        config = SlamConfig()
+        config = SlamConfig(filter="rao_blackwellised")
     else:
         window = int(rng.choice([40, 12]))
         config = SlamConfig(
+            filter="rao_blackwellised",
             num_particles=int(rng.choice([1, 6])),
             sigma_a=float(rng.choice([0.01, 1e-6, 1.0])),
             use_vt=bool(rng.integers(2)),

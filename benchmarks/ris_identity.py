@@ -25,6 +25,7 @@ from rislam_rt.measurement import with_reference_snr
 from rislam_rt.model import RadioConfig, RisCode, Scene
 from rislam_rt.report.style import save_figure, styled
 from rislam_rt.ris import leg_response
+from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.scene import load_scene
 from rislam_rt.slam.identity import (
     STRENGTHS,
@@ -33,7 +34,6 @@ from rislam_rt.slam.identity import (
     log_panel_missed,
     log_scatterer,
     log_scatterer_missed,
-    point_amplitude,
 )
 
 BLOCK = 400

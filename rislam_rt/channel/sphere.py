@@ -1,25 +1,13 @@
 """Cross-section of a conducting sphere: physical optics (pi r^2, the scene's default) and the exact Mie series."""
 
-from dataclasses import replace
-
 import numpy as np
 import scipy
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.errors import SceneError
-from rislam_rt.model import Scene
 
 MAX_SIZE = 3000.0
 """Largest k r of the series, whose time grows with its square (0.2 s there): from 1000 on it is pi r^2 within 3e-7."""
-
-
-def with_exact_spheres(scene: Scene) -> Scene:
-    """The scene with every sphere's cross-section left to the Mie series, as by `mie = true` in its file.
-
-    Cylinders, and scatterers given by a cross-section without a radius, stay as they are.
-    """
-    exact = tuple(s if s.radius is None or s.height is not None else replace(s, law="mie") for s in scene.scatterers)
-    return replace(scene, scatterers=exact)
 
 
 def sphere_rcs(radius: float, wavelength: float, angle: Floats) -> tuple[Floats, Floats]:

@@ -2,36 +2,28 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from rislam_rt.cli.verbosity import verbosity
+from rislam_rt.progress import Tell
 
 if TYPE_CHECKING:
-    from rich.progress import TaskID
+    from rich.progress import Progress, ProgressColumn, TaskID
 
     from rislam_rt.sweeps import SweepCost, SweepProgress
 
 
-class ProgressReport(Protocol):
-    """Takes news of the work."""
+def _bars(*columns: "ProgressColumn") -> "Progress":
+    from rich.console import Console
+    from rich.progress import Progress
 
-    def __call__(self, stage: str, at: int, total: int) -> None:
-        """`at` of `total` steps of a stage are done."""
-        ...
+    return Progress(*columns, console=Console(stderr=True), refresh_per_second=4, disable=verbosity().quiet)
 
 
 @contextmanager
-def show_progress() -> Iterator[ProgressReport]:
+def show_progress() -> Iterator[Tell]:
     """Show a bar for every stage that news comes of."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     columns = (
         TextColumn("{task.description:>12}"),
@@ -41,7 +33,7 @@ def show_progress() -> Iterator[ProgressReport]:
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), refresh_per_second=4, disable=verbosity().quiet) as bars:
+    with _bars(*columns) as bars:
         tasks: dict[str, TaskID] = {}
 
         def tell(stage: str, at: int, total: int) -> None:
@@ -55,11 +47,10 @@ def show_progress() -> Iterator[ProgressReport]:
 @contextmanager
 def show_sweep() -> "Iterator[Callable[[SweepProgress], None]]":
     """Show a sweep: its cost before it starts, a bar with the time left, and every failure as it comes."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 
     columns = (TextColumn("cells"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[left]}"))
-    with Progress(*columns, console=Console(stderr=True), refresh_per_second=4, disable=verbosity().quiet) as bar:
+    with _bars(*columns) as bar:
         task = bar.add_task("cells", total=None, left="one cell goes first, to tell the cost")
 
         def tell(told: "SweepProgress") -> None:

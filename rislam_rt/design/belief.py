@@ -11,10 +11,12 @@ from rislam_rt.design.designers import blind_design, designer
 from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.result import Design, DesignConfig
 from rislam_rt.geometry.angles import unit
+from rislam_rt.geometry.bistatic import path_gradient
 from rislam_rt.geometry.planes import mirror, mirror_direction, plane_between
-from rislam_rt.information import GradientMode, path_gradient, prior_from_covariance, range_information
+from rislam_rt.information import GradientMode, prior_from_covariance, range_information
 from rislam_rt.model import DataSheet, MapEstimate, RadioConfig, RisCode, RisSpec, SlamEstimate, join_codes, join_sheets
 from rislam_rt.ris import leg_response
+from rislam_rt.ris.path_gain import point_amplitude
 
 _DEFAULT = DesignConfig()
 
@@ -196,9 +198,8 @@ def _point_gains(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Float
     first = np.maximum(np.linalg.norm(landmarks.position[paths.tx_point] - tx, axis=-1), nearest)
     second = np.maximum(np.linalg.norm(landmarks.position[paths.rx_point] - rx, axis=-1), nearest)
     strength = landmarks.strength[paths.source] * _ratio(landmarks, paths)
-    amplitude = radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi) ** 1.5
     phase = np.exp(-2j * np.pi / radio.wavelength * (first + second))
-    return amplitude * strength / (first * second) * phase
+    return point_amplitude(strength, first, second, radio) * phase
 
 
 def _length_variance(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats) -> Floats:

@@ -11,17 +11,7 @@ from rislam_rt.evaluate.confidence_intervals import (
     share_interval,
 )
 from rislam_rt.evaluate.consistency import Consistency, chi_square_bounds, consistency, normalised_squares
-from rislam_rt.evaluate.errors import (
-    TrajectoryError,
-    WallError,
-    align,
-    landmark_rmse,
-    position_errors,
-    rmse,
-    root_mean_square,
-    trajectory_error,
-    wall_errors,
-)
+from rislam_rt.evaluate.errors import TrajectoryError, align, position_errors, rmse, root_mean_square, trajectory_error
 from rislam_rt.evaluate.set_distances import Gospa, Ospa, gospa, match_points, ospa
 
 __all__ = [
@@ -31,7 +21,6 @@ __all__ = [
     "Interval",
     "Ospa",
     "TrajectoryError",
-    "WallError",
     "align",
     "association_fractions",
     "association_score",
@@ -41,7 +30,6 @@ __all__ = [
     "consistency",
     "gospa",
     "label_switches",
-    "landmark_rmse",
     "match_points",
     "mean_over_runs",
     "median_over_runs",
@@ -53,5 +41,4 @@ __all__ = [
     "root_mean_square",
     "share_interval",
     "trajectory_error",
-    "wall_errors",
 ]

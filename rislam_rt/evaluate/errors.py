@@ -33,18 +33,6 @@ def root_mean_square(errors: Floats) -> float:
     return float(np.sqrt(np.mean(errors**2)))
 
 
-def landmark_rmse(estimate: Floats, truth: Floats) -> Floats:
-    """RMSE (N,) [m] of N landmarks, estimates (K, N, 3) over K cycles against (N, 3); NaN rows are not counted.
-
-    Infinite for a landmark that was never estimated.
-    """
-    squared = np.sum((np.asarray(estimate) - np.asarray(truth)) ** 2, axis=-1)
-    known = ~np.isnan(squared)
-    count = known.sum(axis=0)
-    mean = np.where(known, squared, 0.0).sum(axis=0) / np.maximum(count, 1)
-    return np.where(count > 0, np.sqrt(mean), np.inf)
-
-
 class TrajectoryError(NamedTuple):
     """Errors of a trajectory, in metres and radians."""
 
@@ -103,33 +91,3 @@ def align(estimate: Floats, truth: Floats) -> Floats:
     angle = np.angle(overlap) if overlap != 0.0 else 0.0
     c, s = np.cos(angle), np.sin(angle)
     return centred @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + truth.mean(axis=0)
-
-
-class WallError(NamedTuple):
-    """Errors of W planes."""
-
-    angle: Floats
-    """(W,) [rad] between the normals, whichever way they point."""
-    offset: Floats
-    """(W,) [m] signed, along the true normal, at the point asked for."""
-
-
-def wall_errors(
-    normal: Floats, offset: Floats, true_normal: Floats, true_offset: Floats, at: Floats | None = None
-) -> WallError:
-    """Angle and offset errors of planes `normal . x = offset` (W, 3), (W,) against true ones.
-
-    Parameters
-    ----------
-    at
-        (3,) or (W, 3) points [m] at which the offset is compared, brought onto the true plane first; the origin by
-        default. Far from where the agent saw the wall the offset holds the angle's error as well.
-    """
-    normal, true_normal = np.atleast_2d(normal), np.atleast_2d(true_normal)
-    sign = np.where(np.sum(normal * true_normal, axis=-1) < 0.0, -1.0, 1.0)
-    normal, offset = normal * sign[:, None], np.asarray(offset) * sign
-    cosine = np.sum(normal * true_normal, axis=-1)
-    angle = np.arctan2(np.linalg.norm(np.cross(normal, true_normal), axis=-1), cosine)
-    points = np.broadcast_to(np.zeros(3) if at is None else np.asarray(at, dtype=np.float64), true_normal.shape)
-    foot = points + (np.asarray(true_offset) - np.sum(points * true_normal, axis=-1))[:, None] * true_normal
-    return WallError(angle, offset - np.sum(foot * normal, axis=-1))

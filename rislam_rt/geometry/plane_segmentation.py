@@ -47,11 +47,6 @@ class _Mesh(NamedTuple):
         return rows[np.abs(self.triangles[rows] @ normal - distance).max(axis=1, initial=0.0) <= offset]
 
 
-def planar_groups(triangles: Floats, angle: float, offset: float) -> Integers:
-    """Number (T,) of the plane each triangle (T, 3, 3) lies in, counted in the order of first appearance."""
-    return planar_regions(triangles, angle, offset).group
-
-
 def planar_regions(triangles: Floats, angle: float, offset: float) -> PlanarRegions:
     """Part a mesh (T, 3, 3) into planes, and fit each to all its corners.
 

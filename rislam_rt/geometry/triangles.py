@@ -68,9 +68,3 @@ def inside_any(points: Floats, triangles: Floats, slack: float) -> Booleans:
         depth = (np.einsum("ni,tei->nte", points[rows], inward) - offset).min(axis=-1)
         inside[rows] = (depth >= -slack).any(axis=-1)
     return inside
-
-
-def edge_distance_pairs(points: Floats, triangles: Floats) -> Floats:
-    """Distance [m] (S,) of points (S, 3) from the nearest edge line of their triangle (S, 3, 3), positive inside."""
-    inward, offset = edge_planes(triangles)
-    return (np.einsum("sei,si->se", inward, points) - offset).min(axis=-1)

@@ -10,17 +10,14 @@ from rislam_rt.information.delay_gain import (
     steering,
 )
 from rislam_rt.information.dilution_maps import position_error_map
-from rislam_rt.information.gradient import GradientMode, cosine_gradient, path_gradient, vertex_gradient
+from rislam_rt.information.gradient import GradientMode, vertex_gradient
 from rislam_rt.information.heard_paths import heard_paths
 from rislam_rt.information.landmark_model import (
     LandmarkModel,
     LinearMeasurements,
-    MirrorChain,
     WallSpread,
     build_landmark_model,
     fewer_rows,
-    mirror_chain,
-    plane_tangents,
 )
 from rislam_rt.information.outcome import Outcome
 from rislam_rt.information.position import PositionBound, position_bound, position_information, range_information
@@ -34,7 +31,6 @@ __all__ = [
     "LandmarkModel",
     "LinearMeasurements",
     "MeasurementStd",
-    "MirrorChain",
     "MotionPrior",
     "Outcome",
     "PositionBound",
@@ -44,7 +40,6 @@ __all__ = [
     "assumed_std",
     "build_landmark_model",
     "certainty_share",
-    "cosine_gradient",
     "cosine_information",
     "delay_gain_information",
     "delay_information",
@@ -53,9 +48,6 @@ __all__ = [
     "heard_paths",
     "map_to_position",
     "measurement_std",
-    "mirror_chain",
-    "path_gradient",
-    "plane_tangents",
     "position_bound",
     "position_error_map",
     "position_information",

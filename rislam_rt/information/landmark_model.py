@@ -14,9 +14,9 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import unit
-from rislam_rt.geometry.planes import mirror
+from rislam_rt.geometry.bistatic import cosine_gradient
+from rislam_rt.geometry.mirror_chain import mirror_chain, plane_tangents
 from rislam_rt.information.accuracy import cosine_information
-from rislam_rt.information.gradient import cosine_gradient
 from rislam_rt.information.position import range_information
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 
@@ -50,40 +50,6 @@ class WallSpread(NamedTuple):
     """[rad] between the normals, both tilts together."""
     distance: float
     """[m] along the normal, at one point of the wall."""
-
-
-class MirrorChain(NamedTuple):
-    """A point mirrored in D walls, one after the other."""
-
-    image: Floats
-    """(..., 3) [m]."""
-    linear: Floats
-    """(3, 3) derivative of the image with respect to the point."""
-    planes: Floats
-    """(..., D, 3, 3): wall, coordinate, and two tilts [1/rad] and the offset [1] of that wall."""
-
-
-def mirror_chain(point: Floats, normal: Floats, offset: Floats) -> MirrorChain:
-    """Mirror points (..., 3) in planes (D, 3), (D,) in turn, with derivatives by the chain rule."""
-    depth = len(offset)
-    linear = np.eye(3)
-    planes = np.zeros((*point.shape[:-1], depth, 3, 3))
-    for d in range(depth):
-        reflection = np.eye(3) - 2.0 * np.outer(normal[d], normal[d])
-        planes[..., :d, :, :] = reflection @ planes[..., :d, :, :]
-        distance = (point @ normal[d] - offset[d])[..., None]
-        for column, tangent in enumerate(plane_tangents(normal[d])):
-            planes[..., d, :, column] = -2.0 * ((point @ tangent)[..., None] * normal[d] + distance * tangent)
-        planes[..., d, :, 2] = 2.0 * normal[d]
-        point = mirror(point, normal[d], offset[d])
-        linear = reflection @ linear
-    return MirrorChain(point, linear, planes)
-
-
-def plane_tangents(normal: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors at right angles to a unit vector and to each other."""
-    first = unit(np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))]))
-    return first, np.cross(normal, first)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,7 +1,7 @@
 """A run: trace the room once, then lead every scheme through all cycles under the same noise."""
 
 import platform
-from collections.abc import Callable, Mapping, MutableMapping
+from collections.abc import Mapping, MutableMapping
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from time import perf_counter
@@ -26,12 +26,12 @@ from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.specification.spec import PipelineSpec
-from rislam_rt.pipeline.workers import run_side_by_side
+from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.ris import delay_spread_warnings
 from rislam_rt.scene.check import material_errors
 from rislam_rt.scene.findings import raise_errors
+from rislam_rt.worker_pool import run_side_by_side
 
-Progress = Callable[[str, int, int], None]
 """Told the stage (`trace` or a scheme), how much of it is done, and how much there is."""
 
 LIBRARIES = ("numpy", "scipy", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-core")
@@ -118,7 +118,7 @@ def run_slam(
     rng: np.random.Generator,
     jobs: int = 1,
     done: MutableMapping[str, SchemeResult] | None = None,
-    progress: Progress | None = None,
+    progress: Tell = tell_nobody,
 ) -> SlamResult:
     """Run all schemes of a specification in a room.
 
@@ -144,12 +144,11 @@ def run_slam(
     expect("spec", spec, PipelineSpec)
     expect("rng", rng, np.random.Generator)
     done = {} if done is None else done
-    tell = progress or (lambda stage, at, total: None)
-    tell("trace", 0, 1)
+    progress("trace", 0, 1)
     stage = prepare_setup(scene, spec, rng=rng)
-    tell("trace", 1, 1)
+    progress("trace", 1, 1)
     todo = [name for name in spec.schemes if name not in done]
-    for name, scheme in run_side_by_side(run_scheme, todo, (stage, spec), jobs, tell):
+    for name, scheme in run_side_by_side(run_scheme, todo, (stage, spec), jobs, progress):
         if isinstance(scheme, RislamError):
             raise scheme
         done[name] = scheme
@@ -174,7 +173,7 @@ def result_of(
 
 
 def run_scheme(
-    name: str, stage: RunSetup, spec: PipelineSpec, tell: Progress, estimator: Estimator | None = None
+    name: str, stage: RunSetup, spec: PipelineSpec, tell: Tell, estimator: Estimator | None = None
 ) -> SchemeResult:
     """One scheme over all cycles, with its own estimator unless another is given."""
     walk = SchemeSimulation(name, stage.scene, stage.body, spec, stage.seeds, estimator)

@@ -1,6 +1,5 @@
 """One scheme on its way through the cycles of a run, led through all of them at once or slice by slice."""
 
-from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import replace
 
@@ -20,9 +19,8 @@ from rislam_rt.pipeline.room.front_end import prepare_front_end
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, child
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.progress import Tell
 from rislam_rt.ris import draw_panel
-
-Tell = Callable[[str, int, int], None]
 
 
 class SchemeSimulation:

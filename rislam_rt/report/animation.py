@@ -1,7 +1,6 @@
 """A run as a moving picture: the room from above, and beside it the agent in close-up, moment by moment."""
 
 import io
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from matplotlib.figure import Figure
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import SchemeResult, SlamResult
+from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.report.geometry import ellipse
 from rislam_rt.report.room import draw_plan
 from rislam_rt.report.style import TRUTH, scheme_colour, styled
@@ -33,7 +33,7 @@ HALVES = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 """[m] Half widths of the close-up: the least that holds all errors but the largest twentieth."""
 
 
-def gif_bytes(result: SlamResult, tell: Callable[[str, int, int], None] = lambda *_: None) -> bytes:
+def gif_bytes(result: SlamResult, tell: Tell = tell_nobody) -> bytes:
     """The content of a GIF file. `tell` is told of every frame."""
     rows = spread(len(result.scene.agent), FRAMES)
     pictures: list[Image] = []

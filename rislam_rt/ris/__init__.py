@@ -1,15 +1,7 @@
 """Floor 3: physics of the panel. Pure functions of geometry; the channel and the agent's belief both call them."""
 
 from rislam_rt.ris.element import element_gain_area, element_pattern
-from rislam_rt.ris.impairments import (
-    PanelErrors,
-    PanelTolerance,
-    draw_panel,
-    flip_bits,
-    mean_power_shares,
-    perfect_panel,
-    quantise,
-)
+from rislam_rt.ris.impairments import PanelErrors, PanelTolerance, draw_panel, flip_bits, mean_power_shares, quantise
 from rislam_rt.ris.rephase import panel_gain, rephase
 from rislam_rt.ris.response import far_field_response, leg_response, zero_code
 from rislam_rt.ris.validity import delay_spread, delay_spread_warnings, far_field_limit, far_field_warnings
@@ -29,7 +21,6 @@ __all__ = [
     "leg_response",
     "mean_power_shares",
     "panel_gain",
-    "perfect_panel",
     "quantise",
     "rephase",
     "zero_code",

@@ -66,12 +66,6 @@ class PanelErrors:
         return RisCode(np.where(self.stuck == FREE, code.index, self.stuck), code.levels)
 
 
-def perfect_panel(spec: DataSheet) -> PanelErrors:
-    """A panel that does what its data sheet says, or several."""
-    shape = spec.rows, spec.cols
-    return PanelErrors(np.ones(shape), np.zeros(shape), np.zeros(shape, dtype=np.bool_), np.full(shape, FREE))
-
-
 def draw_panel(spec: DataSheet, tolerance: PanelTolerance, *, rng: np.random.Generator) -> PanelErrors:
     """A panel, or several, with errors drawn independently for each element.
 

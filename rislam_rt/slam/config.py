@@ -25,7 +25,7 @@ MOST = {"num_particles": 100_000, "window": 10_000, "num_samples": 10_000, "agen
 class SlamConfig:
     """Everything that the filter is free to choose. SI units."""
 
-    filter: str = "rao_blackwellised"
+    filter: str = "window"
     """Who localises and maps; all filters have the same inputs and outputs."""
     num_particles: int = 1
     """Gaussian particles that the start prior is split into: more where it is too wide to be linear in."""
@@ -33,7 +33,7 @@ class SlamConfig:
     """Share of the start's variance that lies between the particles, if there are several; the rest is within them."""
     sigma_a: float = 0.01
     """Standard deviation of the white acceleration [m/s^2]."""
-    use_vt: bool = False
+    use_vt: bool = True
     """Whether wall returns (virtual transmitters) join the map as planes, or are thrown away as in the paper."""
     heading: str = "known"
     """`known` by a compass, along the `velocity`, or `estimated` as a random walk."""

@@ -10,8 +10,8 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.information import amplitude_std
 from rislam_rt.model import Body, DataSheet, RadioConfig, RisCode, RisSpec, SensorModel
 from rislam_rt.ris import leg_response, panel_gain
+from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.book import Book
-from rislam_rt.slam.identity import point_amplitude
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, Sight, bounced, compact, observe, reflect
 
 FAINT = 0.35

@@ -9,8 +9,8 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Complexes, Floats
-from rislam_rt.model import RadioConfig, RisCode, RisSpec
-from rislam_rt.ris import leg_response, panel_gain
+from rislam_rt.model import RadioConfig
+from rislam_rt.ris.path_gain import point_amplitude
 
 STRENGTHS = np.linspace(np.log(1e-3), np.log(3.0), 81)
 """Grid of log sqrt(cross-section / m^2): 1 mm to 3 m in steps of 10 %."""
@@ -46,23 +46,6 @@ def log_missed(mean: Floats, std: Floats, threshold: float) -> Floats:
     level = threshold / std
     below = scipy.special.chndtr(level**2, 2.0, np.minimum(mean / std, level + BEYOND) ** 2)
     return np.asarray(np.log(1.0 - SHOWN * (1.0 - below)))
-
-
-def point_amplitude(strength: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig) -> Floats:
-    """|alpha| of eq. `a2` for `strength`, the square root of a cross-section [m]."""
-    scale = radio.wavelength * np.sqrt(4.0 * np.pi * radio.tx_gain * radio.rx_gain) / (4.0 * np.pi) ** 2
-    return scale * strength / (tx_length * rx_length)
-
-
-def predicted_panel_gain(
-    spec: RisSpec, code: RisCode, center: Floats, tx: Floats, rx: Floats, ratio: Floats, radio: RadioConfig
-) -> Complexes:
-    """Gain (...,) of a panel at `center` (..., 3) between (unfolded) ends (..., 3); `ratio` (...,) of the walls."""
-    legs = [
-        leg_response(spec, center, end, np.sqrt(ratio * gain), radio.wavelength)
-        for end, gain in ((tx, radio.tx_gain), (rx, radio.rx_gain))
-    ]
-    return panel_gain(legs[0], legs[1], code)
 
 
 def log_panel(amplitude: Floats, std: Floats, gain: Complexes) -> Floats:

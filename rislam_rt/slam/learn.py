@@ -8,6 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.information import amplitude_std
 from rislam_rt.model import RisCode
+from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.book import Book, image_idents, learn_ratio
 from rislam_rt.slam.expect import Belief, Expected
 from rislam_rt.slam.identity import (
@@ -17,7 +18,6 @@ from rislam_rt.slam.identity import (
     log_panel_missed,
     log_scatterer,
     log_scatterer_missed,
-    predicted_panel_gain,
     weigh_silence,
 )
 from rislam_rt.slam.match import Outlook
@@ -180,6 +180,6 @@ def _sampled_gains(
     poses = poses_of(draws[:, :3], belief.poses.heading, belief.body)
     centers = np.swapaxes(draws[:, 3:].reshape(BELIEF_SAMPLES, -1, 3), 0, 1)
     return [
-        predicted_panel_gain(sheet, part, centers, poses.tx[None], poses.rx[None], np.ones(1), belief.radio)
+        panel_path_gain(sheet, part, centers, poses.tx[None], poses.rx[None], np.ones(1), belief.radio)
         for sheet, part in zip(belief.ris.panels, belief.ris.parts(code), strict=True)
     ]

@@ -7,7 +7,6 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body
 from rislam_rt.slam.returns import Poses
 
@@ -59,8 +58,7 @@ def where(feature: int) -> slice:
 
 def poses_of(position: Floats, heading: Floats, body: Body) -> Poses:
     """Ends of agents at positions (..., 3) with headings that broadcast against the leading axes."""
-    rotation = rotation_z(heading)
-    return Poses(position + rotation @ body.tx_offset, position + rotation @ body.rx_offset, np.asarray(heading))
+    return Poses(*body.ends(position, heading), np.asarray(heading))
 
 
 def normalised(log_weight: Floats) -> tuple[Floats, float]:

@@ -196,8 +196,8 @@ def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats
         by_wall = -2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :])
         block[..., rows, walls, :, :] += by_wall
         image[..., rows, :] = mirrored
-    own = (~moving).nonzero()[0]
-    block[..., own, legs[own, 0], :, :] = by_base[..., own, :, :]
+    held = (legs[:, 0, None] == np.arange(features.shape[-2])).astype(np.float64)
+    by_feature += by_base[..., None, :] * held[:, None, :, None]
     return image, by_feature, by_base
 
 

@@ -9,17 +9,10 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.information import amplitude_std
 from rislam_rt.model import Body, PanelCandidate, RisCode
+from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.book import Book
 from rislam_rt.slam.expect import Belief
-from rislam_rt.slam.identity import (
-    TOLD,
-    add_evidence,
-    log_panel,
-    log_panel_missed,
-    log_scatterer,
-    log_scatterer_missed,
-    predicted_panel_gain,
-)
+from rislam_rt.slam.identity import TOLD, add_evidence, log_panel, log_panel_missed, log_scatterer, log_scatterer_missed
 from rislam_rt.slam.mirrors import is_behind_mirror, mirror_images, rays
 from rislam_rt.slam.moments import Moments, even_draws, poses_of
 from rislam_rt.slam.returns import Poses
@@ -64,7 +57,7 @@ def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None) -> Tracks
     amplitude = np.exp(tracks.log_amplitude[rows])
     panel, side = np.empty((len(rows), len(belief.ris.panels))), tracks.side[rows]
     for number, (sheet, part) in enumerate(zip(belief.ris.panels, belief.ris.parts(code), strict=True)):
-        gain = predicted_panel_gain(sheet, part, center, belief.poses.tx, belief.poses.rx, np.ones(1), radio)
+        gain = panel_path_gain(sheet, part, center, belief.poses.tx, belief.poses.rx, np.ones(1), radio)
         panel[:, number] = np.where(here, log_panel(amplitude, std, gain), log_panel_missed(std, gain, threshold))
         panel[here & (side != UNTOLD) & (side != PANEL + number), number] = -np.inf
     scatterer = np.where(

@@ -9,10 +9,10 @@ from rislam_rt.channel.compare import PathReport, Validation, compare_paths, val
 from rislam_rt.channel.compare.channels import room_rng, trace_both
 from rislam_rt.errors import RislamError
 from rislam_rt.model import Paths, RadioConfig, Scene
-from rislam_rt.pipeline.run import Progress
 from rislam_rt.pipeline.specification.radio import build_radio
-from rislam_rt.pipeline.workers import Tell, run_side_by_side
+from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.studies.spec import CompareSpec
+from rislam_rt.worker_pool import run_side_by_side
 
 
 class Certificate(NamedTuple):
@@ -50,7 +50,7 @@ class Comparison(NamedTuple):
 
 
 def run_comparison(
-    scenes: Sequence[Scene], spec: CompareSpec, *, jobs: int = 1, progress: Progress | None = None
+    scenes: Sequence[Scene], spec: CompareSpec, *, jobs: int = 1, progress: Tell = tell_nobody
 ) -> Comparison:
     """Compare both channels in the rooms of a specification, given in its order; `jobs` rooms at a time.
 
@@ -61,7 +61,6 @@ def run_comparison(
     TraceError, SetupError
         The tracer failed, or the machine lacks what it needs.
     """
-    tell = progress or (lambda stage, at, total: None)
     radio = build_radio(spec.radio)
     work = {
         str(number): (scene, room.depth) for number, (scene, room) in enumerate(zip(scenes, spec.rooms, strict=True))
@@ -69,17 +68,17 @@ def run_comparison(
     shown = [number for number, room in enumerate(spec.rooms) if room.picture]
     found: dict[str, list[Validation]] = {}
     steps = len(work) + len(shown)
-    tell("rooms", 0, steps)
+    progress("rooms", 0, steps)
     common = (work, radio, spec.poses, spec.seed)
-    for name, rows in run_side_by_side(compare_room, list(work), common, jobs, lambda *_: None):
+    for name, rows in run_side_by_side(compare_room, list(work), common, jobs, tell_nobody):
         if isinstance(rows, RislamError):
             raise rows
         found[name] = rows
-        tell("rooms", len(found), steps)
+        progress("rooms", len(found), steps)
     certificate = None
     for number in shown:
         certificate = certify_pose(scenes[number], spec.rooms[number].depth, radio, poses=spec.poses, seed=spec.seed)
-        tell("rooms", steps, steps)
+        progress("rooms", steps, steps)
     return Comparison([row for name in work for row in found[name]], certificate)
 
 

@@ -11,9 +11,10 @@ from rislam_rt.design import DesignProblem, GainCurves, direct_only, gain_curves
 from rislam_rt.design.gain_curves import GainInterval
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Paths, RadioConfig, RisPanel, Scatterer, Scene, Trajectory
-from rislam_rt.pipeline.run import Progress, build_channel
+from rislam_rt.pipeline.run import build_channel
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.specification.spec import build_design
+from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.studies.spec import Fig4aSpec
 
 
@@ -61,7 +62,7 @@ def lone_panel(scene: Scene) -> RisPanel:
     return scene.ris
 
 
-def run_fig4a(scene: Scene, spec: Fig4aSpec, *, rng: np.random.Generator, progress: Progress | None = None) -> Fig4a:
+def run_fig4a(scene: Scene, spec: Fig4aSpec, *, rng: np.random.Generator, progress: Tell = tell_nobody) -> Fig4a:
     """Trace the places and design, draw and bound the panel's gain at each of them.
 
     Raises
@@ -73,11 +74,10 @@ def run_fig4a(scene: Scene, spec: Fig4aSpec, *, rng: np.random.Generator, progre
     """
     check_fig4a(scene, spec)
     panel = lone_panel(scene)
-    tell = progress or (lambda stage, at, total: None)
     radio, motion = build_radio(spec.radio), walk_to_panel(scene, spec.places, spec.closest_m)
     radius = spec.sphere_radius_m or 0.5 * longer_side(panel)
     steps = len(spec.elements) * spec.places
-    tell("places", 0, steps)
+    progress("places", 0, steps)
     sphere = sphere_gain(scene, motion, radio, radius, spec.channel)
     curves: dict[str, GainCurves] = {}
     for number, element in enumerate(spec.elements):
@@ -90,7 +90,7 @@ def run_fig4a(scene: Scene, spec: Fig4aSpec, *, rng: np.random.Generator, progre
                     coverage=spec.coverage, config=build_design(spec.design),
                 )
             )  # fmt: skip
-            tell("places", number * spec.places + place, steps)
+            progress("places", number * spec.places + place, steps)
         curves[element] = _joined(at_places)
     distance = np.linalg.norm(motion.position - panel.center, axis=1)
     return Fig4a(motion.position, distance, panel.spec.levels, curves, sphere, radius)

@@ -6,13 +6,14 @@ from importlib import import_module
 from typing import Any
 
 from rislam_rt.errors import ConfigError, SetupError
-from rislam_rt.sweeps.work import LOST, CellOutcome, Task
-from rislam_rt.sweeps.worker_pool import Run, WorkerPool
+from rislam_rt.sweeps.local_pool import SAME_BITS, Run, outcome_of
+from rislam_rt.sweeps.work import LOST, CellOutcome, Task, attempt
+from rislam_rt.worker_pool import Pool
 
 CONNECT_SECONDS = 3
 """How long to wait for the scheduler, which is there already: it only has to answer."""
 
-_CREW = WorkerPool()
+_POOL = Pool(SAME_BITS)
 """Of the Dask worker that this module is imported in."""
 
 
@@ -54,7 +55,7 @@ def cluster_pool(address: str, limit: float | None) -> Iterator[tuple[Run, int]]
 
 def do_cell(task: Task, limit: float | None) -> tuple[Any, ...]:
     """One cell, on a Dask worker; the outcome as plain data."""
-    return tuple(_CREW.do(Task(*task), limit))
+    return tuple(outcome_of(_POOL.do(attempt, (Task(*task),), limit), limit))
 
 
 def _outcome(future: Any, address: str) -> CellOutcome:
@@ -68,4 +69,4 @@ def _outcome(future: Any, address: str) -> CellOutcome:
 
 def dismiss_idle() -> None:
     """End the workers that wait for nothing."""
-    _CREW.dismiss()
+    _POOL.dismiss()

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from rislam_rt.errors import ConfigError
 from rislam_rt.sweeps.axes import Cell, Sweep, build_cells
 from rislam_rt.sweeps.cost import SweepCost, estimate_cost
+from rislam_rt.sweeps.local_pool import Run, local_pool
 from rislam_rt.sweeps.store import (
     DONE,
     MISSING,
@@ -23,7 +24,6 @@ from rislam_rt.sweeps.store import (
     write_table,
 )
 from rislam_rt.sweeps.work import LOST, CellOutcome, Task, find_function
-from rislam_rt.sweeps.worker_pool import Run, local_pool
 
 TABLE_SECONDS = 1.0
 """Least time between two writings of the growing table."""

@@ -1,17 +1,10 @@
-"""The life of a worker: an interpreter that does one cell after another, told and telling in lines of JSON.
+"""One cell: what a worker is given, and what became of it."""
 
-`main` takes a `Task` a line on its standard input and gives a `CellOutcome` a line on its standard output. It ends with
-its input, in the middle of a cell if need be: nobody is left to hear the result.
-"""
-
-import json
 import os
 from collections.abc import Mapping
 from importlib import import_module
-from queue import SimpleQueue
-from threading import Thread
 from time import perf_counter, process_time
-from typing import Any, NamedTuple, TextIO
+from typing import Any, NamedTuple
 
 from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.sweeps.record import plain_result
@@ -46,8 +39,8 @@ class CellOutcome(NamedTuple):
     """What the function itself says of its times."""
 
 
-def attempt(task: Task) -> CellOutcome:
-    """Do one cell; an exception is an outcome."""
+def attempt(task: Task, tell: object = None) -> CellOutcome:
+    """Do one cell; an exception is an outcome. A cell has no progress to `tell` of."""
     begin, cpu = perf_counter(), process_time()
     result, cause, message, timing = None, "", "", None
     try:
@@ -86,23 +79,3 @@ def one_line(error: BaseException) -> str:
     text = str(error).strip().splitlines()
     kind = "" if isinstance(error, RislamError) else f"{type(error).__name__}: "
     return (kind + (text[0] if text else "")).rstrip(": ")[:500]
-
-
-def main() -> None:
-    """Serve until the input ends. Cells read nothing, and what they print goes to the error stream."""
-    mouth = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)
-    tasks: SimpleQueue[Task] = SimpleQueue()
-    ear = os.fdopen(os.dup(0), encoding="utf-8")
-    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-    Thread(target=_listen, args=(ear, tasks), daemon=True).start()
-    mouth.write("ready\n")
-    while True:
-        mouth.flush()
-        mouth.write(json.dumps(attempt(tasks.get()), allow_nan=False) + "\n")
-
-
-def _listen(ear: TextIO, tasks: "SimpleQueue[Task]") -> None:
-    for line in ear:
-        tasks.put(Task(*json.loads(line)))
-    os._exit(0)

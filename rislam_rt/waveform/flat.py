@@ -61,9 +61,3 @@ def flat_pulse(time: Floats, bandwidth: float, energy: float = 1.0, *, derivativ
     Samples at any rate of at least B carry its whole energy: `sum s^2 / rate = E`.
     """
     return np.sqrt(bandwidth / energy) * autocorrelation(time, bandwidth, energy, derivative=derivative)
-
-
-def pulse_spectrum(frequency: Floats, bandwidth: float, energy: float = 1.0) -> Floats:
-    """Fourier transform (...,) [sqrt(J/Hz)] of the pulse at baseband frequencies (...,) [Hz]."""
-    inside = np.abs(np.asarray(frequency, dtype=np.float64)) <= bandwidth / 2.0
-    return np.where(inside, np.sqrt(energy / bandwidth), 0.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.errors import GeometryError
-from rislam_rt.evaluate import align, landmark_rmse, rmse, trajectory_error, wall_errors
+from rislam_rt.evaluate import align, rmse, trajectory_error
 from rislam_rt.geometry.angles import rotation_z
 
 TRUTH = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [2.0, 1.0, 1.0], [2.0, 3.0, 1.0]])
@@ -46,30 +46,3 @@ def test_alignment_undoes_a_turn_about_z_and_a_shift():
 def test_trajectories_of_different_lengths_are_refused():
     with pytest.raises(GeometryError, match="same"):
         trajectory_error(TRUTH[:3], TRUTH)
-
-
-def test_landmarks_count_only_the_cycles_that_know_them():
-    truth = np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
-    estimate = np.full((3, 2, 3), np.nan)
-    estimate[1:, 0] = [[1.0, 0.3, 0.0], [1.0, 0.0, 0.1]]
-    np.testing.assert_allclose(landmark_rmse(estimate, truth), [np.sqrt(0.05), np.inf])
-
-
-class TestWalls:
-    def test_a_flipped_normal_is_the_same_wall(self):
-        score = wall_errors(
-            np.array([[-1.0, 0.0, 0.0]]), np.array([-6.1]), np.array([[1.0, 0.0, 0.0]]), np.array([6.0])
-        )
-        np.testing.assert_allclose(score.angle, 0.0, atol=1e-15)
-        np.testing.assert_allclose(score.offset, 0.1, atol=1e-12)
-
-    def test_angle_of_a_tilted_wall_and_its_offset_where_it_was_seen(self):
-        tilt, seen = 0.01, np.array([0.0, 3.0, 1.0])
-        normal = np.array([[np.cos(tilt), np.sin(tilt), 0.0]])
-        foot = np.array([6.0, 3.0, 1.0])
-        offset = np.array([normal[0] @ foot])  # turned about the point next to the agent
-        score = wall_errors(normal, offset, np.array([[1.0, 0.0, 0.0]]), np.array([6.0]), at=seen)
-        np.testing.assert_allclose(score.angle, tilt, rtol=1e-9)
-        np.testing.assert_allclose(score.offset, 0.0, atol=1e-12)
-        elsewhere = wall_errors(normal, offset, np.array([[1.0, 0.0, 0.0]]), np.array([6.0]))
-        np.testing.assert_allclose(elsewhere.offset, 3.0 * np.sin(tilt), rtol=1e-9)

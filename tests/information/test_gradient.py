@@ -5,8 +5,8 @@ import pytest
 
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.information import cosine_gradient, path_gradient, vertex_gradient
+from rislam_rt.geometry.bistatic import path_gradient
+from rislam_rt.information import vertex_gradient
 from rislam_rt.model import PathKind, RadioConfig, Trajectory
 from rislam_rt.scene import load_scene
 
@@ -92,20 +92,3 @@ def test_paper_mode_vanishes_for_a_monostatic_landmark():
     np.testing.assert_allclose(vertex_gradient(agent, agent, vertices, one, mode="paper"), 0.0, atol=1e-15)
     exact = vertex_gradient(agent, agent, vertices, one)[0, 0]
     np.testing.assert_allclose(np.linalg.norm(exact), 2.0, atol=1e-15)
-
-
-def test_cosine_gradient_equals_differences():
-    rng = np.random.default_rng(3)
-    rx, apparent = rng.normal(size=(20, 3)), rng.normal(size=(20, 3)) + np.array([0.0, 0.0, 4.0])
-    heading = rng.uniform(-3, 3, size=20)
-
-    def cosines(position):
-        ray = apparent - position
-        body = np.einsum("kji,kj->ki", rotation_z(heading), ray / np.linalg.norm(ray, axis=-1, keepdims=True))
-        return body[:, :2]
-
-    analytic = cosine_gradient(rx, apparent, heading)
-    for axis in range(3):
-        shift = STEP * np.eye(3)[axis]
-        difference = (cosines(rx + shift) - cosines(rx - shift)) / (2 * STEP)
-        np.testing.assert_allclose(analytic[..., axis], difference, atol=1e-8)

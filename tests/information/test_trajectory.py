@@ -9,14 +9,8 @@ from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
-from rislam_rt.information import (
-    LinearMeasurements,
-    MotionPrior,
-    build_landmark_model,
-    mirror_chain,
-    plane_tangents,
-    posterior_bound,
-)
+from rislam_rt.geometry.mirror_chain import mirror_chain, plane_tangents
+from rislam_rt.information import LinearMeasurements, MotionPrior, build_landmark_model, posterior_bound
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.scene import load_scene
 
@@ -82,21 +76,6 @@ def test_points_move_with_landmarks_and_walls_as_their_derivatives_say(room, mod
             moved.append(build(room, mode, point, plane, away).point)
         difference = (moved[0] - moved[1]) / (2 * STEP)
         np.testing.assert_allclose(model.jacobian[:, :, column], difference, atol=1e-7, err_msg=label)
-
-
-def test_chain_of_mirrors_of_a_moving_point():
-    rng = np.random.default_rng(0)
-    normal = rng.normal(size=(3, 3))
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    point, offset = rng.normal(size=3), rng.normal(size=3)
-    chain = mirror_chain(point, normal, offset)
-    for axis in range(3):
-        shift = STEP * np.eye(3)[axis]
-        difference = (
-            mirror_chain(point + shift, normal, offset).image - mirror_chain(point - shift, normal, offset).image
-        ) / (2 * STEP)
-        np.testing.assert_allclose(chain.linear[:, axis], difference, atol=1e-9)
-    np.testing.assert_allclose(chain.linear @ chain.linear.T, np.eye(3), atol=1e-12)
 
 
 def test_wall_returns_equal_differences(room):

@@ -115,3 +115,10 @@ def test_uneven_stamps_from_the_epoch_run_as_even_ones_do(room, run_short):
     first, second = even.schemes["random"].position - agent.position, uneven.schemes["random"].position - place
     assert np.abs(first - second).max() < 0.005
     np.testing.assert_allclose(uneven.scene.agent.elapsed, stamps, rtol=0, atol=3e-7)
+
+
+def test_two_processes_give_the_same_bits(run_short, short_result):
+    twice = run_short(jobs=2)
+    for name, scheme in short_result.schemes.items():
+        np.testing.assert_array_equal(twice.schemes[name].position, scheme.position)
+        np.testing.assert_array_equal(twice.schemes[name].applied, scheme.applied)

@@ -13,8 +13,9 @@ from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.specification.spec import Settings, build_settings
 from rislam_rt.slam import StartPrior
-from rislam_rt.slam.filter import FilterState, glance_of, stranger_density
+from rislam_rt.slam.filter import glance_of, stranger_density
 from rislam_rt.slam.schemes.bp_slam.filter import told
+from rislam_rt.slam.window import WindowState
 
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
 RECEIVERS = (
@@ -29,12 +30,12 @@ def settings_of(words: list[str]) -> Settings:
     return build_settings(load_spec(PIPELINE, words))
 
 
-def begin(settings: Settings, scheme: str, sensor: SensorModel) -> FilterState:
+def begin(settings: Settings, scheme: str, sensor: SensorModel) -> WindowState:
     """The filter as a run begins it."""
     estimator, start = ESTIMATORS[scheme], StartPrior(np.array([1.0, 1.0, 0.5]), np.array([0.1, 0.0, 0.0]), 0.0)
     body = Body(np.array([-0.05, 0.0, 0.0]), np.array([0.05, 0.0, 0.0]))
     state = estimator.init(start, body, None, sensor, estimator.config(settings), rng=np.random.default_rng(0))
-    assert isinstance(state, FilterState)
+    assert isinstance(state, WindowState)
     return state
 
 
@@ -75,8 +76,8 @@ def test_the_filter_reckons_with_the_threshold_that_the_receiver_applies(words: 
     ]
     faintest = float(settings.radio.integrated_snr(np.concatenate(heard)).min())
     state = begin(settings, "slam", settings.sensor)
-    assert state.sensor.threshold <= faintest * (1.0 + 1e-9)
-    assert state.sensor.threshold == pytest.approx(faintest, rel=0.1)
+    assert state.scene.sensor.threshold <= faintest * (1.0 + 1e-9)
+    assert state.scene.sensor.threshold == pytest.approx(faintest, rel=0.1)
 
 
 def test_a_rate_of_false_alarms_moves_the_threshold_of_both() -> None:
@@ -89,7 +90,7 @@ def test_a_rate_of_false_alarms_moves_the_threshold_of_both() -> None:
 def test_what_is_told_wrong_is_believed() -> None:
     settings = settings_of([])
     state = begin(settings, "slam", replace(settings.sensor, threshold=20.0))
-    assert state.sensor.threshold == 20.0
+    assert state.scene.sensor.threshold == 20.0
     assert settings.sensor.threshold == pytest.approx(10.0)
 
 

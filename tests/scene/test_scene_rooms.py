@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rislam_rt.geometry.plane_segmentation import planar_groups
+from rislam_rt.geometry.plane_segmentation import planar_regions
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.scene import check_scene, load_scene
 from rislam_rt.scene.build import main
@@ -79,7 +79,7 @@ def test_paper_room_is_the_papers() -> None:
 def test_tilted_room_has_no_parallel_and_no_axis_aligned_faces() -> None:
     normals = []
     for reflector in load_scene(SCENES / "tilted_room").reflectors:
-        assert planar_groups(reflector.triangles, 1e-9, 1e-9).max() == 0
+        assert planar_regions(reflector.triangles, 1e-9, 1e-9).group.max() == 0
         normals.append(triangle_planes(reflector.triangles)[0][0])
     cosines = np.abs(np.array(normals) @ np.array(normals).T) - np.eye(6)
     assert cosines.max() < np.cos(np.radians(2.0))
@@ -89,7 +89,7 @@ def test_tilted_room_has_no_parallel_and_no_axis_aligned_faces() -> None:
 def test_large_hall_has_thousands_of_triangles_in_hundreds_of_planes() -> None:
     scene = load_scene(SCENES / "large_hall")
     assert sum(len(r.faces) for r in scene.reflectors) > 4000
-    assert sum(planar_groups(r.triangles, 1e-4, 1e-4).max() + 1 for r in scene.reflectors) > 150
+    assert sum(planar_regions(r.triangles, 1e-4, 1e-4).group.max() + 1 for r in scene.reflectors) > 150
 
 
 def test_glb_nodes_stand_where_their_transforms_put_them() -> None:

@@ -326,7 +326,7 @@ def test_heading_follows_the_compass_when_known(rng: np.random.Generator) -> Non
 
 def test_heading_along_the_velocity_errs_with_it(rng: np.random.Generator) -> None:
     """Its covariance with everything is the derivative of the course by the velocity, by differences, times theirs."""
-    config = SlamConfig(heading="velocity")
+    config = SlamConfig(filter="rao_blackwellised", heading="velocity")
     velocity = np.array([0.3, -0.2, 0.0])
     particles = gaussian.begin(StartPrior(np.zeros(3), velocity, 0.0), config, rng=rng)
     particles = gaussian.propagate(particles, CYCLE, PLANE * SIGMA_A, 0.7, 1, config, rng=rng)

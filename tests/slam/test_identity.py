@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.model import RadioConfig, RisCode, RisSpec
+from rislam_rt.ris.path_gain import panel_path_gain, point_amplitude
 from rislam_rt.slam.identity import (
     BLOCKED,
     DOUBT,
@@ -20,8 +21,6 @@ from rislam_rt.slam.identity import (
     log_scatterer,
     log_scatterer_missed,
     panel_probabilities,
-    point_amplitude,
-    predicted_panel_gain,
     weigh_silence,
 )
 
@@ -139,7 +138,7 @@ def test_changing_codes_find_the_panel_where_a_held_one_cannot():
     for held in (True, False):
         codes = [RisCode(rng.integers(4, size=(6, 6)), 4) for _ in range(20)]
         codes = [codes[0]] * 20 if held else codes
-        gain = np.array([predicted_panel_gain(PANEL, c, center, tx, rx, np.ones(1), RADIO)[0] for c in codes])
+        gain = np.array([panel_path_gain(PANEL, c, center, tx, rx, np.ones(1), RADIO)[0] for c in codes])
         seen = np.abs(np.stack([np.full(20, gain[0]), gain], axis=1))
         odds[held] = _filtered(seen, np.repeat(gain[:, None, None], 2, axis=1), *lengths, std)
     assert odds[True][0] == pytest.approx(odds[True][1], abs=1e-9)

@@ -5,10 +5,11 @@ import pytest
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import Body, RadioConfig, SensorModel
+from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.book import Book, empty_book, enter, image_idents, learn_ratio, strike
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.expect import Belief, expected_returns, shown_share
-from rislam_rt.slam.identity import STRENGTHS, point_amplitude
+from rislam_rt.slam.identity import STRENGTHS
 from rislam_rt.slam.learn import Hits, learn
 from rislam_rt.slam.mapping import WALL_HITS, build_map
 from rislam_rt.slam.match import Outlook, look_ahead

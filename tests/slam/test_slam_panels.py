@@ -8,10 +8,11 @@ import pytest
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Body, Measurement, RadioConfig, RisCode, RisSpec, RisSpecs, SensorModel
+from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.book import Book, empty_book, enter
 from rislam_rt.slam.expect import Belief
 from rislam_rt.slam.filter import side_of
-from rislam_rt.slam.identity import panel_probabilities, predicted_panel_gain
+from rislam_rt.slam.identity import panel_probabilities
 from rislam_rt.slam.inputs import check_sides
 from rislam_rt.slam.match import return_sides
 from rislam_rt.slam.moments import POSE, Moments, poses_of
@@ -65,7 +66,7 @@ def follow(cycles: int, sides: bool, rng: np.random.Generator) -> Tracks:
     for cycle in range(cycles):
         code = RisCode(rng.integers(4, size=(1, 72)), 4)
         gain = [
-            abs(predicted_panel_gain(SHEET, part, spot[None], POSES.tx, POSES.rx, np.ones(1), RADIO)[0])
+            abs(panel_path_gain(SHEET, part, spot[None], POSES.tx, POSES.rx, np.ones(1), RADIO)[0])
             for part, spot in zip(SHEETS.parts(code), SPOTS, strict=False)
         ]
         amplitude = np.hypot(*(np.array([[*gain, 3.0 * least], np.zeros(3)]) + noise * rng.standard_normal((2, 3))))

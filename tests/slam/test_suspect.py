@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec, SensorModel
+from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.book import empty_book
 from rislam_rt.slam.expect import Belief
-from rislam_rt.slam.identity import predicted_panel_gain
 from rislam_rt.slam.moments import POSE, Moments, poses_of
 from rislam_rt.slam.returns import Returns, observe
 from rislam_rt.slam.suspect import DEEP, find_suspect, places, weigh_tracks
@@ -51,7 +51,7 @@ def follow(cycles: int, rng: np.random.Generator) -> Tracks:
     tracks, dull = no_tracks(40), np.zeros(2, dtype=np.bool_)
     for cycle in range(cycles):
         code = RisCode(rng.integers(4, size=(6, 6)), 4)
-        gain = predicted_panel_gain(PANEL, code, SPOTS[:1], POSES.tx, POSES.rx, np.ones(1), RADIO)
+        gain = panel_path_gain(PANEL, code, SPOTS[:1], POSES.tx, POSES.rx, np.ones(1), RADIO)
         amplitude = np.hypot(*(np.array([[abs(gain[0]), ball], [0.0, 0.0]]) + noise * rng.standard_normal((2, 2))))
         seen = glance([0, 1], amplitude)
         if not cycle:
@@ -83,7 +83,7 @@ def test_silence_when_the_panel_would_shout_speaks_against_it(rng: np.random.Gen
     tracks = advance(tracks, 0.1, 1, np.full(3, 1e-3))
     loudest = max(
         (RisCode(rng.integers(4, size=(6, 6)), 4) for _ in range(300)),
-        key=lambda c: abs(predicted_panel_gain(PANEL, c, SPOTS[:1], POSES.tx, POSES.rx, np.ones(1), RADIO)[0]),
+        key=lambda c: abs(panel_path_gain(PANEL, c, SPOTS[:1], POSES.tx, POSES.rx, np.ones(1), RADIO)[0]),
     )
     before = tracks.log_ris[0]
     assert weigh_tracks(tracks, belief(), loudest).log_ris[0] < before - 0.5

@@ -13,6 +13,8 @@ from rislam_rt.model import Measurement, Paths, RadioConfig, RisCode, RisLegs, S
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import Outcome, SlamConfig, StartPrior, StepInfo, estimate, init, step
+from rislam_rt.slam.window import motion as model
+from rislam_rt.slam.window.levels import LEVELS
 
 ROOM = Path(__file__).parents[2] / "scenes" / "paper_room"
 CYCLES = slice(180, 300)
@@ -179,17 +181,25 @@ def test_labels_are_idents_of_the_map(clear: tuple[Heard, Course]) -> None:
             place[ident] = position
 
 
+def motion_prior(level: float) -> float:
+    """Variance of the first step's acceleration, of a liveliness told to be `level`."""
+    gait = model.first_gait(level) @ model.transition(LEVELS.stay)
+    return float(1.0 / model.prior_precision(gait, False))
+
+
 def test_prediction_is_the_belief_without_a_measurement(clear: tuple[Heard, Course]) -> None:
     """An empty cycle moves the mean by velocity times dt and widens it, and is told as what it is."""
     heard = clear[0]
-    motion = heard.scene.agent[CYCLES]
     rng = np.random.default_rng(1)
-    state = init(heard.start, motion.body, None, heard.sensor, CONFIG, rng=rng)
+    state = init(heard.start, heard.scene.agent.body, None, heard.sensor, CONFIG, rng=rng)
     none = Measurement(*(np.zeros(shape) for shape in (0, (0, 2), 0, 0, (0, 2), 0)))
     after, info = step(state, none, None, 0.5, 0.0, CONFIG, rng=rng)
     belief = estimate(after, CONFIG)
     np.testing.assert_allclose(belief.position, heard.start.position + 0.5 * heard.start.velocity, atol=1e-12)
-    want = 0.01**2 + 0.5**2 * 0.01**2 + (0.5 * 0.5**2 * 0.01) ** 2
-    np.testing.assert_allclose(np.diag(belief.covariance)[:3], [want, want, 0.0], rtol=1e-9, atol=1e-18)
+    # the expected precision of the first step's acceleration, across and upwards, is its prior
+    push = [motion_prior(level) for level in (CONFIG.sigma_a, 0.0)]
+    want = 0.01**2 + 0.5**2 * 0.01**2 + (0.5 * 0.5**2) ** 2 * push[0]
+    height = (0.5 * 0.5**2) ** 2 * push[1]
+    np.testing.assert_allclose(np.diag(belief.covariance)[:3], [want, want, height], rtol=1e-6, atol=1e-9)
     assert info.outcome == Outcome.NO_MEASUREMENTS
     assert info.nis_dof == 0

@@ -24,7 +24,6 @@ from rislam_rt.channel.traced.candidate_indices import CandidateIndices
 from rislam_rt.channel.traced.float32_limits import SEGMENT_LIMIT
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
 from rislam_rt.channel.traced.tracer_scene import NO_OCCLUDER, TracerScene, as_points
-from rislam_rt.errors import TraceError
 
 
 class SingleRays:
@@ -92,33 +91,6 @@ def _clear_of_occluder(
         clear &= ~np.array(tracer_scene.occluders[spared].ray_test(ray), dtype=np.bool_)
         last = point
     return np.flatnonzero(clear)
-
-
-def attached_vertices(
-    tracer_scene: TracerScene,
-    sequences: Integers,
-    far: mi.Point3f,
-    device: mi.Point3f,
-    rows: CandidateIndices,
-    spared: int,
-) -> list[mi.Point3f]:
-    """Bounce points from far end to device, bounce by bounce, that keep their dependence on the ends' positions.
-
-    Raises
-    ------
-    TraceError
-        The tracer denies a leg.
-    """
-    method = ImageMethod()
-    method.loop_mode = "evaluated"
-    candidates = sequences[rows.sequence]
-    traced = _trace(tracer_scene, candidates, far, device, rows, method, spared)
-    if len(_confirmed(tracer_scene, candidates, traced)) < len(candidates):
-        raise TraceError("legs: one that was found before is denied now; were paths and channel made for one scene?")
-    depth = traced.depth_dim_size
-    index = dr.arange(mi.UInt, len(candidates)) * depth
-    columns = [getattr(traced, f"vertices_{axis}").array for axis in "xyz"]
-    return [mi.Point3f(*(dr.gather(mi.Float, c, index + d) for c in columns)) for d in range(sequences.shape[1])]
 
 
 def _trace(

@@ -21,7 +21,7 @@ from rislam_rt.pipeline.long.slices import (
     subsample_scheme,
 )
 from rislam_rt.pipeline.long.tally import Tally
-from rislam_rt.pipeline.run import Progress, library_versions, panel_warnings, set_scene
+from rislam_rt.pipeline.run import library_versions, panel_warnings, set_scene
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.pipeline.store.run_folder import (
@@ -33,10 +33,11 @@ from rislam_rt.pipeline.store.run_folder import (
     read_run,
     record_files,
 )
-from rislam_rt.pipeline.workers import run_side_by_side
+from rislam_rt.progress import Tell
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.write import tum_bytes
 from rislam_rt.storage.files import write_pieces
+from rislam_rt.worker_pool import run_side_by_side
 
 
 class LongRun(NamedTuple):
@@ -52,7 +53,7 @@ def is_long(scene: Scene, spec: PipelineSpec) -> bool:
 
 
 def run_long(
-    scene: Scene, spec: PipelineSpec, store: RunFolder, *, rng: np.random.Generator, jobs: int, progress: Progress
+    scene: Scene, spec: PipelineSpec, store: RunFolder, *, rng: np.random.Generator, jobs: int, progress: Tell
 ) -> LongRun:
     """Run all schemes of a specification slice by slice into a run's folder, and complete it.
 

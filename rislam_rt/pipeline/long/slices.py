@@ -28,11 +28,12 @@ from rislam_rt.pipeline.dataset import (
 from rislam_rt.pipeline.long.join import join_paths, join_schemes, subsampled_paths, subsampled_scheme
 from rislam_rt.pipeline.record import given_to_dataset
 from rislam_rt.pipeline.room.diffuse_clutter import trace_diffuse_clutter
-from rislam_rt.pipeline.run import Progress, build_channel
+from rislam_rt.pipeline.run import build_channel
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.seeds import Seeds
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.progress import Tell
 
 SLICE = 1000
 """Cycles of a slice. With the paper's room a cycle holds 0.1 MB while it is traced: 0.1 GB a slice."""
@@ -67,7 +68,7 @@ def run_slices(
     seeds: Seeds,
     folder: Path,
     run: str,
-    tell: Progress,
+    tell: Tell,
 ) -> float:
     """Lead one scheme through all slices, each written to `folder` when it is done. Returns the seconds of tracing.
 

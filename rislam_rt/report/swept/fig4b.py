@@ -27,8 +27,6 @@ from rislam_rt.studies.swept.sweep import SNR
 
 OURS = "optimized"
 """The scheme that the paper proposes."""
-BENCHMARKS = ("random", "no_ris", "bp_slam", "channel_slam")
-"""Those that the paper, or we, hold it against; `exact` and `genie` are references."""
 
 
 def fig4b_content(groups: Sequence[Group], spec: Fig4bSpec) -> dict[str, Any]:

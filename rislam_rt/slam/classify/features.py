@@ -16,6 +16,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, RadioConfig
+from rislam_rt.ris.path_gain import image_amplitude
 from rislam_rt.slam.classify.echo import echo_misfit
 from rislam_rt.slam.classify.images import image_misfit
 from rislam_rt.slam.classify.still import stillness
@@ -100,7 +101,7 @@ def track_features(sightings: Sightings, body: Body, radio: RadioConfig) -> Floa
     held = sightings.held
     count = held.sum(axis=1)
     length = np.maximum(_mean(sightings.seen[..., 0], held), 1e-3)
-    log_free = np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi))
+    log_free = np.log(image_amplitude(np.ones(()), radio))
     level = np.where(held, sightings.log_amplitude, 0.0)
     log_power = np.log(np.maximum(_mean(np.exp(2.0 * level), held), 1e-300))
     noise = _mean(0.5 / np.maximum(radio.integrated_snr(np.exp(level)), 0.5), held)

@@ -14,15 +14,9 @@ from rislam_rt.slam.window.guesses import BESIDE, known_features
 from rislam_rt.slam.window.kinds import NEW, Verdict, judge, wanted
 from rislam_rt.slam.window.learn import seed
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.numerics import MOST, NEAR, STRIDE
 from rislam_rt.slam.window.retract import behind, release
 from rislam_rt.slam.window.steps import HEAD
-
-NEAR = np.array([0.3, 0.15, 0.15])
-"""Gap in length [m] and cosines up to which a return of the map is weighed as a track's explanation."""
-MOST = 2
-"""Explanations of one track by the map that are weighed, the nearest."""
-STRIDE = 3
-"""Cycles between two examinations."""
 
 
 def births(context: Context, expected: Expected, groups: Clusters) -> Context:
@@ -102,13 +96,11 @@ def _missing_legs(context: Context, histories: Digest, mean: Floats) -> Floats:
     along, share = ray @ away.T, reach / length[:, None]
     leg = (np.abs(along - share) < LEG) | (np.abs(along) > 1.0 - LEG)
     found = (leg & (share < 0.995) & bright).sum(axis=1)
-    return LOG_MISSING[np.minimum(found, 2)]
+    return LEVELS.log_rare * (1.0 - 0.5 * np.minimum(found, 2))
 
 
 LEG = 0.04
 """Difference of cosines up to which one return may be a leg of another's right angle, or lie along its line."""
-LOG_MISSING = np.log(np.array([0.02, 0.3, 1.0]))
-"""Log probability that none, one, both of the single returns of two walls are heard, where they are heard together."""
 
 
 def explanations(

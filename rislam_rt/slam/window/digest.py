@@ -15,12 +15,11 @@ from rislam_rt.slam.tracks import PANEL
 from rislam_rt.slam.window.gauss import Window, now, pose_covariance, poses
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log
+from rislam_rt.slam.window.numerics import POINTS
 from rislam_rt.slam.window.steps import TURN
 
 TOGETHER = 10.0
 """Measurements over which the pull of neighbours keeps its sign."""
-POINTS = 8
-"""Most normal points of a history."""
 
 
 class Digest(NamedTuple):

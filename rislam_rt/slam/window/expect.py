@@ -8,19 +8,16 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body, DataSheet, RadioConfig, RisCode, RisSpec
 from rislam_rt.model.sensor import SensorModel
 from rislam_rt.ris import leg_response, panel_gain
-from rislam_rt.slam.identity import point_amplitude
+from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.forms import enumerate_forms, forms_of, possible_legs
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.numerics import EDGE, FAINT, LEVEL
 from rislam_rt.slam.window.steps import HEAD
 
-LEVEL = 0.02
-"""Third direction cosine down to which returns are heard: those of upright walls arrive level."""
-FAINT = 0.5
-"""SNR below which a return is not looked for: it moves nothing in its cell by more than the noise does."""
-PANEL_STD = 0.7
-"""Spread of the panel's predicted log amplitude: its gain hangs on phases, hence on millimetres."""
+PANEL_STD = float(np.pi / np.sqrt(24.0))
+"""Spread of the panel's predicted log amplitude: that of a Rayleigh variable, as phases hang on millimetres."""
 
 
 class Scene(NamedTuple):
@@ -98,7 +95,7 @@ def amplitudes(
     point = returns.point
     moving = point == TX
     strength, strength_std = book.log_strength
-    free = np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * rx_length)) + ratio
+    free = np.log(image_amplitude(rx_length, radio)) + ratio
     unit = point_amplitude(np.ones(()), np.maximum(tx_length, 1e-3), rx_length, radio)
     level = np.where(moving, free, np.log(unit) + ratio + strength[point])
     spread = np.sqrt(np.where(moving, 0.0, strength_std[point] ** 2) + variance + (0.3 * LEVELS.fading) ** 2)
@@ -167,27 +164,26 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
     np.fill_diagonal(gap, np.inf)
     if sides is not None:
         gap[sides[:, None] != sides] = np.inf
-    inside, around = gap < 1.0, gap < 1.15
+    weaker = strength <= strength[:, None]
+    inside, around = weaker & (gap < 1.0), weaker & (gap < EDGE)
     taken, partner, by_itself = np.zeros(count, dtype=np.bool_), np.full(count, -1), np.ones(count)
-    crowded = np.flatnonzero(around.any(axis=1))
-    disturbance, power = np.zeros((count, 3)), np.exp(2.0 * strength)
+    crowded = np.flatnonzero(inside.any(axis=1))
+    power = np.exp(2.0 * strength)
     total = power.copy()
     for leader in crowded[np.argsort(-strength[crowded], kind="stable")]:
-        if taken[leader]:
-            continue
         members = (inside[leader] & ~taken).nonzero()[0]
-        members = members[strength[members] <= strength[leader]]
+        if taken[leader] or not len(members):
+            continue
         taken[members] = True
-        by_itself[members] = np.maximum(1.0 - clear[leader], ALONE)
-        if len(members):
-            first = members[np.argmax(strength[members])]
-            partner[leader] = first
-            total[leader] += power[members].sum()
-        beside = around[leader] & (strength <= strength[leader])
-        beside[partner[leader]] &= partner[leader] < 0
-        others = beside.nonzero()[0]
-        ratio = power[others] / power[leader] * clear[others]
-        disturbance[leader] = (0.5 * ratio[:, None] * (expected.seen[others] - expected.seen[leader]) ** 2).sum(axis=0)
+        by_itself[members] = np.maximum(1.0 - clear[leader], LEVELS.rare)
+        partner[leader] = members[np.argmax(strength[members])]
+        total[leader] += power[members].sum()
+    paired = (partner >= 0).nonzero()[0]
+    around[paired, partner[paired]] = False
+    first, second = (around & ~taken[:, None]).nonzero()
+    ratio = 0.5 * power[second] / power[first] * clear[second]
+    disturbance = np.zeros((count, 3))
+    np.add.at(disturbance, first, ratio[:, None] * (expected.seen[second] - expected.seen[first]) ** 2)
     leader = np.concatenate([(~taken).nonzero()[0], taken.nonzero()[0]])
     mate = np.where(taken[leader], -1, partner[leader])
     both = mate >= 0
@@ -217,8 +213,6 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
     )
 
 
-ALONE = 0.05
-"""Least probability that what lies in a stronger one's cell comes out by itself: cells have no sharp edge."""
 TWIN_STD = 0.03
 """Relative difference of a return and its reciprocal in amplitude: a baseline of 0.1 m at some metres."""
 

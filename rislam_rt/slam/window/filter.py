@@ -21,14 +21,12 @@ from rislam_rt.slam.window.learn import learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.look import Look, echoes, look
+from rislam_rt.slam.window.numerics import DAMPING, REFRESH
 from rislam_rt.slam.window.retract import condemned, release
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import TURN
 from rislam_rt.slam.window.suspect import weigh_tracks
 from rislam_rt.slam.window.tracks import Tracks
-
-REFRESH = 5
-"""Cycles between two re-linearisations of the whole window."""
 
 
 def init(
@@ -148,8 +146,6 @@ def smoothed(state: WindowState) -> Floats:
 
 START = ((3, 0.5), (10, 1.0))
 """Steps that may have been livelier than thought, and standard deviation [m/s^2] of their accelerations then."""
-LOG_START = np.log(0.01)
-"""Log probability of a manoeuvre that nothing announced."""
 MISSED, STRAINED = 1.5, 1.5
 """Standard deviations by which fewer returns show than should, and mean square of their innovations, from which on a
 manoeuvre is looked for."""
@@ -174,7 +170,7 @@ def _notice(
             precision[-steps:, lively] = np.minimum(precision[-steps:, lively], liveliness**-2.0)
             trial = gauss.solve(state.window._replace(precision=precision))
             view = view_of(trial)
-            if view.score + LOG_START > best.score:
+            if view.score + LEVELS.log_rare > best.score:
                 best, window = view, trial
     if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
         by = doubt.jump(best, glance)
@@ -267,10 +263,6 @@ def liven(state: WindowState) -> WindowState:
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
     return state._replace(window=window._replace(precision=precision), level=level)
-
-
-DAMPING = 0.3
-"""Share of the new in each step's log precision."""
 
 
 class _Followed(NamedTuple):

@@ -13,6 +13,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, reflect
+from rislam_rt.slam.window.numerics import IN_WALL
 
 UNKNOWN = -9
 """In a form's base: it is not known."""
@@ -82,10 +83,6 @@ def possible_legs(legs: Integers, features: Floats, anchor: Floats, poses: Poses
     near, device = _depths(legs[one, 1], base[one], far[one], features, anchor)
     fine[one] &= (near * device > 0.0) & (np.abs(near) > IN_WALL)
     return fine
-
-
-IN_WALL = 0.05
-"""Distance [m] from a wall below which a point is held to lie in it."""
 
 
 def _normals(walls: Integers, features: Floats, anchor: Floats) -> Floats:

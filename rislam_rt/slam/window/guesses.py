@@ -81,28 +81,14 @@ def hypotheses(digest: Digest, known: Known, book: Book, use_vt: bool) -> Hypoth
     seen, tx, rx = digest.mean
     ray, length = digest.direction, seen[:, 0]
     middle, image = digest.middle, rx + length[:, None] * digest.direction
-    kinds, knowns, tracks, starts, turns, shifts, doubts = [], [], [], [], [], [], []
-    plain = (AXES, np.zeros(3), np.zeros((3, 3)))
-    every = np.arange(count)
+    kinds, knowns, starts, legs, spots = [], [], [], [], []
 
     def add(kind: int, wall: int, start: Floats, first: int, second: int, at: tuple[Floats, Floats]) -> None:
-        kinds.append(np.full(count, kind))
-        knowns.append(np.full(count, wall))
-        tracks.append(every)
+        kinds.append(kind)
+        knowns.append(wall)
         starts.append(start)
-        parts = []
-        for row, spot in ((first, at[0]), (second, at[1])):
-            if row < 0:
-                parts.append(tuple(np.broadcast_to(part, (count, *part.shape)) for part in plain))
-            else:
-                slope = by_wall(spot, known.place[row], middle)
-                parts.append((
-                    np.broadcast_to(known.turn[row], (count, 3, 3)), np.broadcast_to(known.shift[row], (count, 3)),
-                    slope @ known.root[row],
-                ))  # fmt: skip
-        turns.append(np.stack([part[0] for part in parts], axis=1))
-        shifts.append(np.stack([part[1] for part in parts], axis=1))
-        doubts.append(np.stack([part[2] for part in parts], axis=1))
+        legs.append((first, second))
+        spots.append(at)
 
     anchor = np.broadcast_to(middle, image.shape)
     direct = place_on_ray(ray, length, tx, rx)
@@ -122,21 +108,35 @@ def hypotheses(digest: Digest, known: Known, book: Book, use_vt: bool) -> Hypoth
             upright = reflect(anchor, image, tx)
             upright[:, 2] = middle[2]  # what lies higher comes of the edge
             add(BESIDE, wall, upright, NONE, NONE, (tx, tx))
-    for pair in _pairs(ray):
-        turned = (pair @ tx[..., None])[..., 0]
-        add(TWO_WALLS, NONE, image - turned, NONE, NONE, (tx, tx))
-        turns[-1] = np.stack([pair, np.broadcast_to(AXES, (count, 3, 3))], axis=1)
-    for point in book.points.tolist() if not use_vt else []:
-        start, *parts = _image(digest, known.place[point], known.root[point])
+    pairs, points = _pairs(ray), book.points.tolist() if not use_vt else []
+    for pair in pairs:
+        add(TWO_WALLS, NONE, image - (pair @ tx[..., None])[..., 0], NONE, NONE, (tx, tx))
+    images = [_image(digest, known.place[point], known.root[point]) for point in points]
+    for point, (start, *_) in zip(points, images, strict=True):
         add(IMAGE, point, start, NONE, NONE, (tx, tx))
-        turns[-1], shifts[-1], doubts[-1] = parts
-    kind, walled = np.concatenate(kinds), np.concatenate(knowns)
+    turns, shifts, doubts = _over(known, np.array(legs), np.array(spots), middle)
+    for row, pair in zip((np.array(kinds) == TWO_WALLS).nonzero()[0], pairs, strict=True):
+        turns[row, :, 0] = pair
+    for row, (_, *parts) in zip((np.array(kinds) == IMAGE).nonzero()[0], images, strict=True):
+        turns[row], shifts[row], doubts[row] = parts
+    kind, walled = np.repeat(kinds, count), np.repeat(knowns, count)
     trials = Trials(
-        np.concatenate(tracks), np.isin(kind, WALLS), kind == TWO_WALLS, np.concatenate(starts),
-        np.concatenate(turns), np.concatenate(shifts), np.concatenate(doubts), kind == BESIDE,
+        np.tile(np.arange(count), len(kinds)), np.isin(kind, WALLS), kind == TWO_WALLS, np.concatenate(starts),
+        turns.reshape(-1, 2, 3, 3), shifts.reshape(-1, 2, 3), doubts.reshape(-1, 2, 3, 3), kind == BESIDE,
         _beyond(kind, walled, known), kind == IMAGE,
     )  # fmt: skip
     return Hypotheses(kind, walled, trials)
+
+
+def _over(known: Known, legs: Integers, spots: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
+    """Turns (N, T, 2, 3, 3), shifts (N, T, 2, 3) and doubts (N, T, 2, 3, 3) of the walls that N kinds go over on either
+    leg (N, 2), `NONE` for none, at about the places (N, 2, T, 3) of T tracks."""
+    count, nowhere = spots.shape[2], (middle + 1.0, np.zeros((3, 3)), AXES, np.zeros(3))
+    place, root, turn, shift = (np.concatenate([field, none[None]]) for field, none in zip(known, nowhere, strict=True))
+    slope = by_wall(spots, place[legs][:, :, None], middle)
+    doubt = np.swapaxes(slope @ root[legs][:, :, None], 1, 2)
+    turns, shifts = (np.repeat(field[legs][:, None], count, axis=1) for field in (turn, shift))
+    return turns, shifts, doubt
 
 
 def _image(digest: Digest, spot: Floats, root: Floats) -> tuple[Floats, Floats, Floats, Floats]:

@@ -12,7 +12,8 @@ from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.gauss import poses
 from rislam_rt.slam.window.guesses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.panel import CERTAIN, Identity, Sight, gains, spread_places, unknown, weigh
+from rislam_rt.slam.window.numerics import CERTAIN
+from rislam_rt.slam.window.panel import Identity, Sight, gains, spread_places, unknown, weigh
 from rislam_rt.slam.window.trial import Fits
 
 ASIDE = 12.0

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.identity import point_amplitude
+from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.context import Context
@@ -28,6 +28,7 @@ from rislam_rt.slam.window.guesses import (
 )
 from rislam_rt.slam.window.identify import identify
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.panel import Identity, unknown
 from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
 
@@ -35,14 +36,6 @@ LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 
 """Log prior of each kind; over known walls, of all walls together; of known points in walls, of all points together."""
 LOG_NONE = np.log(0.05)
 """Of a path of no kind here: over walls that the map lacks."""
-OVER_PANEL = 0.2
-"""Share of such paths that run over panels, where there are any."""
-LOG_VOLUME = float(np.log(4.0 / 3.0 * np.pi * LEVELS.size**3))
-BEHIND = -4.0
-"""Log probability of a thing behind a wall that stands between it and the agent, or of a wall that stands before known
-things: the walls of a room that is not convex end somewhere."""
-DEPTH = 0.15
-"""Distance [m] beyond a wall from which on a thing is behind it, and not on it."""
 
 
 class Verdict(NamedTuple):
@@ -113,7 +106,9 @@ def judge(
     track = table.trials.track
     rivals = np.where(table.known >= 0, np.log(max(len(book.walls), 1)), 0.0)
     rivals[table.kind == IMAGE] = np.log(max(len(book.points), 1))
-    evidence = fits.log_evidence - LOG_VOLUME - np.where(table.trials.is_wall | table.trials.is_pair, np.log(8.0), 0.0)
+    evidence = (
+        fits.log_evidence - LEVELS.log_volume - np.where(table.trials.is_wall | table.trials.is_pair, np.log(8.0), 0.0)
+    )
     evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair, lonely[track], 0.0)
     evidence += _amplitudes(table, fits, digest, book, scene) + _opacity(table, fits, digest, known, book)
     evidence += _beside(table, digest, known, book, scene)
@@ -127,9 +122,9 @@ def judge(
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
-    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LOG_VOLUME + LOG_NONE
+    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LEVELS.log_volume + LOG_NONE
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
-    none += np.logaddexp(np.log(1.0 - OVER_PANEL), np.log(OVER_PANEL) + over_panels)
+    none += np.logaddexp(np.log1p(-LEVELS.panels), np.log(LEVELS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
     evidence += _shared(table, fits, evidence, none, explained)
     verdicts, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
@@ -207,7 +202,7 @@ def _shared(
     gap = off[first, second]
     log_place = -0.5 * np.vecdot(gap, np.linalg.solve(spread, gap[..., None])[..., 0])
     log_place -= 0.5 * np.linalg.slogdet(spread)[1] + 1.5 * np.log(2.0 * np.pi)
-    log_place += LOG_VOLUME + np.where(wall[first], np.log(8.0), 0.0)
+    log_place += LEVELS.log_volume + np.where(wall[first], np.log(8.0), 0.0)
     other = track[good[second]]
     odds = np.full((len(good), count), -np.inf)
     np.logaddexp.at(odds, (first, other), evidence[good[second]] + log_place - total[other])
@@ -217,10 +212,6 @@ def _shared(
 
 ASIDE = 10.0
 """Log evidence behind a track's best from which on a hypothesis does not speak for others."""
-NEARBY = 2.0
-"""Distance [m] beyond which two places are not compared."""
-MOST_SHARED = 4.0
-"""Log odds that one more track may add, so that no chance coincidence decides alone."""
 COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(4 + 3) log(1 + chi^2 / 4)` for chi^2 with 3 degrees of freedom."""
 
@@ -269,7 +260,7 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
     middle, walls, wall = digest.middle, book.walls, table.trials.is_wall
     pair = table.trials.is_pair
     foot = np.where(wall[:, None], 0.5 * (fits.place + middle), fits.place)
-    slack = DEPTH + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
+    slack = LEVELS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
     total = np.zeros(len(foot))
     span = fits.place - middle
     normal = span / np.maximum(np.linalg.norm(span, axis=1), 1e-6)[:, None]
@@ -278,12 +269,12 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
         reach = np.linalg.norm(out, axis=1)
         feet = 0.5 * (known.place[walls] + middle)
         depth = foot @ (out / reach[:, None]).T - np.vecdot(feet, out) / reach
-        total += BEHIND * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        total += LEVELS.log_rare * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
         before = normal @ feet.T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, BEHIND, 0.0) * (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        total += np.where(wall, LEVELS.log_rare, 0.0) * (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
     if len(book.points):
         depth = normal @ known.place[book.points].T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, BEHIND, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        total += np.where(wall, LEVELS.log_rare, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
     return np.where(pair, 0.0, total)
 
 
@@ -294,13 +285,12 @@ def beliefs(place: Floats, digest: Digest, known: Known, book: Book) -> Holds:
     rise, std = abs(span[2]) / reach, LEVELS.lean * reach
     axes: list[Floats] = []
     log_odds: list[float] = []
-    even = np.log(LEVELS.upright / (1.0 - LEVELS.upright))
     if rise > 0.9:
         axes += [AXES[0], AXES[1]]
-        log_odds += 2 * [even + np.log(reach)]
+        log_odds += 2 * [LEVELS.log_upright + np.log(reach)]
     elif rise < 0.35:
         axes.append(AXES[2])
-        log_odds.append(even + np.log(reach))
+        log_odds.append(LEVELS.log_upright + np.log(reach))
         others = known.place[book.walls] - digest.middle
         if len(others):
             flat = np.linalg.norm(others[:, :2], axis=1) > 0.95 * np.linalg.norm(others, axis=1)
@@ -334,13 +324,9 @@ def _upright(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
         variance = np.vecdot(holds.axis, holds.axis @ fits.covariance[row]) + holds.std**2
         log_right = -0.5 * (holds.axis @ span) ** 2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
         # odds hold the width: right against a density of one over it
-        each = np.logaddexp(0.0, holds.log_odds + log_right) - np.log1p(EVEN)
+        each = np.logaddexp(0.0, holds.log_odds + log_right) - np.logaddexp(0.0, LEVELS.log_upright)
         gain[row] = (each[:1] if trials.is_pair[row] and turn[0, 0] < 0.0 else each).sum()
     return gain
-
-
-EVEN = LEVELS.upright / (1.0 - LEVELS.upright)
-"""Odds that a direction is as it is held to be."""
 
 
 def wanted(verdict: Verdict, length: float) -> bool:

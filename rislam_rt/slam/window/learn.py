@@ -12,6 +12,7 @@ from rislam_rt.slam.window.book import Book, learn_ratio
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene
 from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.numerics import SCATTER_RATE
 from rislam_rt.slam.window.panel import Sight, gains, spread_places, weigh
 from rislam_rt.slam.window.steps import HEAD
 
@@ -41,15 +42,9 @@ def pack(forms: Integers, book: Book) -> Integers:
     return code
 
 
-SCATTER_RATE = 0.1
-"""Share of the latest residual in its running mean square."""
-FIRST = np.array([0.8, 0.6, 0.4, 0.4, 0.4])
-"""Probability that nothing stands in the way of a path over so many walls, before it was looked for."""
-
-
 def recall(sights: Sights, expected: Expected, book: Book) -> tuple[Floats, Floats]:
     """Probability (R,) that nothing stands in the way of each return now, and its scatter (R,)."""
-    first, scatter = FIRST[expected.bounces], np.full(len(expected.seen), LEVELS.crowd)
+    first, scatter = LEVELS.steady ** (1.0 + expected.bounces), np.full(len(expected.seen), LEVELS.crowd)
     if len(sights.code):
         code = pack(expected.forms, book)
         place = np.minimum(np.searchsorted(sights.code, code), len(sights.code) - 1)

@@ -2,18 +2,19 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 
 class Levels(NamedTuple):
     """SI units; probabilities are a cycle's unless said otherwise."""
 
     window: int = 40
     """Poses that are re-linearised: a batch over 40 cycles does what one over the run does."""
-    stay: float = 0.98
-    """Probability that a step's liveliness is that of the step before: an agent changes its gait every 5 s."""
+    rare: float = 0.02
+    """Probability of what happens every 5 s: a gait changes; something comes to stand in a path's way, or leaves
+    hidden what lies behind it."""
     tail: float = 4.0
     """Degrees of freedom of Student's t, where the receiver tells no tails: neighbours that the map lacks."""
-    gate: float = 16.3
-    """Squared Mahalanobis distance of delay and cosines beyond which nothing associates (chi^2, 3 dof: 0.999)."""
     wall_ratio: float = -0.6
     """Mean log amplitude reflection of a wall: concrete to plasterboard at 10 GHz, ITU-R P.2040."""
     wall_ratio_std: float = 0.5
@@ -44,16 +45,57 @@ class Levels(NamedTuple):
     """Mean square of a residual in reported deviations beforehand: 1 + the SNR (9 dB) of what a cell holds besides."""
     memory: float = 4.0
     """Cycles over which the pull of such neighbours keeps its sign: phases turn once in half a wavelength of motion."""
-    blocked: float = 0.02
-    """Probability that in a cycle something comes to stand in the way of a path..."""
     cleared: float = 0.05
-    """...and that it goes away again."""
+    """Probability that in a cycle what stands in the way of a path goes away again."""
+    depth: float = 0.15
+    """Distance [m] beyond a wall from which on a thing is behind it, and not on it: furniture, frames."""
     shown: float = 0.95
     """Probability that a path above the threshold with nothing in its way is reported by itself."""
-    against: float = 9.0
-    """Median squared residual (3 dof, half are below 2.4) from which on a feature's measurements contradict it."""
-    dead: float = 0.01
-    """Probability of existence below which a feature is taken back."""
+
+    @property
+    def stay(self) -> float:
+        """Probability that a step is as lively as the one before."""
+        return 1.0 - self.rare
+
+    @property
+    def dead(self) -> float:
+        """Probability of existence below which a feature is taken back."""
+        return self.rare
+
+    @property
+    def log_rare(self) -> float:
+        """Of an unannounced manoeuvre; of a thing behind a wall; half of it of a wall that is not heard by itself."""
+        return float(np.log(self.rare))
+
+    @property
+    def weaker(self) -> float:
+        """Share of the weaker of two paths that are a wall's loss apart in the place of both, and its spread."""
+        return float(1.0 / (1.0 + np.exp(-self.wall_ratio)))
+
+    @property
+    def steady(self) -> float:
+        """Probability that nothing stands in the way of a leg that was not looked for before."""
+        return self.cleared / (self.cleared + self.rare)
+
+    @property
+    def blocked(self) -> float:
+        """Probability that in a cycle something comes to stand in the way of a path."""
+        return self.rare
+
+    @property
+    def against(self) -> float:
+        """Median squared residual (3 dof, half are below 2.4) from which on measurements contradict a feature."""
+        return self.fit**2
+
+    @property
+    def log_volume(self) -> float:
+        """Of the space in which features are looked for [m^3]."""
+        return float(np.log(4.0 / 3.0 * np.pi * self.size**3))
+
+    @property
+    def log_upright(self) -> float:
+        """Log odds of an upright or level surface."""
+        return float(np.log(self.upright / (1.0 - self.upright)))
 
 
 LEVELS = Levels()

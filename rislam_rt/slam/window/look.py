@@ -16,7 +16,7 @@ from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, cluster, expect
 from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.learn import Sights, recall, visible
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.numerics import GATE
 from rislam_rt.slam.window.steps import HEAD
 
 
@@ -115,7 +115,7 @@ def _associate(
     odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))
     side = np.full(len(lead), UNTOLD) if sides is None else sides[lead]
     candidates = Candidates(seen, spread, groups.log_amplitude, np.hypot(groups.log_amplitude_std, 0.15), odds, side)
-    cost = pair_costs(candidates, glance, LEVELS.gate, strangers)
+    cost = pair_costs(candidates, glance, GATE, strangers)
     rows, columns = scipy.optimize.linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     # the cost counts what is missed: seen against missed, both against strangers

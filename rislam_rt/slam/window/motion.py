@@ -11,9 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from rislam_rt.arrays import Floats
-
-LADDER = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0])
-"""Standard deviations [m/s^2] of a step's acceleration: from a rail car to a person who turns on the spot."""
+from rislam_rt.slam.window.numerics import LADDER
 
 
 def first_gait(sigma_a: float) -> Floats:

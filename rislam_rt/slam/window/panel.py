@@ -6,6 +6,7 @@ silent whatever it is. A receiver that alternates codes tells more: what only th
 update serves features and tracks from cycle to cycle, and births over a whole history.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import amplitude_std
 from rislam_rt.model import DataSheet, RadioConfig, RisCode, SensorModel
+from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.identity import (
     DOUBT,
     STRENGTHS,
@@ -21,17 +23,12 @@ from rislam_rt.slam.identity import (
     log_panel_missed,
     log_scatterer,
     log_scatterer_missed,
-    predicted_panel_gain,
     weigh_silence,
 )
 from rislam_rt.slam.moments import even_draws, square_root
 from rislam_rt.slam.tracks import PANEL, UNTOLD
 from rislam_rt.slam.window.levels import LEVELS
-
-DRAWS = 12
-"""Places of the belief over which the panel's predicted gain is averaged."""
-CERTAIN = 30.0
-"""Log odds beyond which an identity is no longer in question."""
+from rislam_rt.slam.window.numerics import CERTAIN, DRAWS
 
 
 class Identity(NamedTuple):
@@ -64,19 +61,18 @@ class Identity(NamedTuple):
         return Identity(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
 
-def _strength_prior() -> Floats:
-    log = -0.5 * ((STRENGTHS - np.log(LEVELS.strength)) / LEVELS.strength_std) ** 2
+@lru_cache(maxsize=1)
+def _strength_prior(middle: float, spread: float) -> Floats:
+    """(G,) log probability of a point's strength beforehand."""
+    log = -0.5 * ((STRENGTHS - np.log(middle)) / spread) ** 2
     return np.asarray(log - np.logaddexp.reduce(log))
-
-
-STRENGTH_PRIOR = _strength_prior()
-"""(G,) log probability of a point's strength beforehand."""
 
 
 def unknown(count: int, panels: int = 1) -> Identity:
     """Points of which nothing is known but that panels are fewer than scatterers."""
     return Identity(
-        np.tile(STRENGTH_PRIOR, (count, 1)), np.full((count, panels), np.log(LEVELS.panels)),
+        np.tile(_strength_prior(LEVELS.strength, LEVELS.strength_std), (count, 1)),
+        np.full((count, panels), np.log(LEVELS.panels)),
         np.zeros((count, panels + 1)),
     )  # fmt: skip
 
@@ -115,7 +111,7 @@ def gains(sight: Sight, ris: DataSheet | None, code: RisCode | None, radio: Radi
         return None
     ends, ratio = (sight.tx[:, None], sight.rx[:, None]), sight.ratio[:, None]
     parts = zip(ris.panels, ris.parts(code), strict=True)
-    return np.stack([predicted_panel_gain(spec, part, sight.place, *ends, ratio, radio) for spec, part in parts])
+    return np.stack([panel_path_gain(spec, part, sight.place, *ends, ratio, radio) for spec, part in parts])
 
 
 def weigh(before: Identity, sight: Sight, gain: Complexes | None, sensor: SensorModel) -> Identity:

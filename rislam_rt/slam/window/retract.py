@@ -11,13 +11,9 @@ from rislam_rt.slam.window.expect import Expected
 from rislam_rt.slam.window.forms import UNKNOWN
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals
+from rislam_rt.slam.window.numerics import FEWEST, RECENT
 from rislam_rt.slam.window.panel import unknown
 from rislam_rt.slam.window.tracks import Tracks
-
-RECENT = 5
-"""Cycles within which a form must have been seen for its measurements to go on as a track."""
-FEWEST = 15
-"""Measurements of a feature within the window from which on their residuals speak against it."""
 
 
 def release(context: Context, keep: Booleans) -> Context:
@@ -121,6 +117,6 @@ def behind(context: Context, wall: int) -> Booleans:
             out = out / np.linalg.norm(out)
             foot = middle + ((0.5 * (features[row] + book.anchor[row]) - middle) @ out) * out
         at = slice(7 + 3 * row, 10 + 3 * row)
-        slack = 0.15 + 2.0 * float(np.sqrt(np.trace(context.window.covariance[at, at])))
+        slack = LEVELS.depth + 2.0 * float(np.sqrt(np.trace(context.window.covariance[at, at])))
         found[row] = sign * ((foot - middle) @ normal) > abs(depth) + slack
     return found

@@ -11,12 +11,10 @@ from rislam_rt.slam.tracks import OTHER
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.expect import Scene
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.panel import DRAWS, Sight, gains, weigh
+from rislam_rt.slam.window.numerics import DRAWS
+from rislam_rt.slam.window.panel import Sight, gains, weigh
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.tracks import Tracks
-
-LOG_FEW = np.log(LEVELS.panels)
-"""What identities start from: the design asks what was measured, not how many panels there are."""
 
 
 def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: Scene, code: RisCode | None) -> Tracks:
@@ -48,7 +46,8 @@ def find_suspect(
     points = book.points[~np.isin(book.points, book.panels)]  # what is another panel is not this one
     patience = np.where(tracks.hits > 3, np.inf, np.minimum(tracks.hits - 1, PATIENCE))
     least = np.where(tracks.hits > 1, DISMISSAL, 0.0)
-    told = tracks.log_ris[:, panel] - LOG_FEW
+    few = np.log(LEVELS.panels)  # the design asks what was measured, not how many panels there are
+    told = tracks.log_ris[:, panel] - few
     rows = ((tracks.side != OTHER) & (cycle - tracks.last <= patience) & (told > least)).nonzero()[0]
     spots, _ = places(tracks.mean[rows, :, 0], poses)
     if len(walls) and len(rows):
@@ -57,7 +56,7 @@ def find_suspect(
         gap = np.linalg.norm(spots[:, None] - image, axis=-1) - np.linalg.norm(spots - mean[:3], axis=1)[:, None]
         shown = (gap > -DEEP).all(axis=1)
         rows, spots = rows[shown], spots[shown]
-    odds = np.concatenate([book.log_ris[points, panel] - LOG_FEW, told[rows]])
+    odds = np.concatenate([book.log_ris[points, panel] - few, told[rows]])
     if not len(odds) or odds.max() <= DISMISSAL:
         return None
     best = int(np.argmax(odds))

@@ -9,6 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.associate import Candidates, pair_costs
 from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.numerics import GATE
 from rislam_rt.slam.window.panel import Identity, unknown
 
 WANDER = 1.0
@@ -90,7 +91,7 @@ def match(tracks: Tracks, glance: Glance, free: Integers, cycle: int) -> tuple[I
     candidates = Candidates(
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
     )
-    cost = pair_costs(candidates, glance.take(free), LEVELS.gate, LEVELS.clutter)
+    cost = pair_costs(candidates, glance.take(free), GATE, LEVELS.clutter)
     rows, columns = scipy.optimize.linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     return rows[good], free[columns[good]]

@@ -15,13 +15,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window.digest import Digest
 from rislam_rt.slam.window.levels import LEVELS
-
-STEPS = 4
-"""Gauss-Newton steps: the first guesses are within the linear range of the truth."""
-HOPELESS = 60.0
-"""Log likelihood behind the best hypothesis of a track from which on one is not followed."""
-RIDGE = 1e-3
-"""Information [1/m^2] that keeps blind directions finite: (30 m)^-2."""
+from rislam_rt.slam.window.numerics import HOPELESS, RIDGE, STEPS
 
 
 class Trials(NamedTuple):
@@ -78,12 +72,10 @@ def try_all(trials: Trials, digest: Digest) -> Fits:
     for turn in range(STEPS + 1):
         now = _equations(trials, digest, active, place[active], error[active], trust[active])
         cost[active] = now.cost
-        if turn >= 2 or turn == STEPS:
-            inverse = np.linalg.inv(now.normal)
-            covariance[active] = inverse[:, common:, common:]
+        if turn == STEPS:
+            covariance[active] = np.linalg.inv(now.normal)[:, common:, common:]
             held[active] = np.linalg.inv(now.normal[:, common:, common:])
             log_det[active] = np.linalg.slogdet(now.normal)[1]
-        if turn == STEPS:
             break
         trust[active] = now.trust
         step = np.linalg.solve(now.normal, now.slope[..., None])[..., 0]
@@ -99,7 +91,7 @@ def try_all(trials: Trials, digest: Digest) -> Fits:
             lost[active] = False
             cost[lost] = np.inf
     evidence = -0.5 * cost - 0.5 * log_det + 1.5 * np.log(2.0 * np.pi)
-    share = np.where(trials.mixed, SHARE + SHARE_STD * error[:, -1], 0.0)
+    share = np.where(trials.mixed, LEVELS.weaker * (1.0 + error[:, -1]), 0.0)
     # a component lies between the two that it is made of
     evidence -= 20.0 * (np.maximum(-share, 0.0) + np.maximum(share - 1.0, 0.0))
     return Fits(place, covariance, held, cost, share, evidence)
@@ -107,8 +99,6 @@ def try_all(trials: Trials, digest: Digest) -> Fits:
 
 COMMON = 13
 """Unknowns beside the place: errors of pose and velocity, of the two maps, and of the share; headings come on top."""
-SHARE, SHARE_STD = 0.35, 0.35
-"""Share of the weaker of two in the place of both: amplitudes a wall's loss apart, and a phase that hardly turns."""
 
 
 class _Equations(NamedTuple):
@@ -199,9 +189,9 @@ def _mix(
     length = np.sqrt(np.vecdot(out, out))
     ray = out / length[..., None]
     gap = np.concatenate([length[..., None], ray[..., :2]], axis=-1) - value[both]
-    share = (SHARE + SHARE_STD * error[both, -1])[:, None, None]
+    share = LEVELS.weaker * (1.0 + error[both, -1])[:, None, None]
     value[both] += share * gap
-    split[both] = SHARE_STD * gap[..., None]
+    split[both] = LEVELS.weaker * gap[..., None]
     across = _by_image(ray, length)
     turned = across @ mirror[:, None, :, :3]
     by_new, by_agent = turned @ by_place[both], turned @ by_tx[both][:, None] - across

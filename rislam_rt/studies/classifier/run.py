@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Scene
-from rislam_rt.pipeline.run import Progress
+from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.slam.classify import Network
 from rislam_rt.studies.classifier.gather import Examples
 from rislam_rt.studies.classifier.score import (
@@ -42,7 +42,7 @@ class Training(NamedTuple):
     """Loss of F1 on all test rooms, feature by feature, several shuffles each."""
 
 
-def run_training(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Progress | None = None) -> Training:
+def run_training(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Tell = tell_nobody) -> Training:
     """Everything that a specification asks for; its seed decides all draws.
 
     Raises

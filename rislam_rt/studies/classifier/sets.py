@@ -10,8 +10,9 @@ import numpy as np
 from rislam_rt.errors import SceneError
 from rislam_rt.measurement import with_reference_snr
 from rislam_rt.model import RadioConfig, Scene, Trajectory
-from rislam_rt.pipeline.run import Progress, build_channel
+from rislam_rt.pipeline.run import build_channel
 from rislam_rt.pipeline.specification.radio import build_radio
+from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.scene.random_rooms.box_rooms import random_room
 from rislam_rt.studies.classifier.codes import AIMED, POLICIES, set_codes
@@ -47,7 +48,7 @@ class Sets(NamedTuple):
         return join(list(self.drawn.values()))
 
 
-def gather_sets(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Progress | None = None) -> Sets:
+def gather_sets(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Tell = tell_nobody) -> Sets:
     """Everything that a specification asks for; its seed decides all draws.
 
     Raises
@@ -57,20 +58,19 @@ def gather_sets(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Prog
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
-    tell = progress or (lambda stage, at, total: None)
     total, rooms = spec.train + spec.validation, list[Examples]()
-    tell("rooms to learn from", 0, total)
+    progress("rooms to learn from", 0, total)
     for number in range(total):
         rooms.append(gather_random(number, spec))
-        tell("rooms to learn from", number + 1, total)
+        progress("rooms to learn from", number + 1, total)
     test, drawn = dict[str, Examples](), dict[str, Examples]()
-    tell("rooms to test on", 0, len(scenes) + spec.drawn)
+    progress("rooms to test on", 0, len(scenes) + spec.drawn)
     for scene, room in zip(scenes, spec.rooms, strict=True):
         test[scene.name] = gather_room(scene, room.depth, spec)
-        tell("rooms to test on", len(test), len(scenes) + spec.drawn)
+        progress("rooms to test on", len(test), len(scenes) + spec.drawn)
     for seed in range(spec.drawn_first, spec.drawn_first + spec.drawn):
         drawn[f"random_{seed}"] = gather_drawn(seed, spec)
-        tell("rooms to test on", len(test) + len(drawn), len(scenes) + spec.drawn)
+        progress("rooms to test on", len(test) + len(drawn), len(scenes) + spec.drawn)
     return Sets(join(rooms[: spec.train]), join(rooms[spec.train :]), test, drawn)
 
 

@@ -14,6 +14,7 @@ from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, res
 from rislam_rt.pipeline.scores.summary import summarise_scheme
 from rislam_rt.pipeline.specification.read import Table, build_spec
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.progress import tell_nobody
 from rislam_rt.scene import load_scene
 from rislam_rt.sweeps.work import one_line
 from rislam_rt.toml import put_dotted
@@ -36,7 +37,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     for name in spec.schemes:
         begin = process_time()
         try:
-            result = result_of(stage, spec, {name: run_scheme(name, stage, spec, lambda *_: None)}, seed=seed)
+            result = result_of(stage, spec, {name: run_scheme(name, stage, spec, tell_nobody)}, seed=seed)
             scores = _scores(result, name)
         except Exception as error:  # whatever it is, it is this scheme's alone
             schemes[name] = {"failed": one_line(error)}

@@ -14,6 +14,7 @@ from rislam_rt.pipeline.recordings.replay import Recorder
 from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, run_scheme
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.progress import tell_nobody
 from rislam_rt.scene.random_rooms import RandomRoom, draw_room
 from rislam_rt.studies.swept.cell import cell_spec
 from rislam_rt.studies.unseen.file import Recording
@@ -63,7 +64,7 @@ def _run(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Scores and times of one scheme."""
     recorder = Recorder(ESTIMATORS[SCHEMES[name].estimator])
-    result = run_scheme(name, stage, spec, lambda *_: None, recorder.estimator)
+    result = run_scheme(name, stage, spec, tell_nobody, recorder.estimator)
     truth = build_truth(stage.scene, stage.paths, result, spec)
     scores = {"ran": name, **score_run(truth, recorder.inputs, recorder.answers)}
     if keep.what != "nothing":

@@ -8,7 +8,6 @@ import pytest
 
 from rislam_rt.channel.compare.match import named_identity
 from rislam_rt.channel.traced import TracedChannel
-from rislam_rt.channel.traced.gradient import length_gradients
 from rislam_rt.model import Occluder, PathKind, RadioConfig
 from rislam_rt.scene.solids import sphere_mesh
 
@@ -71,11 +70,3 @@ def test_shades_reflect_nothing(rooms_and_paths):
     assert {named_identity(after, p) for p in range(after.num_paths)} <= {
         named_identity(before, p) for p in range(before.num_paths)
     }
-
-
-def test_gradients_pass_the_scatterers_own_shade(rooms_and_paths):
-    (_, (dark, paths)), trajectory = rooms_and_paths
-    cycle, path = np.nonzero(paths.valid & (paths.landmark == 0))
-    gradient = length_gradients(TracedChannel(dark, RADIO, 2), trajectory, paths, cycle[:40], path[:40])
-    expected = -(paths.departure[cycle[:40], path[:40]] + paths.arrival[cycle[:40], path[:40]])
-    np.testing.assert_allclose(gradient, expected, atol=1e-4)

@@ -106,7 +106,7 @@ def test_true_identity_joins_reciprocals_and_leaves_wall_returns_out(short_resul
         scheme,
         **{name: getattr(scheme, name)[:1] for name in PER_CYCLE},
         component_path=everything, component_landmark=np.full_like(everything, 5), outcome=("ok",),
-        info={name: value[:1] for name, value in scheme.info.items()},
+        info={name: value[:1] for name, value in scheme.info.items()}, smoothed=None,
     )  # fmt: skip
     label, identity = component_labels(paths, record)
     assert (label == 5).all()

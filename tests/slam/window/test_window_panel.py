@@ -13,9 +13,10 @@ from rislam_rt.information import amplitude_std
 from rislam_rt.measurement import ReceiverConfig, measure, with_reference_snr
 from rislam_rt.model import RadioConfig, RisCode, RisSpec, RisSpecs, SensorModel
 from rislam_rt.ris import rephase
+from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
-from rislam_rt.slam.identity import MODEL_ERROR, point_amplitude
+from rislam_rt.slam.identity import MODEL_ERROR
 from rislam_rt.slam.returns import TX as MOVING
 from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.window.book import empty_book, enter

@@ -38,21 +38,19 @@ class Case(NamedTuple):
     """Largest NEES per degree of freedom, mean over the run; the start's own draw makes much of it."""
 
 
-WINDOW = {"filter": "window", "use_vt": True}
-NESTED = {"filter": "nested", "machine": "numpy", "agent_particles": 100, "landmark_particles": 200}
+LANDMARKS = {"use_vt": False}
+NESTED = {"filter": "nested", "use_vt": False, "machine": "numpy", "agent_particles": 100, "landmark_particles": 200}
 CASES = [
-    Case("default", "random", {}, 103, 0.1, 10.0, 1.0),
-    Case("default", "random", {}, 233, 0.2, 7.0, 1.1),
-    Case("default with walls", "random", {"use_vt": True}, 233, 0.2, 90.0, 0.65),
-    Case("default with walls", "random", {"use_vt": True}, 266, 0.2, 110.0, 0.7),
+    Case("default", "random", {}, 103, 0.05, 50.0, 1.0),
+    Case("default", "random", {}, 233, 0.05, 20.0, 0.55),
+    Case("default", "random", {}, 266, 0.05, 20.0, 0.55),
+    Case("landmarks", "random", LANDMARKS, 103, 0.1, 10.0, 1.0),
+    Case("landmarks", "random", LANDMARKS, 233, 0.2, 7.0, 1.1),
     Case("nested", "random", NESTED, 233, 0.2, 7.0, 1.6),
     Case("bp_slam", "bp_slam", {}, 233, 0.5, 1.5, 0.7),
     Case("bp_slam", "bp_slam", {}, 266, 0.8, 6.0, 2.5),
     Case("channel_slam", "channel_slam", {}, 233, 0.5, 1.5, 2.7),
     Case("channel_slam", "channel_slam", {}, 266, 0.8, 6.0, 1.9),
-    Case("window", "random", WINDOW, 103, 0.05, 50.0, 1.0),
-    Case("window", "random", WINDOW, 233, 0.05, 20.0, 0.55),
-    Case("window", "random", WINDOW, 266, 0.05, 20.0, 0.55),
 ]
 
 
@@ -71,7 +69,7 @@ def test_it_errs_no_more_than_it_says(case: Case) -> None:
 
 
 @pytest.mark.parametrize(
-    "case", [CASES[1], CASES[2], CASES[5], CASES[7], CASES[9]], ids=lambda case: f"{case.name}-{case.room}"
+    "case", [CASES[1], CASES[4], CASES[5], CASES[6], CASES[8]], ids=lambda case: f"{case.name}-{case.room}"
 )
 def test_an_estimator_that_learns_nothing_fails(case: Case) -> None:
     scores = run(case, deaf(ESTIMATORS[SCHEMES[case.scheme].estimator]))
@@ -80,7 +78,7 @@ def test_an_estimator_that_learns_nothing_fails(case: Case) -> None:
     assert scores["births"] == 0
 
 
-@pytest.mark.parametrize("case", [*CASES[:4], *CASES[9:]], ids=lambda case: f"{case.name}-{case.room}")
+@pytest.mark.parametrize("case", CASES[:5], ids=lambda case: f"{case.name}-{case.room}")
 def test_most_births_are_of_the_right_kind(case: Case) -> None:
     scores = run(case, None)
     assert scores["births_judged"] >= 3

@@ -1,0 +1,30 @@
+"""What a believed point returns: amplitudes of scatterers, gains of panels, from places and strengths alone."""
+
+import numpy as np
+
+from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.model import RadioConfig, RisCode, RisSpec
+from rislam_rt.ris.rephase import panel_gain
+from rislam_rt.ris.response import leg_response
+
+
+def image_amplitude(length: Floats, radio: RadioConfig) -> Floats:
+    """|alpha| of eq. `a1` over perfect walls: free space along a path of `length` [m]."""
+    return radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * length)
+
+
+def point_amplitude(strength: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig) -> Floats:
+    """|alpha| of eq. `a2` for `strength`, the square root of a cross-section [m]."""
+    scale = radio.wavelength * np.sqrt(4.0 * np.pi * radio.tx_gain * radio.rx_gain) / (4.0 * np.pi) ** 2
+    return scale * strength / (tx_length * rx_length)
+
+
+def panel_path_gain(
+    spec: RisSpec, code: RisCode, center: Floats, tx: Floats, rx: Floats, ratio: Floats, radio: RadioConfig
+) -> Complexes:
+    """Gain (...,) of a panel at `center` (..., 3) between (unfolded) ends (..., 3); `ratio` (...,) of the walls."""
+    legs = [
+        leg_response(spec, center, end, np.sqrt(ratio * gain), radio.wavelength)
+        for end, gain in ((tx, radio.tx_gain), (rx, radio.rx_gain))
+    ]
+    return panel_gain(legs[0], legs[1], code)

@@ -1,0 +1,48 @@
+"""Steps of the solver and limits of what is worth a look: they are no part of the model."""
+
+import numpy as np
+
+GATE = 16.3
+"""Squared Mahalanobis distance of delay and cosines beyond which nothing associates (chi^2, 3 dof: 0.999)."""
+REFRESH = 5
+"""Cycles between two re-linearisations of the whole window."""
+DAMPING = 0.3
+"""Share of the new in each step's log precision."""
+STEPS = 4
+"""Gauss-Newton steps: the first guesses are within the linear range of the truth."""
+HOPELESS = 60.0
+"""Log likelihood behind the best hypothesis of a track from which on one is not followed."""
+RIDGE = 1e-3
+"""Information [1/m^2] that keeps blind directions finite: (30 m)^-2."""
+POINTS = 8
+"""Most normal points of a history."""
+NEAR = np.array([0.3, 0.15, 0.15])
+"""Gap in length [m] and cosines up to which a return of the map is weighed as a track's explanation."""
+MOST = 2
+"""Explanations of one track by the map that are weighed, the nearest."""
+STRIDE = 3
+"""Cycles between two examinations."""
+NEARBY = 2.0
+"""Distance [m] beyond which two places are not compared."""
+MOST_SHARED = 4.0
+"""Log odds that one more track may add, so that no chance coincidence decides alone."""
+DRAWS = 12
+"""Places of the belief over which the panel's predicted gain is averaged."""
+CERTAIN = 30.0
+"""Log odds beyond which an identity is no longer in question."""
+FEWEST = 15
+"""Measurements of a feature within the window from which on their residuals speak against it."""
+RECENT = 5
+"""Cycles within which a form must have been seen for its measurements to go on as a track."""
+FAINT = 0.5
+"""SNR below which a return is not looked for: it moves nothing in its cell by more than the noise does."""
+LEVEL = 0.02
+"""Third direction cosine down to which returns are heard: those of upright walls arrive level."""
+EDGE = 1.15
+"""Distance in cells up to which a weaker path moves a stronger one: cells have no sharp edge."""
+IN_WALL = 0.05
+"""Distance [m] from a wall below which a point is held to lie in it."""
+LADDER = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0])
+"""Standard deviations [m/s^2] of a step's acceleration: from a rail car to a person who turns on the spot."""
+SCATTER_RATE = 0.1
+"""Share of the latest residual in its running mean square."""
