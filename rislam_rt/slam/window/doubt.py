@@ -17,7 +17,7 @@ from rislam_rt.slam.window.gauss import Quadratic, Window
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log
 from rislam_rt.slam.window.look import Look
-from rislam_rt.slam.window.motion import LADDER
+from rislam_rt.slam.window.numerics import LADDER
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.tracks import CYCLE
 
