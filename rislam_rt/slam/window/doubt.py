@@ -65,7 +65,7 @@ def jump(view: Look, glance: Glance) -> Floats:
     if len(row) < FEWEST:
         return np.zeros(3)
     gap = heard[column, 0] - expected[row, 0]
-    found = Rates(view.expected.jacobian[lead[row], 0, :3], gap, np.full(len(row), CELL**2))
+    found = Rates(view.expected.jacobian[lead[row], 0, :3], gap, np.full(len(row), CELL**2), np.zeros(len(row)))
     return egomotion.agreed(found)
 
 
@@ -92,11 +92,11 @@ def landed(window: Window, by: Floats) -> Window:
     return window._replace(head=head, prior=prior, slots=slots, covariance=covariance)
 
 
-def ask_tracks(window: Window, log: Log, heading: Floats) -> egomotion.Told | None:
+def ask_tracks(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.Told | None:
     """What the first tracks say of the start, once there are enough of them."""
     passes = window.step[window.step > 0.0]
     step = float(passes.mean()) if len(passes) else CYCLE
-    found = egomotion.rates(log, heading, step)
+    found = egomotion.rates(log, heading, step, baseline)
     if len(found.rate) < egomotion.FEWEST:
         return None
     share = window.step.mean() / step
@@ -105,7 +105,7 @@ def ask_tracks(window: Window, log: Log, heading: Floats) -> egomotion.Told | No
     return told._replace(velocity=told.velocity / share if share > 0.0 else window.head[3:6])
 
 
-def ask_picture(window: Window, log: Log, heading: Floats, lively: float) -> float:
+def ask_picture(window: Window, log: Log, heading: Floats, baseline: float, lively: float) -> float:
     """Log likelihood ratio of the last cycles' picture moving in any way against moving as the agent is thought to.
 
     `lively` [m/s^2] of that motion.
@@ -114,7 +114,7 @@ def ask_picture(window: Window, log: Log, heading: Floats, lively: float) -> flo
         return 0.0
     passed = float(window.step[-PAST:].sum())
     time = passed if passed > 0.0 else PAST * CYCLE
-    found = egomotion.rates(log, heading[-PAST - 1 :], time / PAST)
+    found = egomotion.rates(log, heading[-PAST - 1 :], time / PAST, baseline)
     if len(found.rate) < egomotion.FEWEST:
         return 0.0
     place = gauss.poses(window)[-PAST - 1 :, :3]

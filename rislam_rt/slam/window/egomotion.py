@@ -37,6 +37,8 @@ class Rates(NamedTuple):
     """(T,) [m/s] of the length."""
     variance: Floats
     """(T,)."""
+    blur: Floats
+    """(T,) error of the rate by the baseline between Tx and Rx, as a share of the speed."""
 
 
 class Told(NamedTuple):
@@ -54,16 +56,16 @@ class Told(NamedTuple):
     """[rad] by which the compass shows too little, if it is that which is wrong."""
 
 
-def rates(log: Log, heading: Floats, step: float) -> Rates:
+def rates(log: Log, heading: Floats, step: float, baseline: float) -> Rates:
     """Of all that was heard often enough, understood or not, in the log's last K cycles of `step` [s].
 
-    `heading` (K,) [rad] of these.
+    `heading` (K,) [rad] of these; `baseline` [m] between Tx and Rx.
     """
     first = int(log.cycle[-1]) - len(heading) + 1 if len(log.cycle) else 0
     known = log.explained
     rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
     if not len(rows):
-        return Rates(np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+        return Rates(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0))
     forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
     every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
     names, which = unique_forms(every)
@@ -88,7 +90,9 @@ def rates(log: Log, heading: Floats, step: float) -> Rates:
     toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
     rate, variance = (s * sxy - sx * sy) / spread, LEVELS.crowd * s / spread
     enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0
-    return Rates(toward[enough], rate[enough], variance[enough])
+    # seen from the two ends a point, or a wall's normal, lies in directions so much apart
+    blur = 2.0 * baseline * s / np.maximum(sy, 1e-9)
+    return Rates(toward[enough], rate[enough], variance[enough], blur[enough])
 
 
 def weigh(found: Rates, told: Floats, std: Floats) -> Told:
@@ -155,11 +159,12 @@ NEAR, MOST = 0.01, 8
 
 
 def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Floats]:
-    """Log likelihoods (S, T) of the tracks under level velocities (S, 2), and the shares by which they agree."""
+    """Log likelihoods (S, T) of tracks under level velocities (S, 2), and the weights (S, T) with which they agree."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
-    close = np.log1p(-APART) - 0.5 * left**2 / found.variance - 0.5 * np.log(2.0 * np.pi * found.variance)
+    variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
+    close = np.log1p(-APART) - 0.5 * left**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
     either = np.logaddexp(close, np.log(APART) - np.log(4.0 * WALK))
-    return either, np.exp(close - either)
+    return either, np.exp(close - either) / variance
 
 
 def _settle(found: Rates, start: Floats, climb: float) -> _Settled:
@@ -167,8 +172,7 @@ def _settle(found: Rates, start: Floats, climb: float) -> _Settled:
     flat, rate = found.toward[:, :2], found.rate - found.toward[:, 2] * climb
     v, prior = start.copy(), np.eye(2) / (3.0 * WALK) ** 2
     for last in (False,) * 6 + (True,):
-        either, share = _agreement(found, v, climb)
-        weight = share / found.variance
+        either, weight = _agreement(found, v, climb)
         normal = np.einsum("st,ti,tj->sij", weight, flat, flat) + prior
         if last:
             break

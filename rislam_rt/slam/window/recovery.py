@@ -15,13 +15,14 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
     """Whether the picture moves as the agent is told; the start as the first tracks would have it."""
     if len(state.level) > 2 or len(state.heading) != state.window.num_poses:
         return state, False
+    baseline = float(np.linalg.norm(state.scene.body.tx_offset - state.scene.body.rx_offset))
     if len(state.book.ident):
         if state.cycle % doubt.PAST == 0:
             lively = float(np.sqrt(motion.expected_variance(state.level[0])))
-            odds = doubt.ask_picture(state.window, state.log, state.heading, lively)
+            odds = doubt.ask_picture(state.window, state.log, state.heading, baseline, lively)
             state = state._replace(doubt=float(np.clip(state.doubt + odds, doubt.SURE, -doubt.SURE)))
         return state, False
-    told = None if state.asked else doubt.ask_tracks(state.window, state.log, state.heading)
+    told = None if state.asked else doubt.ask_tracks(state.window, state.log, state.heading, baseline)
     if told is None or told.log_odds <= 0.0:
         return state, False
     state = state._replace(asked=True)

@@ -18,7 +18,7 @@ def _rates(velocity, rng, *, tracks=12, apart=4, error=0.01):
     toward *= -2.0 / np.linalg.norm(toward, axis=1)[:, None]
     rate = toward @ velocity + error * rng.standard_normal(tracks)
     rate[:apart] = rng.uniform(-2.0, 2.0, apart)
-    return Rates(toward, rate, np.full(tracks, error**2))
+    return Rates(toward, rate, np.full(tracks, error**2), np.zeros(tracks))
 
 
 def test_a_start_told_right_is_left_alone():
@@ -70,7 +70,7 @@ def test_rates_are_those_of_walls_points_and_square_corners(heading):
         np.zeros(number), np.zeros(number), np.zeros(number, dtype=np.int64), np.array([row[3] for row in rows]),
         np.full((number, 2, 5), UNKNOWN), np.zeros(number), np.zeros((number, 3)),
     )  # fmt: skip
-    found = egomotion.rates(log, np.full(count, heading), step)
+    found = egomotion.rates(log, np.full(count, heading), step, 0.0)
     assert len(found.rate) == 3
     # the direction of a point turns a little on the way: (0.2 m / 3 m)^2 of a velocity of 0.2 m/s
     np.testing.assert_allclose(found.rate, found.toward @ velocity, atol=2e-3)
