@@ -86,7 +86,7 @@ def test_a_start_told_wrong_is_said_and_mended(kind: str, seed: int) -> None:
 
 
 def test_a_jump_is_said_and_landed_from() -> None:
-    verdict = _led("jump of the agent", 3, 30)
+    verdict = _led("jump of the agent", 5, 30)
     assert verdict.said
     assert not verdict.lost
     assert verdict.drift < 0.05
