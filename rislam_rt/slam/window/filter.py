@@ -105,24 +105,29 @@ def step(
     landmark[free[pick]] = np.where(used, _names(state.book, expected, groups, row), REMOVED)
 
     state, wrong = recovery.ask(state)
+    state = _grown(state, left, expected, groups)
+    outcome = _outcome(len(measurement), len(state.book.ident), wrong or jumped or state.doubt >= 0.0)
+    if doubt.is_lost(state.doubt) and len(state.book.ident):
+        state = recovery.restart(state)
+    info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome)
+    return state._replace(cycle=state.cycle + 1), info
+
+
+def _grown(state: WindowState, left: Residuals, expected: Expected, groups: Clusters) -> WindowState:
+    """With what the evidence has turned against taken back, or else with what is born."""
     context = Context(
-        state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle, state.sights, state.codes
+        state.window, state.book, state.log, state.tracks, state.heading, state.scene, state.cycle, state.sights, state.codes
     )  # fmt: skip
-    if state.cycle % REFRESH == 0 and len(book.ident):
+    if state.cycle % REFRESH == 0 and len(state.book.ident):
         gone = condemned(context.book, left, context.log, expected, gauss.now(context.window)[1])
         context, fresh = release(context, ~gone), not gone.any()
     else:
         fresh = True
     if fresh:
         context = births(context, expected, groups)
-    state = state._replace(
+    return state._replace(
         window=context.window, book=context.book, log=context.log, tracks=context.tracks, sights=context.sights
     )  # fmt: skip
-    outcome = _outcome(len(measurement), len(state.book.ident), wrong or jumped or state.doubt >= 0.0)
-    if doubt.is_lost(state.doubt) and len(state.book.ident):
-        state = recovery.restart(state)
-    info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome)
-    return state._replace(cycle=state.cycle + 1), info
 
 
 def _move(state: WindowState, dt: float, heading: float) -> WindowState:
