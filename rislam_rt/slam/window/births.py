@@ -96,7 +96,8 @@ def _missing_legs(context: Context, histories: Digest, mean: Floats) -> Floats:
     along, share = ray @ away.T, reach / length[:, None]
     leg = (np.abs(along - share) < LEG) | (np.abs(along) > 1.0 - LEG)
     found = (leg & (share < 0.995) & bright).sum(axis=1)
-    return LEVELS.log_rare * (1.0 - 0.5 * np.minimum(found, 2))
+    missing = np.array([LEVELS.log_rare, np.log1p(-LEVELS.steady), 0.0])  # both, one of them, none
+    return missing[np.minimum(found, 2)]
 
 
 LEG = 0.04

@@ -64,7 +64,7 @@ class Levels(NamedTuple):
 
     @property
     def log_rare(self) -> float:
-        """Of an unannounced manoeuvre; of a thing behind a wall; half of it of a wall that is not heard by itself."""
+        """Of an unannounced manoeuvre; of a thing behind a wall; of two walls neither of which is heard by itself."""
         return float(np.log(self.rare))
 
     @property
