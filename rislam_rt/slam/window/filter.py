@@ -116,7 +116,8 @@ def step(
 def _grown(state: WindowState, left: Residuals, expected: Expected, groups: Clusters) -> WindowState:
     """With what the evidence has turned against taken back, or else with what is born."""
     context = Context(
-        state.window, state.book, state.log, state.tracks, state.heading, state.scene, state.cycle, state.sights, state.codes
+        state.window, state.book, state.log, state.tracks, state.heading, state.scene, state.cycle, state.sights,
+        state.codes,
     )  # fmt: skip
     if state.cycle % REFRESH == 0 and len(state.book.ident):
         gone = condemned(context.book, left, context.log, expected, gauss.now(context.window)[1])
