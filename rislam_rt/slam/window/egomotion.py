@@ -41,7 +41,7 @@ class Rates(NamedTuple):
     """(T,) error of the rate by the baseline between Tx and Rx, as a share of the speed."""
 
 
-class Told(NamedTuple):
+class StartCheck(NamedTuple):
     """What the tracks say of the start."""
 
     log_odds: float
@@ -95,9 +95,9 @@ def rates(log: Log, heading: Floats, step: float, baseline: float) -> Rates:
     return Rates(toward[enough], rate[enough], variance[enough], blur[enough])
 
 
-def weigh(found: Rates, told: Floats, std: Floats) -> Told:
+def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
     """The velocity `told` (3,) within `std` (3,), against any other, and against the same one turned by any angle."""
-    every = _settle(found, _starts(found, told), told[2])
+    every = _find_modes(found, _starts(found, told), told[2])
     spread = every.covariance + np.diag(std[:2] ** 2)
     wide = spread + WALK**2 * np.eye(2)
     right = float(np.max(every.evidence + _log_normal(every.velocity - told[:2], spread)))
@@ -113,7 +113,7 @@ def weigh(found: Rates, told: Floats, std: Floats) -> Told:
     velocity = np.append(every.velocity[best], told[2])
     turn = float(np.arctan2(told[1], told[0]) - np.arctan2(velocity[1], velocity[0]))
     variance = spread[best] if is_compass else every.covariance[best]
-    return Told(
+    return StartCheck(
         max(float(speed.max()), float(compass.max())) - right + LOG_WRONG, is_compass, velocity,
         float(np.sqrt(np.trace(variance) / 2.0)), float((turn + np.pi) % (2.0 * np.pi) - np.pi),
     )  # fmt: skip
@@ -121,7 +121,7 @@ def weigh(found: Rates, told: Floats, std: Floats) -> Told:
 
 def agreed(found: Rates) -> Floats:
     """(3,) level velocity, or way, that most agree on; near to nothing if it may be."""
-    every = _settle(found, _starts(found, np.zeros(3)), 0.0)
+    every = _find_modes(found, _starts(found, np.zeros(3)), 0.0)
     best = int(np.argmax(every.evidence + _log_normal(every.velocity, every.covariance + WALK**2 * np.eye(2))))
     return np.append(every.velocity[best], 0.0)
 
@@ -132,7 +132,7 @@ def _log_normal(off: Floats, spread: Floats) -> Floats:
     return -0.5 * inside - 0.5 * np.linalg.slogdet(spread)[1] - np.log(2.0 * np.pi)
 
 
-class _Settled(NamedTuple):
+class _Modes(NamedTuple):
     velocity: Floats
     covariance: Floats
     evidence: Floats
@@ -167,7 +167,7 @@ def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Fl
     return either, np.exp(close - either) / variance
 
 
-def _settle(found: Rates, start: Floats, climb: float) -> _Settled:
+def _find_modes(found: Rates, start: Floats, climb: float) -> _Modes:
     """From velocities (S, 2): the nearest that tracks agree on, and the evidence there, over a flat prior."""
     flat, rate = found.toward[:, :2], found.rate - found.toward[:, 2] * climb
     v, prior = start.copy(), np.eye(2) / (3.0 * WALK) ** 2
@@ -178,4 +178,4 @@ def _settle(found: Rates, start: Floats, climb: float) -> _Settled:
             break
         v = np.linalg.solve(normal, ((weight * rate) @ flat)[..., None])[..., 0]
     evidence = either.sum(axis=1) + np.log(2.0 * np.pi) - 0.5 * np.linalg.slogdet(normal)[1]
-    return _Settled(v, np.linalg.inv(normal), evidence)
+    return _Modes(v, np.linalg.inv(normal), evidence)

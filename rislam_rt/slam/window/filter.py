@@ -11,7 +11,7 @@ from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of,
 from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.returns import TX
 from rislam_rt.slam.tracks import Glance
-from rislam_rt.slam.window import doubt, gauss, motion, recovery, tracks
+from rislam_rt.slam.window import divergence, gauss, motion, recovery, tracks
 from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.book import Book, empty_book, idents, image_ident
 from rislam_rt.slam.window.context import Context
@@ -46,7 +46,7 @@ def init(
     return WindowState(
         0, config, window, empty_book(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_sights(),
         gait, gait,
-        np.array([start.heading]), start.position_std * free, scene, doubt.SURE, False, 0.0,
+        np.array([start.heading]), start.position_std * free, scene, divergence.SURE, False, 0.0,
         (None,), np.zeros((0, 3)),
     )  # fmt: skip
 
@@ -95,7 +95,7 @@ def step(
     state = state._replace(tracks=followed.tracks, log=followed.log)
     jumped = state.doubt == 0.0
     if len(expected.seen) and len(glance.seen):
-        state = state._replace(doubt=doubt.advance(state.doubt, view.score, followed.followed, followed.kept))
+        state = state._replace(doubt=divergence.advance(state.doubt, view.score, followed.followed, followed.kept))
     if min(book.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, poses, scene, code))
     sights, book = learn(
@@ -107,7 +107,7 @@ def step(
     state, wrong = recovery.ask(state)
     state = _grown(state, left, expected, groups)
     outcome = _outcome(len(measurement), len(state.book.ident), wrong or jumped or state.doubt >= 0.0)
-    if doubt.is_lost(state.doubt) and len(state.book.ident):
+    if divergence.is_lost(state.doubt) and len(state.book.ident):
         state = recovery.restart(state)
     info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome)
     return state._replace(cycle=state.cycle + 1), info
@@ -179,9 +179,9 @@ def _notice(
             if view.score + LEVELS.log_rare > best.score:
                 best, window = view, trial
     if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
-        by = doubt.jump(best, glance)
-        view = view_of(doubt.shifted(state.window, by)) if by.any() else best
-        if view.score + doubt.LOG_JUMP > max(best.score, doubt.SURE):
+        by = divergence.jump(best, glance)
+        view = view_of(divergence.shifted(state.window, by)) if by.any() else best
+        if view.score + divergence.LOG_JUMP > max(best.score, divergence.SURE):
             return recovery.landed(state, by), view
     return state._replace(window=window), best
 

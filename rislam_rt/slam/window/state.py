@@ -34,7 +34,7 @@ class WindowState(NamedTuple):
     """(3,) [m] standard deviation of the start's position: what no measurement tells."""
     scene: Scene
     doubt: float
-    """Log odds that the agent is lost: that the map explains nothing of what is heard (see `doubt`)."""
+    """Log odds that the agent is lost: that the map explains nothing of what is heard (see `divergence`)."""
     asked: bool
     """Whether the first tracks told that the start is another."""
     turned: float

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.window import doubt, egomotion, gauss
+from rislam_rt.slam.window import divergence, egomotion, gauss
 from rislam_rt.slam.window.egomotion import Rates
 from rislam_rt.slam.window.forms import UNKNOWN
 from rislam_rt.slam.window.log import Log
@@ -78,23 +78,23 @@ def test_rates_are_those_of_walls_points_and_square_corners(heading):
 
 def test_the_chain_is_that_of_two_states():
     """Against the forward filter of the hidden chain, in probabilities."""
-    rng, odds = np.random.default_rng(4), doubt.SURE
-    least = 1.0 / (1.0 + 1.0 / doubt.RATE)
+    rng, odds = np.random.default_rng(4), divergence.SURE
+    least = 1.0 / (1.0 + 1.0 / divergence.RATE)
     lost = least
     for score in rng.normal(-0.3, 1.0, 60):
-        odds = doubt.advance(odds, score, 0, 0)
+        odds = divergence.advance(odds, score, 0, 0)
         passed = lost + (1.0 - lost) * least
         lost = np.clip(passed / (passed + (1.0 - passed) * np.exp(score)), least, 1.0 - least)
         assert odds == pytest.approx(np.log(lost / (1.0 - lost)), abs=1e-6)
-    assert not doubt.is_lost(doubt.SURE)
+    assert not divergence.is_lost(divergence.SURE)
 
 
 def test_tracks_that_end_at_once_make_a_loss_likelier_and_a_map_that_explains_does_not():
-    torn = doubt.advance(doubt.SURE, -3.0, 20, 3)
-    assert torn > 3.0 > doubt.advance(doubt.SURE, -3.0, 20, 18)
-    assert doubt.is_lost(torn)
-    assert not doubt.is_lost(doubt.advance(doubt.SURE, 40.0, 20, 3))
-    assert doubt.advance(torn, 30.0, 5, 5) == pytest.approx(doubt.SURE)
+    torn = divergence.advance(divergence.SURE, -3.0, 20, 3)
+    assert torn > 3.0 > divergence.advance(divergence.SURE, -3.0, 20, 18)
+    assert divergence.is_lost(torn)
+    assert not divergence.is_lost(divergence.advance(divergence.SURE, 40.0, 20, 3))
+    assert divergence.advance(torn, 30.0, 5, 5) == pytest.approx(divergence.SURE)
 
 
 def _window(rng):
@@ -113,17 +113,17 @@ def _window(rng):
 def test_after_a_jump_all_but_the_place_is_as_it_was():
     window, by = _window(np.random.default_rng(5)), np.array([0.7, -0.4, 0.0])
     mean, covariance = gauss.now(window)
-    after, spread = gauss.now(doubt.landed(window, by))
+    after, spread = gauss.now(divergence.landed(window, by))
     np.testing.assert_allclose(after, mean + np.concatenate([by, np.zeros(len(mean) - 3)]), atol=1e-6)
     wide = covariance.copy()
-    wide[[0, 1], [0, 1]] += doubt.JUMP**2
+    wide[[0, 1], [0, 1]] += divergence.JUMP**2
     free = np.delete(np.arange(len(mean)), 6)  # the compass is held
     np.testing.assert_allclose(spread[np.ix_(free, free)], wide[np.ix_(free, free)], atol=1e-5)
 
 
 def test_a_look_elsewhere_moves_the_last_pose_alone():
     window, by = _window(np.random.default_rng(6)), np.array([0.7, -0.4, 0.1])
-    there = doubt.shifted(window, by)
+    there = divergence.shifted(window, by)
     np.testing.assert_allclose(gauss.poses(there)[-1, :3] - gauss.poses(window)[-1, :3], by, atol=1e-12)
     np.testing.assert_allclose(gauss.now(there)[0][3:6], gauss.now(window)[0][3:6], atol=1e-9)
     np.testing.assert_allclose(gauss.now(there)[0][HEAD:], gauss.now(window)[0][HEAD:])

@@ -92,7 +92,7 @@ def landed(window: Window, by: Floats) -> Window:
     return window._replace(head=head, prior=prior, slots=slots, covariance=covariance)
 
 
-def ask_tracks(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.Told | None:
+def ask_tracks(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.StartCheck | None:
     """What the first tracks say of the start, once there are enough of them."""
     passes = window.step[window.step > 0.0]
     step = float(passes.mean()) if len(passes) else CYCLE
