@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los, stranger_density
@@ -73,7 +74,7 @@ def step(
     free = free[~echoes(glance.take(free), scene.sensor.cell_length)]
     glance = glance.take(free)
 
-    strangers = stranger_density(glance, scene.sensor, config.new_density)
+    strangers = stranger_density(glance, scene.sensor, max(config.new_density, _unexplained(state, glance)))
     state, view = _notice(state, heading, code, glance, strangers)
     mean, poses, expected, groups = view.mean, view.poses, view.expected, view.groups
     shows, scatter, row, pick = view.shows, view.scatter, view.row, view.pick
@@ -271,6 +272,16 @@ def liven(state: WindowState) -> WindowState:
     return state._replace(window=window._replace(precision=precision), level=level)
 
 
+def _unexplained(state: WindowState, glance: Glance) -> float:
+    """Components per metre, unit of each cosine and e-fold that nothing explained in the cycle before."""
+    if not len(glance.seen):
+        return 0.0
+    window, sensor = np.diff(state.scene.sensor.window)[0] * SPEED_OF_LIGHT, state.scene.sensor
+    loudness = 0.5 * np.log(sensor.radio.integrated_snr(np.exp(glance.log_amplitude.max())) / sensor.threshold)
+    count = float((state.tracks.last == state.cycle - 1).sum())
+    return count / (window * np.pi * max(float(loudness), 1.0))
+
+
 class _Followed(NamedTuple):
     tracks: Tracks
     log: Log
@@ -289,7 +300,7 @@ def _follow(
     drift = np.array([2.0 * bend + speed**2, 0.1, 0.1]) if len(length) else np.zeros(3)
     found = tracks.advance(state.tracks, dt, turn, drift)
     late = found.last == state.cycle - 1
-    rows, picks = tracks.match(found, glance, free, state.cycle)
+    rows, picks = tracks.match(found, glance, free, state.cycle, state.config.new_density)
     found = tracks.extend(found, rows, glance, picks, state.cycle)
     spare = np.setdiff1d(free, picks)
     reach = np.maximum(glance.seen[spare, 0], 0.5)

@@ -39,8 +39,6 @@ class Levels(NamedTuple):
     """Posterior probability of a kind from which on a feature enters the map."""
     fit: float = 3.0
     """Standard deviations of its cost above which a hypothesis does not fit at all."""
-    clutter: float = 0.016
-    """New or false components per metre of length, unit of each cosine, and e-fold of amplitude."""
     crowd: float = 9.0
     """Mean square of a residual in reported deviations beforehand: 1 + the SNR (9 dB) of what a cell holds besides."""
     memory: float = 4.0

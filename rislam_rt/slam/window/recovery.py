@@ -58,6 +58,6 @@ def landed(state: WindowState, by: Floats) -> WindowState:
     """After a jump: the last pose alone, with the map; held for lost until the next cycle agrees."""
     passed = np.concatenate([state.passed, gauss.poses(state.window)[:-1, :3]])
     return state._replace(
-        window=divergence.landed(state.window, by), gait=state.level, heading=state.heading[-1:], codes=state.codes[-1:],
-        passed=passed, doubt=0.0,
+        window=divergence.landed(state.window, by), gait=state.level, heading=state.heading[-1:],
+        codes=state.codes[-1:], passed=passed, doubt=0.0,
     )  # fmt: skip

@@ -79,8 +79,8 @@ def advance(tracks: Tracks, dt: float, turn: float, bend: Floats) -> Tracks:
     return tracks._replace(mean=mean, covariance=move @ tracks.covariance @ move.T + noise)
 
 
-def match(tracks: Tracks, glance: Glance, free: Integers, cycle: int) -> tuple[Integers, Integers]:
-    """Rows of tracks and the free components that continue them."""
+def match(tracks: Tracks, glance: Glance, free: Integers, cycle: int, strangers: float) -> tuple[Integers, Integers]:
+    """Rows of tracks and the free components that continue them; `strangers` is the density of new ones."""
     count = len(tracks.ident)
     if not count or not len(free):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
@@ -91,7 +91,7 @@ def match(tracks: Tracks, glance: Glance, free: Integers, cycle: int) -> tuple[I
     candidates = Candidates(
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
     )
-    cost = pair_costs(candidates, glance.take(free), GATE, LEVELS.clutter)
+    cost = pair_costs(candidates, glance.take(free), GATE, strangers)
     rows, columns = scipy.optimize.linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     return rows[good], free[columns[good]]
