@@ -14,6 +14,8 @@ from rislam_rt.slam.window.panel import Identity, unknown
 
 WANDER = 1.0
 """Spread of an unexplained path's log amplitude from cycle to cycle: a panel's code may change."""
+CYCLE = 0.1
+"""Time [s] that may pass from cycle to cycle where the clock says that none does."""
 
 
 class Tracks(NamedTuple):
@@ -68,6 +70,9 @@ def advance(tracks: Tracks, dt: float, turn: float, bend: Floats) -> Tracks:
     """Predict over `dt` [s] while the body turns by `turn` [rad]; `bend` (3,) is the drift of the rates a second."""
     move = np.array([[1.0, dt], [0.0, 1.0]])
     noise = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]]) * (bend**2)[:, None, None]
+    if dt <= 0.0:  # time passes from cycle to cycle, whatever a coarse clock says
+        noise = np.zeros((len(tracks.ident), 3, 2, 2))
+        noise[..., 0, 0] = CYCLE**2 * (tracks.mean[..., 1] ** 2 + tracks.covariance[..., 1, 1])
     mean = tracks.mean @ move.T
     cos, sin = np.cos(turn), np.sin(turn)
     mean[:, 1], mean[:, 2] = cos * mean[:, 1] + sin * mean[:, 2], cos * mean[:, 2] - sin * mean[:, 1]

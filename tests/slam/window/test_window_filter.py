@@ -53,6 +53,11 @@ def test_walls_are_found_and_nothing_else_is_a_wall(run):
         assert abs(offset - true[axis]) < 0.02 + 0.01  # the start's own error moves the whole map
 
 
+def test_it_never_holds_itself_for_lost(run):
+    found, *_ = run
+    assert "diverged" not in {str(info.outcome) for _, info in found}
+
+
 def test_scatterer_is_found_and_is_no_panel(run):
     found, _, shift, *_ = run
     last = found[-1][0].map
