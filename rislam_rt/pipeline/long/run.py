@@ -30,9 +30,9 @@ from rislam_rt.pipeline.store.run_folder import (
     RUN_FILE,
     RunFolder,
     check_files,
-    damage_told,
     read_marker,
     read_run,
+    reading_run,
 )
 from rislam_rt.progress import Tell
 from rislam_rt.scene import load_scene
@@ -153,7 +153,7 @@ def read_any(folder: Path) -> LongRun:
     if about["state"] != DONE:
         raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
     check_files(folder, about)
-    with damage_told(folder):
+    with reading_run(folder):
         scene = replace(load_scene(folder / "scene"), digest=about["scene"]["sha256"])
         return gather_long(folder, scene, about, about["identity"])
 

@@ -24,6 +24,7 @@ from rislam_rt.pipeline.dataset import (
     seal_dataset,
 )
 from rislam_rt.pipeline.record import given_to_dataset
+from rislam_rt.pipeline.store.exports import SUMMARY_FILE, export_files, json_text
 from rislam_rt.pipeline.store.identity import RunIdentity
 from rislam_rt.scene import load_scene
 from rislam_rt.storage.files import TEMPORARY, make_folders, remove_empty, remove_temporaries, write_atomic
@@ -294,7 +295,7 @@ def read_run(folder: Path) -> SlamResult:
     if not (folder / RUN_FILE).is_file():
         raise ConfigError(f"{folder}: not a completed run (no {RUN_FILE}); give a folder that `run` wrote")
     about = read_marker(folder)
-    with damage_told(folder):
+    with reading_run(folder):
         if about["state"] != DONE:
             raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
         check_files(folder, about)
@@ -326,7 +327,7 @@ def read_run(folder: Path) -> SlamResult:
 
 
 @contextmanager
-def damage_told(folder: Path) -> Iterator[None]:
+def reading_run(folder: Path) -> Iterator[None]:
     """Around the reading of a run: whatever a damaged file raises becomes one line.
 
     Raises
