@@ -111,8 +111,8 @@ MUTANTS = (
     ),
     Mutant(
         "the receiver mirrors a cosine", "measurement/bound.py",
-        "into_disc(blind_axes(found.points[:, 1:], radio))",
-        "into_disc(blind_axes(found.points[:, 1:] * [1.0, -1.0], radio))",
+        "clip_to_unit_disc(blind_axes(found.points[:, 1:], radio))",
+        "clip_to_unit_disc(blind_axes(found.points[:, 1:] * [1.0, -1.0], radio))",
     ),
     Mutant(
         "a sweep's seed hangs on its order", "sweeps/axes.py",

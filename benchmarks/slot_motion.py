@@ -17,7 +17,7 @@ from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.design import exact_code
 from rislam_rt.measurement import ReceiverConfig, measure, receive, with_reference_snr
-from rislam_rt.measurement.slot_motion import split
+from rislam_rt.measurement.slot_motion import split_by_code
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene, Trajectory
 from rislam_rt.scene import load_scene
 
@@ -80,7 +80,7 @@ def leaks(paths: Paths, motion: Trajectory, radio: RadioConfig, config: Receiver
     found = []
     for cycle in range(len(motion)):
         heard = receive(paths, cycle, float(motion.heading[cycle]), radio, config, shift[cycle])
-        common, difference = split(heard, config)
+        common, difference = split_by_code(heard, config)
         leak = np.where(heard.panel >= 0, common.gain, difference.gain)
         snr = [10.0 * np.log10(np.maximum(radio.integrated_snr(gain), 1e-9)) for gain in (heard.gain, leak)]
         found.append(np.column_stack([paths.kind[heard.path], *snr]))

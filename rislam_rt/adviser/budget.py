@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.adviser.codes import codes_of, under
+from rislam_rt.adviser.codes import codes_of, paths_under_codes
 from rislam_rt.adviser.detection import DetectionForecast, forecast_detection
 from rislam_rt.adviser.reasons import Reasons, build_reasons
 from rislam_rt.arrays import Floats, Integers
@@ -62,7 +62,7 @@ class Survey(NamedTuple):
 def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
     """Find the paths at places along the way, by exact image sources."""
     rows = np.unique(np.linspace(0, len(scene.agent) - 1, places).round().astype(np.int64))
-    scene = replace(scene, agent=at_rows(scene.agent, rows))
+    scene = replace(scene, agent=trajectory_at(scene.agent, rows))
     faces = sum(len(reflector.faces) for reflector in scene.reflectors)
     channel = ImageSourceChannel(scene, settings.radio, next((depth for most, depth in DEPTHS if faces <= most), 0))
     return Survey(scene, channel.paths(scene.agent), settings, channel.depth)
@@ -76,7 +76,7 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLin
         return [_link(name, "", [_all_places(paths, looked)], reasons, n) for n, name in enumerate(scene.landmarks)]
     links: list[LandmarkLink] = []
     for codes in codes_of(paths, scene.ris.spec, settings.radio, rng=rng):
-        heard = [_all_places(under(paths, scene.ris.spec, levels), looked) for levels in codes.levels]
+        heard = [_all_places(paths_under_codes(paths, scene.ris.spec, levels), looked) for levels in codes.levels]
         if codes.name == "aimed":
             links += [_link(s.name, "", heard, reasons, n) for n, s in enumerate(scene.scatterers)]
         links += [
@@ -86,7 +86,7 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLin
     return links
 
 
-def at_rows(motion: Trajectory, rows: Integers) -> Trajectory:
+def trajectory_at(motion: Trajectory, rows: Integers) -> Trajectory:
     """The cycles of these rows."""
     return Trajectory(
         motion.time[rows], motion.position[rows], motion.velocity[rows], motion.heading[rows], motion.body

@@ -57,6 +57,6 @@ def aimed_codes(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Integers:
     return index.reshape(-1, spec.rows, spec.cols)
 
 
-def under(paths: Paths, spec: DataSheet, index: Integers) -> Paths:
+def paths_under_codes(paths: Paths, spec: DataSheet, index: Integers) -> Paths:
     """The paths under levels (K, N, M)."""
     return rephase(paths, RisCode(index, spec.levels))

@@ -7,8 +7,8 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.measurement import Received, receive
 from rislam_rt.measurement.bound import NEGLIGIBLE
-from rislam_rt.measurement.components import NoiselessComponents, audible, merge, single
-from rislam_rt.measurement.slot_motion import split
+from rislam_rt.measurement.components import NoiselessComponents, merge, select_paths, single
+from rislam_rt.measurement.slot_motion import split_by_code
 from rislam_rt.model import Paths, SensorModel
 from rislam_rt.pipeline.specification.spec import Settings
 
@@ -34,9 +34,9 @@ def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Setti
     received = receive(paths, cycle, heading, radio, settings.receiver)
     count = len(paths.landmarks)
     missed, strongest, covered = np.ones(count), np.zeros(count), np.full(count, -1)
-    for capture in split(received, settings.receiver):
+    for capture in split_by_code(received, settings.receiver):
         snr, owner = radio.integrated_snr(capture.gain), paths.landmark[capture.path]
-        loud = audible(capture, snr > NEGLIGIBLE * sensor.threshold)
+        loud = select_paths(capture, snr > NEGLIGIBLE * sensor.threshold)
         parts = merge(loud, sensor) if settings.receiver.merge else single(loud)
         inside = (parts.tau >= sensor.window[0]) & (parts.tau <= sensor.window[1])
         chance = sensor.detection_probability(radio.integrated_snr(parts.gain)) * inside

@@ -1,1 +1,1 @@
-"""Floor 1: pure functions on points, directions, planes and triangles. No data types of ours."""
+"""Floor 1: pure functions of points, directions, planes, triangles, mirror chains, bistatic paths. No types of ours."""

@@ -14,12 +14,12 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.measurement.components import (
     NoiselessComponents,
-    audible,
     blind_axes,
-    capped,
-    into_disc,
+    capped_cosine_std,
+    clip_to_unit_disc,
     lone_errors,
     merge,
+    select_paths,
     single,
 )
 from rislam_rt.measurement.config import ReceiverConfig
@@ -27,7 +27,7 @@ from rislam_rt.measurement.joint_bound import joint_errors
 from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.sensor_model import build_sensor
-from rislam_rt.measurement.slot_motion import split
+from rislam_rt.measurement.slot_motion import split_by_code
 from rislam_rt.model import Measurement, PathTruth, RadioConfig, SensorModel
 
 NEGLIGIBLE = 1e-3
@@ -65,7 +65,7 @@ def measure_bound(
     whether heard or not, so that two codes see the same noise; the `num_extra` columns beyond have theirs from a
     generator of their own, so that they change nobody else's.
     """
-    sensor, captures = build_sensor(radio, config), split(received, config)
+    sensor, captures = build_sensor(radio, config), split_by_code(received, config)
     draws = rng.standard_normal((len(captures), num_paths, 5))
     if num_extra:
         more = rng.spawn(1)[0].standard_normal((len(captures), num_extra, 5))
@@ -80,10 +80,10 @@ def measure_bound(
     told = panel_probability(ComponentSides(*found[1:], side), radio, config) if config.alternation else ()
     measurement = Measurement(
         found.points[:, 0],
-        into_disc(blind_axes(found.points[:, 1:], radio)),
+        clip_to_unit_disc(blind_axes(found.points[:, 1:], radio)),
         np.abs(found.gain),
         found.deviation[:, 0],
-        capped(found.deviation[:, 1:], radio),
+        capped_cosine_std(found.deviation[:, 1:], radio),
         found.gain_std / np.sqrt(2.0),
         *told,
     )
@@ -95,7 +95,7 @@ def _capture(
 ) -> ReportedComponents:
     """What is reported of the paths in one capture, and what is false."""
     radio, window = sensor.radio, sensor.window
-    received = audible(received, radio.integrated_snr(received.gain) > NEGLIGIBLE * sensor.threshold)
+    received = select_paths(received, radio.integrated_snr(received.gain) > NEGLIGIBLE * sensor.threshold)
     if config.resolution == "joint":
         parts, errors = joint_errors(received, radio, config, draws)
     else:

@@ -20,7 +20,7 @@ from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_gri
 from rislam_rt.measurement.estimation.estimate import estimate_paths
 from rislam_rt.measurement.estimation.refine import fit_amplitudes
 from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding, tone_response
-from rislam_rt.measurement.hardware import Correction, mirrored
+from rislam_rt.measurement.hardware import Correction, image_spectrum
 from rislam_rt.measurement.signal import num_tones
 from rislam_rt.model import Body, RadioConfig
 
@@ -76,13 +76,13 @@ def calibrate(
     image = np.zeros(len(residue), dtype=np.complex128)
     spread, stray = float(np.mean(np.abs(heard) ** 2)), STRAY
     for faintest in FAINTEST:
-        plain, inverse = heard - image[:, None] * mirrored(heard) - residue, _inverse(matrix)
+        plain, inverse = heard - image[:, None] * image_spectrum(heard) - residue, _inverse(matrix)
         drawn = np.array([_as_drawn(inverse @ one, known, faintest) for one in plain])
         matrix = _array_matrix(plain, drawn, matrix, spread, stray)
         stray = max(float(np.sqrt(np.mean(np.abs(matrix - np.diag(np.diag(matrix))) ** 2))), LEAST_STRAY)
         model = matrix @ drawn
         image = _image(heard - residue - model, heard)
-        rest = heard - image[:, None] * mirrored(heard) - model
+        rest = heard - image[:, None] * image_spectrum(heard) - model
         residue, spread = _standing(rest)
     left = max(spread - known.noise, 0.0) / float(np.mean(np.abs(heard - residue) ** 2))
     return Correction(_inverse(matrix), residue, image, direct, loudness, left)
@@ -159,5 +159,5 @@ def _image(rest: Complexes, heard: Complexes) -> Complexes:
 
     At rest an image is the same as a chain's gain.
     """
-    rest, other = (part - part.mean(axis=0) for part in (rest, mirrored(heard)))
+    rest, other = (part - part.mean(axis=0) for part in (rest, image_spectrum(heard)))
     return np.asarray(np.einsum("tlm,tlm->l", rest, other.conj()) / np.sum(np.abs(other) ** 2, axis=(0, 2)))

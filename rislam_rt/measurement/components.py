@@ -50,7 +50,9 @@ def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:
 def merge(received: Received, sensor: SensorModel) -> NoiselessComponents:
     """Join paths of one capture closer than a resolution cell in delay and both cosines, from the strongest down."""
     cell = np.ones((len(received.tau), len(received.tau)), dtype=bool)
-    for value in in_cells(received, sensor.radio).T:  # axis by axis: half the time of one three-dimensional array
+    for value in in_resolution_cells(
+        received, sensor.radio
+    ).T:  # axis by axis: half the time of one three-dimensional array
         cell &= np.abs(np.subtract.outer(value, value)) < 1.0
     return join(received, _leaders(np.abs(received.gain), cell))
 
@@ -86,25 +88,25 @@ def lone_errors(parts: NoiselessComponents, radio: RadioConfig, draws: Floats) -
     return ComponentErrors(deviation * draws[:, 2:], deviation, gain_std)
 
 
-def audible(received: Received, keep: Booleans) -> Received:
+def select_paths(received: Received, keep: Booleans) -> Received:
     """The paths marked (N,)."""
     return Received._make(field[keep] for field in received)
 
 
-def in_cells(received: Received, radio: RadioConfig) -> Floats:
+def in_resolution_cells(received: Received, radio: RadioConfig) -> Floats:
     """Delays and cosines (N, 3) in resolution cells; 0 along an axis without aperture."""
     array = radio.array
     widths = [count * array.spacing if count > 1 else 0.0 for count in (array.rows, array.cols)]
     return np.column_stack([received.tau * radio.bandwidth, received.direction[:, :2] * widths])
 
 
-def into_disc(cosines: Floats) -> Floats:
+def clip_to_unit_disc(cosines: Floats) -> Floats:
     """Cosines (..., 2) brought radially into the unit disc, where directions are."""
     length = np.linalg.norm(cosines, axis=-1, keepdims=True)
     return cosines / np.maximum(length, 1.0)
 
 
-def capped(deviation: Floats, radio: RadioConfig) -> Floats:
+def capped_cosine_std(deviation: Floats, radio: RadioConfig) -> Floats:
     """Standard deviations (N, 2) of cosines, `DISC_STD` at most and along an axis without aperture."""
     blind = np.array([radio.array.rows, radio.array.cols]) < 2
     return np.where(blind, DISC_STD, np.minimum(deviation, DISC_STD))

@@ -136,7 +136,7 @@ def digitise(
     config, leakage = front_end.config, sent.leakage
     heard = front_end.matrix @ clean + leakage * front_end.residue
     noisy = add_noise(_shaken(heard, config, radio, rng), radio.noise_psd, rng=rng)
-    mixed = sent.swing * (noisy + front_end.image[:, None] * mirrored(noisy))
+    mixed = sent.swing * (noisy + front_end.image[:, None] * image_spectrum(noisy))
     samples, extra = convert(mixed, receiver.converter_bits, radio, config.clip_rms)
     level = radio.noise_psd + extra
     if config.told:
@@ -152,24 +152,24 @@ def digitise(
 def correct(samples: Complexes, unit: float, correction: Correction) -> Complexes:
     """Samples with residue, image, the array's errors and the gain control taken out; `unit` is the root of the energy
     a tone over that of a whole sounding."""
-    plain = samples - correction.image[:, None] * mirrored(samples)
+    plain = samples - correction.image[:, None] * image_spectrum(samples)
     if correction.loudness:
         direct = abs(np.vdot(correction.direct, plain))
         plain = plain * (unit * correction.loudness / max(direct, np.finfo(np.float64).tiny))
     return np.asarray(correction.matrix @ (plain - unit * correction.residue))
 
 
-def draw_swing(config: HardwareConfig, *, rng: np.random.Generator) -> float:
+def draw_gain_variation(config: HardwareConfig, *, rng: np.random.Generator) -> float:
     """Gain of the gain control in one cycle, an amplitude ratio."""
     return float(10.0 ** (config.agc_std_db * rng.standard_normal() / 20.0)) if config.agc_std_db else 1.0
 
 
-def in_step(samples: Complexes, other: Complexes) -> Complexes:
+def scaled_to_fit(samples: Complexes, other: Complexes) -> Complexes:
     """Samples (L, M) turned and scaled to fit the other's best, which share direct path and walls with them."""
     return np.asarray(samples * (np.vdot(samples, other) / np.vdot(samples, samples)))
 
 
-def mirrored(spectrum: Complexes) -> Complexes:
+def image_spectrum(spectrum: Complexes) -> Complexes:
     """Conjugate tones (..., M) in reverse order: what a mixer's image adds to them."""
     return np.conj(spectrum[..., ::-1])
 

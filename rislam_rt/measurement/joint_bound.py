@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.measurement.components import ComponentErrors, NoiselessComponents, in_cells, join
+from rislam_rt.measurement.components import ComponentErrors, NoiselessComponents, in_resolution_cells, join
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.estimation.inner_products import inner_of, waves_at
 from rislam_rt.measurement.estimation.refine import joint_bound
@@ -32,7 +32,7 @@ def joint_errors(
     """
     sounding = build_sounding(num_tones(radio, config), radio)
     merging = config.merge
-    place = in_cells(received, radio)
+    place = in_resolution_cells(received, radio)
     near = np.linalg.norm(place[:, None] - place, axis=-1)
     unit = np.sqrt(radio.energy * radio.array.num_antennas / (sounding.num_samples * radio.noise_psd))
     strength = np.abs(received.gain)

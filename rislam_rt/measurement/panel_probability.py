@@ -12,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.slot_motion import look_signs, slot_mean
+from rislam_rt.measurement.slot_motion import code_signs, slot_mean
 from rislam_rt.model import RadioConfig
 
 DENSITY = 0.5
@@ -75,7 +75,7 @@ def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: 
     Both ends ride on the agent, so that a path shortens by twice its speed at most.
     """
     shift = np.linspace(-1.0, 1.0, SHIFTS) * 2.0 * config.top_speed / radio.wavelength
-    signs = look_signs(config.order, config.panels)
+    signs = code_signs(config.order, config.panels)
     return np.asarray(slot_mean(shift, signs[into] * signs[of], config) / slot_mean(shift, signs[0], config))
 
 

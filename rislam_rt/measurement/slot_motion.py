@@ -16,7 +16,7 @@ from rislam_rt.measurement.received import Received
 
 
 @lru_cache(maxsize=64)
-def look_signs(order: str, panels: int) -> Floats:
+def code_signs(order: str, panels: int) -> Floats:
     """Signs (1 + panels, S) of what meets no panel, and of each panel's paths, in the S looks of an `order`.
 
     Rows of a Hadamard matrix, so that each sum over the looks with the signs of one panel holds its paths alone. `ABBA`
@@ -57,14 +57,14 @@ def slot_weights(doppler: Floats, config: ReceiverConfig) -> tuple[Complexes, ..
     """
     if not config.alternation:
         return np.sinc(doppler * config.slot).astype(np.complex128), np.zeros(len(doppler), dtype=np.complex128)
-    return tuple(slot_mean(doppler, signs, config) for signs in look_signs(config.order, config.panels))
+    return tuple(slot_mean(doppler, signs, config) for signs in code_signs(config.order, config.panels))
 
 
-def split(received: Received, config: ReceiverConfig) -> list[Received]:
+def split_by_code(received: Received, config: ReceiverConfig) -> list[Received]:
     """The paths as they are in the sum of the codes, and with alternation in each panel's difference."""
     if not config.alternation:
         return [received._replace(gain=received.gain * slot_weights(received.doppler, config)[0])]
-    signs = look_signs(config.order, config.panels)
+    signs = code_signs(config.order, config.panels)
     kind = np.minimum(received.panel, config.panels - 1) + 1
     captures = []
     for own in signs:

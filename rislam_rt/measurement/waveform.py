@@ -7,18 +7,18 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import measurement_std
-from rislam_rt.measurement.components import capped, into_disc
+from rislam_rt.measurement.components import capped_cosine_std, clip_to_unit_disc
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimation.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding
 from rislam_rt.measurement.false_alarms import detection_threshold
-from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_swing, in_step
+from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_gain_variation, scaled_to_fit
 from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
 from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.signal import num_tones, tones
-from rislam_rt.measurement.slot_motion import codes_in_turn, split
+from rislam_rt.measurement.slot_motion import codes_in_turn, split_by_code
 from rislam_rt.measurement.true_identity import identify
 from rislam_rt.measurement.variance_inflation import crowding, mirror_variance, peak_bias, unmirrored
 from rislam_rt.model import Measurement, PathTruth, RadioConfig
@@ -77,9 +77,9 @@ def capture(
     leakage
         Gain of the direct path before its cancellation: a real receiver's cancellation leaves something of it.
     """
-    heard = split(received, config)
+    heard = split_by_code(received, config)
     elements = None if front_end is None else radio.array.positions(1.0) + front_end.offset
-    swing = 1.0 if front_end is None else draw_swing(front_end.config, rng=rng)
+    swing = 1.0 if front_end is None else draw_gain_variation(front_end.config, rng=rng)
     clean = [tones(one, radio, config, elements) for one in heard]
     direct = leakage * np.sqrt(radio.energy / num_tones(radio, config))
     if not config.alternation:
@@ -92,7 +92,7 @@ def capture(
     ]
     under = [samples for samples, _ in heard_under]
     if front_end is not None and front_end.correction is not None:
-        under[1:] = [in_step(other, under[0]) for other in under[1:]]
+        under[1:] = [scaled_to_fit(other, under[0]) for other in under[1:]]
     level = sum(noise for _, noise in heard_under) / len(signs)
     return [Capture(share * _signed_sum(under, signs[number]), level, number) for number in range(config.num_captures)]
 
@@ -138,7 +138,7 @@ def measure_waveform(
 def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
     """Column (N,) of the path that each component most likely is, by what its capture holds; -1 for none."""
     path = np.full(len(found.tau), -1)
-    for number, heard in enumerate(split(received, config)):
+    for number, heard in enumerate(split_by_code(received, config)):
         mine = found.capture == number
         path[mine] = identify(found.tau[mine], found.cosines[mine], found.gain[mine], heard, radio)
     return path
@@ -183,7 +183,7 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
     samples = one.samples / np.sqrt(one.noise_psd)
     found = estimate_paths(sounding, grid, samples, threshold, window, config.max_components, known)
     parameters, gain, deviation, amplitude_std = _resolved(found, one.samples.size, radio)
-    cosines = into_disc(unmirrored(parameters[:, 1:], radio))
+    cosines = clip_to_unit_disc(unmirrored(parameters[:, 1:], radio))
     variance = deviation**2 * peak_bias(np.abs(gain) ** 2 * one.samples.size)[:, None]
     variance *= crowding(parameters, threshold, radio)
     mirrored = mirror_variance(cosines, np.sqrt(variance[:, 1:]), radio)
@@ -193,7 +193,7 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
         cosines,
         scale * gain,
         np.sqrt(variance[:, 0]) / radio.bandwidth,
-        np.hypot(capped(np.sqrt(variance[:, 1:]), radio), np.sqrt(mirrored)),
+        np.hypot(capped_cosine_std(np.sqrt(variance[:, 1:]), radio), np.sqrt(mirrored)),
         scale * amplitude_std,
         np.full(len(gain), one.number),
     )

@@ -107,24 +107,24 @@ class CodePolicy(Protocol):
 
 
 def run_cycle(
-    agent: Agent, room: GroundTruth, cycle: int, means: RunContext, *, rng: CycleGenerators
+    agent: Agent, room: GroundTruth, cycle: int, context: RunContext, *, rng: CycleGenerators
 ) -> tuple[Agent, Cycle]:
     """One cycle of one scheme."""
-    control, estimator, told = means.spec.control, means.estimator, means.told
+    control, estimator, told = context.spec.control, context.estimator, context.told
     config = estimator.config(told.settings)
     dt = float(told.time[cycle] - told.time[cycle - 1]) if cycle else 0.0
     clock = [perf_counter()]
 
     link, sent = agent.link, None
-    if link is not None and means.designer is not None:
+    if link is not None and context.designer is not None:
         ahead = dt + control.delay_cycles * usual_step(told.time)
-        sent = means.designer(partial(estimator.predict, agent.state, ahead, config), cycle, room, rng=rng.design)
+        sent = context.designer(partial(estimator.predict, agent.state, ahead, config), cycle, room, rng=rng.design)
     clock.append(perf_counter())
 
     air = 0.0
-    if link is not None and sent is not None and means.panel is not None:
-        link = send_code(link, sent, control, rng=rng.control, bit_flip=means.spec.panel.bit_flip)
-        air = message_seconds(means.panel, control)
+    if link is not None and sent is not None and context.panel is not None:
+        link = send_code(link, sent, control, rng=rng.control, bit_flip=context.spec.panel.bit_flip)
+        air = message_seconds(context.panel, control)
     clock.append(perf_counter())
 
     paths, applied = room.at(cycle), None
@@ -132,13 +132,13 @@ def run_cycle(
         applied = link.applied if room.faults is None else room.faults.applied(link.applied)
         paths = rephase(paths, applied, 1.0 if room.faults is None else room.faults.weight)
     measurement, truth = measure(
-        paths, 0, float(room.trajectory.heading[cycle]), means.settings.radio, means.settings.receiver, agent.heard,
+        paths, 0, float(room.trajectory.heading[cycle]), context.settings.radio, context.settings.receiver, agent.heard,
         room.doppler[cycle - room.first], room.front_end, room.clutter_at(cycle), rng=rng.noise,
     )  # fmt: skip
     clock.append(perf_counter())
 
     believed = link.believed if link is not None else None
-    reported = tell_measurement(measurement, means.spec.told)
+    reported = tell_measurement(measurement, context.spec.told)
     heading = float(told.heading[cycle])
     state, info = estimator.step(agent.state, reported, believed, dt, heading, config, rng=rng.filter)
     belief = estimator.estimate(state, config)

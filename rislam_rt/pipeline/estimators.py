@@ -10,10 +10,10 @@ from rislam_rt.arrays import Integers
 from rislam_rt.errors import ConfigError, expect
 from rislam_rt.information.landmark_model import Unknown
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
-from rislam_rt.pipeline.own_methods import at_work, load_own
+from rislam_rt.pipeline.own_methods import load_own, own_method_errors
 from rislam_rt.pipeline.specification.spec import Settings
 from rislam_rt.slam import StartPrior
-from rislam_rt.slam.schemes import bp_slam, channel_slam
+from rislam_rt.slam.schemes import bp_slam, bp_slam_aoa, channel_slam
 
 ROUNDING = 1e-6
 """Negative eigenvalues of a covariance over its largest one, that rounding in single precision may leave."""
@@ -65,18 +65,18 @@ def own_estimator(name: str) -> Estimator:
 
     def init(start: StartPrior, body: Body, panel: DataSheet | None, sensor: SensorModel, config: Any,
              *, rng: np.random.Generator) -> Any:  # fmt: skip
-        with at_work(name):
+        with own_method_errors(name):
             return own.init(start, body, panel, sensor, rng=rng)
 
     def estimate(state: Any, config: Any = None) -> SlamEstimate:
-        with at_work(name):
+        with own_method_errors(name):
             found: SlamEstimate = own.estimate(state)
         return checked(found, "estimate")
 
     def predict(state: Any, ahead: float, config: Any) -> SlamEstimate:
         if not hasattr(own, "predict"):
             return estimate(state)
-        with at_work(name):
+        with own_method_errors(name):
             found: SlamEstimate = own.predict(state, ahead)
         return checked(found, "predict")
 
@@ -84,7 +84,7 @@ def own_estimator(name: str) -> Estimator:
         state: Any, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: Any,
         *, rng: np.random.Generator,
     ) -> tuple[Any, Outcomes]:  # fmt: skip
-        with at_work(name):
+        with own_method_errors(name):
             state = own.step(state, measurement, code, dt, heading, rng=rng)
         return state, Outcomes(np.full(len(measurement), -1))
 
@@ -105,6 +105,10 @@ ESTIMATORS = Estimators({
     "bp_slam": Estimator(
         bp_slam.init, bp_slam.predict, bp_slam.step, bp_slam.estimate, lambda settings: settings.bp_slam,
         angles=False, walls="images",
+    ),
+    "bp_slam_aoa": Estimator(
+        bp_slam_aoa.init, bp_slam_aoa.predict, bp_slam_aoa.step, bp_slam_aoa.estimate,
+        lambda settings: settings.bp_slam_aoa,
     ),
     "channel_slam": Estimator(
         channel_slam.init, channel_slam.predict, channel_slam.step, channel_slam.estimate,

@@ -99,7 +99,7 @@ def load_own(name: str) -> Any:
 
 
 @contextmanager
-def at_work(name: str) -> Iterator[None]:
+def own_method_errors(name: str) -> Iterator[None]:
     """Around a call of a method of one's own: whatever it raises becomes one line that says where.
 
     Raises
@@ -147,7 +147,7 @@ def own_code(
     ConfigError
         It returned something else than levels of the panel.
     """
-    with at_work(name):
+    with own_method_errors(name):
         levels = np.asarray(load_own(name)(belief, panel, radio, rng=rng))
     wanted = f"give whole numbers ({panel.rows}, {panel.cols}) from 0 to {panel.levels - 1}"
     if levels.shape != (panel.rows, panel.cols) or levels.dtype.kind not in "iu":
@@ -162,7 +162,7 @@ class OwnChannel:
 
     def __init__(self, name: str, scene: Scene, radio: RadioConfig, depth: int) -> None:
         self.name, self.scene, self.radio, self.depth = name, scene, radio, depth
-        with at_work(name):
+        with own_method_errors(name):
             self.inner = load_own(name)(scene, radio, depth)
 
     def paths(self, trajectory: Trajectory) -> Paths:
@@ -173,7 +173,7 @@ class OwnChannel:
         ConfigError
             The channel raised, or gave something else.
         """
-        with at_work(self.name):
+        with own_method_errors(self.name):
             found = self.inner.paths(trajectory)
         expect(f"'{self.name}': paths", found, Paths)
         if found.num_cycles != len(trajectory):
@@ -182,7 +182,7 @@ class OwnChannel:
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
         """The same paths under another code."""
-        with at_work(self.name):
+        with own_method_errors(self.name):
             return self.inner.respond(paths, code)
 
 

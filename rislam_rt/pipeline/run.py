@@ -78,7 +78,7 @@ def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
 
 
 def prepare_setup(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> RunSetup:
-    """Draw the true motion and find all paths along it. None of it depends on the noise, so that one stage serves many.
+    """Draw the true motion and find all paths along it. None of it depends on the noise, so that one setup serves many.
 
     Raises
     ------
@@ -145,39 +145,39 @@ def run_slam(
     expect("rng", rng, np.random.Generator)
     done = {} if done is None else done
     progress("trace", 0, 1)
-    stage = prepare_setup(scene, spec, rng=rng)
+    setup = prepare_setup(scene, spec, rng=rng)
     progress("trace", 1, 1)
     todo = [name for name in spec.schemes if name not in done]
-    for name, scheme in run_side_by_side(run_scheme, todo, (stage, spec), jobs, progress):
+    for name, scheme in run_side_by_side(run_scheme, todo, (setup, spec), jobs, progress):
         if isinstance(scheme, RislamError):
             raise scheme
         done[name] = scheme
-    return result_of(stage, spec, {name: done[name] for name in spec.schemes}, seed=_seed_of(rng))
+    return result_of(setup, spec, {name: done[name] for name in spec.schemes}, seed=_seed_of(rng))
 
 
 def result_of(
-    stage: RunSetup, spec: PipelineSpec, schemes: Mapping[str, SchemeResult], *, seed: int | None
+    setup: RunSetup, spec: PipelineSpec, schemes: Mapping[str, SchemeResult], *, seed: int | None
 ) -> SlamResult:
-    """Schemes that ran on one stage, as a run."""
+    """Schemes that ran on one setup, as a run."""
     return SlamResult(
         name=spec.name,
-        scene=stage.scene,
-        paths=replace(stage.paths, ris=None),
+        scene=setup.scene,
+        paths=replace(setup.paths, ris=None),
         schemes=schemes,
         config=spec.model_dump(mode="json"),
         seed=seed,
         versions=library_versions(),
-        seconds={"trace": stage.seconds},
-        warnings=panel_warnings(stage.scene, spec),
+        seconds={"trace": setup.seconds},
+        warnings=panel_warnings(setup.scene, spec),
     )
 
 
 def run_scheme(
-    name: str, stage: RunSetup, spec: PipelineSpec, tell: Tell, estimator: Estimator | None = None
+    name: str, setup: RunSetup, spec: PipelineSpec, tell: Tell, estimator: Estimator | None = None
 ) -> SchemeResult:
     """One scheme over all cycles, with its own estimator unless another is given."""
-    walk = SchemeSimulation(name, stage.scene, stage.body, spec, stage.seeds, estimator)
-    return walk.lead(stage.paths, 0, len(stage.scene.agent), tell, stage.extras)
+    walk = SchemeSimulation(name, setup.scene, setup.body, spec, setup.seeds, estimator)
+    return walk.lead(setup.paths, 0, len(setup.scene.agent), tell, setup.extras)
 
 
 def check_run(scene: Scene, spec: PipelineSpec) -> None:

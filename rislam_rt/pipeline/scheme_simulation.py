@@ -45,7 +45,7 @@ class SchemeSimulation:
             self.faults = draw_panel(panel, spec.panel.tolerance, rng=np.random.default_rng(seeds.panel))
             designer = build_designer(self.scheme, panel, spec, settings, told)
         estimator = estimator or ESTIMATORS[self.scheme.estimator]
-        self.means = RunContext(panel, designer, estimator, spec, settings, told)
+        self.context = RunContext(panel, designer, estimator, spec, settings, told)
         self.filter_rng, self.design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
         config = estimator.config(told.settings)
         state = estimator.init(
@@ -56,39 +56,39 @@ class SchemeSimulation:
     @property
     def foresight(self) -> int:
         """Cycles beyond the last one whose paths a slice needs: a design on the truth looks as far as the delay."""
-        return self.means.spec.control.delay_cycles if self.scheme.on_truth else 0
+        return self.context.spec.control.delay_cycles if self.scheme.on_truth else 0
 
     def lead(self, paths: Paths, first: int, last: int, tell: Tell, extras: Paths | None = None) -> SchemeResult:
         """Cycles `first` to `last` (not included); `paths` begin at `first` and may go on beyond `last`, and so do the
         `extras` that are heard with them.
         """
-        if self.means.panel is None:
+        if self.context.panel is None:
             paths = without_panel(paths)
-        spec, motion = self.means.spec, self.motion[first : first + paths.num_cycles]
-        shift = doppler_shift(paths, motion, self.means.settings.radio.wavelength)
+        spec, motion = self.context.spec, self.motion[first : first + paths.num_cycles]
+        shift = doppler_shift(paths, motion, self.context.settings.radio.wavelength)
         clutter, twin = None, deepcopy(self.sway)  # one array hears both
         if extras is not None:
             extras = perceived_paths(extras, motion, spec.told, rng=twin, since=float(self.motion.time[0]))
-            clutter = received_clutter(extras, motion, self.means.settings.radio)
+            clutter = received_clutter(extras, motion, self.context.settings.radio)
         heard = perceived_paths(paths, motion, spec.told, rng=self.sway, since=float(self.motion.time[0]))
         if first == 0:
             build = np.random.default_rng(self.seeds.hardware)
-            self.front_end = prepare_front_end(heard, motion, self.body, self.means.settings, rng=build)
+            self.front_end = prepare_front_end(heard, motion, self.body, self.context.settings, rng=build)
         room = GroundTruth(heard, self.motion, shift, self.faults, first, self.front_end, clutter)
         cycles: list[Cycle] = []
         tell(self.name, first, len(self.motion))
         for cycle in range(first, last):
             control, noise = (child(seed, cycle) for seed in (self.seeds.control, self.seeds.noise))
             rng = CycleGenerators(self.design_rng, control, noise, self.filter_rng)
-            self.agent, outcome = run_cycle(self.agent, room, cycle, self.means, rng=rng)
+            self.agent, outcome = run_cycle(self.agent, room, cycle, self.context, rng=rng)
             cycles.append(outcome)
             tell(self.name, cycle + 1, len(self.motion))
-        given = given_of(self.means.told, first, cycles, self.seeds.filter)
-        levels = self.means.panel.levels if self.means.panel is not None else 0
+        given = given_of(self.context.told, first, cycles, self.seeds.filter)
+        levels = self.context.panel.levels if self.context.panel is not None else 0
         found = gather(self.name, self.motion.time[first:last], cycles, levels, given)
         # a slice does not know what later ones tell of its end
         whole = first == 0 and last == len(self.motion)
-        return replace(found, smoothed=self.means.estimator.smoothed(self.agent.state)) if whole else found
+        return replace(found, smoothed=self.context.estimator.smoothed(self.agent.state)) if whole else found
 
 
 def without_panel(paths: Paths) -> Paths:

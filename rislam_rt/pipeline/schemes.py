@@ -44,8 +44,10 @@ SCHEMES = Schemes(
         "genie": Scheme("spec", on_truth=True),
         "no_ris": Scheme(None),
         "bp_slam": Scheme("random", estimator="bp_slam"),
+        "bp_slam_aoa": Scheme("random", estimator="bp_slam_aoa"),
         "channel_slam": Scheme("random", estimator="channel_slam"),
         "bp_slam_no_ris": Scheme(None, estimator="bp_slam"),
+        "bp_slam_aoa_no_ris": Scheme(None, estimator="bp_slam_aoa"),
         "channel_slam_no_ris": Scheme(None, estimator="channel_slam"),
     }
 )

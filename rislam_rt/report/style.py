@@ -24,6 +24,7 @@ SCHEME = {
     "genie": "#CC79A7",
     "no_ris": "#7a5c00",
     "bp_slam": "#56B4E9",
+    "bp_slam_aoa": "#004B6E",
     "channel_slam": "#E69F00",
 }
 """Colour of each scheme, the same in every figure."""
@@ -34,6 +35,7 @@ MARKER = {
     "genie": "*",
     "no_ris": "D",
     "bp_slam": "v",
+    "bp_slam_aoa": "^",
     "channel_slam": "P",
 }
 """Marker of each scheme, so that colour is never all that tells them apart."""

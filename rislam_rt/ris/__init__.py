@@ -1,4 +1,4 @@
-"""Floor 3: physics of the panel. Pure functions of geometry; the channel and the agent's belief both call them."""
+"""Floor 3: physics of the panel, and amplitudes of believed points: pure functions that channel and belief call."""
 
 from rislam_rt.ris.element import element_gain_area, element_pattern
 from rislam_rt.ris.impairments import PanelErrors, PanelTolerance, draw_panel, flip_bits, mean_power_shares, quantise

@@ -17,7 +17,7 @@ from rislam_rt.measurement import (
     receive,
     to_samples,
 )
-from rislam_rt.measurement.hardware import Sent, _clipped, digitise, in_step, mirrored
+from rislam_rt.measurement.hardware import Sent, _clipped, digitise, image_spectrum, scaled_to_fit
 from rislam_rt.measurement.received import direct_gain
 from rislam_rt.measurement.signal import convert, to_tones
 from rislam_rt.model import RadioConfig
@@ -114,7 +114,7 @@ def test_an_image_lies_mirrored_in_frequency_and_beside_in_time():
     """Mixing the conjugate of the samples in time is mixing mirrored conjugate tones: one by FFT, one by indices."""
     spectrum = signal()
     in_time = to_tones(np.conj(to_samples(spectrum, RADIO)), RADIO)
-    np.testing.assert_allclose(in_time, mirrored(spectrum), atol=1e-12 * np.abs(spectrum).max() * 128)
+    np.testing.assert_allclose(in_time, image_spectrum(spectrum), atol=1e-12 * np.abs(spectrum).max() * 128)
 
 
 def test_what_clipping_cuts_off_a_normal_signal():
@@ -142,7 +142,7 @@ def test_the_residue_is_there_in_every_cycle_and_scales_with_the_leakage():
 
 def test_halves_that_turn_against_each_other_are_brought_in_step():
     one = signal()
-    np.testing.assert_allclose(in_step(one * 1.3 * np.exp(0.4j), one), one, rtol=1e-12)
+    np.testing.assert_allclose(scaled_to_fit(one * 1.3 * np.exp(0.4j), one), one, rtol=1e-12)
 
 
 @pytest.mark.slow

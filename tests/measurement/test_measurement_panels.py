@@ -9,7 +9,7 @@ import pytest
 from rislam_rt.measurement import ReceiverConfig, load_signals, measure, signals_dataset
 from rislam_rt.measurement.config import ORDERS
 from rislam_rt.measurement.received import receive
-from rislam_rt.measurement.slot_motion import codes_in_turn, look_signs, slot_mean, split
+from rislam_rt.measurement.slot_motion import code_signs, codes_in_turn, slot_mean, split_by_code
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 
 RADIO = RadioConfig()
@@ -33,13 +33,13 @@ def two_panels(make_paths, make_gain, loud: float = 40.0) -> Paths:
 @pytest.mark.parametrize("panels", [1, 2, 3, 5])
 def test_signs_of_panels_are_apart_and_even(panels: int) -> None:
     for order in ORDERS:
-        signs = look_signs(order, panels)
+        signs = code_signs(order, panels)
         assert signs.shape[0] == 1 + panels
         np.testing.assert_array_equal(signs @ signs.T, signs.shape[1] * np.eye(1 + panels))
-    for one, other in combinations(look_signs("ABBA", panels), 2):
+    for one, other in combinations(code_signs("ABBA", panels), 2):
         np.testing.assert_array_equal(one * other, (one * other)[::-1])
-    assert len(codes_in_turn(panels)) == len(look_signs("AB", panels)[0]) >= 1 + panels
-    np.testing.assert_array_equal(look_signs("ABBA", 1)[1], [1.0, -1.0, -1.0, 1.0])
+    assert len(codes_in_turn(panels)) == len(code_signs("AB", panels)[0]) >= 1 + panels
+    np.testing.assert_array_equal(code_signs("ABBA", 1)[1], [1.0, -1.0, -1.0, 1.0])
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -50,10 +50,10 @@ def test_captures_are_sums_over_the_slot_with_the_signs_of_each(make_paths, make
     heard = receive(paths, 0, 0.0, RADIO, config, doppler)
     np.testing.assert_array_equal(heard.panel, [-1, 0, 1, 1])
     time = (np.arange(40_000) + 0.5) / 40_000
-    signs = look_signs(order, 2)
+    signs = code_signs(order, 2)
     at = signs[:, (time * signs.shape[1]).astype(int)]
     turning = np.exp(2j * np.pi * doppler[:, None] * (time - 0.5) * config.slot)
-    for number, capture in enumerate(split(heard, config)):
+    for number, capture in enumerate(split_by_code(heard, config)):
         want = np.mean(turning * at[heard.panel + 1] * at[number], axis=1)
         np.testing.assert_allclose(capture.gain, heard.gain * want, atol=1e-6 * np.abs(heard.gain).max())
     first = [abs(slot_mean(np.array([SHIFT]), signs[a] * signs[b], config)[0]) for a, b in ((0, 1), (0, 2), (1, 2))]
@@ -84,7 +84,7 @@ def test_what_a_fast_path_leaves_in_another_panels_difference_is_not_taken_for_t
     paths = two_panels(make_paths, make_gain)
     paths = paths.with_gain(np.where(np.arange(4) == 3, make_gain(55.0, RADIO), paths.gain))
     shift = np.array([0.0, 0.0, 0.0, 30.0])
-    level = [abs(capture.gain[3]) for capture in split(receive(paths, 0, 0.0, RADIO, config, shift), config)]
+    level = [abs(capture.gain[3]) for capture in split_by_code(receive(paths, 0, 0.0, RADIO, config, shift), config)]
     np.testing.assert_allclose(np.array(level) / abs(make_gain(55.0, RADIO)), [0.44, 0.10, 0.86], atol=0.01)
     for _ in range(20):
         measurement, truth = measure(paths, 0, 0.0, RADIO, config, None, shift, rng=rng)

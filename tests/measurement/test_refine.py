@@ -11,10 +11,10 @@ from rislam_rt.measurement.estimation.refine import (
     accuracy,
     contribution,
     fit_amplitudes,
-    part,
-    pick,
     refine,
     residual,
+    residual_fit,
+    subset_fit,
 )
 from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding
 from rislam_rt.measurement.signal import add_noise
@@ -46,9 +46,9 @@ def test_parts_of_a_fit_are_fits_of_parts(sounding: Sounding) -> None:
     places, samples = crowd(sounding, 12, rng)
     fit = fit_amplitudes(sounding, places, samples)
     keep = rng.uniform(size=12) < 0.6
-    same(pick(sounding, fit, keep, samples), fit_amplitudes(sounding, places[keep], samples))
+    same(subset_fit(sounding, fit, keep, samples), fit_amplitudes(sounding, places[keep], samples))
     rows = np.flatnonzero(keep)
-    some, local = part(sounding, fit, rows, samples)
+    some, local = residual_fit(sounding, fit, rows, samples)
     np.testing.assert_allclose(local, residual(fit, samples) + contribution(fit, rows, samples), atol=1e-9)
     same(some, fit_amplitudes(sounding, places[rows], local))
 

@@ -10,7 +10,7 @@ from rislam_rt.channel.doppler import advance_paths, doppler_shift
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import ReceiverConfig, measure
 from rislam_rt.measurement.config import ORDERS
-from rislam_rt.measurement.slot_motion import look_signs, slot_weights
+from rislam_rt.measurement.slot_motion import code_signs, slot_weights
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.scene import load_scene
 
@@ -29,7 +29,7 @@ def test_weights_are_means_over_the_slot(order: str, dwell: float) -> None:
     config = replace(SPLIT, order=order, code_dwell=dwell)
     time = (np.arange(40_000) + 0.5) / 40_000 * config.slot
     length = dwell or config.slot / len(order)
-    sign = look_signs(order, 1)[1][(time // length).astype(int) % len(order)]
+    sign = code_signs(order, 1)[1][(time // length).astype(int) % len(order)]
     for shift in (0.0, 1.0, FASTEST, 40.0):
         turning = np.exp(2j * np.pi * shift * (time - 0.5 * config.slot))
         plain, signed = slot_weights(np.array([shift]), config)
@@ -48,7 +48,7 @@ def test_weights_are_those_of_the_paths_a_moment_later() -> None:
     later = np.array([advance_paths(paths, scene, RADIO, motion, float(t)).gain for t in quarters])
     shift = doppler_shift(paths, motion, RADIO.wavelength)
     for order in ("AB", "ABBA"):
-        signs = np.repeat(look_signs(order, 1)[1], 4 // len(order))
+        signs = np.repeat(code_signs(order, 1)[1], 4 // len(order))
         moved = np.einsum("q,qkp->kp", signs, later) / 4.0
         for cycle in range(len(motion)):
             # in the sidelobes of a panel under a fixed code the gain itself changes within millimetres

@@ -65,7 +65,7 @@ def test_references_run(run_short):
 
 def test_completed_schemes_are_not_run_again(short_result, run_short):
     done, stages = {"random": short_result.schemes["random"]}, []
-    result = run_short(done=done, progress=lambda stage, at, total: stages.append(stage))
+    result = run_short(done=done, progress=lambda setup, at, total: stages.append(setup))
     assert set(stages) == {"trace", "optimized"}
     assert result.schemes["random"] is short_result.schemes["random"]
     assert list(done) == ["random", "optimized"]

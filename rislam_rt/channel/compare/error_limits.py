@@ -189,7 +189,7 @@ def coherent_scale(
     return scale
 
 
-def with_mirrors(scene: Scene) -> Scene | None:
+def with_perfect_mirrors(scene: Scene) -> Scene | None:
     """The scene with perfect mirrors in place of its slabs, or nothing if it has none."""
     if not any(reflector.material.is_slab for reflector in scene.reflectors):
         return None

@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT, DifferenceExplainer, Identity
-from rislam_rt.channel.compare.error_limits import ErrorLimits, RoomPrecision, coherent_scale, with_mirrors
+from rislam_rt.channel.compare.error_limits import ErrorLimits, RoomPrecision, coherent_scale, with_perfect_mirrors
 from rislam_rt.channel.compare.report import OneSidedPath, PathReport
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.image_source.antennas import peak_amplitude
@@ -102,7 +102,7 @@ def _scale(
 ) -> Floats:
     """(M,) coherent scale of matched paths, given by cycle, analytic column and identity."""
     cycle, column, path = matched
-    mirrors, antennas = with_mirrors(precision.scene), precision.radio.antennas
+    mirrors, antennas = with_perfect_mirrors(precision.scene), precision.radio.antennas
     if (mirrors is None and antennas.plain) or len(path) == 0:
         return coherent_scale(analytic, cycle, column, trajectory, precision)
     radio = replace(precision.radio, antennas=Antennas())

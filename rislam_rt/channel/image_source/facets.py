@@ -104,7 +104,7 @@ class WallFacets:
         span = slice(self.first[wall], self.first[wall + 1])
         normals, offsets = self.edge_normal[span].reshape(-1, 3), self.edge_offset[span].reshape(-1)
         inside = np.zeros(len(points), dtype=np.bool_)
-        for rows in blocks(len(points), len(offsets)):
+        for rows in row_blocks(len(points), len(offsets)):
             depth = (points[rows] @ normals.T - offsets).reshape(-1, len(offsets) // 3, 3).min(axis=-1)
             inside[rows] = (depth >= -SEAM).any(axis=-1)
         return inside
@@ -123,7 +123,7 @@ class WallFacets:
         """
         blocker = np.full(len(start), -1, dtype=np.int64)
         normal, offset = self.normal[walls].T, self.offset[walls]
-        for rows in blocks(len(start), len(walls)) if len(walls) else []:
+        for rows in row_blocks(len(start), len(walls)) if len(walls) else []:
             a, b = start[rows] @ normal - offset, end[rows] @ normal - offset
             crossing = np.minimum(a, b) < -SURFACE_TOLERANCE
             crossing &= np.maximum(a, b) > SURFACE_TOLERANCE
@@ -139,7 +139,7 @@ class WallFacets:
         """Side bits (W, W): on which sides of wall i wall j has a part, 0 if it lies in the plane."""
         bits = np.zeros((len(self), len(self)), dtype=np.int64)
         points = self.corners.reshape(-1, 3)
-        for rows in blocks(len(self), len(points)):
+        for rows in row_blocks(len(self), len(points)):
             distance = self.normal[rows] @ points.T - self.offset[rows, None]
             starts = 3 * self.first[:-1]
             front = np.maximum.reduceat(distance, starts, axis=1) > SEAM
@@ -163,7 +163,7 @@ def build_facets(walls: Walls) -> WallFacets:
     edge_normal, edge_offset = edge_planes(corners)
     points = corners.reshape(-1, 3)
     extent, distinct = np.zeros((2, len(walls))), np.unique(points, axis=0)
-    for rows in blocks(len(walls), len(points)):
+    for rows in row_blocks(len(walls), len(points)):
         distance = walls.normal[rows] @ distinct.T - walls.offset[rows, None]
         extent[:, rows] = distance.min(axis=1), distance.max(axis=1)
     starts = 3 * first[:-1]
@@ -184,7 +184,7 @@ def build_facets(walls: Walls) -> WallFacets:
     )
 
 
-def blocks(count: int, width: int) -> list[slice]:
+def row_blocks(count: int, width: int) -> list[slice]:
     """Slices of `count` rows of `width` numbers, each of about `_BLOCK` numbers."""
     step = max(1, _BLOCK // max(width, 1))
     return [slice(i, min(i + step, count)) for i in range(0, count, step)]

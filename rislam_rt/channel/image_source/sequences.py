@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.image_source.facets import WallFacets, blocks
+from rislam_rt.channel.image_source.facets import WallFacets, row_blocks
 
 
 def wall_sequences(facets: WallFacets, device: Floats, far: Floats, depth: int, host: int = -1) -> Iterator[Integers]:
@@ -41,7 +41,7 @@ def _extended(level: Integers, before: Integers, sides: Integers) -> tuple[Integ
     `sides[i, j]` tells on which sides of wall i wall j has a part.
     """
     grown, seen_from = [], []
-    for rows in blocks(len(level), len(sides)):
+    for rows in row_blocks(len(level), len(sides)):
         first = level[rows, 0]
         row, wall = np.nonzero((sides[first] & before[rows, None]) > 0)
         grown.append(np.concatenate([wall[:, None], level[rows][row]], axis=1))
@@ -55,5 +55,5 @@ def _extended(level: Integers, before: Integers, sides: Integers) -> tuple[Integ
 
 def _in_blocks(sequences: Integers, cycles: int) -> Iterator[Integers]:
     """Sequences in blocks that bound the memory of what is computed for every cycle."""
-    for rows in blocks(len(sequences), 16 * cycles):
+    for rows in row_blocks(len(sequences), 16 * cycles):
         yield sequences[rows]

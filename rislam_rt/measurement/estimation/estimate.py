@@ -17,11 +17,11 @@ from rislam_rt.measurement.estimation.refine import (
     LeastSquaresFit,
     accuracy,
     fit_amplitudes,
-    part,
-    pick,
     refine,
     refine_some,
     residual,
+    residual_fit,
+    subset_fit,
     without_idle,
 )
 from rislam_rt.measurement.estimation.sounding import Sounding
@@ -129,9 +129,9 @@ def drop(
     """Without the paths that left the window or the sky, and those whose loss alone costs less than the threshold."""
     keep = _inside(fit.parameters, window)
     if not keep.all():
-        fit = pick(sounding, fit, keep, samples)
+        fit = subset_fit(sounding, fit, keep, samples)
     keep = without_idle(fit, threshold)
-    return fit if keep.all() else pick(sounding, fit, keep, samples)
+    return fit if keep.all() else subset_fit(sounding, fit, keep, samples)
 
 
 def prune(
@@ -162,9 +162,9 @@ def _neighbours_instead(
 ) -> Floats | None:
     """Parameters (P - 1, 3) without a path, its neighbours refined, if the cost stays below `enough`."""
     near = np.flatnonzero(np.abs(fit.inner.signal[row]) > COUPLED * sounding.num_samples)
-    whole, local = part(sounding, fit, near, samples)
+    whole, local = residual_fit(sounding, fit, near, samples)
     others = near != row
-    trial = pick(sounding, whole, others, local)
+    trial = subset_fit(sounding, whole, others, local)
     trial = refine(sounding, trial, local, steps=TRIAL_STEPS, enough=enough)
     if trial.cost >= enough:
         return None

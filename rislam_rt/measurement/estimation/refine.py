@@ -105,14 +105,14 @@ def _exact_fit(
     return LeastSquaresFit(waves, inner, exact, seen, inverse(inner.signal), amplitude, slopes, energy, cost)
 
 
-def pick(sounding: Sounding, fit: LeastSquaresFit, keep: Booleans, samples: Complexes) -> LeastSquaresFit:
+def subset_fit(sounding: Sounding, fit: LeastSquaresFit, keep: Booleans, samples: Complexes) -> LeastSquaresFit:
     """The fit of some of the paths alone."""
     if fit.exact is not None:
         return fit_amplitudes(sounding, fit.parameters[keep], samples)
     return _fit(fit.waves.take(keep), fit.inner.take(keep), fit.seen[:, keep], fit.energy)
 
 
-def part(
+def residual_fit(
     sounding: Sounding, fit: LeastSquaresFit, rows: Integers, samples: Complexes
 ) -> tuple[LeastSquaresFit, Complexes]:
     """The fit of some paths to the samples less all the others; and those (L, M)."""
@@ -197,7 +197,7 @@ def refine_some(
     tolerance: float = SEARCH_TOLERANCE,
 ) -> LeastSquaresFit:
     """Refine some paths, the others held."""
-    begun, local = part(sounding, fit, rows, samples)
+    begun, local = residual_fit(sounding, fit, rows, samples)
     some = refine(sounding, begun, local, steps=steps, tolerance=tolerance)
     parameters = fit.parameters.copy()
     parameters[rows] = some.parameters

@@ -93,7 +93,7 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
             what = "not a readable NetCDF file" if file.exists() else "no such file"
             raise ConfigError(f"{file}: {what}; give one as a run folder's measurements_<scheme>.nc") from None
         try:
-            return checked(dataset_to_inputs(data), str(file))
+            return check_inputs(dataset_to_inputs(data), str(file))
         except (KeyError, ValueError, TypeError) as error:
             raise ConfigError(
                 f"{file}: {type(error).__name__} {str(error)[:80]}; give one as a run folder's measurements_<scheme>.nc"
@@ -143,10 +143,10 @@ def inputs_of(
         start = replace(start, heading=float(heading[0]))
     nothing = (None,) * len(cycles)
     made = Inputs(start, body or Body(), None, cycles - cycles[0], heading, tuple(measurements), nothing)
-    return checked(made, place)
+    return check_inputs(made, place)
 
 
-def checked(inputs: Inputs, place: str) -> Inputs:
+def check_inputs(inputs: Inputs, place: str) -> Inputs:
     """The inputs, if units and ranges are such as a room has.
 
     Raises

@@ -29,6 +29,7 @@ from rislam_rt.pipeline.specification.section import (
 from rislam_rt.ris import PanelTolerance
 from rislam_rt.slam import SlamConfig
 from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
+from rislam_rt.slam.schemes.bp_slam_aoa import BpSlamAoaConfig
 from rislam_rt.slam.schemes.channel_slam import ChannelSlamConfig
 
 RECORDS: dict[type, type] = {}
@@ -46,6 +47,7 @@ def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()
 _Filter = _section("_Filter", SlamConfig, "Fields of `SlamConfig`.")
 _Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.", without=("slot", "panels"))
 _BpSlam = _section("_BpSlam", BpSlamConfig, "Fields of `BpSlamConfig`.")
+_BpSlamAoa = _section("_BpSlamAoa", BpSlamAoaConfig, "Fields of `BpSlamAoaConfig`.")
 _ChannelSlam = _section("_ChannelSlam", ChannelSlamConfig, "Fields of `ChannelSlamConfig`.")
 _Designers = _section("_Designers", DesignConfig, "Fields of `DesignConfig`.", without=("certify",))
 
@@ -59,6 +61,10 @@ class SlamSection(_Filter):  # type: ignore[misc, valid-type]
 
 class BpSlamSection(_BpSlam):  # type: ignore[misc, valid-type]
     """Settings of the scheme `bp_slam`, SI units."""
+
+
+class BpSlamAoaSection(_BpSlamAoa):  # type: ignore[misc, valid-type]
+    """Settings of the scheme `bp_slam_aoa`, SI units."""
 
 
 class ChannelSlamSection(_ChannelSlam):  # type: ignore[misc, valid-type]
@@ -226,6 +232,7 @@ class PipelineSpec(Section):
     told: AssumedSection = AssumedSection()
     slam: SlamSection = SlamSection()
     bp_slam: BpSlamSection = BpSlamSection()
+    bp_slam_aoa: BpSlamAoaSection = BpSlamAoaSection()
     channel_slam: ChannelSlamSection = ChannelSlamSection()
 
     @model_validator(mode="before")
@@ -252,8 +259,12 @@ class PipelineSpec(Section):
         return self
 
 
-ESTIMATOR_SECTIONS = ("bp_slam", "channel_slam")
-"""Sections of the estimators that are not the project's own."""
+ESTIMATOR_SECTIONS = {
+    "bp_slam": ("sigma_a", "height"),
+    "bp_slam_aoa": ("sigma_a", "use_vt"),
+    "channel_slam": ("sigma_a", "height"),
+}
+"""Sections of the estimators that are not the project's own, and what they are told unless they are told their own."""
 
 
 def share_settings(content: dict[str, Any]) -> dict[str, Any]:
@@ -267,11 +278,11 @@ def share_settings(content: dict[str, Any]) -> dict[str, Any]:
         return content
     told = {"sigma_a": motion.get("sigma_a_m_s2") or _Filter.model_fields["sigma_a"].default}
     slam = {**told, **slam}
-    shared = {"sigma_a": slam["sigma_a"], "height": slam.get("height", _Filter.model_fields["height"].default)}
+    shared = {key: slam.get(key, _Filter.model_fields[key].default) for key in ("sigma_a", "height", "use_vt")}
     found = {**content, "slam": slam}
-    for name in ESTIMATOR_SECTIONS:
+    for name, keys in ESTIMATOR_SECTIONS.items():
         section = content.get(name, {})
-        found[name] = {**shared, **section} if isinstance(section, dict) else section
+        found[name] = {key: shared[key] for key in keys} | section if isinstance(section, dict) else section
     return found
 
 
@@ -283,6 +294,7 @@ class Settings(NamedTuple):
     slam: SlamConfig
     design: DesignConfig
     bp_slam: BpSlamConfig
+    bp_slam_aoa: BpSlamAoaConfig
     channel_slam: ChannelSlamConfig
     sensor: SensorModel
     """What the estimators are told of the receiver."""
@@ -306,6 +318,7 @@ def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
         SlamConfig(**spec.slam.model_dump()),
         build_design(spec.design),
         BpSlamConfig(**spec.bp_slam.model_dump()),
+        BpSlamAoaConfig(**spec.bp_slam_aoa.model_dump()),
         ChannelSlamConfig(**spec.channel_slam.model_dump()),
         build_sensor(radio, receiver),
         _build_hardware(spec.hardware, receiver),

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from rislam_rt.evaluate import Interval
 from rislam_rt.report.style import TRUTH, styled
 from rislam_rt.report.swept.entries import (
+    failure_notes,
     interval_entry,
     metres,
     metres_between,
@@ -16,7 +17,6 @@ from rislam_rt.report.swept.entries import (
     ratio,
     scheme_entry,
     table_lines,
-    trouble,
 )
 from rislam_rt.report.swept.error_curves import mark_metres
 from rislam_rt.studies.swept import AblationsSpec, Group, paired_gain
@@ -85,7 +85,7 @@ def ablations_page(
     for name in dict.fromkeys(entry["group"] for entry in content["entries"]):
         own = [entry for entry in content["entries"] if entry["group"] == name]
         lines += [f"## {name or 'Reference'}", "", *table_lines(_HEAD, [_row(entry) for entry in own]), ""]
-    return "\n".join([*lines, "## Failures", "", *trouble(groups)]) + "\n"
+    return "\n".join([*lines, "## Failures", "", *failure_notes(groups)]) + "\n"
 
 
 _HEAD = [

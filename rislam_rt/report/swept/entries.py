@@ -105,7 +105,7 @@ def paragraph(text: str) -> list[str]:
     return textwrap.wrap(" ".join(text.split()), 118, break_long_words=False, break_on_hyphens=False)
 
 
-def trouble(groups: Sequence[Group]) -> list[str]:
+def failure_notes(groups: Sequence[Group]) -> list[str]:
     """Markdown: how many runs failed or diverged, and why they failed."""
     runs = sum((len(group.results) - group.missing) * len(group.schemes) for group in groups)
     failed = sum(group.failed(scheme) for group in groups for scheme in group.schemes)

@@ -10,6 +10,7 @@ from rislam_rt.evaluate import Interval
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import (
     NOTHING,
+    failure_notes,
     interval_entry,
     metres,
     metres_between,
@@ -18,7 +19,6 @@ from rislam_rt.report.swept.entries import (
     ratio,
     scheme_entry,
     table_lines,
-    trouble,
     what_limits,
 )
 from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines
@@ -105,7 +105,7 @@ def fig4b_page(
         if entries:
             lines += [f"## {case.name}: {case.note}", "", *_error_lines(entries), "", *_gain_lines(gains), ""]
             lines += [*_budget_lines(entries), ""]
-    return "\n".join([*lines, "## Failures", "", *trouble(groups)]) + "\n"
+    return "\n".join([*lines, "## Failures", "", *failure_notes(groups)]) + "\n"
 
 
 def _error_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from rislam_rt.evaluate import Interval
 from rislam_rt.report.style import MARKER, scheme_colour, styled
 from rislam_rt.report.swept.entries import (
+    failure_notes,
     interval_entry,
     metres,
     metres_between,
@@ -17,7 +18,6 @@ from rislam_rt.report.swept.entries import (
     ratio,
     scheme_entry,
     table_lines,
-    trouble,
     what_limits,
 )
 from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines, label_ends, mark_metres
@@ -91,7 +91,7 @@ def fig4c_page(content: Mapping[str, Any], groups: Sequence[Group], about: Seque
     for fall in content["falls"]:
         agent, panel = _percent(fall, "agent"), _percent(fall, "panel")
         lines.append(f"- `{fall['scheme']}`: agent's RMSE lower by {agent}, panel's by {panel}")
-    return "\n".join([*lines, "", "## Failures", "", *trouble(groups)]) + "\n"
+    return "\n".join([*lines, "", "## Failures", "", *failure_notes(groups)]) + "\n"
 
 
 def panel_error(group: Group, scheme: str) -> Any:

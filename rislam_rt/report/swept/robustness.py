@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from rislam_rt.evaluate import Interval
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import (
+    failure_notes,
     interval_entry,
     metres,
     metres_between,
@@ -17,7 +18,6 @@ from rislam_rt.report.swept.entries import (
     ratio,
     scheme_entry,
     table_lines,
-    trouble,
 )
 from rislam_rt.report.swept.error_curves import mark_metres
 from rislam_rt.studies.swept import Group, RobustnessSpec, paired_gain
@@ -103,7 +103,7 @@ def robustness_page(
     lines += ["## Why a level is ordinary", ""]
     lines += [f"- `{name}`, {_level(content, name, mismatch['ordinary'])}: {mismatch['source']}."
               for name, mismatch in content["about"].items() if mismatch["source"]]  # fmt: skip
-    return "\n".join([*lines, "", "## Failures", "", *trouble(groups)]) + "\n"
+    return "\n".join([*lines, "", "## Failures", "", *failure_notes(groups)]) + "\n"
 
 
 _HEAD = ["mismatch", "level", "scheme", "agent RMSE [m]", "change", "bound [m]", "shape of the way [m]", "NEES",

@@ -9,13 +9,13 @@ from matplotlib.figure import Figure
 
 from rislam_rt.report.style import MARKER, scheme_colour, styled
 from rislam_rt.report.swept.entries import (
+    failure_notes,
     metres,
     metres_between,
     paragraph,
     ratio,
     scheme_entry,
     table_lines,
-    trouble,
     what_limits,
 )
 from rislam_rt.report.swept.error_curves import mark_metres
@@ -146,7 +146,7 @@ def rooms_page(content: Mapping[str, Any], groups: Sequence[Group], about: Seque
         ]
         for entry in content["entries"]
     ]  # fmt: skip
-    return "\n".join([*lines, *table_lines(head, rows), "", "## Failures", "", *trouble(groups)]) + "\n"
+    return "\n".join([*lines, *table_lines(head, rows), "", "## Failures", "", *failure_notes(groups)]) + "\n"
 
 
 NAMES = {

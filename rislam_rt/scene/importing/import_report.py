@@ -11,7 +11,7 @@ from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface
 from rislam_rt.scene.meshes import Mesh
 
 
-def account(
+def summarise_import(
     facets: FlatRegions, found: SortedSurfaces, surfaces: list[Surface], unseen: float, reflectors: dict[str, Any],
     occluders: dict[str, Mesh], options: ImportOptions, *, scanned: bool,
 ) -> list[str]:  # fmt: skip

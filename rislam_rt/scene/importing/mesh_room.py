@@ -9,7 +9,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.scene.built_in_rooms.shapes import joined
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.free_space import find_free, is_seen
-from rislam_rt.scene.importing.import_report import account
+from rislam_rt.scene.importing.import_report import summarise_import
 from rislam_rt.scene.importing.materials import MaterialAssignment, itu_by_word
 from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
 from rislam_rt.scene.importing.options import ImportOptions
@@ -67,7 +67,7 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
     if palette.unused():
         names = ", ".join([*reflectors, *sorted({p.material for p in parts if p.material})][:12])
         raise Fault(f"--material {palette.unused()[0]}: nothing has that name", f"give one of: {names}")
-    said = account(facets, found, surfaces, unseen, reflectors, occluders, options, scanned=bool(about))
+    said = summarise_import(facets, found, surfaces, unseen, reflectors, occluders, options, scanned=bool(about))
     remarks = [*notes, *about, *said]
     return RoomDraft(reflectors, occluders, remarks + palette.remarks())
 

@@ -60,7 +60,7 @@ def empty_log() -> Log:
 
 def append(log: Log, glance: Glance, cycle: int, first: int) -> Log:
     """The log with a cycle's components, unexplained as yet, and without those before cycle `first`."""
-    count, old = len(glance.seen), log.take(log.cycle >= first)
+    count, old = len(glance.seen), log.take(slice(np.searchsorted(log.cycle, first), None))
     fresh = Log(
         np.full(count, cycle), glance.seen, glance.std, glance.log_amplitude, glance.log_amplitude_std, glance.sides,
         np.full(count, -1), np.full((count, 2, 5), UNKNOWN), np.zeros(count), np.zeros((count, 3)),

@@ -32,14 +32,10 @@ def transition(stay: float) -> Floats:
 
 def log_likelihood(accel: Floats, spread: Floats, precision: Floats) -> Floats:
     """Log likelihood (K, L) of each level from posterior means (K, A), covariances (K, A, A) and prior precisions."""
-    axes = accel.shape[1]
-    inside = np.linalg.inv(spread)
-    cavity = inside - precision[:, None, None] * np.eye(axes)
-    pull = (inside @ accel[..., None])[..., 0]
-    # N(m; 0, C + s^2 I) through information: C^-1 = cavity may be singular
-    value, vector = np.linalg.eigh(0.5 * (cavity + np.swapaxes(cavity, 1, 2)))
-    value = np.maximum(value, 0.0)
-    along = (np.swapaxes(vector, 1, 2) @ pull[..., None])[..., 0]
+    spread, vector = np.linalg.eigh(spread)
+    along = (np.swapaxes(vector, 1, 2) @ accel[..., None])[..., 0] / spread
+    # N(m; 0, C + s^2 I) through the cavity's information C^-1, which may be singular
+    value = np.maximum(1.0 / spread - precision[:, None], 0.0)
     variance = LADDER**2
     total = 1.0 + value[:, None] * variance[:, None]
     gain = (along**2)[:, None] * variance[:, None] / total
@@ -64,7 +60,8 @@ def smooth(before: Floats, log_like: Floats, stay: float) -> tuple[Floats, Float
     for row in range(count):
         coming[row] = message @ ways
         message = coming[row] * both[row]
-        message /= message.sum(axis=2, keepdims=True)
+        if row % 16 == 15 or row == count - 1:  # nothing can vanish in fewer steps
+            message /= message.sum(axis=2, keepdims=True)
     ahead, back = coming[:, :chains, 0], coming[::-1, chains:, 0]
     posterior = np.swapaxes(ahead * like.swapaxes(0, 1) * back, 0, 1)
     return posterior / posterior.sum(axis=2, keepdims=True), message[:chains, 0]

@@ -10,7 +10,7 @@ DAMPING = 0.3
 """Share of the new in each step's log precision."""
 STEPS = 4
 """Gauss-Newton steps: the first guesses are within the linear range of the truth."""
-HOPELESS = 60.0
+HOPELESS = 30.0
 """Log likelihood behind the best hypothesis of a track from which on one is not followed."""
 RIDGE = 1e-3
 """Information [1/m^2] that keeps blind directions finite: (30 m)^-2."""

@@ -31,20 +31,20 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     spec = cell_spec(settings)
     prepare_channel(spec.channel)
     scene = load_scene(Path(settings["beside"]) / str(settings["scene"]))
-    stage = prepare_setup(scene, spec, rng=np.random.default_rng(seed))
+    setup = prepare_setup(scene, spec, rng=np.random.default_rng(seed))
     schemes: dict[str, Any] = {}
-    timing: dict[str, Any] = {"trace_seconds": stage.seconds}
+    timing: dict[str, Any] = {"trace_seconds": setup.seconds}
     for name in spec.schemes:
         begin = process_time()
         try:
-            result = result_of(stage, spec, {name: run_scheme(name, stage, spec, tell_nobody)}, seed=seed)
+            result = result_of(setup, spec, {name: run_scheme(name, setup, spec, tell_nobody)}, seed=seed)
             scores = _scores(result, name)
         except Exception as error:  # whatever it is, it is this scheme's alone
             schemes[name] = {"failed": one_line(error)}
             continue
         timing[name] = {key: scores.pop(key) for key in CLOCK} | {"cpu_seconds": process_time() - begin}
         schemes[name] = scores
-    return {"schemes": schemes, "paper_snr_db": _paper_snr(stage, spec), "timing": timing}
+    return {"schemes": schemes, "paper_snr_db": _paper_snr(setup, spec), "timing": timing}
 
 
 def cell_spec(settings: Mapping[str, Any], path: Path | None = None) -> PipelineSpec:
@@ -67,12 +67,12 @@ def _scores(result: SlamResult, name: str) -> dict[str, Any]:
     return summarise_scheme(result, result.schemes[name])
 
 
-def _paper_snr(stage: RunSetup, spec: PipelineSpec) -> float:
+def _paper_snr(setup: RunSetup, spec: PipelineSpec) -> float:
     """SNR [dB] as the paper has it, of the mean power at some twenty places of the way, panel at level 0."""
-    settings, rows = build_settings(spec), np.arange(len(stage.scene.agent))
+    settings, rows = build_settings(spec), np.arange(len(setup.scene.agent))
     rows = rows[:: max(1, len(rows) // 20)]
     per_cycle = ("valid", "tau", "departure", "arrival", "gain", "vertices")
-    fields: dict[str, Any] = {name: getattr(stage.paths, name)[rows] for name in per_cycle}
-    few = replace(stage.paths, **fields, ris=None)
-    found = paper_snr_db(few, settings.radio, settings.receiver, heading=stage.scene.agent.heading[rows])
+    fields: dict[str, Any] = {name: getattr(setup.paths, name)[rows] for name in per_cycle}
+    few = replace(setup.paths, **fields, ris=None)
+    found = paper_snr_db(few, settings.radio, settings.receiver, heading=setup.scene.agent.heading[rows])
     return float(10.0 * np.log10(np.mean(10.0 ** (found / 10.0))))

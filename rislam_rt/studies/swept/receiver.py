@@ -33,16 +33,16 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     begin, spec = process_time(), cell_spec(settings)
     prepare_channel(spec.channel)
     scene = load_scene(Path(settings["beside"]) / str(settings["scene"]))
-    stage = prepare_setup(scene, spec, rng=np.random.default_rng(seed))
-    made, motion = build_settings(spec), stage.scene.agent
-    build = np.random.default_rng(stage.seeds.hardware)
-    front_end = prepare_front_end(stage.paths, motion, stage.body, made, rng=build)
-    codes = panel_codes(stage.scene, stage.paths, "focused", rng=np.random.default_rng(stage.seeds.design))
-    paths = stage.paths if codes is None else rephase(stage.paths, codes)
+    setup = prepare_setup(scene, spec, rng=np.random.default_rng(seed))
+    made, motion = build_settings(spec), setup.scene.agent
+    build = np.random.default_rng(setup.seeds.hardware)
+    front_end = prepare_front_end(setup.paths, motion, setup.body, made, rng=build)
+    codes = panel_codes(setup.scene, setup.paths, "focused", rng=np.random.default_rng(setup.seeds.design))
+    paths = setup.paths if codes is None else rephase(setup.paths, codes)
     places = np.linspace(len(motion) // 2, len(motion) - 1, int(settings["places"])).astype(int)
 
     def looks(front_end: FrontEnd | None) -> list[dict[str, Any]]:
-        noise = np.random.default_rng(stage.seeds.noise)
+        noise = np.random.default_rng(setup.seeds.noise)
         return [_look(paths, motion, int(cycle), made, front_end, rng=noise.spawn(1)[0]) for cycle in places]
 
     left = front_end.correction.left if front_end is not None and front_end.correction is not None else None

@@ -13,7 +13,7 @@ from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.recordings.replay import Recorder
 from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, run_scheme
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.pipeline.specification.spec import ESTIMATOR_SECTIONS, PipelineSpec
 from rislam_rt.progress import tell_nobody
 from rislam_rt.scene.random_rooms import RandomRoom, draw_room
 from rislam_rt.studies.swept.cell import cell_spec
@@ -37,13 +37,13 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     """
     spec = cell_spec(settings)
     prepare_channel(spec.channel)
-    room, stage = find_setup(int(settings["room"]), trace_key(spec))
+    room, setup = find_setup(int(settings["room"]), trace_key(spec))
     schemes: dict[str, Any] = {}
-    timing: dict[str, Any] = {"trace_seconds": stage.seconds}
+    timing: dict[str, Any] = {"trace_seconds": setup.seconds}
     keep = KeptOutputs(str(settings.get("save", "nothing")), Path(settings.get("data", ".")), cell_label(settings))
     for asked in spec.schemes:
         try:
-            schemes[asked], timing[asked] = _run(scheme_here(asked, room), stage, spec, room_traits(room), keep)
+            schemes[asked], timing[asked] = _run(scheme_here(asked, room), setup, spec, room_traits(room), keep)
         except Exception as error:  # whatever it is, it is this scheme's alone
             schemes[asked] = {"failed": one_line(error)}
     return {"traits": room_traits(room), "schemes": schemes, "timing": timing}
@@ -60,20 +60,20 @@ class KeptOutputs(NamedTuple):
 
 
 def _run(
-    name: str, stage: RunSetup, spec: PipelineSpec, traits: Mapping[str, Any], keep: KeptOutputs
+    name: str, setup: RunSetup, spec: PipelineSpec, traits: Mapping[str, Any], keep: KeptOutputs
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Scores and times of one scheme."""
     recorder = Recorder(ESTIMATORS[SCHEMES[name].estimator])
-    result = run_scheme(name, stage, spec, tell_nobody, recorder.estimator)
-    truth = build_truth(stage.scene, stage.paths, result, spec)
+    result = run_scheme(name, setup, spec, tell_nobody, recorder.estimator)
+    truth = build_truth(setup.scene, setup.paths, result, spec)
     scores = {"ran": name, **score_run(truth, recorder.inputs, recorder.answers)}
     if keep.what != "nothing":
         label = f"{keep.label}{name}"
         config = spec.model_dump(mode="json")
         save_run(Recording(recorder.inputs, truth, name, config, traits, scores), keep.folder, label)
-        save_room(stage.scene, traits, keep.folder)
+        save_room(setup.scene, traits, keep.folder)
         if keep.what == "signals":
-            save_signals(stage, result, spec, traits, keep.folder, label)
+            save_signals(setup, result, spec, traits, keep.folder, label)
     return scores, {"cycle_s": recorder.answers.seconds}
 
 
@@ -94,7 +94,7 @@ def scheme_here(asked: str, room: RandomRoom) -> str:
 
 def trace_key(spec: PipelineSpec) -> str:
     """The settings that decide true motion and paths, as text."""
-    content = spec.model_dump(mode="json", exclude={*SEEN_BY_TRACER_NOT, "bp_slam", "channel_slam"})
+    content = spec.model_dump(mode="json", exclude={*SEEN_BY_TRACER_NOT, *ESTIMATOR_SECTIONS})
     content["radio"] |= {"reference_snr_db": None, "noise_psd": None}
     return json.dumps(content, sort_keys=True)
 

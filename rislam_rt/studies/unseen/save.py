@@ -44,7 +44,7 @@ def save_room(scene: Scene, traits: Mapping[str, Any], folder: Path) -> None:
 
 
 def save_signals(
-    stage: RunSetup, result: SchemeResult, spec: PipelineSpec, traits: Mapping[str, Any], folder: Path, label: str
+    setup: RunSetup, result: SchemeResult, spec: PipelineSpec, traits: Mapping[str, Any], folder: Path, label: str
 ) -> None:
     """Samples of the received signal under the codes that were applied, as `<room>/<label>_signals.nc`.
 
@@ -57,11 +57,11 @@ def save_signals(
     """
     section = spec.receiver.model_copy(update={"estimator": "waveform"})
     own = SignalsSpec(seed=int(traits["seed"]), code="zero", radio=spec.radio, receiver=section)
-    paths = without_panel(stage.paths)
+    paths = without_panel(setup.paths)
     if result.levels:
-        paths = rephase(stage.paths, RisCode(result.applied, result.levels))
-    rng = np.random.default_rng(stage.seeds.noise)
-    data = build_signals(stage.scene, paths, own, rng=rng, on_cycle=lambda: None)
+        paths = rephase(setup.paths, RisCode(result.applied, result.levels))
+    rng = np.random.default_rng(setup.seeds.noise)
+    data = build_signals(setup.scene, paths, own, rng=rng, on_cycle=lambda: None)
     target = room_folder(folder, traits)
     target.mkdir(parents=True, exist_ok=True)
     write_dataset(data.assign_attrs(code="as applied"), target / f"{label}_signals.nc")

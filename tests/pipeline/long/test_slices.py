@@ -92,8 +92,8 @@ def _cut(room):
 
 
 def test_a_stopped_run_goes_on_and_leaves_the_same(room, spec, done, tmp_path):
-    def stop(stage, at, total):
-        if (stage, at) == ("no_ris", 30):
+    def stop(setup, at, total):
+        if (setup, at) == ("no_ris", 30):
             raise KeyboardInterrupt
 
     again = tmp_path / "again"
@@ -101,13 +101,13 @@ def test_a_stopped_run_goes_on_and_leaves_the_same(room, spec, done, tmp_path):
         lead(room, spec, again, stop)
     assert {f.name for f in again.rglob("*.nc")} == {"paths.nc", "scheme_random.nc", "measurements_random.nc"}
     told = []
-    lead(room, spec, again, lambda stage, *_: told.append(stage))
+    lead(room, spec, again, lambda setup, *_: told.append(setup))
     assert set(told) == {"no_ris"}
     assert contents(again) == contents(done[1])
 
 
 def test_a_stop_before_the_first_scheme_is_done_leaves_nothing(room, spec, short_slices, tmp_path):
-    def stop(stage, at, total):
+    def stop(setup, at, total):
         if at == 30:
             raise KeyboardInterrupt
 

@@ -63,7 +63,7 @@ def test_the_run_goes_on_in_the_changed_room(room):
     spec = load_spec(
         PIPELINE, ["channel=image_source", "cycles=3", "depth=0", "room.panel_rows=4", "room.scatterers=3"]
     )
-    stage = prepare_setup(room, spec, rng=np.random.default_rng(1))
-    assert stage.paths.landmarks == stage.scene.landmarks
-    assert len(stage.scene.landmarks) == 4
-    assert stage.paths.ris.tx.shape[2:] == (4, 6)
+    setup = prepare_setup(room, spec, rng=np.random.default_rng(1))
+    assert setup.paths.landmarks == setup.scene.landmarks
+    assert len(setup.scene.landmarks) == 4
+    assert setup.paths.ris.tx.shape[2:] == (4, 6)

@@ -28,95 +28,95 @@ SEEN = "radio.reference_snr_db=60.0"
 
 
 @pytest.fixture(scope="module")
-def stage(room):
+def setup(room):
     return prepare_setup(room, load_spec(PIPELINE, SHORT), rng=np.random.default_rng(1))
 
 
-def bound(stage, scheme, *settings, gain=None):
+def bound(setup, scheme, *settings, gain=None):
     config = load_spec(PIPELINE, [*SHORT, *settings]).model_dump(mode="json")
-    return scheme_bound(stage.scene, stage.paths, stage.paths.gain if gain is None else gain, scheme, config).agent
+    return scheme_bound(setup.scene, setup.paths, setup.paths.gain if gain is None else gain, scheme, config).agent
 
 
-def test_it_is_the_recursion_over_all_paths_times_their_detection_probability(stage):
+def test_it_is_the_recursion_over_all_paths_times_their_detection_probability(setup):
     """The same without dropping columns or rows, the probability from the noncentral chi-square law itself."""
     settings = build_settings(load_spec(PIPELINE, SHORT))
-    walls, motion = build_walls(stage.scene), stage.scene.agent
-    snr = settings.radio.integrated_snr(stage.paths.gain)
-    reported = (stage.paths.arrival[..., 2] >= 0.0) & (stage.paths.tau <= settings.receiver.max_delay)
-    gain = np.where(reported, stage.paths.gain * np.sqrt(ncx2.sf(20.0, 2, 2.0 * snr)), 0.0)
+    walls, motion = build_walls(setup.scene), setup.scene.agent
+    snr = settings.radio.integrated_snr(setup.paths.gain)
+    reported = (setup.paths.arrival[..., 2] >= 0.0) & (setup.paths.tau <= settings.receiver.max_delay)
+    gain = np.where(reported, setup.paths.gain * np.sqrt(ncx2.sf(20.0, 2, 2.0 * snr)), 0.0)
     model = build_landmark_model(
-        stage.paths.with_gain(gain), motion, stage.scene.landmark_positions, walls.normal, walls.offset, settings.radio
+        setup.paths.with_gain(gain), motion, setup.scene.landmark_positions, walls.normal, walls.offset, settings.radio
     )
-    beforehand = assumed_std(model, float(stage.scene.agent.position[:, 2].min()), upright=False)
+    beforehand = assumed_std(model, float(setup.scene.agent.position[:, 2].min()), upright=False)
     expected = posterior_bound(model.rows(1e-6), motion.time, MotionPrior(), beforehand).rms
     # the table of probabilities has steps of 0.1 dB, and paths of less than 1e-3 in SNR are left out
-    np.testing.assert_allclose(bound(stage, "random", "slam.use_vt=false"), expected, rtol=2e-3)
+    np.testing.assert_allclose(bound(setup, "random", "slam.use_vt=false"), expected, rtol=2e-3)
 
 
-def test_a_path_below_the_threshold_counts_for_something(stage):
+def test_a_path_below_the_threshold_counts_for_something(setup):
     """Noise lifts it over the threshold now and then: no step at 10 dB."""
-    values = [bound(stage, "random", f"radio.reference_snr_db={snr}")[-1] for snr in np.arange(0.0, 8.0, 0.5)]
+    values = [bound(setup, "random", f"radio.reference_snr_db={snr}")[-1] for snr in np.arange(0.0, 8.0, 0.5)]
     ratio = np.array(values[1:]) / values[:-1]
     assert (ratio < 1.0).all()
     assert ratio.min() > 0.8
 
 
-def test_without_signals_it_is_the_start_carried_on(stage):
+def test_without_signals_it_is_the_start_carried_on(setup):
     """No path is heard: variance `s_x^2 + t^2 s_v^2` an axis and the noise of the motion, which adds to it."""
-    found = bound(stage, "random", "radio.reference_snr_db=-200.0", "slam.sigma_a=1e-9")
-    time = stage.scene.agent.time
+    found = bound(setup, "random", "radio.reference_snr_db=-200.0", "slam.sigma_a=1e-9")
+    time = setup.scene.agent.time
     np.testing.assert_allclose(found, np.sqrt(2.0) * 0.01 * np.hypot(1.0, time), rtol=1e-6)
 
 
-def test_less_noise_and_more_signals_lower_it(stage):
-    loud, quiet = (bound(stage, "random", f"radio.reference_snr_db={snr}")[-1] for snr in (30.0, 0.0))
+def test_less_noise_and_more_signals_lower_it(setup):
+    loud, quiet = (bound(setup, "random", f"radio.reference_snr_db={snr}")[-1] for snr in (30.0, 0.0))
     assert loud < quiet
-    plain = without_panel(stage.paths).gain
-    assert bound(stage, "random", SEEN)[-1] < bound(stage, "no_ris", SEEN, gain=plain)[-1]
+    plain = without_panel(setup.paths).gain
+    assert bound(setup, "random", SEEN)[-1] < bound(setup, "no_ris", SEEN, gain=plain)[-1]
 
 
-def test_told_of_the_front_ends_faults_it_is_that_of_the_noise_they_make(stage):
+def test_told_of_the_front_ends_faults_it_is_that_of_the_noise_they_make(setup):
     """Between the bounds at the least and at the largest distortion of any cycle; untold, as with an ideal one."""
     fault = ('receiver.estimator="waveform"', "hardware.phase_std_deg=1.0")
-    ideal, untold = bound(stage, "random"), bound(stage, "random", *fault)
-    told = bound(stage, "random", *fault, "hardware.told=true")
+    ideal, untold = bound(setup, "random"), bound(setup, "random", *fault)
+    told = bound(setup, "random", *fault, "hardware.told=true")
     assert (untold == ideal).all()
-    assert (bound(stage, "random", *fault, "hardware.told=true", "hardware.calibration_cycles=5") == ideal).all()
+    assert (bound(setup, "random", *fault, "hardware.told=true", "hardware.calibration_cycles=5") == ideal).all()
     noise = build_settings(load_spec(PIPELINE, SHORT)).radio.noise_psd
-    lit = over_distortion(stage.paths, build_settings(load_spec(PIPELINE, [*SHORT, *fault, "hardware.told=true"])))
-    here = stage.paths.gain[:, 0] != 0.0
-    rise = np.abs(stage.paths.gain[here, 0] / lit[here, 0]) ** 2
-    low, high = (bound(stage, "random", f"radio.noise_psd={float(noise * r)!r}")[-1] for r in (rise.min(), rise.max()))
+    lit = over_distortion(setup.paths, build_settings(load_spec(PIPELINE, [*SHORT, *fault, "hardware.told=true"])))
+    here = setup.paths.gain[:, 0] != 0.0
+    rise = np.abs(setup.paths.gain[here, 0] / lit[here, 0]) ** 2
+    low, high = (bound(setup, "random", f"radio.noise_psd={float(noise * r)!r}")[-1] for r in (rise.min(), rise.max()))
     assert ideal[-1] < low * (1.0 - 1e-9) < told[-1] < high * (1.0 + 1e-9)
 
 
-def test_delays_alone_and_images_apart_know_less(stage):
-    less, more = bound(stage, "bp_slam", SEEN), bound(stage, "random", SEEN)
+def test_delays_alone_and_images_apart_know_less(setup):
+    less, more = bound(setup, "bp_slam", SEEN), bound(setup, "random", SEEN)
     # covariances of 100 m^2 beforehand beside information of 1e8 / m^2: rounding leaves some 1e-6 of a value
     assert (less >= more * (1.0 - 1e-5)).all()
     assert less[-1] > more[-1]
 
 
-def test_what_the_receiver_does_not_report_does_not_count(stage):
+def test_what_the_receiver_does_not_report_does_not_count(setup):
     settings = build_settings(load_spec(PIPELINE, [*SHORT, "receiver.max_delay=25e-9"]))
-    heard = heard_paths(stage.paths, settings.sensor, use_vt=True)
+    heard = heard_paths(setup.paths, settings.sensor, use_vt=True)
     shown = heard.gain != 0.0
-    assert 0 < shown.sum() < stage.paths.valid.sum()
+    assert 0 < shown.sum() < setup.paths.valid.sum()
     assert (heard.tau[shown] <= 25e-9).all()
     assert (heard.arrival[shown][:, 2] >= 0.0).all()
     assert (heard.kind != PathKind.LOS).all()
-    assert (heard_paths(stage.paths, settings.sensor, use_vt=False).kind != PathKind.VT).all()
+    assert (heard_paths(setup.paths, settings.sensor, use_vt=False).kind != PathKind.VT).all()
 
 
-def test_what_the_filter_takes_for_granted_is_in_the_bound(stage):
+def test_what_the_filter_takes_for_granted_is_in_the_bound(setup):
     """A level floor always; walls upright with wall returns alone. Nothing of their direction, nor of the ceiling."""
-    walls = build_walls(stage.scene)
+    walls = build_walls(setup.scene)
     model = build_landmark_model(
-        stage.paths, stage.scene.agent, stage.scene.landmark_positions, walls.normal, walls.offset,
+        setup.paths, setup.scene.agent, setup.scene.landmark_positions, walls.normal, walls.offset,
         build_settings(load_spec(PIPELINE, SHORT)).radio,
     )  # fmt: skip
     for upright in (False, True):
-        std = assumed_std(model, float(stage.scene.agent.position[:, 2].min()), upright=upright)
+        std = assumed_std(model, float(setup.scene.agent.position[:, 2].min()), upright=upright)
         tilts = {w: std[model.wall_column[n] + np.arange(2)] for n, w in enumerate(walls.names)}
         np.testing.assert_array_equal(tilts["floor"], FLOOR_TILT)
         np.testing.assert_array_equal(tilts["ceiling"], 0.5)
@@ -126,18 +126,18 @@ def test_what_the_filter_takes_for_granted_is_in_the_bound(stage):
             assert not upright or abs(lean[2]) == 1.0
 
 
-def test_landmarks_and_walls_have_bounds_where_they_are_heard(stage):
+def test_landmarks_and_walls_have_bounds_where_they_are_heard(setup):
     """Louder is sharper; nothing heard, nothing known."""
     found = [
         scheme_bound(
-            stage.scene, stage.paths, stage.paths.gain, "random",
+            setup.scene, setup.paths, setup.paths.gain, "random",
             load_spec(PIPELINE, [*SHORT, f"radio.reference_snr_db={snr}"]).model_dump(mode="json"),
         )
         for snr in (60.0, 30.0, -200.0)
     ]  # fmt: skip
     loud, quiet, silent = found
-    assert set(loud.landmarks) == set(stage.scene.landmarks)
-    assert set(loud.walls) == set(build_walls(stage.scene).names)
+    assert set(loud.landmarks) == set(setup.scene.landmarks)
+    assert set(loud.walls) == set(build_walls(setup.scene).names)
     for name in set(loud.walls) & set(quiet.walls):
         assert loud.walls[name].angle < quiet.walls[name].angle
         assert loud.walls[name].distance < quiet.walls[name].distance

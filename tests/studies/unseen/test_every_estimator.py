@@ -51,6 +51,9 @@ CASES = [
     Case("bp_slam", "bp_slam", {}, 266, 0.8, 6.0, 2.5),
     Case("channel_slam", "channel_slam", {}, 233, 0.5, 1.5, 2.7),
     Case("channel_slam", "channel_slam", {}, 266, 0.8, 6.0, 1.9),
+    Case("bp_slam_aoa", "bp_slam_aoa", {"use_vt": True}, 103, 0.015, 20.0, 1.0),
+    Case("bp_slam_aoa", "bp_slam_aoa", {"use_vt": True}, 233, 0.015, 6.0, 0.55),
+    Case("bp_slam_aoa", "bp_slam_aoa", {"use_vt": True}, 266, 0.015, 9.0, 0.75),
 ]
 
 
@@ -69,7 +72,7 @@ def test_it_errs_no_more_than_it_says(case: Case) -> None:
 
 
 @pytest.mark.parametrize(
-    "case", [CASES[1], CASES[4], CASES[5], CASES[6], CASES[8]], ids=lambda case: f"{case.name}-{case.room}"
+    "case", [CASES[1], CASES[4], CASES[5], CASES[6], CASES[8], CASES[-2]], ids=lambda case: f"{case.name}-{case.room}"
 )
 def test_an_estimator_that_learns_nothing_fails(case: Case) -> None:
     scores = run(case, deaf(ESTIMATORS[SCHEMES[case.scheme].estimator]))
@@ -101,11 +104,11 @@ def _run(case: Case, estimator: Estimator | None) -> dict[str, Any]:
         "motion": {"sigma_a_m_s2": 0.01}, "start": {"velocity_std_m_s": 0.03}, "slam": case.settings,
     }  # fmt: skip
     spec = PipelineSpec.model_validate(content)
-    room, stage = find_setup(case.room, trace_key(spec))
+    room, setup = find_setup(case.room, trace_key(spec))
     name = scheme_here(case.scheme, room)
     recorder = Recorder(estimator or ESTIMATORS[SCHEMES[name].estimator])
-    result = run_scheme(name, stage, spec, lambda *_: None, recorder.estimator)
-    return score_run(build_truth(stage.scene, stage.paths, result, spec), recorder.inputs, recorder.answers)
+    result = run_scheme(name, setup, spec, lambda *_: None, recorder.estimator)
+    return score_run(build_truth(setup.scene, setup.paths, result, spec), recorder.inputs, recorder.answers)
 
 
 def deaf(estimator: Estimator) -> Estimator:

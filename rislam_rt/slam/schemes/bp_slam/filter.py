@@ -13,14 +13,14 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.config import StartPrior
-from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los
+from rislam_rt.slam.filter import REMOVED, UNUSED, StepInfo, glance_of, is_los
 from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import absorb, claims, is_strong, newborn
 from rislam_rt.slam.schemes.shared.course import Course, advance, begin
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
-from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, reported
+from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, outcome_of, reported
 from rislam_rt.slam.schemes.shared.scan import Odds, Scan, birth_ratio
 from rislam_rt.slam.schemes.shared.sums import Sight, Sums, born, carry, join, kinds_of, look, no_sums, prune, spread_of
 
@@ -28,8 +28,6 @@ FEWEST_FALSE = 1e-3
 """Mean number of false ranges a scan that is reckoned with at least, so that no range is ever held for certain."""
 FIRST_DETECTION = 0.95
 """That a feature which stands in view for the first time is measured, as published."""
-NIS_LIMIT = 3.0
-"""Running mean of the NIS per degree of freedom above which the filter says that it has diverged."""
 STRAIN_RATE = 0.05
 """Share of the latest cycle in that mean."""
 
@@ -133,7 +131,7 @@ def step(
     state = _give_birth(state, scan, is_strong(glance.ratio[rows], config.specular_ratio), found, fresh, config)
     strain = state.strain + (STRAIN_RATE * (nis / dof - state.strain) if dof else 0.0)
     count = int((state.sums.existence > config.detection_threshold).sum())
-    report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, count, _outcome(len(measurement), count, strain))
+    report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, count, outcome_of(len(measurement), count, strain))
     return state._replace(strain=strain), report
 
 
@@ -172,11 +170,3 @@ def _claimed(
     second = np.bincount(sums.owner, sums.share * (spread + (sight.length - mean[sums.owner]) ** 2), minlength=count)
     nis = np.sum((scan.length[shown] - mean[feature]) ** 2 / (second[feature] + scan.std[shown] ** 2))
     return numbers, float(nis)
-
-
-def _outcome(num_measurements: int, num_features: int, strain: float) -> Outcome:
-    if num_measurements == 0:
-        return Outcome.NO_MEASUREMENTS
-    if num_features == 0:
-        return Outcome.NO_LANDMARKS
-    return Outcome.DIVERGED if strain > NIS_LIMIT else Outcome.OK

@@ -16,7 +16,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.config import StartPrior
-from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los
+from rislam_rt.slam.filter import REMOVED, UNUSED, StepInfo, glance_of, is_los
 from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.schemes.channel_slam import tracker
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
@@ -25,14 +25,12 @@ from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import absorb, is_strong
 from rislam_rt.slam.schemes.shared.course import Course, advance, begin
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
-from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, reported
+from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, outcome_of, reported
 from rislam_rt.slam.schemes.shared.scan import Scan
 from rislam_rt.slam.schemes.shared.sums import Sight, Sums, born, carry, join, kinds_of, look, no_sums, prune, spread_of
 
 STRAIN_RATE = 0.1
 """Share of the latest cycle in the running means of squared innovations."""
-NIS_LIMIT = 3.0
-"""Running mean of the NIS per degree of freedom above which the filter says that it has diverged."""
 
 
 class ChannelSlamState(NamedTuple):
@@ -109,7 +107,7 @@ def step(
     landmark = np.full(len(measurement), REMOVED)
     landmark[rows] = np.where(np.isin(label, state.sums.ident), label, UNUSED)
     shown = len(state.sums.ident)
-    report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, shown, _outcome(len(measurement), shown, strain))
+    report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, shown, outcome_of(len(measurement), shown, strain))
     return state._replace(strain=strain), report
 
 
@@ -200,11 +198,3 @@ def _give_birth(
         )  # fmt: skip
         sums = join(sums, new)
     return state._replace(sums=sums)
-
-
-def _outcome(num_measurements: int, num_paths: int, strain: float) -> Outcome:
-    if num_measurements == 0:
-        return Outcome.NO_MEASUREMENTS
-    if num_paths == 0:
-        return Outcome.NO_LANDMARKS
-    return Outcome.DIVERGED if strain > NIS_LIMIT else Outcome.OK

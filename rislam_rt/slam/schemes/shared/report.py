@@ -7,12 +7,26 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body, MapEstimate, SlamEstimate
+from rislam_rt.slam.filter import Outcome
 from rislam_rt.slam.schemes.shared.course import Course
 from rislam_rt.slam.schemes.shared.gauge import over_all_turns
 from rislam_rt.slam.schemes.shared.sums import POINT, Sums, unit_of
 
 STEP = 1e-6
 """Step of central differences [m, 1, rad]."""
+
+
+NIS_LIMIT = 3.0
+"""Running mean of the NIS per degree of freedom above which a filter says that it has diverged."""
+
+
+def outcome_of(num_measurements: int, num_features: int, strain: float) -> Outcome:
+    """How a cycle went; `strain` is the running mean of the NIS per degree of freedom."""
+    if num_measurements == 0:
+        return Outcome.NO_MEASUREMENTS
+    if num_features == 0:
+        return Outcome.NO_LANDMARKS
+    return Outcome.DIVERGED if strain > NIS_LIMIT else Outcome.OK
 
 
 class Points(NamedTuple):

@@ -157,17 +157,17 @@ def test_a_panel_told_tilted_stays_a_panel(room):
 def test_a_leaning_body_hears_from_where_its_array_looks(room):
     """Arrivals from the vertices of the paths, turned by scipy's rotations into the array's own frame."""
     spec = load_spec(PIPELINE, ["channel=image_source", "cycles=3", "told.tilt_deg=4.0"])
-    stage = prepare_setup(room, spec, rng=np.random.default_rng(1))
-    motion = stage.scene.agent
-    heard = assumed_model.perceived_paths(stage.paths, motion, spec.told, rng=np.random.default_rng(2))
-    level = stage.paths.arrival
+    setup = prepare_setup(room, spec, rng=np.random.default_rng(1))
+    motion = setup.scene.agent
+    heard = assumed_model.perceived_paths(setup.paths, motion, spec.told, rng=np.random.default_rng(2))
+    level = setup.paths.arrival
     for cycle in range(3):
         # the front rises by 4 degrees: about y in the right-handed sense it would sink
         body = Rotation.from_euler("ZY", [motion.heading[cycle], -np.radians(4.0)])
-        rx = motion.position[cycle] + body.apply(np.array(stage.body.rx_offset))
+        rx = motion.position[cycle] + body.apply(np.array(setup.body.rx_offset))
         np.testing.assert_allclose(motion.rx[cycle], rx, atol=1e-12)
-        for path in np.flatnonzero(stage.paths.valid[cycle] & (stage.paths.kind != PathKind.LOS)):
-            last = stage.paths.vertices[cycle, path, stage.paths.num_vertices[path] - 1]
+        for path in np.flatnonzero(setup.paths.valid[cycle] & (setup.paths.kind != PathKind.LOS)):
+            last = setup.paths.vertices[cycle, path, setup.paths.num_vertices[path] - 1]
             own = body.inv().apply((last - rx) / np.linalg.norm(last - rx))
             seen = Rotation.from_euler("Z", motion.heading[cycle]).inv().apply(np.array(heard.arrival[cycle, path]))
             np.testing.assert_allclose(seen, own, atol=1e-9)
@@ -178,10 +178,10 @@ def test_a_clock_of_its_own_shifts_and_drifts(room):
     spec = load_spec(
         PIPELINE, ["channel=image_source", "cycles=5", "told.clock_offset_ns=2.0", "told.clock_drift_ns_s=3.0"]
     )
-    stage = prepare_setup(room, spec, rng=np.random.default_rng(1))
+    setup = prepare_setup(room, spec, rng=np.random.default_rng(1))
     late = (
-        assumed_model.perceived_paths(stage.paths, stage.scene.agent, spec.told, rng=np.random.default_rng(2)).tau
-        - stage.paths.tau
+        assumed_model.perceived_paths(setup.paths, setup.scene.agent, spec.told, rng=np.random.default_rng(2)).tau
+        - setup.paths.tau
     )
-    expected = 1e-9 * (2.0 + 3.0 * 0.1 * np.arange(5))[:, None] * stage.paths.valid
+    expected = 1e-9 * (2.0 + 3.0 * 0.1 * np.arange(5))[:, None] * setup.paths.valid
     np.testing.assert_allclose(late, expected, rtol=0.0, atol=1e-22)  # float64 of delays below 1e-7 s

@@ -1,0 +1,221 @@
+"""BP-SLAM that hears what the default filter hears: delays, angles and amplitudes, both ends moving, heading known."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
+from rislam_rt.slam.config import StartPrior
+from rislam_rt.slam.filter import REMOVED, UNUSED, StepInfo, free_space, glance_of, is_los
+from rislam_rt.slam.inputs import check_step
+from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, born, hypothesise
+from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
+from rislam_rt.slam.schemes.bp_slam_aoa.features import Ends, GaussianFeatures, carry, join, look, no_features, prune
+from rislam_rt.slam.schemes.bp_slam_aoa.report import known_map, pose_moments
+from rislam_rt.slam.schemes.bp_slam_aoa.update import View, absorb, claims, expect_scan, likelihoods, spread_of
+from rislam_rt.slam.schemes.shared.association import Association
+from rislam_rt.slam.schemes.shared.correct import is_strong
+from rislam_rt.slam.schemes.shared.course import Course, Step, advance
+from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of
+
+LIVELY_STRIDE = 5
+"""The course's stride while steps are lively."""
+LEAST_FALSE = 1e-12
+"""Density of false components that is reckoned with at least."""
+FAST = 4.0
+"""Acceleration of a fast step over that of a lively one."""
+CALM_ENDS = 0.1
+"""How often a calm stretch ends, over how often a lively one does."""
+CHANGE = 0.05
+"""Probability that a step which is not calm is followed by one that is not calm in another way."""
+UNSEEN = 0.7
+"""Share of what is expected and not yet seen that stays unseen in a cycle."""
+RARE = 1e-6
+"""Density of first sights while gaits are weighed: a surprise, but not an impossible one."""
+VERTICAL_STD = 0.003
+"""White vertical acceleration of an agent on a level floor [m/s^2]."""
+STRAIN_RATE = 0.05
+"""Share of the latest cycle in that mean."""
+
+
+class BpSlamAoaState(NamedTuple):
+    """All that the filter knows."""
+
+    course: Course
+    """Relative to the start [m]."""
+    features: GaussianFeatures
+    fresh: float
+    """Share of the features that were expected at the start, and were never seen."""
+    next_ident: int
+    cycle: int
+    gait: Floats
+    """(4,) probabilities that the last step was calm, lively, fast, climbing."""
+    heading: float
+    """[rad]."""
+    strain: float
+    """Running mean of the NIS per degree of freedom: 1 when all is well."""
+    start: StartPrior
+    body: Body
+    sensor: SensorModel
+    """What the agent is told of its receiver."""
+
+
+def init(
+    start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: BpSlamAoaConfig, *,
+    rng: np.random.Generator,
+) -> BpSlamAoaState:  # fmt: skip
+    """The start prior, and no features. `ris` is taken for the interface and not used; nothing is drawn."""
+    std = np.concatenate([np.zeros(3), start.velocity_std * np.array([1.0, 1.0, 0.0])])
+    mean = np.concatenate([np.zeros(3), start.velocity])
+    course = Course(mean, np.diag(std**2), mean, 3, np.diag(std**2), 0.0)
+    gait = np.array([1.0, 0.0, 0.0, 0.0])
+    return BpSlamAoaState(
+        course, no_features(6), 1.0, 0, 0, gait, float(start.heading), 1.0, start, body, sensor
+    )  # fmt: skip
+
+
+def predict(state: BpSlamAoaState, dt: float, config: BpSlamAoaConfig) -> SlamEstimate:
+    """The belief carried over `dt` [s] without noise."""
+    return ahead_of(estimate(state, config), dt)
+
+
+def step(
+    state: BpSlamAoaState, measurement: Measurement, code: RisCode | None, dt: float, heading: float,
+    config: BpSlamAoaConfig, *, rng: np.random.Generator,
+) -> tuple[BpSlamAoaState, StepInfo]:  # fmt: skip
+    """Advance by one cycle: `dt` [s] since the last, `heading` [rad]. `code` and `rng` are there for the interface.
+
+    Raises
+    ------
+    ConfigError
+        Time step or heading is no number.
+    """
+    check_step(dt, heading)
+    scan, rows = _scan(state, measurement, config)
+    landmark = np.full(len(measurement), REMOVED)
+    state, view, ends = _predict(state._replace(heading=float(heading)), dt, scan, config)
+    free = free_space(state.sensor.radio)
+    window = SPEED_OF_LIGHT * state.sensor.window[1]
+    hypotheses = [hypothesise(scan, row, ends.rotation, free, window, config) for row in range(len(rows))]
+    births = state.fresh * np.array([each.density.sum() for each in hypotheses])
+    fresh = scan.false + births
+    density = likelihoods(view, spread_of(view.predicted, state.course), scan)
+    found, _ = claims(state.features, view, density, fresh)
+    landmark[rows], nis = _claimed(state, view, scan, found, config)
+    dof = 3 * int((landmark >= 0).sum())
+    features, course = absorb(state.features, view, state.course, scan, found, fresh)
+    alive = found.unclaimed * births / fresh
+    new = np.flatnonzero(alive >= config.birth_threshold)
+    if len(new):
+        features = join(
+            features, born([hypotheses[row] for row in new], alive[new], course, ends, state.next_ident, config)
+        )
+    features = prune(features, config.pruning_threshold, config.share_threshold, config.max_features)
+    strain = state.strain + (STRAIN_RATE * (nis / dof - state.strain) if dof else 0.0)
+    count = int((features.existence > config.detection_threshold).sum())
+    report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, count, outcome_of(len(measurement), count, strain))
+    return state._replace(
+        course=course, features=features, next_ident=state.next_ident + len(new), strain=strain, cycle=state.cycle + 1
+    ), report
+
+
+def estimate(state: BpSlamAoaState, config: BpSlamAoaConfig) -> SlamEstimate:
+    """Mean and covariance of the pose, samples of it, points and walls of the map."""
+    position, velocity, covariance, samples = pose_moments(state.course, state.start, config.num_samples)
+    known = known_map(state.features, state.course, state.start, config.detection_threshold)
+    return SlamEstimate(position, velocity, state.heading, covariance, samples, state.body, known)
+
+
+def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConfig) -> tuple[ComponentScan, Integers]:
+    """The components without the direct path (and wall returns that are set aside), and their rows."""
+    sensor = state.sensor
+    glance = glance_of(measurement, sensor.radio)
+    aside = is_los(glance, state.body) | is_strong(glance.ratio, None if config.use_vt else config.specular_ratio)
+    rows = np.flatnonzero(~aside)
+    glance = glance.take(rows)
+    snr = sensor.radio.integrated_snr(np.exp(glance.log_amplitude))
+    false = sensor.false_alarm_density(glance.seen[:, 0] / SPEED_OF_LIGHT, glance.seen[:, 1:]) / SPEED_OF_LIGHT
+    false = np.maximum(false * 2.0 * snr * sensor.false_alarm_snr_density(snr), LEAST_FALSE)
+    return ComponentScan(glance.seen, glance.std, glance.log_amplitude, glance.log_amplitude_std, false), rows
+
+
+def _levels(config: BpSlamAoaConfig) -> Floats:
+    """(4, 3) standard deviations of the acceleration of a calm, a lively, a fast and a climbing step [m/s^2]."""
+    calm, lively, fast = config.sigma_a, config.lively_std, FAST * config.lively_std
+    up = min(VERTICAL_STD, calm)
+    return np.array([[calm, calm, up], [lively, lively, up], [fast, fast, up], [calm, calm, lively]])
+
+
+def _gaits(config: BpSlamAoaConfig) -> Floats:
+    """(4, 4) probabilities of the gait of a step after that of the step before."""
+    calm = config.calm_again
+    move = np.full((4, 4), CHANGE * (1.0 - calm))
+    move[0], move[:, 0] = CALM_ENDS * calm / 3.0, calm
+    np.fill_diagonal(move, 0.0)
+    np.fill_diagonal(move, 1.0 - move.sum(axis=1))
+    return move
+
+
+def _predict(
+    state: BpSlamAoaState, dt: float, scan: ComponentScan, config: BpSlamAoaConfig
+) -> tuple[BpSlamAoaState, View, Ends]:  # fmt: skip
+    """Agent and features carried to this cycle, by the gait that explains what is heard best."""
+    turn = rotation_z(np.asarray(state.heading))
+    upper = state.sensor.radio.array.pattern == "upper"
+    ends = Ends(turn @ state.body.tx_offset, turn @ state.body.rx_offset, turn, upper)
+    levels, free, prior = _levels(config), free_space(state.sensor.radio), state.gait @ _gaits(config)
+
+    def ahead(level: int) -> tuple[BpSlamAoaState, View]:
+        if dt == 0.0:
+            moved = state
+        else:
+            keep = (
+                len(state.course.mean) == 6
+                or state.cycle % config.course_stride == 0
+                or (level > 0 and state.cycle % LIVELY_STRIDE == 0)
+            )
+            course, carried = advance(state.course, dt, levels[level], keep)
+            moved = state._replace(course=course, features=_survive(state.features, carried, config))
+        predicted = look(moved.features, moved.course, ends, free)
+        return moved, expect_scan(moved.features, predicted, scan, state.sensor, config)
+
+    moved, view = ahead(0)
+    rare = scan.false + RARE
+    scores = np.log(np.maximum(prior, 1e-30))
+    if dt > 0.0 and len(moved.features.ident):
+        spread = spread_of(view.predicted, moved.course)
+        for level in range(4):
+            more = np.diag((0.5 * dt**2 * levels[level]) ** 2 - (0.5 * dt**2 * levels[0]) ** 2)
+            scores[level] += claims(moved.features, view, likelihoods(view, spread, scan, more), rare)[1]
+    gait = np.exp(scores - scores.max())
+    best = int(np.argmax(gait))
+    if best:
+        moved, view = ahead(best)
+    unseen = config.birth_mean + (1.0 - config.birth_mean) * UNSEEN * state.fresh if dt > 0.0 else state.fresh
+    return moved._replace(gait=gait / gait.sum(), fresh=unseen), view, ends
+
+
+def _survive(features: GaussianFeatures, carried: Step, config: BpSlamAoaConfig) -> GaussianFeatures:
+    moved = carry(features, carried, config.drift_std)
+    return moved._replace(existence=config.survival_probability * moved.existence)
+
+
+def _claimed(
+    state: BpSlamAoaState, view: View, scan: ComponentScan, found: Association, config: BpSlamAoaConfig
+) -> tuple[Integers, float]:
+    """Feature number of each component (`UNUSED` for none), and the NIS of those claimed, by the likeliest Gaussian."""
+    features, numbers, nis = state.features, np.full(len(scan.seen), UNUSED), 0.0
+    sure = (features.existence > config.detection_threshold)[:, None]
+    for row, shown in zip(*np.nonzero((found.feature[:, :-1] > 0.5) & sure), strict=True):
+        own = np.flatnonzero(features.owner == row)
+        best = own[np.argmax(features.share[own])]
+        numbers[shown] = features.ident[row]
+        by_course = view.predicted.by_course[best]
+        spread = view.predicted.own[best] + view.disturbance[best] + by_course @ state.course.covariance @ by_course.T
+        spread = spread + np.diag(np.exp(features.log_scatter[best]) * scan.std[shown] ** 2)
+        miss = scan.seen[shown] - view.predicted.seen[best]
+        nis += float(miss @ np.linalg.solve(spread, miss))
+    return numbers, nis

@@ -1,0 +1,48 @@
+"""What is handed on: the pose with the start's error back in it, points and walls of the map."""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.model import MapEstimate
+from rislam_rt.slam.config import StartPrior
+from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, GaussianFeatures, spread_over
+from rislam_rt.slam.schemes.shared.course import Course
+
+
+def start_variance(start: StartPrior) -> Floats:
+    """(3, 3) of the position that was told [m^2]; its height is exact."""
+    return start.position_std**2 * np.diag([1.0, 1.0, 0.0])
+
+
+def pose_moments(course: Course, start: StartPrior, count: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Position (3,), velocity (3,), their covariance (6, 6), and `count` positions, equally likely."""
+    covariance = course.covariance[:6, :6].copy()
+    covariance[:3, :3] += start_variance(start)
+    covariance = 0.5 * (covariance + covariance.T)
+    position, velocity = start.position + course.mean[:3], course.mean[3:6]
+    # the same draws in every cycle: the samples move smoothly, and nothing depends on who drew before
+    draws = np.random.default_rng(0).standard_normal((count, 3))
+    value, vector = np.linalg.eigh(covariance[:3, :3])
+    return position, velocity, covariance, position + draws @ (vector * np.sqrt(np.maximum(value, 0.0))).T
+
+
+def known_map(features: GaussianFeatures, course: Course, start: StartPrior, threshold: float) -> MapEstimate:
+    """GaussianFeatures that exist, each by its likeliest Gaussian; wanderers have no place."""
+    total = features.covariance + spread_over(features.slope, course)
+    best = np.zeros(len(features.ident))
+    np.maximum.at(best, features.owner, features.share)
+    shown = (features.existence[features.owner] > threshold) & (features.share > 0.5)
+    shown &= features.share >= best[features.owner]
+    points, walls = (np.flatnonzero(shown & (features.kind == kind)) for kind in (POINT, WALL))
+    image, spread = features.mean[walls], total[walls]
+    size = np.linalg.norm(image, axis=1)
+    normal = image / np.maximum(size, 1e-9)[:, None]
+    along = np.einsum("wi,wij,wj->w", normal, spread, normal)
+    across = np.maximum(np.einsum("wii->w", spread) - along, 0.0)
+    std = np.stack([np.sqrt(0.5 * across) / np.maximum(size, 1e-9), 0.5 * np.sqrt(along)], axis=1)
+    count = len(points)
+    return MapEstimate(
+        features.ident[features.owner[points]], start.position + features.mean[points],
+        total[points] + start_variance(start), np.full(count, -1), np.zeros(count),
+        np.exp(np.clip(features.strength[points], -30.0, 30.0)), normal, 0.5 * size + normal @ start.position, std,
+    )  # fmt: skip
