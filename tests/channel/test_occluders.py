@@ -1,4 +1,4 @@
-"""Shades: exact crossing of meshes, and the image-source channel with a scatterer that hides what lies behind it."""
+"""Occluders: exact crossing of meshes, and the image-source channel with a scatterer that hides what lies behind it."""
 
 from dataclasses import replace
 

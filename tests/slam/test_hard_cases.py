@@ -4,6 +4,7 @@ import importlib.util
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -67,3 +68,49 @@ def test_faults_would_be_noticed() -> None:
     assert hard._not_covariance(np.array([[[1.0, 0.1], [0.0, 1.0]]]))
     assert hard._not_covariance(np.full((1, 2, 2), np.nan))
     assert not hard._not_covariance(np.diag([1.0, 0.0])[None])
+
+
+def _led(kind: str, seed: int, most: int = 12) -> Any:
+    """What the window filter makes of a case at its default settings."""
+    case = hard.draw_case(kind, seed, "window", most=most)
+    return hard.run_case(case._replace(config=hard.SlamConfig(filter="window", use_vt=True)))
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("speed wrong by 0.3 m/s", 2), ("compass wrong by 0.5 rad", 4)])
+def test_a_start_told_wrong_is_said_and_mended(kind: str, seed: int) -> None:
+    verdict = _led(kind, seed)
+    assert verdict.said
+    assert not verdict.lost
+    assert verdict.outcomes[-1] == "ok"
+    assert verdict.drift < 0.03  # a second at the wrong speed is 0.3 m
+
+
+def test_a_jump_is_said_and_landed_from() -> None:
+    verdict = _led("jump of the agent", 5, 30)
+    assert verdict.said
+    assert not verdict.lost
+    assert verdict.drift < 0.05
+    assert verdict.std < 0.1
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_nothing_wrong_is_not_called_lost(seed: int) -> None:
+    assert not _led("nothing wrong", seed, 20).said
+
+
+def test_a_picture_turned_about_ends_the_map_and_begins_another() -> None:
+    """Directions mirrored once walls are known: the map explains nothing; what is kept is the pose, within a metre."""
+    case = hard.draw_case("nothing wrong", 7, "window", most=20)
+    config, half = hard.SlamConfig(filter="window", use_vt=True), 8
+    mirror = hard.SPOILERS["mirrored"]
+    cycles = [
+        cycle._replace(measurement=mirror(cycle.measurement, np.random.default_rng(0))) if row >= half else cycle
+        for row, cycle in enumerate(case.cycles)
+    ]
+    verdict = hard.run_case(case._replace(config=config, cycles=cycles))
+    assert not verdict.faults
+    assert verdict.outcomes[half] == "diverged"
+    assert "diverged" not in verdict.outcomes[:half]
+    assert verdict.outcomes[-1] == "ok"
+    assert not verdict.lost
+    assert verdict.std > 1.0

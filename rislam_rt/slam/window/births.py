@@ -37,17 +37,20 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     panels = context.book.panels
     lonely = _missing_legs(context, histories, mean)
     over = [(row, value, panels.index(base) if (base := int(forms[0, 0])) >= 0 and base in panels else -1)
-            for row, value, forms in told]  # fmt: skip
+            for row, value, forms, _ in told]  # fmt: skip
     verdicts, shares = judge(context, ats, histories, known, over, lonely)
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked, returns = context.tracks.looked.copy(), context.scene.use_vt
-    for (row, _, forms), share in zip(told, shares, strict=True):
+    for (row, _, forms, column), share in zip(told, shares, strict=True):
         if share > LEVELS.born:
             if not returns and forms[0, 0] == TX:  # what it is is known, and that is all it is asked for
                 gone[rows[row]] = True
                 continue
-            context = _assign(context, ats[row], idents(context.book, forms), histories.scatter[row])
-            gone[rows[row]] = True
+            named = idents(context.book, forms)
+            if not _taken(context, ats[row], named[0]):
+                part = float(groups.share[column])
+                context = _assign(context, ats[row], named, histories.scatter[row], part)
+                gone[rows[row]] = True
     born = -1
     for row, verdict in enumerate(verdicts):
         if gone[rows[row]]:
@@ -96,7 +99,8 @@ def _missing_legs(context: Context, histories: Digest, mean: Floats) -> Floats:
     along, share = ray @ away.T, reach / length[:, None]
     leg = (np.abs(along - share) < LEG) | (np.abs(along) > 1.0 - LEG)
     found = (leg & (share < 0.995) & bright).sum(axis=1)
-    return LEVELS.log_rare * (1.0 - 0.5 * np.minimum(found, 2))
+    missing = np.array([LEVELS.log_rare, np.log1p(-LEVELS.steady), 0.0])  # both, one of them, none
+    return missing[np.minimum(found, 2)]
 
 
 LEG = 0.04
@@ -106,8 +110,8 @@ LEG = 0.04
 def explanations(
     context: Context, rows: Integers, histories: Digest, expected: Expected, groups: Clusters, mean: Floats,
     covariance: Floats,
-) -> list[tuple[int, float, Integers]]:  # fmt: skip
-    """(track, log evidence, forms (2, 5) of feature rows) of returns of the map: nothing is free in them."""
+) -> list[tuple[int, float, Integers, int]]:  # fmt: skip
+    """(track, log evidence, forms (2, 5) of feature rows, cluster) of returns of the map: nothing is free in them."""
     if not len(groups.leader):
         return []
     lead, mate, share = groups.leader, groups.partner, groups.share[:, None]
@@ -118,7 +122,7 @@ def explanations(
     root = np.asarray(
         np.linalg.cholesky(inside + 1e-9 * np.diag(np.diag(inside)) + 1e-14 * np.eye(size)), dtype=np.float64
     )
-    found: list[tuple[int, float, Integers]] = []
+    found: list[tuple[int, float, Integers, int]] = []
     for row, place in enumerate(rows):
         off = np.abs(expected.seen[lead] + share * gap - context.tracks.mean[place, :, 0]) / NEAR
         near = (off < 1.0).all(axis=1).nonzero()[0]
@@ -128,7 +132,7 @@ def explanations(
             if mate[column] >= 0:
                 forms[1] = expected.forms[mate[column]]
             value = _explain(context, histories, row, forms, groups, int(column), gap[column], features, root)
-            found.append((row, value, forms))
+            found.append((row, value, forms, int(column)))
     return found
 
 
@@ -170,7 +174,14 @@ def _explain(
     return float(evidence)
 
 
-def _assign(context: Context, at: Integers, forms: Integers, scatter: Floats, part: float = 0.5) -> Context:
+def _taken(context: Context, at: Integers, form: Integers) -> bool:
+    """Whether, in most of the cycles of a track (rows of the log), another component is held to be that form (5,)."""
+    log = context.log
+    same = (log.form[:, 0] == form).all(axis=1) & log.explained
+    return bool(np.isin(log.cycle[at], log.cycle[same]).mean() > 0.5)
+
+
+def _assign(context: Context, at: Integers, forms: Integers, scatter: Floats, part: float) -> Context:
     """Rows of the log held to be forms (2, 5) of idents; they err by as much more as they scatter."""
     log = context.log
     form, share, extra = log.form.copy(), log.share.copy(), log.extra.copy()

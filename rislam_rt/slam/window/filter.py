@@ -5,55 +5,29 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los, stranger_density
 from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.returns import TX
 from rislam_rt.slam.tracks import Glance
-from rislam_rt.slam.window import gauss, motion, tracks
+from rislam_rt.slam.window import divergence, gauss, motion, recovery, tracks
 from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.book import Book, empty_book, idents, image_ident
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, conditioned_share
 from rislam_rt.slam.window.gauss import Window
-from rislam_rt.slam.window.learn import Sights, learn, no_sights
+from rislam_rt.slam.window.learn import learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.look import Look, echoes, look
 from rislam_rt.slam.window.numerics import DAMPING, REFRESH
 from rislam_rt.slam.window.retract import condemned, release
+from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import TURN
 from rislam_rt.slam.window.suspect import weigh_tracks
 from rislam_rt.slam.window.tracks import Tracks
-
-
-class WindowState(NamedTuple):
-    """All that the filter knows."""
-
-    cycle: int
-    config: SlamConfig
-    window: Window
-    book: Book
-    log: Log
-    tracks: Tracks
-    sights: Sights
-    gait: Floats
-    """(2, L) probabilities of the liveliness of the step before the window's first, across and upwards; (3, L) with
-    the rate of turn, where the heading is not known."""
-    level: Floats
-    """(2, L) or (3, L) of the last step's, filtered."""
-    heading: Floats
-    """(K,) [rad] that the compass told; where it is not asked, what offsets are against."""
-    shift: Floats
-    """(3,) [m] standard deviation of the start's position: what no measurement tells."""
-    scene: Scene
-    doubt: float
-    """Running log odds that the map explains nothing of what is heard."""
-    codes: tuple[RisCode | None, ...]
-    """(K,) as the agent believes they were applied."""
-    passed: Floats
-    """(P, 3) [m] positions that left the window, each with the hindsight of its whole length."""
 
 
 def init(
@@ -62,9 +36,9 @@ def init(
 ) -> WindowState:  # fmt: skip
     """The start prior, and an empty map."""
     free = np.array([1.0, 1.0, float(config.height == "estimated")])
-    doubt = start.heading_std if config.heading == "estimated" else 0.0
+    offset = start.heading_std if config.heading == "estimated" else 0.0
     turns = config.heading != "known"
-    std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [doubt]])
+    std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [offset]])
     window = gauss.begin(start.position, start.velocity, std, turns=turns)
     scene = Scene(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
@@ -73,7 +47,8 @@ def init(
     return WindowState(
         0, config, window, empty_book(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_sights(),
         gait, gait,
-        np.array([start.heading]), start.position_std * free, scene, 0.0, (None,), np.zeros((0, 3)),
+        np.array([start.heading]), start.position_std * free, scene, divergence.SURE, False, 0.0,
+        (None,), np.zeros((0, 3)),
     )  # fmt: skip
 
 
@@ -86,6 +61,8 @@ def step(
     check_sides(measurement, state.scene.ris)
     if config.heading != "known":
         heading = float(state.heading[-1])
+    else:
+        heading += state.turned
     turn = heading - float(state.heading[-1])
     state = _move(state, dt, heading)
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
@@ -97,7 +74,7 @@ def step(
     free = free[~echoes(glance.take(free), scene.sensor.cell_length)]
     glance = glance.take(free)
 
-    strangers = stranger_density(glance, scene.sensor, config.new_density)
+    strangers = stranger_density(glance, scene.sensor, max(config.new_density, _unexplained(state, glance)))
     state, view = _notice(state, heading, code, glance, strangers)
     mean, poses, expected, groups = view.mean, view.poses, view.expected, view.groups
     shows, scatter, row, pick = view.shows, view.scatter, view.row, view.pick
@@ -117,6 +94,9 @@ def step(
     turn += float(np.diff(gauss.poses(state.window)[-2:, 3]).sum())
     followed = _follow(state, mean, glance, (~taken).nonzero()[0], dt, turn, bend)
     state = state._replace(tracks=followed.tracks, log=followed.log)
+    jumped = state.doubt == 0.0
+    if len(expected.seen) and len(glance.seen):
+        state = state._replace(doubt=divergence.advance(state.doubt, view.score, followed.followed, followed.kept))
     if min(book.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, poses, scene, code))
     sights, book = learn(
@@ -125,22 +105,31 @@ def step(
     state = state._replace(sights=sights, book=book)
     landmark[free[pick]] = np.where(used, _names(state.book, expected, groups, row), REMOVED)
 
+    state, wrong = recovery.ask(state)
+    state = _grown(state, left, expected, groups)
+    outcome = _outcome(len(measurement), len(state.book.ident), wrong or jumped or state.doubt >= 0.0)
+    if divergence.is_lost(state.doubt) and len(state.book.ident):
+        state = recovery.restart(state)
+    info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome)
+    return state._replace(cycle=state.cycle + 1), info
+
+
+def _grown(state: WindowState, left: Residuals, expected: Expected, groups: Clusters) -> WindowState:
+    """With what the evidence has turned against taken back, or else with what is born."""
     context = Context(
-        state.window, state.book, state.log, state.tracks, state.heading, scene, state.cycle, state.sights, state.codes
+        state.window, state.book, state.log, state.tracks, state.heading, state.scene, state.cycle, state.sights,
+        state.codes,
     )  # fmt: skip
-    if state.cycle % REFRESH == 0 and len(book.ident):
+    if state.cycle % REFRESH == 0 and len(state.book.ident):
         gone = condemned(context.book, left, context.log, expected, gauss.now(context.window)[1])
         context, fresh = release(context, ~gone), not gone.any()
     else:
         fresh = True
     if fresh:
         context = births(context, expected, groups)
-    state = state._replace(
+    return state._replace(
         window=context.window, book=context.book, log=context.log, tracks=context.tracks, sights=context.sights
     )  # fmt: skip
-    outcome = _outcome(len(measurement), len(state.book.ident), state.doubt)
-    info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome)
-    return state._replace(cycle=state.cycle + 1), info
 
 
 def _move(state: WindowState, dt: float, heading: float) -> WindowState:
@@ -172,9 +161,9 @@ manoeuvre is looked for."""
 def _notice(
     state: WindowState, heading: float, code: RisCode | None, glance: Glance, strangers: Floats
 ) -> tuple[WindowState, Look]:
-    """What is seen, and the belief that explains it best: as it was, or with a manoeuvre in the last steps.
+    """What is seen, and the belief that explains it best: as it was, with a manoeuvre in the last steps, or a jump.
 
-    The score of the better one tells whether the map explains anything at all (`doubt`).
+    A jump has to explain the cycle better than being lost does, which explains nothing.
     """
 
     def view_of(window: Window) -> Look:
@@ -190,14 +179,14 @@ def _notice(
             view = view_of(trial)
             if view.score + LEVELS.log_rare > best.score:
                 best, window = view, trial
-    if not len(best.expected.seen) or not len(glance.seen):
-        return state._replace(window=window), best
-    doubt = np.clip(state.doubt - np.clip(best.score, -2.0, 2.0), 0.0, 2.0 * LOST)
-    return state._replace(window=window, doubt=float(doubt)), best
+    if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
+        by = divergence.jump(best, glance)
+        view = view_of(divergence.shifted(state.window, by)) if by.any() else best
+        if view.score + divergence.LOG_JUMP > max(best.score, divergence.SURE):
+            return recovery.landed(state, by), view
+    return state._replace(window=window), best
 
 
-LOST = 10.0
-"""Log odds against the map from which on the agent is lost: some cycles that strangers explain better."""
 GROUPS = (np.array([0, 1]), np.array([2]), np.array([TURN]))
 """Axes that are as lively as each other: an agent that turns does not climb."""
 COLUMNS = np.array([0, 0, 1, 2])
@@ -283,9 +272,23 @@ def liven(state: WindowState) -> WindowState:
     return state._replace(window=window._replace(precision=precision), level=level)
 
 
+def _unexplained(state: WindowState, glance: Glance) -> float:
+    """Components per metre, unit of each cosine and e-fold that nothing explained in the cycle before."""
+    if not len(glance.seen):
+        return 0.0
+    window, sensor = np.diff(state.scene.sensor.window)[0] * SPEED_OF_LIGHT, state.scene.sensor
+    loudness = 0.5 * np.log(sensor.radio.integrated_snr(np.exp(glance.log_amplitude.max())) / sensor.threshold)
+    count = float((state.tracks.last == state.cycle - 1).sum())
+    return count / (window * np.pi * max(float(loudness), 1.0))
+
+
 class _Followed(NamedTuple):
     tracks: Tracks
     log: Log
+    followed: int
+    """Tracks of the last cycle..."""
+    kept: int
+    """...and those among them that go on."""
 
 
 def _follow(
@@ -296,7 +299,8 @@ def _follow(
     length = np.maximum(state.tracks.mean[:, 0, 0], 0.5) if len(state.tracks.ident) else np.ones(1)
     drift = np.array([2.0 * bend + speed**2, 0.1, 0.1]) if len(length) else np.zeros(3)
     found = tracks.advance(state.tracks, dt, turn, drift)
-    rows, picks = tracks.match(found, glance, free, state.cycle)
+    late = found.last == state.cycle - 1
+    rows, picks = tracks.match(found, glance, free, state.cycle, state.config.new_density)
     found = tracks.extend(found, rows, glance, picks, state.cycle)
     spare = np.setdiff1d(free, picks)
     reach = np.maximum(glance.seen[spare, 0], 0.5)
@@ -307,7 +311,8 @@ def _follow(
     base = len(state.log.cycle) - len(glance.seen)
     track = state.log.track.copy()
     track[base + picks], track[base + spare] = found.ident[rows], fresh
-    return _Followed(found.keep(tracks.alive(found, state.cycle)), state.log._replace(track=track))
+    found = found.keep(tracks.alive(found, state.cycle))
+    return _Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()))
 
 
 def _names(book: Book, expected: Expected, groups: Clusters, row: Integers) -> Integers:
@@ -321,9 +326,9 @@ def _names(book: Book, expected: Expected, groups: Clusters, row: Integers) -> I
     return np.where(image, image_ident(own, book.ident[wall]), own)
 
 
-def _outcome(heard: int, features: int, doubt: float) -> Outcome:
+def _outcome(heard: int, features: int, lost: bool) -> Outcome:
     if not heard:
         return Outcome.NO_MEASUREMENTS
-    if doubt > LOST:
+    if lost:
         return Outcome.DIVERGED
     return Outcome.OK if features else Outcome.NO_LANDMARKS

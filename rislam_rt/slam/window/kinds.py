@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.book import Book
@@ -106,9 +106,7 @@ def judge(
     track = table.trials.track
     rivals = np.where(table.known >= 0, np.log(max(len(book.walls), 1)), 0.0)
     rivals[table.kind == IMAGE] = np.log(max(len(book.points), 1))
-    evidence = (
-        fits.log_evidence - LEVELS.log_volume - np.where(table.trials.is_wall | table.trials.is_pair, np.log(8.0), 0.0)
-    )
+    evidence = fits.log_evidence + log_place(table, fits.place, digest.middle)
     evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair, lonely[track], 0.0)
     evidence += _amplitudes(table, fits, digest, book, scene) + _opacity(table, fits, digest, known, book)
     evidence += _beside(table, digest, known, book, scene)
@@ -126,7 +124,7 @@ def judge(
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
     none += np.logaddexp(np.log1p(-LEVELS.panels), np.log(LEVELS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
-    evidence += _shared(table, fits, evidence, none, explained)
+    evidence += _shared(table, fits, evidence, none, explained, digest.middle)
     verdicts, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
     for row in range(len(digest.seen)):
         own = (track == row).nonzero()[0]
@@ -135,7 +133,9 @@ def judge(
         total = np.logaddexp.reduce(weight)
         shares[own_told] = np.exp(weight[1 + len(own) :] - total)
         best = int(np.argmax(weight[: 1 + len(own)]))
-        probability = float(np.exp(weight[best] - total))
+        same = _alike(table, fits, own, own[best - 1]) if best else np.zeros(0, dtype=np.bool_)
+        weighed = np.append(weight[best], weight[1 : 1 + len(own)][same])
+        probability = float(np.exp(np.logaddexp.reduce(weighed) - total))
         if best == 0:
             verdicts.append(Verdict(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody))
             continue
@@ -150,6 +150,28 @@ def judge(
             )
         )  # fmt: skip
     return verdicts, shares
+
+
+def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:
+    """Which others of a track's hypotheses `own` put the same feature where hypothesis `at` has it: it is in question
+    then over which known wall it is heard (before or after, where two stand at right angles), not whether it is there.
+    """
+    wall, pair = table.trials.is_wall, table.trials.is_pair
+    if pair[at]:
+        return np.zeros(len(own), dtype=np.bool_)
+    gap, spread = fits.place[own] - fits.place[at], fits.covariance[own] + fits.covariance[at]
+    near = np.vecdot(gap, np.linalg.solve(spread, gap[..., None])[..., 0]) < 1.0
+    return np.asarray(near & (wall[own] == wall[at]) & ~pair[own] & np.isfinite(fits.cost[own]) & (own != at))
+
+
+def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
+    """(H,) log prior density [1/m^3] of the places: points anywhere in a ball, what two walls do in one twice as wide.
+
+    Walls at any distance up to the ball's radius, in any direction: their places are images of the agent's, `middle`.
+    """
+    reach = np.maximum(np.linalg.norm(place - middle, axis=1), 2.0 * LEVELS.depth)
+    wall = -np.log(4.0 * np.pi * reach**2 * 2.0 * LEVELS.size)
+    return np.where(table.trials.is_wall, wall, -LEVELS.log_volume - np.where(table.trials.is_pair, np.log(8.0), 0.0))
 
 
 def _beside(table: Hypotheses, digest: Digest, known: Known, book: Book, scene: Scene) -> Floats:
@@ -175,7 +197,7 @@ come out as one."""
 
 
 def _shared(
-    table: Hypotheses, fits: Fits, evidence: Floats, none: Floats, explained: list[tuple[int, float]]
+    table: Hypotheses, fits: Fits, evidence: Floats, none: Floats, explained: list[tuple[int, float]], middle: Floats
 ) -> Floats:
     """Gain (H,) of hypotheses whose new feature other tracks ask for as well: shared planes and points decide.
 
@@ -200,12 +222,12 @@ def _shared(
         return gain
     spread = fits.covariance[good[first]] + fits.covariance[good[second]]
     gap = off[first, second]
-    log_place = -0.5 * np.vecdot(gap, np.linalg.solve(spread, gap[..., None])[..., 0])
-    log_place -= 0.5 * np.linalg.slogdet(spread)[1] + 1.5 * np.log(2.0 * np.pi)
-    log_place += LEVELS.log_volume + np.where(wall[first], np.log(8.0), 0.0)
+    log_same = -0.5 * np.vecdot(gap, np.linalg.solve(spread, gap[..., None])[..., 0])
+    log_same -= 0.5 * np.linalg.slogdet(spread)[1] + 1.5 * np.log(2.0 * np.pi)
+    log_same -= log_place(table, fits.place, middle)[good[second]]
     other = track[good[second]]
     odds = np.full((len(good), count), -np.inf)
-    np.logaddexp.at(odds, (first, other), evidence[good[second]] + log_place - total[other])
+    np.logaddexp.at(odds, (first, other), evidence[good[second]] + log_same - total[other])
     gain[good] = np.minimum(np.logaddexp(0.0, odds), MOST_SHARED).sum(axis=1)
     return gain
 
@@ -258,8 +280,10 @@ def _image_amplitudes(table: Hypotheses, rows: Integers, digest: Digest, book: B
 def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: Book) -> Floats:
     """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known."""
     middle, walls, wall = digest.middle, book.walls, table.trials.is_wall
-    pair = table.trials.is_pair
-    foot = np.where(wall[:, None], 0.5 * (fits.place + middle), fits.place)
+    pair, tx = table.trials.is_pair[:, None], digest.mean[1][table.trials.track]
+    image = (table.trials.turn[:, 0] @ tx[..., None])[..., 0] + fits.place
+    # the last of two walls is somewhere on the ray to the image of both: as far as a single wall would be
+    foot = np.where(wall[:, None], 0.5 * (fits.place + middle), np.where(pair, 0.5 * (image + middle), fits.place))
     slack = LEVELS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
     total = np.zeros(len(foot))
     span = fits.place - middle
@@ -275,7 +299,7 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
     if len(book.points):
         depth = normal @ known.place[book.points].T - np.vecdot(foot, normal)[:, None]
         total += np.where(wall, LEVELS.log_rare, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
-    return np.where(pair, 0.0, total)
+    return total
 
 
 def beliefs(place: Floats, digest: Digest, known: Known, book: Book) -> Holds:

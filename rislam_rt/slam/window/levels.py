@@ -39,8 +39,6 @@ class Levels(NamedTuple):
     """Posterior probability of a kind from which on a feature enters the map."""
     fit: float = 3.0
     """Standard deviations of its cost above which a hypothesis does not fit at all."""
-    clutter: float = 0.016
-    """New or false components per metre of length, unit of each cosine, and e-fold of amplitude."""
     crowd: float = 9.0
     """Mean square of a residual in reported deviations beforehand: 1 + the SNR (9 dB) of what a cell holds besides."""
     memory: float = 4.0
@@ -64,7 +62,7 @@ class Levels(NamedTuple):
 
     @property
     def log_rare(self) -> float:
-        """Of an unannounced manoeuvre; of a thing behind a wall; half of it of a wall that is not heard by itself."""
+        """Of an unannounced manoeuvre; of a thing behind a wall; of two walls neither of which is heard by itself."""
         return float(np.log(self.rare))
 
     @property

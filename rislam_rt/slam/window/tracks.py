@@ -14,6 +14,8 @@ from rislam_rt.slam.window.panel import Identity, unknown
 
 WANDER = 1.0
 """Spread of an unexplained path's log amplitude from cycle to cycle: a panel's code may change."""
+CYCLE = 0.1
+"""Time [s] that may pass from cycle to cycle where the clock says that none does."""
 
 
 class Tracks(NamedTuple):
@@ -68,14 +70,17 @@ def advance(tracks: Tracks, dt: float, turn: float, bend: Floats) -> Tracks:
     """Predict over `dt` [s] while the body turns by `turn` [rad]; `bend` (3,) is the drift of the rates a second."""
     move = np.array([[1.0, dt], [0.0, 1.0]])
     noise = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]]) * (bend**2)[:, None, None]
+    if dt <= 0.0:  # time passes from cycle to cycle, whatever a coarse clock says
+        noise = np.zeros((len(tracks.ident), 3, 2, 2))
+        noise[..., 0, 0] = CYCLE**2 * (tracks.mean[..., 1] ** 2 + tracks.covariance[..., 1, 1])
     mean = tracks.mean @ move.T
     cos, sin = np.cos(turn), np.sin(turn)
     mean[:, 1], mean[:, 2] = cos * mean[:, 1] + sin * mean[:, 2], cos * mean[:, 2] - sin * mean[:, 1]
     return tracks._replace(mean=mean, covariance=move @ tracks.covariance @ move.T + noise)
 
 
-def match(tracks: Tracks, glance: Glance, free: Integers, cycle: int) -> tuple[Integers, Integers]:
-    """Rows of tracks and the free components that continue them."""
+def match(tracks: Tracks, glance: Glance, free: Integers, cycle: int, strangers: float) -> tuple[Integers, Integers]:
+    """Rows of tracks and the free components that continue them; `strangers` is the density of new ones."""
     count = len(tracks.ident)
     if not count or not len(free):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
@@ -86,7 +91,7 @@ def match(tracks: Tracks, glance: Glance, free: Integers, cycle: int) -> tuple[I
     candidates = Candidates(
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
     )
-    cost = pair_costs(candidates, glance.take(free), GATE, LEVELS.clutter)
+    cost = pair_costs(candidates, glance.take(free), GATE, strangers)
     rows, columns = scipy.optimize.linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     return rows[good], free[columns[good]]

@@ -17,7 +17,7 @@ from rislam_rt.scene.meshes import Mesh
 RESTING = 5e-3
 """[m] A face this near a wall of the shell, on the far side of its thing, stands on it: nobody sees it."""
 MAX_SHADE_FACES = 3000
-"""Shades are tested against every segment of every path; cells grow until no more triangles are left."""
+"""Occluders are tested against every segment of every path; cells grow until no more triangles are left."""
 OUTLINE = 0.125
 """[wavelengths] Outlines of flat regions are thinned within this."""
 SAGITTA = 0.25

@@ -13,11 +13,15 @@ def systematic_rows(weight: Floats, *, rng: np.random.Generator) -> Integers:
 
     The ancestors come in the order of the particles, so that neighbours in a sorted cloud stay neighbours.
     """
-    count = weight.shape[1]
+    return ancestors_at(weight, weight.shape[1], rng.random(len(weight)))
+
+
+def ancestors_at(weight: Floats, size: int, comb: Floats) -> Integers:
+    """Ancestors (K, size) by systematic resampling of each row of (K, N), from where its comb (K,) in [0, 1) starts."""
     edges = np.cumsum(weight, axis=1)
-    comb = (np.arange(count) + rng.random((len(weight), 1))) / count * edges[:, -1:]
-    rows = [np.searchsorted(edge, tooth, side="right") for edge, tooth in zip(edges, comb, strict=True)]
-    return np.minimum(np.array(rows, dtype=np.int64).reshape(weight.shape), count - 1)
+    teeth = (np.arange(size) + comb[:, None]) / size * edges[:, -1:]
+    rows = [np.searchsorted(edge, tooth, side="right") for edge, tooth in zip(edges, teeth, strict=True)]
+    return np.minimum(np.array(rows, dtype=np.int64).reshape(len(weight), size), weight.shape[1] - 1)
 
 
 def effective_fraction(weight: Floats) -> Floats:

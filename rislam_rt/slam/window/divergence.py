@@ -1,0 +1,152 @@
+"""Lost or not, and what to do about it: a chain of two hidden states, jumps, and a start that was told wrong.
+
+While the agent is tracked, the map foresees what is heard; once it is lost, all is strangers'. The log likelihood of a
+cycle under the one against the other (`look`) moves the log odds of a hidden chain, which passes from tracked to lost
+at a rate of its own. Before it is held for lost, the belief is given what might explain the cycle: livelier motion, and
+a jump to where the map's returns and what is heard agree.
+"""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.slam.tracks import Glance
+from rislam_rt.slam.window import egomotion, gauss
+from rislam_rt.slam.window.egomotion import Rates
+from rislam_rt.slam.window.factor import inverse
+from rislam_rt.slam.window.gauss import Quadratic, Window
+from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.log import Log
+from rislam_rt.slam.window.look import Look
+from rislam_rt.slam.window.numerics import LADDER
+from rislam_rt.slam.window.steps import HEAD
+from rislam_rt.slam.window.tracks import CYCLE
+
+RATE = 1e-4
+"""Probability that a cycle is the one in which the agent is lost: once in 1000 s."""
+SURE = float(np.log(RATE))
+"""Log odds of an agent that is tracked for certain, but for the last cycle."""
+JUMP = egomotion.WALK
+"""Standard deviation [m] of an agent's place after it was lost, and of a jump: as far as it walks in a second."""
+CELL = 0.01
+"""Distance [m] within which two places are one: as far as a cycle's returns tell."""
+LOG_JUMP = np.log(RATE) + 2.0 * np.log(CELL / JUMP)
+"""Log probability of a jump to one certain place."""
+FEWEST = 3
+"""Pairs without which nothing is told of a jump."""
+CUT, END = 0.7, 0.1
+"""Shares of the tracks that end with a jump, and else."""
+PAIRS = 60
+"""Pairs of returns and components of which a jump is asked."""
+ALIKE = 0.1
+"""Difference of cosines, and of log amplitudes in units of ten times that, within which a component may be a return."""
+
+
+def advance(log_odds: float, score: float, followed: int, kept: int) -> float:
+    """Log odds of being lost, a cycle on: one that the map explains better than strangers do by `score`.
+
+    Of `followed` tracks `kept` ones go on. They need no pose: if many end at once, the agent may be elsewhere.
+    """
+    burst = (followed - kept) * np.log(CUT / END) + kept * np.log((1.0 - CUT) / (1.0 - END))
+    rate = 1.0 / (1.0 + np.exp(-SURE - max(burst, 0.0)))
+    lost = 1.0 / (1.0 + np.exp(-log_odds))
+    lost = min(lost + (1.0 - lost) * rate, 1.0 - 1e-9)
+    return float(np.clip(np.log(lost / (1.0 - lost)) - score, SURE, -SURE))
+
+
+def jump(view: Look, glance: Glance) -> Floats:
+    """(3,) [m] by which an agent that hears this is elsewhere than thought: on which most returns agree."""
+    lead = view.groups.leader
+    expected, heard = view.expected.seen[lead], glance.seen
+    off = np.abs(heard[:, 1:] - expected[:, None, 1:]).max(axis=-1)
+    level = np.abs(glance.log_amplitude - view.groups.log_amplitude[:, None])
+    off = off + np.where(level < 10.0 * ALIKE, 0.0, ALIKE)
+    near = np.argsort(off, axis=None, kind="stable")[:PAIRS]
+    row, column = np.unravel_index(near[off.ravel()[near] < ALIKE], off.shape)
+    if len(row) < FEWEST:
+        return np.zeros(3)
+    gap = heard[column, 0] - expected[row, 0]
+    found = Rates(view.expected.jacobian[lead[row], 0, :3], gap, np.full(len(row), CELL**2), np.zeros(len(row)))
+    return egomotion.agreed(found)
+
+
+def shifted(window: Window, by: Floats) -> Window:
+    """The window with the last pose elsewhere, its velocity as it was: for a look, not for a solution."""
+    accel, dt = window.accel.copy(), window.step[-2:]
+    # what one step gives to the velocity the next one takes back
+    size = dt[0] * (0.5 * dt[0] + dt[1]) - 0.5 * dt[0] * dt[1]
+    accel[-2, :3] += by / size
+    accel[-1, :3] -= by / size * dt[0] / dt[1]
+    return window._replace(accel=accel)
+
+
+def landed(window: Window, by: Floats) -> Window:
+    """The window after a jump: its last pose alone, elsewhere within `JUMP`; velocity and map as they were."""
+    while window.num_poses > 1:
+        window = gauss.slide(window)
+    head, size = window.head.copy(), len(window.head)
+    head[:3] += by
+    covariance = inverse(window.prior.hessian)
+    covariance[[0, 1], [0, 1]] += JUMP**2
+    slots = window.slots._replace(middle=np.concatenate([head[[0, 1, 2, 6]], head[HEAD:]])[None])
+    prior = Quadratic(inverse(covariance), np.zeros(size), head)
+    return window._replace(head=head, prior=prior, slots=slots, covariance=covariance)
+
+
+def ask_tracks(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.StartCheck | None:
+    """What the first tracks say of the start, once there are enough of them."""
+    passes = window.step[window.step > 0.0]
+    step = float(passes.mean()) if len(passes) else CYCLE
+    found = egomotion.rates(log, heading, step, baseline)
+    if len(found.rate) < egomotion.FEWEST:
+        return None
+    share = window.step.mean() / step
+    std = np.sqrt(np.diag(window.covariance)[3:6])
+    told = egomotion.weigh(found, share * window.head[3:6], share * std + 1e-6)
+    return told._replace(velocity=told.velocity / share if share > 0.0 else window.head[3:6])
+
+
+def ask_picture(window: Window, log: Log, heading: Floats, baseline: float, lively: float) -> float:
+    """Log likelihood ratio of the last cycles' picture moving in any way against moving as the agent is thought to.
+
+    `lively` [m/s^2] of that motion.
+    """
+    if len(window.step) < PAST:
+        return 0.0
+    passed = float(window.step[-PAST:].sum())
+    time = passed if passed > 0.0 else PAST * CYCLE
+    found = egomotion.rates(log, heading[-PAST - 1 :], time / PAST, baseline)
+    if len(found.rate) < egomotion.FEWEST:
+        return 0.0
+    place = gauss.poses(window)[-PAST - 1 :, :3]
+    # what a clock that stands still does not allow for was not foreseen
+    std = passed / time * np.sqrt(np.diag(gauss.now(window)[1])[3:6] + (lively * time) ** 2) + 1e-6
+    return egomotion.weigh(found, (place[-1] - place[0]) / time, std).log_odds - egomotion.LOG_WRONG
+
+
+PAST = 10
+"""Cycles over which the picture's motion is looked at."""
+
+
+def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
+    """Before anything is born: with another level velocity at its start, within `std` [m/s] or what was told."""
+    head, hessian = window.head.copy(), window.prior.hessian.copy()
+    # the tracks will be asked again, as features: their word is not to count twice
+    head[3:5], hessian[[3, 4], [3, 4]] = velocity[:2], np.minimum(hessian[[3, 4], [3, 4]], std**-2.0)
+    return _begun(window, head, hessian)
+
+
+def with_free_compass(window: Window, std: float) -> Window:
+    """Before anything is born: with an offset of the compass within `std` [rad], which turns as little as may be."""
+    hessian, still = window.prior.hessian.copy(), ((0, 0), (0, 1))
+    hessian[6, 6] = std**-2.0
+    precision = np.pad(window.precision, still, constant_values=LADDER[0] ** -2.0)
+    return _begun(window._replace(accel=np.pad(window.accel, still), precision=precision), window.head, hessian)
+
+
+def _begun(window: Window, head: Floats, hessian: Floats) -> Window:
+    return gauss.solve(window._replace(head=head, prior=Quadratic(hessian, np.zeros(len(head)), head)))
+
+
+def is_lost(log_odds: float) -> bool:
+    """Whether the map is given up."""
+    return log_odds > np.log(LEVELS.born / (1.0 - LEVELS.born))

@@ -1,0 +1,181 @@
+"""Does the picture move as the agent is told that it moves? Asked of the first tracks, before anything is born of them.
+
+Whatever throws it, a wall, a point, or two walls at right angles, a return grows shorter by twice the way that the
+agent goes towards it: `rate = -2 u . v`, with `u` the direction of arrival. What comes over a wall on one leg alone, or
+between opposite walls, does not. So a velocity is wanted that many tracks agree on, each of them with a probability of
+its own of being none of these. The told velocity is one such, with its own deviation; if it was told wrong, any other
+within walking speed is as good. Laplace evidences of both decide.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.slam.window.forms import UNKNOWN
+from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.log import Log, unique_forms
+
+WALK = 1.0
+"""Standard deviation [m/s] of a velocity of which nothing is known."""
+APART = 0.5
+"""Share of paths that do not shorten as the agent nears where they come from."""
+LOG_WRONG = np.log(0.01)
+"""Log odds beforehand that a start was told wrong."""
+MEASURED = 6
+"""Measurements of a track from which on it has a rate: as many as births ask for."""
+FEWEST = 5
+"""Tracks with a rate from which on they are asked."""
+
+
+class Rates(NamedTuple):
+    """T tracks."""
+
+    toward: Floats
+    """(T, 3) direction of arrival in the room's axes, times -2: the rate is its product with the velocity."""
+    rate: Floats
+    """(T,) [m/s] of the length."""
+    variance: Floats
+    """(T,)."""
+    blur: Floats
+    """(T,) error of the rate by the baseline between Tx and Rx, as a share of the speed."""
+
+
+class StartCheck(NamedTuple):
+    """What the tracks say of the start."""
+
+    log_odds: float
+    """That it was told wrong."""
+    is_compass: bool
+    """Whether it is the compass that is wrong, rather than the speed."""
+    velocity: Floats
+    """(3,) [m/s] that they agree on, as the compass shows it."""
+    std: float
+    """[m/s] of it, or, if the compass is wrong, of what was told."""
+    turn: float
+    """[rad] by which the compass shows too little, if it is that which is wrong."""
+
+
+def rates(log: Log, heading: Floats, step: float, baseline: float) -> Rates:
+    """Of all that was heard often enough, understood or not, in the log's last K cycles of `step` [s].
+
+    `heading` (K,) [rad] of these; `baseline` [m] between Tx and Rx.
+    """
+    first = int(log.cycle[-1]) - len(heading) + 1 if len(log.cycle) else 0
+    known = log.explained
+    rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
+    if not len(rows):
+        return Rates(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0))
+    forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
+    every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
+    names, which = unique_forms(every)
+    count = len(names)
+    x = (log.cycle[rows] - log.cycle[-1]) * step
+    weight = 1.0 / log.std[rows, 0] ** 2
+
+    def total(value: Floats) -> Floats:
+        return np.asarray(np.bincount(which, value, count), dtype=np.float64)
+
+    s, sx, sxx = total(weight), total(weight * x), total(weight * x**2)
+    sy, sxy = total(weight * log.seen[rows, 0]), total(weight * x * log.seen[rows, 0])
+    spread = s * sxx - sx**2
+    enough = (np.bincount(which, minlength=count) >= MEASURED) & (spread > 1e-9 * s * s * step**2)
+    spread = np.where(enough, spread, 1.0)
+    angle = heading[log.cycle[rows] - first]
+    cos, sin = np.cos(angle), np.sin(angle)
+    flat = log.seen[rows, 1:]
+    toward = np.stack([total(cos * flat[:, 0] - sin * flat[:, 1]), total(sin * flat[:, 0] + cos * flat[:, 1])], axis=1)
+    toward /= np.bincount(which, minlength=count)[:, None]
+    up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
+    toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
+    rate, variance = (s * sxy - sx * sy) / spread, LEVELS.crowd * s / spread
+    enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0
+    # seen from the two ends a point, or a wall's normal, lies in directions so much apart
+    blur = 2.0 * baseline * s / np.maximum(sy, 1e-9)
+    return Rates(toward[enough], rate[enough], variance[enough], blur[enough])
+
+
+def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
+    """The velocity `told` (3,) within `std` (3,), against any other, and against the same one turned by any angle."""
+    every = _find_modes(found, _starts(found, told), told[2])
+    spread = every.covariance + np.diag(std[:2] ** 2)
+    wide = spread + WALK**2 * np.eye(2)
+    right = float(np.max(every.evidence + _log_normal(every.velocity - told[:2], spread)))
+    speed = every.evidence + _log_normal(every.velocity - told[:2], wide)
+    length, aim = np.linalg.norm(every.velocity, axis=1), float(np.linalg.norm(told[:2]))
+    # the speed agrees, and all directions are alike
+    along = np.maximum(np.trace(spread, axis1=1, axis2=2) / 2.0, 1e-12)
+    ring = -0.5 * (length - aim) ** 2 / along - 0.5 * np.log(2.0 * np.pi * along)
+    ring -= np.log(2.0 * np.pi * np.hypot(length, np.sqrt(along)))
+    compass = every.evidence + ring
+    is_compass = bool(compass.max() > speed.max())
+    best = int(np.argmax(compass if is_compass else speed))
+    velocity = np.append(every.velocity[best], told[2])
+    turn = float(np.arctan2(told[1], told[0]) - np.arctan2(velocity[1], velocity[0]))
+    variance = spread[best] if is_compass else every.covariance[best]
+    return StartCheck(
+        max(float(speed.max()), float(compass.max())) - right + LOG_WRONG, is_compass, velocity,
+        float(np.sqrt(np.trace(variance) / 2.0)), float((turn + np.pi) % (2.0 * np.pi) - np.pi),
+    )  # fmt: skip
+
+
+def agreed(found: Rates) -> Floats:
+    """(3,) level velocity, or way, that most agree on; near to nothing if it may be."""
+    every = _find_modes(found, _starts(found, np.zeros(3)), 0.0)
+    best = int(np.argmax(every.evidence + _log_normal(every.velocity, every.covariance + WALK**2 * np.eye(2))))
+    return np.append(every.velocity[best], 0.0)
+
+
+def _log_normal(off: Floats, spread: Floats) -> Floats:
+    """Log densities (S,) of offsets (S, 2) under covariances (S, 2, 2)."""
+    inside = np.vecdot(off, np.linalg.solve(spread, off[..., None])[..., 0])
+    return -0.5 * inside - 0.5 * np.linalg.slogdet(spread)[1] - np.log(2.0 * np.pi)
+
+
+class _Modes(NamedTuple):
+    velocity: Floats
+    covariance: Floats
+    evidence: Floats
+
+
+def _starts(found: Rates, told: Floats) -> Floats:
+    """(S, 2) velocities from which to look for agreement: those on which two tracks agree, and what is told."""
+    first, second = np.triu_indices(len(found.rate), 1)
+    pair = np.stack([found.toward[first], found.toward[second]], axis=1)
+    aim = np.stack([found.rate[first], found.rate[second]], axis=1) - pair[..., 2] * told[2]
+    det = pair[:, 0, 0] * pair[:, 1, 1] - pair[:, 0, 1] * pair[:, 1, 0]
+    fine = np.abs(det) > 0.5
+    x = (aim[:, 0] * pair[:, 1, 1] - aim[:, 1] * pair[:, 0, 1])[fine] / det[fine]
+    y = (aim[:, 1] * pair[:, 0, 0] - aim[:, 0] * pair[:, 1, 0])[fine] / det[fine]
+    every = np.stack([x, y], axis=1)[np.hypot(x, y) < 3.0 * WALK]
+    level, cell = _agreement(found, every, told[2])[0].sum(axis=1), np.round(every / NEAR)
+    order = np.argsort(-level, kind="stable")
+    _, first = np.unique(cell[order], axis=0, return_index=True)
+    return np.concatenate([told[None, :2], every[order[np.sort(first)[:MOST]]]])
+
+
+NEAR, MOST = 0.01, 8
+"""Difference [m/s] up to which velocities are one to look at, and how many are looked at closely."""
+
+
+def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Floats]:
+    """Log likelihoods (S, T) of tracks under level velocities (S, 2), and the weights (S, T) with which they agree."""
+    left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
+    variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
+    close = np.log1p(-APART) - 0.5 * left**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
+    either = np.logaddexp(close, np.log(APART) - np.log(4.0 * WALK))
+    return either, np.exp(close - either) / variance
+
+
+def _find_modes(found: Rates, start: Floats, climb: float) -> _Modes:
+    """From velocities (S, 2): the nearest that tracks agree on, and the evidence there, over a flat prior."""
+    flat, rate = found.toward[:, :2], found.rate - found.toward[:, 2] * climb
+    v, prior = start.copy(), np.eye(2) / (3.0 * WALK) ** 2
+    for last in (False,) * 6 + (True,):
+        either, weight = _agreement(found, v, climb)
+        normal = np.einsum("st,ti,tj->sij", weight, flat, flat) + prior
+        if last:
+            break
+        v = np.linalg.solve(normal, ((weight * rate) @ flat)[..., None])[..., 0]
+    evidence = either.sum(axis=1) + np.log(2.0 * np.pi) - 0.5 * np.linalg.slogdet(normal)[1]
+    return _Modes(v, np.linalg.inv(normal), evidence)

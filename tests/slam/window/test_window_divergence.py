@@ -1,0 +1,129 @@
+"""Lost or not: the velocity that tracks agree on, the chain of two states, and what a jump makes of the belief."""
+
+import numpy as np
+import pytest
+
+from rislam_rt.slam.window import divergence, egomotion, gauss
+from rislam_rt.slam.window.egomotion import Rates
+from rislam_rt.slam.window.forms import UNKNOWN
+from rislam_rt.slam.window.log import Log
+from rislam_rt.slam.window.steps import HEAD
+
+TOLD, STD = np.array([0.3, 0.1, 0.0]), np.full(3, 0.01)
+
+
+def _rates(velocity, rng, *, tracks=12, apart=4, error=0.01):
+    """Tracks of which all but `apart` shorten as the agent nears them."""
+    toward = rng.standard_normal((tracks, 3))
+    toward *= -2.0 / np.linalg.norm(toward, axis=1)[:, None]
+    rate = toward @ velocity + error * rng.standard_normal(tracks)
+    rate[:apart] = rng.uniform(-2.0, 2.0, apart)
+    return Rates(toward, rate, np.full(tracks, error**2), np.zeros(tracks))
+
+
+def test_a_start_told_right_is_left_alone():
+    """Posterior odds above 1 at prior odds of 1 in 100 come up in less than 1 of 100 runs (Markov's inequality)."""
+    rng, wrong = np.random.default_rng(1), 0
+    for _ in range(100):
+        wrong += egomotion.weigh(_rates(TOLD + STD * [1, 1, 0] * rng.standard_normal(3), rng), TOLD, STD).log_odds > 0.0
+    assert wrong <= 4  # 1 expected at most: 4 or fewer in 99.6 % of such samples
+
+
+def test_a_speed_told_wrong_is_found_and_mended():
+    rng = np.random.default_rng(2)
+    for _ in range(10):
+        angle = rng.uniform(-np.pi, np.pi)
+        true = TOLD + 0.6 * np.array([np.cos(angle), np.sin(angle), 0.0])
+        told = egomotion.weigh(_rates(true, rng), TOLD, STD)
+        assert told.log_odds > 0.0
+        # a component of each of 8 tracks: a third of their squares is along either axis, twice over
+        assert np.linalg.norm(told.velocity - true) < 5.0 * 0.01 * np.sqrt(2.0 / (8 * 4 / 3))
+
+
+def test_a_turned_compass_is_told_from_a_wrong_speed():
+    rng, turn = np.random.default_rng(3), 0.7
+    cos, sin = np.cos(turn), np.sin(turn)
+    shown = np.array([cos * TOLD[0] + sin * TOLD[1], cos * TOLD[1] - sin * TOLD[0], 0.0])
+    told = egomotion.weigh(_rates(shown, rng), TOLD, STD)
+    assert told.log_odds > 0.0
+    assert told.is_compass
+    assert told.turn == pytest.approx(turn, abs=5.0 * 0.01 / np.linalg.norm(TOLD))
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.4])
+def test_rates_are_those_of_walls_points_and_square_corners(heading):
+    """Lengths of a point, a wall's image and a corner's, as an agent without a baseline hears them."""
+    velocity, step, count = np.array([0.2, -0.1, 0.0]), 0.1, 8
+    place = velocity * step * np.arange(count)[:, None]
+    normal, corner, point = np.array([0.6, 0.8, 0.0]), np.array([-3.0, 2.0, 0.0]), np.array([1.0, 4.0, 1.5])
+    away = [np.tile((2.0 - place @ normal)[:, None] * normal, (1, 1)), corner - place, point - place]
+    rows = []
+    for track, ray in enumerate(away):
+        length = 2.0 * np.linalg.norm(ray, axis=1)
+        unit = 2.0 * ray / length[:, None]
+        cosines = [np.cos(heading), np.sin(heading)] @ np.stack([unit[:, :2], unit[:, 1::-1] * [1, -1]], axis=1)
+        rows += [(cycle, length[cycle], cosines[cycle], track) for cycle in range(count)]
+    rows.sort(key=lambda row: row[0])
+    number = len(rows)
+    log = Log(
+        np.array([row[0] for row in rows]), np.array([[row[1], *row[2]] for row in rows]), np.full((number, 3), 1e-3),
+        np.zeros(number), np.zeros(number), np.zeros(number, dtype=np.int64), np.array([row[3] for row in rows]),
+        np.full((number, 2, 5), UNKNOWN), np.zeros(number), np.zeros((number, 3)),
+    )  # fmt: skip
+    found = egomotion.rates(log, np.full(count, heading), step, 0.0)
+    assert len(found.rate) == 3
+    # the direction of a point turns a little on the way: (0.2 m / 3 m)^2 of a velocity of 0.2 m/s
+    np.testing.assert_allclose(found.rate, found.toward @ velocity, atol=2e-3)
+
+
+def test_the_chain_is_that_of_two_states():
+    """Against the forward filter of the hidden chain, in probabilities."""
+    rng, odds = np.random.default_rng(4), divergence.SURE
+    least = 1.0 / (1.0 + 1.0 / divergence.RATE)
+    lost = least
+    for score in rng.normal(-0.3, 1.0, 60):
+        odds = divergence.advance(odds, score, 0, 0)
+        passed = lost + (1.0 - lost) * least
+        lost = np.clip(passed / (passed + (1.0 - passed) * np.exp(score)), least, 1.0 - least)
+        assert odds == pytest.approx(np.log(lost / (1.0 - lost)), abs=1e-6)
+    assert not divergence.is_lost(divergence.SURE)
+
+
+def test_tracks_that_end_at_once_make_a_loss_likelier_and_a_map_that_explains_does_not():
+    torn = divergence.advance(divergence.SURE, -3.0, 20, 3)
+    assert torn > 3.0 > divergence.advance(divergence.SURE, -3.0, 20, 18)
+    assert divergence.is_lost(torn)
+    assert not divergence.is_lost(divergence.advance(divergence.SURE, 40.0, 20, 3))
+    assert divergence.advance(torn, 30.0, 5, 5) == pytest.approx(divergence.SURE)
+
+
+def _window(rng):
+    """Three poses and two features that measurements tie together."""
+    window = gauss.begin(np.zeros(3), np.array([0.1, 0.2, 0.0]), np.array([1e-5] * 3 + [0.01] * 3 + [0.0]))
+    for place in ([1.0, 2.0, 1.0], [-2.0, 1.0, 2.0]):
+        window = gauss.add_feature(window, np.array(place), gauss.no_holds())
+    for _ in range(2):
+        window = gauss.extend(window, 0.1, np.full(3, 25.0))
+    root = rng.standard_normal(window.slots.hessian.shape) * 10.0
+    root[-1] = 0.0  # nothing is measured from the last pose as yet
+    slots = window.slots._replace(hessian=root @ np.swapaxes(root, 1, 2))
+    return gauss.solve(window._replace(slots=slots))
+
+
+def test_after_a_jump_all_but_the_place_is_as_it_was():
+    window, by = _window(np.random.default_rng(5)), np.array([0.7, -0.4, 0.0])
+    mean, covariance = gauss.now(window)
+    after, spread = gauss.now(divergence.landed(window, by))
+    np.testing.assert_allclose(after, mean + np.concatenate([by, np.zeros(len(mean) - 3)]), atol=1e-6)
+    wide = covariance.copy()
+    wide[[0, 1], [0, 1]] += divergence.JUMP**2
+    free = np.delete(np.arange(len(mean)), 6)  # the compass is held
+    np.testing.assert_allclose(spread[np.ix_(free, free)], wide[np.ix_(free, free)], atol=1e-5)
+
+
+def test_a_look_elsewhere_moves_the_last_pose_alone():
+    window, by = _window(np.random.default_rng(6)), np.array([0.7, -0.4, 0.1])
+    there = divergence.shifted(window, by)
+    np.testing.assert_allclose(gauss.poses(there)[-1, :3] - gauss.poses(window)[-1, :3], by, atol=1e-12)
+    np.testing.assert_allclose(gauss.now(there)[0][3:6], gauss.now(window)[0][3:6], atol=1e-9)
+    np.testing.assert_allclose(gauss.now(there)[0][HEAD:], gauss.now(window)[0][HEAD:])

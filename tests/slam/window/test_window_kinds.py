@@ -1,0 +1,66 @@
+"""What a track could be: prior densities, forms that put the same feature in the same place, returns that are taken."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from rislam_rt.slam.returns import NONE, TX
+from rislam_rt.slam.window import births, kinds
+from rislam_rt.slam.window.forms import UNKNOWN
+from rislam_rt.slam.window.guesses import KNOWN_WALL, POINT, WALL, WALL_KNOWN
+from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.log import empty_log
+from rislam_rt.slam.window.trial import Fits
+
+
+def _table(kind, pair=None):
+    count = len(kind)
+    walls = np.array(kind) != POINT
+    pair = np.zeros(count, dtype=bool) if pair is None else np.array(pair)
+    return SimpleNamespace(kind=np.array(kind), trials=SimpleNamespace(is_wall=walls & ~pair, is_pair=pair))
+
+
+def test_places_of_walls_and_points_have_densities_that_integrate_to_one():
+    rng, middle = np.random.default_rng(5), np.array([3.0, -2.0, 1.0])
+    for kind, radius in ((WALL, 2.0 * LEVELS.size), (POINT, LEVELS.size)):
+        # shells, sampled evenly in distance: the density times the area of each
+        reach = rng.uniform(0.0, radius, 20_000)
+        way = rng.standard_normal((len(reach), 3))
+        place = middle + reach[:, None] * way / np.linalg.norm(way, axis=1)[:, None]
+        density = np.exp(kinds.log_place(_table([kind] * len(reach)), place, middle))
+        share = radius * density * 4.0 * np.pi * reach**2
+        # within the depth of a surface a wall is no likelier: two thirds of the share of that shell are missing
+        missing = 2.0 / 3.0 * 2.0 * LEVELS.depth / radius if kind == WALL else 0.0
+        assert abs(share.mean() - (1.0 - missing)) < 5.0 * np.std(share) / len(reach) ** 0.5
+
+
+def test_a_wall_twice_as_far_is_as_likely_in_the_same_step_of_distance():
+    far = np.array([[4.0, 0.0, 0.0], [8.0, 0.0, 0.0]])
+    density = np.exp(kinds.log_place(_table([WALL, WALL]), far, np.zeros(3)))
+    assert np.isclose(density[0] * 4.0**2, density[1] * 8.0**2)
+
+
+def test_forms_that_put_the_wall_in_one_place_speak_for_it_together():
+    place = np.array([[5.0, 0.0, 0.0], [5.01, 0.0, 0.02], [5.5, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, 0.0, 0.0]])
+    spread = np.tile(0.03**2 * np.eye(3), (5, 1, 1))
+    cost = np.array([1.0, 1.0, 1.0, 1.0, np.inf])
+    fits = Fits(place, spread, spread, cost, np.zeros(5), np.zeros(5))
+    table = _table([KNOWN_WALL, WALL_KNOWN, WALL, POINT, WALL])
+    found = kinds._alike(table, fits, np.arange(5), 0)
+    # not itself, not half a metre off, not a point, not what could not be fitted
+    assert found.tolist() == [False, True, False, False, False]
+    pair = _table([WALL, WALL, WALL, WALL, WALL], [True, True, False, False, False])
+    assert not kinds._alike(pair, fits, np.arange(5), 0).any()
+
+
+def test_two_components_at_a_time_are_not_the_same_return():
+    form = np.array([TX, NONE, NONE, 3, NONE])
+    log = empty_log()
+    cycle, forms = np.repeat(np.arange(6), 2), np.full((12, 2, 5), UNKNOWN)
+    forms[::2, 0] = form
+    log = log._replace(cycle=cycle, form=forms)
+    context = SimpleNamespace(log=log)
+    assert births._taken(context, np.arange(1, 12, 2), form)
+    assert not births._taken(context, np.arange(1, 12, 2), np.array([TX, NONE, NONE, 4, NONE]))
+    log.form[4:, 0] = UNKNOWN  # only in two of six cycles
+    assert not births._taken(context, np.arange(1, 12, 2), form)
