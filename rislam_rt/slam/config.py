@@ -33,6 +33,8 @@ class SlamConfig:
     """Share of the start's variance that lies between the particles, if there are several; the rest is within them."""
     sigma_a: float = 0.01
     """Standard deviation of the white acceleration [m/s^2]."""
+    motion: str = "learnt"
+    """`learnt`: how lively each step is, `sigma_a` being where to begin; `told`: white acceleration of `sigma_a`."""
     use_vt: bool = True
     """Whether wall returns (virtual transmitters) join the map as planes, or are thrown away as in the paper."""
     heading: str = "known"
@@ -82,6 +84,7 @@ class SlamConfig:
         for name, value, allowed in (
             ("filter", self.filter, FILTERS),
             ("heading", self.heading, ("known", "velocity", "estimated")),
+            ("motion", self.motion, ("learnt", "told")),
             ("height", self.height, ("known", "estimated")),
             ("weighting", self.weighting, WEIGHTINGS),
             ("classifier", self.classifier, CLASSIFIERS),

@@ -145,8 +145,11 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = gauss.slide(window), headings[1:]
     level = state.level @ motion.transition(LEVELS.stay)
-    window = gauss.extend(window, dt, precision := _precisions(level))
-    excess = grow(state.excess, dt, motion.expected_variance(level)[COLUMNS[:3]] - 1.0 / precision[:3])
+    if state.config.motion == "told":
+        window, excess = gauss.extend(window, dt, _told_precision(state.config, dt)), state.excess
+    else:
+        window = gauss.extend(window, dt, precision := _precisions(level))
+        excess = grow(state.excess, dt, motion.expected_variance(level)[COLUMNS[:3]] - 1.0 / precision[:3])
     return state._replace(
         window=window, gait=gait, heading=np.append(headings, heading), excess=excess, passed=passed
     )  # fmt: skip
@@ -176,7 +179,8 @@ def _notice(
         return look(window, state.book, state.sights, heading, state.scene, code, glance, strangers)
 
     best, window = view_of(state.window), state.window
-    if (best.surprise > MISSED or best.strain > STRAINED) and len(state.window.step):
+    learnt = state.config.motion == "learnt"
+    if learnt and (best.surprise > MISSED or best.strain > STRAINED) and len(state.window.step):
         for steps, liveliness in START:
             precision = state.window.precision.copy()
             lively = COLUMNS[: precision.shape[1]] != 1
@@ -217,6 +221,17 @@ def _precisions(levels: Floats) -> Floats:
     """(..., A) prior precisions of accelerations whose groups have levels (N, ..., L)."""
     each = [motion.prior_precision(level, group == 2) for group, level in enumerate(levels)]
     return np.stack([each[group] for group in COLUMNS[: len(levels) + 1]], axis=-1)
+
+
+STILL = 1e-5
+"""[m/s^2] Acceleration of an axis that is known to be still."""
+
+
+def _told_precision(config: SlamConfig, dt: float) -> Floats:
+    """(A,) of a step's white acceleration and, where the heading is not known, rate of turn, as the agent is told."""
+    upwards = config.sigma_a if config.height == "estimated" else STILL
+    turns = () if config.heading == "known" else (config.turn_std / np.sqrt(dt),)
+    return np.array([config.sigma_a, config.sigma_a, upwards, *turns]) ** -2.0
 
 
 def _explain(
@@ -269,7 +284,7 @@ def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
 def liven(state: WindowState) -> WindowState:
     """The prior of every step's acceleration, by what the measurements say of its liveliness."""
     window = state.window
-    if not len(window.accel):
+    if not len(window.accel) or state.config.motion == "told":
         return state
     posterior, level = motion.smooth(state.gait, _likelihoods(window, len(window.accel)), LEVELS.stay)
     fresh = _precisions(posterior)

@@ -166,3 +166,20 @@ def test_a_second_run_on_the_map_finds_out_where_it_began(run):
     # not surer of its place than the map was told of its own
     assert 0.008 < np.sqrt(found.covariance[0, 0]) < 0.015
     assert error[:2] @ np.linalg.solve(found.covariance[:2, :2], error[:2]) < 9.2  # chi^2, 2 dof: 0.99
+
+
+def test_motion_that_is_told_stays_told(run):
+    """Every step keeps the white acceleration of `sigma_a`, whatever the measurements say; nothing else is changed."""
+    *_, (_, paths, radio) = run
+    motion, config = run[1], replace(CONFIG, motion="told", sigma_a=0.02)
+    rng = np.random.default_rng(2)
+    start = StartPrior(motion.position[0], motion.velocity[0], float(motion.heading[0]))
+    state = slam.init(start, motion.body, None, SensorModel(radio), config, rng=rng)
+    for cycle in range(20):
+        heard, _ = measure(paths, cycle, float(motion.heading[cycle]), radio, ReceiverConfig(), rng=rng)
+        dt = 0.1 if cycle else 0.0
+        state, _ = slam.step(state, heard, None, dt, float(motion.heading[cycle]), config, rng=rng)
+    assert state.window.precision.shape == (19, 3)
+    assert np.array_equal(state.window.precision[:, :2], np.full((19, 2), 0.02**-2.0))
+    assert np.all(np.abs(state.window.accel[:, 2]) < 1e-4)  # a height that is known
+    assert len(slam.estimate(state, config).map.wall_offset) >= 3
