@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.cli import main as cli_main
-from rislam_rt.pipeline.dataset import read_dataset
+from rislam_rt.storage.netcdf import read_dataset
 
 ROOT = Path(__file__).resolve().parents[1]
 SHORT = (

@@ -137,8 +137,9 @@ def trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, 
     """All paths with the panel at level 0, written to a file if one is given."""
     from time import perf_counter
 
-    from rislam_rt.pipeline.dataset import paths_to_dataset, write_dataset
+    from rislam_rt.pipeline.dataset import paths_to_dataset
     from rislam_rt.pipeline.run import build_channel
+    from rislam_rt.storage.netcdf import write_dataset
 
     begin = perf_counter()
     paths = build_channel(channel, scene, radio, depth).paths(scene.agent)
@@ -159,7 +160,6 @@ def trace_signals(
     import numpy as np
 
     from rislam_rt.cli.progress import show_progress
-    from rislam_rt.pipeline.dataset import write_dataset
     from rislam_rt.pipeline.signals import (
         build_signals,
         check_space,
@@ -168,6 +168,7 @@ def trace_signals(
         mean_components,
         signals_size,
     )
+    from rislam_rt.storage.netcdf import write_dataset
 
     spec = load_signals_spec(settings)
     size = signals_size(scene, spec)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rislam_rt.channel.doppler import doppler_shift
-from rislam_rt.errors import StoreError
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.received import receive
 from rislam_rt.measurement.tracking import TrackingConfig, init_tracks, step_tracks
 from rislam_rt.measurement.waveform import DetectedComponents, capture, find_components, to_measurement, true_paths
 from rislam_rt.model import Paths, RadioConfig, Trajectory
+from rislam_rt.storage.netcdf import Entry, padded, read_dataset, variables
 from rislam_rt.waveform import subcarrier_frequencies
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 NO_COMPONENT = -9
 """Fills the integer variables where a cycle has fewer components than the fullest one."""
 
-SCHEMA: dict[str, tuple[tuple[str, ...], str, str]] = {
+SCHEMA: dict[str, Entry] = {
     "samples": (("time", "capture", "antenna", "tone"), "sqrt(J)", "received tones, noise of variance noise_variance"),
     "noise_variance": (("time", "capture"), "J", "variance of the noise in a tone, converters included"),
     "heard": (("time", "path"), "1", "truth: whether the array hears the path, 1 or 0"),
@@ -87,14 +87,14 @@ def signals_dataset(
         "frequency": subcarrier_frequencies(samples[0][0].shape[1], radio.bandwidth),
         "antenna_position": radio.array.positions(radio.wavelength),
         "receiver_heading": trajectory.heading,
-        "found_label": _padded(labels, NO_COMPONENT),
-        "found_path": _padded(truth, NO_COMPONENT),
-        "found_from_panel": _padded(over_panel, float(NO_COMPONENT)),
+        "found_label": padded(labels, NO_COMPONENT),
+        "found_path": padded(truth, NO_COMPONENT),
+        "found_from_panel": padded(over_panel, float(NO_COMPONENT)),
     }
     if config.alternation and config.panels > 1:
-        values["found_which_panel"] = _padded(which, NO_COMPONENT)
+        values["found_which_panel"] = padded(which, NO_COMPONENT)
     for name in DetectedComponents._fields[:-1]:
-        values[f"found_{name}"] = _padded([getattr(one, name) for one in found], 0.0)
+        values[f"found_{name}"] = padded([getattr(one, name) for one in found], 0.0)
     return _dataset(values, radio, config)
 
 
@@ -106,14 +106,8 @@ def load_signals(path: str | Path) -> "xr.Dataset":
     StoreError
         The file is missing or not a readable data set.
     """
-    import xarray as xr
-
-    try:
-        data = xr.load_dataset(path, engine="h5netcdf")
-    except FileNotFoundError:
-        raise StoreError(f"{path}: no such file; write one with 'rislam-rt trace SCENE --signals'") from None
-    except Exception as error:  # the HDF5 library raises nearly anything on a damaged file
-        raise StoreError(f"{path}: not a readable NetCDF file ({type(error).__name__}); write it again") from None
+    missing = "write one with 'rislam-rt trace SCENE --signals'"
+    data = read_dataset(Path(path), missing=missing, damaged="write it again")
     names = [str(name)[:-5] for name in data.data_vars if str(name).endswith("_real")]
     joined = {name: data[f"{name}_real"] + 1j * data[f"{name}_imag"] for name in names}
     return data.drop_vars([f"{name}{part}" for name in names for part in ("_real", "_imag")]).assign(joined)
@@ -122,27 +116,10 @@ def load_signals(path: str | Path) -> "xr.Dataset":
 def _dataset(values: dict[str, Any], radio: RadioConfig, config: ReceiverConfig) -> "xr.Dataset":
     import xarray as xr
 
-    content: dict[str, Any] = {}
-    for name, value in values.items():
-        dims, unit, meaning = SCHEMA[name]
-        parts = {"": value}
-        if np.iscomplexobj(value):
-            parts = {"_real": value.real, "_imag": value.imag}
-        for suffix, part in parts.items():
-            content[name + suffix] = (dims, part, {"units": unit, "long_name": meaning})
     attributes = {f"radio_{key}": value for key, value in asdict(radio).items() if key not in ("array", "antennas")}
     for part in ("array", "antennas"):
         attributes |= {f"{part}_{key}": value for key, value in asdict(getattr(radio, part)).items()}
     # NetCDF attributes know numbers and text, not truth values.
     settings = {key: int(value) if isinstance(value, bool) else value for key, value in asdict(config).items()}
     attributes |= {f"receiver_{key}": value for key, value in settings.items()}
-    return xr.Dataset(content, attrs={"Conventions": "CF-1.11", **attributes})
-
-
-def _padded(rows: list[Any], fill: Any) -> Any:
-    """Arrays (M_k, ...) of K cycles as one (K, max M, ...)."""
-    longest = max((len(row) for row in rows), default=0)
-    table = np.full((len(rows), longest, *rows[0].shape[1:]), fill, dtype=rows[0].dtype)
-    for cycle, row in enumerate(rows):
-        table[cycle, : len(row)] = row
-    return table
+    return xr.Dataset(variables(values, SCHEMA), attrs={"Conventions": "CF-1.11", **attributes})

@@ -8,17 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rislam_rt.errors import ResultError, StoreError
+from rislam_rt.errors import ResultError
 from rislam_rt.model import MapEstimate, PathKind, Paths, SchemeResult, Trajectory
 from rislam_rt.model.result import STEPS
-from rislam_rt.storage.files import write_atomic
+from rislam_rt.storage.netcdf import Entry, variables
 from rislam_rt.storage.seal import SCHEMA
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Entry = tuple[tuple[str, ...], str, str]
-"""Dimensions, unit, meaning."""
 
 TRAJECTORY: dict[str, Entry] = {
     "time": (("time",), "s", "time of the cycle's measurement"),
@@ -90,7 +87,7 @@ def paths_to_dataset(paths: Paths, motion: Trajectory) -> "xr.Dataset":
     """True trajectory and true paths."""
     content = _arrays(paths, PATHS, "")
     truth = {"true_position": motion.position, "true_velocity": motion.velocity, "true_heading": motion.heading}
-    content |= _entries({"time": motion.time, **truth}, TRAJECTORY, "")
+    content |= variables({"time": motion.time, **truth}, TRAJECTORY, "")
     names = np.array([*paths.landmarks, ""], dtype=object)
     coords = {
         "path": (
@@ -120,7 +117,7 @@ def scheme_to_dataset(result: SchemeResult) -> "xr.Dataset":
     outcomes = sorted(set(result.outcome))
     codes = np.array([outcomes.index(outcome) for outcome in result.outcome], dtype=np.int64)
     if result.smoothed is not None:
-        content |= _entries({"smoothed": result.smoothed}, SMOOTHED, "")
+        content |= variables({"smoothed": result.smoothed}, SMOOTHED, "")
     content["outcome"] = (("time",), codes, {"long_name": "how the cycle went, index into attribute 'outcomes'"})
     coords = {"landmark": (("landmark",), result.ident, {"long_name": "number of each landmark ever held"})}
     return _dataset(content, {"scheme": result.scheme, "levels": result.levels, "outcomes": outcomes}, coords)
@@ -186,65 +183,10 @@ def _plain(attributes: Any) -> list[tuple[str, list[Any]]]:
     return found
 
 
-def write_dataset(data: "xr.Dataset", path: Path) -> None:
-    """Write NetCDF whole or not at all.
-
-    Raises
-    ------
-    StoreError
-        The disk refused.
-    """
-    write_atomic(path, dataset_bytes(data))
-
-
-def dataset_bytes(data: "xr.Dataset") -> bytes:
-    """A data set as a NetCDF file."""
-    squeeze = {"zlib": True, "complevel": 1}
-    packed = {name: squeeze for name, value in data.data_vars.items() if value.size > 1000}
-    return bytes(data.to_netcdf(engine="h5netcdf", encoding=packed))
-
-
-def read_dataset(path: Path) -> "xr.Dataset":
-    """Read NetCDF into memory.
-
-    Raises
-    ------
-    StoreError
-        The file is missing or damaged.
-    """
-    import xarray as xr
-
-    try:
-        return xr.load_dataset(path, engine="h5netcdf")
-    except FileNotFoundError:
-        raise StoreError(f"{path}: no such file; give the folder of a completed run") from None
-    except Exception as error:  # the HDF5 library raises nearly anything on a damaged file
-        raise StoreError(f"{path}: not a readable NetCDF file ({type(error).__name__}); run again") from None
-
-
 def _arrays(record: Any, table: dict[str, Entry], prefix: str) -> dict[str, Any]:
     names = {f.name for f in fields(record)}
     found = {name: getattr(record, name) for name in table if name in names}
-    return _entries({name: value for name, value in found.items() if value is not None}, table, prefix)
-
-
-def _entries(values: dict[str, Any], table: dict[str, Entry], prefix: str) -> dict[str, Any]:
-    """Variables with their attributes; NetCDF has no complex numbers, so those become two variables."""
-    content: dict[str, Any] = {}
-    for name, value in values.items():
-        dims = table[name][0]
-        dims = tuple(prefix + d if prefix and not d.startswith("xyz") else d for d in dims)
-        parts = [("", value)]
-        if np.iscomplexobj(value):
-            parts = [("_real", np.real(value)), ("_imag", np.imag(value))]
-        for suffix, part in parts:
-            content[prefix + name + suffix] = (dims, part, attributes_of(table[name]))
-    return content
-
-
-def attributes_of(entry: Entry) -> dict[str, str]:
-    """Unit and meaning as attributes."""
-    return {"units": entry[1], "long_name": entry[2]}
+    return variables({name: value for name, value in found.items() if value is not None}, table, prefix)
 
 
 def _values(data: "xr.Dataset", table: dict[str, Entry], prefix: str) -> dict[str, Any]:

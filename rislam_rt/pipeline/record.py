@@ -10,6 +10,7 @@ from rislam_rt.model import NOTHING, RisCode, SchemeResult
 from rislam_rt.pipeline.assumed_model import AssumedModel
 from rislam_rt.pipeline.cycle import Cycle
 from rislam_rt.pipeline.recordings.inputs import Inputs, inputs_to_dataset, seed_marks
+from rislam_rt.storage.netcdf import padded
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,8 +53,8 @@ def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, give
         applied=_codes([cycle.applied for cycle in cycles]),
         levels=levels,
         gain=np.array([cycle.gain for cycle in cycles]),
-        component_path=_padded([cycle.truth.path for cycle in cycles]),
-        component_landmark=_padded([cycle.info.landmark for cycle in cycles]),
+        component_path=padded([cycle.truth.path for cycle in cycles], NOTHING, np.int64),
+        component_landmark=padded([cycle.info.landmark for cycle in cycles], NOTHING, np.int64),
         ident=ident,
         parent=parent,
         held=held,
@@ -88,14 +89,6 @@ def _codes(codes: Sequence[RisCode | None]) -> Integers:
     if any(code is None for code in codes):
         return np.zeros((len(codes), 0, 0), dtype=np.int64)
     return np.array([code.index for code in codes if code is not None], dtype=np.int64)
-
-
-def _padded(rows: Sequence[Integers]) -> Integers:
-    """(K, M) rows of different length, filled up with `NOTHING`."""
-    table = np.full((len(rows), max(map(len, rows), default=0)), NOTHING, dtype=np.int64)
-    for number, row in enumerate(rows):
-        table[number, : len(row)] = row
-    return table
 
 
 def _diagnostics(infos: Sequence[Any]) -> dict[str, Any]:

@@ -103,8 +103,8 @@ class ClaimsSpec(Section):
     """Folder of `fig4a.json`, `fig4b.json` and `fig4c.json`, relative to the pipeline file."""
 
 
-def study_record(spec: StudySpec, scenes: list[Scene]) -> dict[str, Any]:
-    """What is needed to repeat a study: configuration, seed, versions, and the hash of every scene."""
+def study_record(spec: Any, scenes: list[Scene], **more: Any) -> dict[str, Any]:
+    """What is needed to repeat a study: configuration, seed, versions, the hash of every scene, and `more`."""
     return {
         "kind": spec.kind,
         "name": spec.name,
@@ -112,4 +112,5 @@ def study_record(spec: StudySpec, scenes: list[Scene]) -> dict[str, Any]:
         "scenes": {scene.name: {"sha256": scene.digest} for scene in scenes},
         "versions": library_versions(),
         "config": spec.model_dump(mode="json"),
+        **more,
     }

@@ -9,7 +9,8 @@ import xarray as xr
 
 from rislam_rt.measurement import load_signals
 from rislam_rt.model import PathKind
-from rislam_rt.pipeline.dataset import dataset_to_paths, read_dataset
+from rislam_rt.pipeline.dataset import dataset_to_paths
+from rislam_rt.storage.netcdf import read_dataset
 
 SCENE = Path(__file__).parents[2] / "scenes" / "paper_room"
 FEW = ("--signals", "--channel", "image_source", "--depth", 1, "--cycles", 401, "--stride", 200)

@@ -24,6 +24,7 @@ from rislam_rt.pipeline.long.tally import Tally
 from rislam_rt.pipeline.run import library_versions, panel_warnings, set_scene
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.pipeline.store.exports import record_files
 from rislam_rt.pipeline.store.run_folder import (
     DONE,
     RUN_FILE,
@@ -31,7 +32,7 @@ from rislam_rt.pipeline.store.run_folder import (
     check_files,
     read_marker,
     read_run,
-    record_files,
+    reading_run,
 )
 from rislam_rt.progress import Tell
 from rislam_rt.scene import load_scene
@@ -152,14 +153,9 @@ def read_any(folder: Path) -> LongRun:
     if about["state"] != DONE:
         raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
     check_files(folder, about)
-    try:
+    with reading_run(folder):
         scene = replace(load_scene(folder / "scene"), digest=about["scene"]["sha256"])
         return gather_long(folder, scene, about, about["identity"])
-    except ResultError:
-        raise
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RislamError) as error:
-        cause = f"{type(error).__name__}: {error}"[:120]
-        raise ResultError(f"{folder}: a file of the run is damaged ({cause}); run again with another --out") from None
 
 
 def _complete(store: RunFolder, scene: Scene, found: LongRun, about: Mapping[str, Any]) -> None:

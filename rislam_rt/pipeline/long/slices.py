@@ -20,10 +20,8 @@ from rislam_rt.pipeline.dataset import (
     dataset_to_paths,
     dataset_to_scheme,
     paths_to_dataset,
-    read_dataset,
     scheme_to_dataset,
     seal_dataset,
-    write_dataset,
 )
 from rislam_rt.pipeline.long.join import join_paths, join_schemes, subsampled_paths, subsampled_scheme
 from rislam_rt.pipeline.record import given_to_dataset
@@ -34,6 +32,7 @@ from rislam_rt.pipeline.seeds import Seeds
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.progress import Tell
+from rislam_rt.storage.netcdf import read_dataset, write_dataset
 
 SLICE = 1000
 """Cycles of a slice. With the paper's room a cycle holds 0.1 MB while it is traced: 0.1 GB a slice."""

@@ -7,8 +7,9 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, RisSpec
 from rislam_rt.model.ris import join_sheets
-from rislam_rt.pipeline.dataset import AXES, Entry, attributes_of, names_of
+from rislam_rt.pipeline.dataset import AXES, names_of
 from rislam_rt.slam import StartPrior
+from rislam_rt.storage.netcdf import Entry, padded, variables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,11 +68,12 @@ def inputs_to_dataset(inputs: Inputs, **about: Any) -> "xr.Dataset":
     """Variables of `INPUTS`, and attributes: the rest of the start and of the panel's data sheet, and `about`."""
     import xarray as xr
 
-    values: dict[str, Any] = {name: _padded([getattr(m, name) for m in inputs.measurements]) for name in PARTS}
-    if all(m.from_panel is not None for m in inputs.measurements):
-        values["from_panel"] = _padded([np.asarray(m.from_panel) for m in inputs.measurements])
-    if all(m.panel is not None for m in inputs.measurements):
-        values["which_panel"] = _padded([np.asarray(m.panel) for m in inputs.measurements])
+    heard = inputs.measurements
+    values: dict[str, Any] = {name: padded([getattr(m, name) for m in heard], PADDING, float) for name in PARTS}
+    if all(m.from_panel is not None for m in heard):
+        values["from_panel"] = padded([np.asarray(m.from_panel) for m in heard], PADDING, float)
+    if all(m.panel is not None for m in heard):
+        values["which_panel"] = padded([np.asarray(m.panel) for m in heard], PADDING, float)
     values |= {"time": inputs.time, "heading": inputs.heading}
     values |= {"start_position": inputs.start.position, "start_velocity": inputs.start.velocity}
     values |= {"tx_offset": inputs.body.tx_offset, "rx_offset": inputs.body.rx_offset}
@@ -85,7 +87,7 @@ def inputs_to_dataset(inputs: Inputs, **about: Any) -> "xr.Dataset":
             values[f"panel_{name}"] = np.array([getattr(sheet, name) for sheet in sheets])
         values["panel_shape"] = np.array([(sheet.rows, sheet.cols) for sheet in sheets])
         attributes |= {"panel_levels": inputs.panel.levels, "panel_element": [sheet.element for sheet in sheets]}
-    content = {name: (INPUTS[name][0], value, attributes_of(INPUTS[name])) for name, value in values.items()}
+    content = variables(values, INPUTS)
     coords: dict[str, Any] = {name: AXES[name] for name in ("xyz", "cosine")}
     coords["component"] = np.arange(values["tau"].shape[1])  # so that files join along time
     return xr.Dataset(content, coords, {"Conventions": "CF-1.11", **attributes, **about})
@@ -140,11 +142,3 @@ def _measurements(data: "xr.Dataset") -> tuple[Measurement, ...]:
         Measurement(**{name: value[cycle, held[cycle]] for name, value in table.items()})
         for cycle in range(data.sizes["time"])
     )
-
-
-def _padded(rows: list[Any]) -> Any:
-    longest = max((len(row) for row in rows), default=0)
-    table = np.full((len(rows), longest, *rows[0].shape[1:]), PADDING)
-    for cycle, row in enumerate(rows):
-        table[cycle, : len(row)] = row
-    return table

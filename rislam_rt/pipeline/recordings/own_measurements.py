@@ -12,11 +12,11 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError, StoreError
 from rislam_rt.information import amplitude_std, measurement_std
 from rislam_rt.model import Body, Measurement, RadioConfig
-from rislam_rt.pipeline.dataset import read_dataset
 from rislam_rt.pipeline.recordings.inputs import Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.recordings.replay import Answers, replay
 from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.slam import StartPrior
+from rislam_rt.storage.netcdf import read_dataset
 
 COLUMNS: dict[str, tuple[str, str]] = {
     "time_s": (

@@ -13,30 +13,26 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from rislam_rt.errors import ConfigError, ResultError, RislamError
-from rislam_rt.model import MapEstimate, Scene, SchemeResult, SlamResult, Trajectory
+from rislam_rt.model import SchemeResult, SlamResult, Trajectory
 from rislam_rt.pipeline.dataset import (
     check_dataset,
-    dataset_bytes,
     dataset_to_paths,
     dataset_to_scheme,
     paths_to_dataset,
-    read_dataset,
     scheme_to_dataset,
     seal_dataset,
 )
 from rislam_rt.pipeline.record import given_to_dataset
+from rislam_rt.pipeline.store.exports import SUMMARY_FILE, export_files, json_text
 from rislam_rt.pipeline.store.identity import RunIdentity
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.write import scene_files, tum_bytes
 from rislam_rt.storage.files import TEMPORARY, make_folders, remove_empty, remove_temporaries, write_atomic
 from rislam_rt.storage.lock import LOCK_FILE, hold
+from rislam_rt.storage.netcdf import dataset_bytes, read_dataset
 from rislam_rt.storage.seal import file_digest, read_sealed, seal
-from rislam_rt.toml import toml_bytes
 
-RUN_FILE, PATHS_FILE, SUMMARY_FILE = "run.json", "paths.nc", "summary.json"
+RUN_FILE, PATHS_FILE = "run.json", "paths.nc"
 RUNNING, DONE = "running", "done"
 """States of a run."""
 OWN_FOLDERS = ("", "figures", "scene", "scene/meshes")
@@ -101,7 +97,7 @@ class RunFolder(MutableMapping[str, SchemeResult]):
             The disk refused.
         """
         about = {"state": state, "identity": self.identity.digest, **self.identity.content, **(more or {})}
-        write_atomic(self.folder / RUN_FILE, _json(seal({**about, "files": self.files})))
+        write_atomic(self.folder / RUN_FILE, json_text(seal({**about, "files": self.files})))
 
     def complete(self, result: SlamResult, summary: Mapping[str, Any]) -> Path:
         """Add what the schemes' files do not hold; the last step is the marker. Returns the folder.
@@ -286,23 +282,6 @@ def given_file(folder: Path, name: str) -> Path:
     return folder / f"measurements_{name}.nc"
 
 
-def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, bytes]:
-    """Trajectories, maps, room, configuration and summary: name -> content."""
-    motion = result.scene.agent
-    files = {"truth.tum": tum_bytes(motion.time, motion.position, motion.heading)}
-    for name, scheme in result.schemes.items():
-        files[f"estimate_{name}.tum"] = tum_bytes(motion.time, scheme.position, scheme.heading)
-    return files | record_files(result, result.scene, summary)
-
-
-def record_files(result: SlamResult, scene: Scene, summary: Mapping[str, Any]) -> dict[str, bytes]:
-    """Maps, configuration and summary of a result, and its room: name -> content."""
-    maps = {name: map_table(scheme.map) for name, scheme in result.schemes.items()}
-    files = {"map.json": _json(maps), "config.toml": toml_bytes(_without_none({**result.config}))}
-    files |= {f"scene/{name}": content for name, content in scene_files(scene).items()}
-    return files | {SUMMARY_FILE: _json(summary)}
-
-
 def read_run(folder: Path) -> SlamResult:
     """A completed run, every file of which is as it was written.
 
@@ -316,7 +295,7 @@ def read_run(folder: Path) -> SlamResult:
     if not (folder / RUN_FILE).is_file():
         raise ConfigError(f"{folder}: not a completed run (no {RUN_FILE}); give a folder that `run` wrote")
     about = read_marker(folder)
-    try:
+    with reading_run(folder):
         if about["state"] != DONE:
             raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
         check_files(folder, about)
@@ -345,6 +324,19 @@ def read_run(folder: Path) -> SlamResult:
             seconds=about["seconds"],
             warnings=tuple(about["warnings"]),
         )
+
+
+@contextmanager
+def reading_run(folder: Path) -> Iterator[None]:
+    """Around the reading of a run: whatever a damaged file raises becomes one line.
+
+    Raises
+    ------
+    ResultError
+        A file is damaged.
+    """
+    try:
+        yield
     except (ConfigError, ResultError):
         raise
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RislamError) as error:
@@ -352,43 +344,8 @@ def read_run(folder: Path) -> SlamResult:
         raise ResultError(f"{folder}: a file of the run is damaged ({cause}); run again with another --out") from None
 
 
-def map_table(estimate: MapEstimate) -> dict[str, Any]:
-    """A map as plain lists: landmarks, their images, walls."""
-    std = np.sqrt(np.einsum("nii->ni", estimate.covariance))
-    features = [
-        {
-            "ident": int(estimate.ident[row]),
-            "position_m": estimate.position[row].tolist(),
-            "std_m": std[row].tolist(),
-            "image_of": int(estimate.ident[estimate.parent[row]]) if estimate.parent[row] >= 0 else None,
-            "ris_probability": float(estimate.ris_probability[row]),
-            **({} if estimate.panel is None else {"panel": int(estimate.panel[row])}),
-            "strength": float(estimate.strength[row]),
-        }
-        for row in range(len(estimate.ident))
-    ]
-    walls = [
-        {"normal": normal.tolist(), "offset_m": float(offset), "angle_std_rad": float(a), "offset_std_m": float(b)}
-        for normal, offset, (a, b) in zip(estimate.wall_normal, estimate.wall_offset, estimate.wall_std, strict=True)
-    ]
-    return {"landmarks": features, "walls": walls}
-
-
 def _read_scheme(file: Path, name: str, run: str, cycles: int | None = None) -> SchemeResult:
     """A scheme's data set, which must be of this scheme and run."""
     data = read_dataset(file)
     check_dataset(data, file, scheme=name, run=run, **({} if cycles is None else {"cycles": cycles}))
     return dataset_to_scheme(data)
-
-
-def _without_none(table: dict[str, Any]) -> dict[str, Any]:
-    """TOML has no null: what is not set is left out."""
-    return {
-        key: _without_none(value) if isinstance(value, dict) else value
-        for key, value in table.items()
-        if value is not None
-    }
-
-
-def _json(content: Any) -> bytes:
-    return (json.dumps(content, indent=2, allow_nan=False) + "\n").encode()

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.returns import TX, linearise
+from rislam_rt.slam.tracks import PANEL
 from rislam_rt.slam.window import gauss, tracks
 from rislam_rt.slam.window.book import enter, idents
 from rislam_rt.slam.window.context import Context, resolve
@@ -14,7 +15,7 @@ from rislam_rt.slam.window.guesses import BESIDE, known_features
 from rislam_rt.slam.window.kinds import NEW, Verdict, judge, wanted
 from rislam_rt.slam.window.learn import seed
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.numerics import MOST, NEAR, STRIDE
+from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER, STRIDE
 from rislam_rt.slam.window.retract import behind, release
 from rislam_rt.slam.window.steps import HEAD
 
@@ -36,9 +37,10 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     told = explanations(context, rows, histories, expected, groups, mean, covariance)
     panels = context.book.panels
     lonely = _missing_legs(context, histories, mean)
+    beside = np.zeros(len(rows)) if context.scene.use_vt else _company(context, ats, histories, mean)
     over = [(row, value, panels.index(base) if (base := int(forms[0, 0])) >= 0 and base in panels else -1)
             for row, value, forms, _ in told]  # fmt: skip
-    verdicts, shares = judge(context, ats, histories, known, over, lonely)
+    verdicts, shares = judge(context, ats, histories, known, over, lonely, beside)
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked, returns = context.tracks.looked.copy(), context.scene.use_vt
     for (row, _, forms, column), share in zip(told, shares, strict=True):
@@ -80,12 +82,7 @@ def _missing_legs(context: Context, histories: Digest, mean: Floats) -> Floats:
     every, ray = context.tracks, histories.direction
     length, shine = histories.mean[0][:, 0], histories.log_amplitude + np.log(histories.mean[0][:, 0])
     old = every.hits >= 3
-    heading = float(context.heading[-1] + mean[6])
-    flat = every.mean[old, 1:, 0]
-    up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=1), 0.0))
-    cos, sin = np.cos(heading), np.sin(heading)
-    away = np.stack([cos * flat[:, 0] - sin * flat[:, 1], sin * flat[:, 0] + cos * flat[:, 1], up], axis=1)
-    reach = np.maximum(every.mean[old, 0, 0], 0.1)
+    away, reach = _bearings(context, old, mean)
     bright = (every.log_amplitude[old] + np.log(reach))[None] > shine[:, None] - 0.3
     walls = context.book.walls
     if len(walls):
@@ -101,6 +98,37 @@ def _missing_legs(context: Context, histories: Digest, mean: Floats) -> Floats:
     found = (leg & (share < 0.995) & bright).sum(axis=1)
     missing = np.array([LEVELS.log_rare, np.log1p(-LEVELS.steady), 0.0])  # both, one of them, none
     return missing[np.minimum(found, 2)]
+
+
+def _bearings(context: Context, rows: Booleans, mean: Floats) -> tuple[Floats, Floats]:
+    """Directions (N, 3) in the room's axes and lengths (N,) of some of the tracks."""
+    heading = float(context.heading[-1] + mean[6])
+    flat = context.tracks.mean[rows, 1:, 0]
+    up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=1), 0.0))
+    cos, sin = np.cos(heading), np.sin(heading)
+    away = np.stack([cos * flat[:, 0] - sin * flat[:, 1], sin * flat[:, 0] + cos * flat[:, 1], up], axis=1)
+    return away, np.maximum(context.tracks.mean[rows, 0, 0], 0.1)
+
+
+def _company(context: Context, ats: list[Integers], histories: Digest, mean: Floats) -> Floats:
+    """(T,) log odds by which a direction speaks for a path over unknown walls, and against all else: a shorter one
+    comes from there.
+
+    A wall on the Tx leg alone changes the length and not the direction: the point itself is heard there as well.
+    """
+    away, reach = _bearings(context, context.tracks.hits >= 3, mean)
+    span = mean[HEAD:].reshape(-1, 3)[context.book.points] - mean[:3]
+    far = np.linalg.norm(span, axis=1)
+    away, reach = np.concatenate([away, span / np.maximum(far, 0.05)[:, None]]), np.append(reach, 2.0 * far)
+    ray, length = histories.direction, histories.mean[0][:, 0]
+    variance = (histories.weight[..., 1:] ** 2).sum(axis=1) ** -1.0 + BEARING**2
+    gap = ray[:, None, :2] - away[None, :, :2]
+    log_odds = -0.5 * (gap**2 / variance[:, None]).sum(axis=-1) - 0.5 * np.log(variance).sum(axis=1)[:, None]
+    log_odds += np.log(np.maximum(ray[:, 2], 0.1))[:, None]  # against any direction of the half sphere
+    shorter = reach < length[:, None] - SHORTER
+    odds = np.where(shorter, np.exp(np.minimum(log_odds, 20.0)), 0.0).sum(axis=1)
+    over_panel = np.array([bool((context.log.side[at] >= PANEL).all()) for at in ats])
+    return np.where(over_panel, 0.0, np.log1p(ALIGNED * (odds - 1.0)))
 
 
 LEG = 0.04

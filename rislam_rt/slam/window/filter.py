@@ -16,6 +16,7 @@ from rislam_rt.slam.window import divergence, gauss, motion, recovery, tracks
 from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.book import Book, empty_book, idents, image_ident
 from rislam_rt.slam.window.context import Context
+from rislam_rt.slam.window.excess import grow, take_in
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, conditioned_share
 from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.learn import learn, no_sights
@@ -48,7 +49,7 @@ def init(
         0, config, window, empty_book(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_sights(),
         gait, gait,
         np.array([start.heading]), start.position_std * free, scene, divergence.SURE, False, 0.0,
-        (None,), np.zeros((0, 3)),
+        (None,), np.zeros((6, 6)), np.zeros((0, 3)),
     )  # fmt: skip
 
 
@@ -78,6 +79,7 @@ def step(
     state, view = _notice(state, heading, code, glance, strangers)
     mean, poses, expected, groups = view.mean, view.poses, view.expected, view.groups
     shows, scatter, row, pick = view.shows, view.scatter, view.row, view.pick
+    before = gauss.now(state.window)[1]
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(LEVELS.stay))))
 
     log = append(state.log, glance, state.cycle, state.cycle - state.window.num_poses + 1)
@@ -107,6 +109,7 @@ def step(
 
     state, wrong = recovery.ask(state)
     state = _grown(state, left, expected, groups)
+    state = state._replace(excess=take_in(state.excess, before[:6, :6], gauss.now(state.window)[1][:6, :6]))
     outcome = _outcome(len(measurement), len(state.book.ident), wrong or jumped or state.doubt >= 0.0)
     if divergence.is_lost(state.doubt) and len(state.book.ident):
         state = recovery.restart(state)
@@ -142,8 +145,11 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = gauss.slide(window), headings[1:]
     level = state.level @ motion.transition(LEVELS.stay)
-    window = gauss.extend(window, dt, _precisions(level))
-    return state._replace(window=window, gait=gait, heading=np.append(headings, heading), passed=passed)
+    window = gauss.extend(window, dt, precision := _precisions(level))
+    excess = grow(state.excess, dt, motion.expected_variance(level)[COLUMNS[:3]] - 1.0 / precision[:3])
+    return state._replace(
+        window=window, gait=gait, heading=np.append(headings, heading), excess=excess, passed=passed
+    )  # fmt: skip
 
 
 def smoothed(state: WindowState) -> Floats:

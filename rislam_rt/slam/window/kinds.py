@@ -91,14 +91,14 @@ _TEMPLATES = (
 
 def judge(
     context: Context, ats: list[Integers], digest: Digest, known: Known, told: list[tuple[int, float, int]],
-    lonely: Floats,
+    lonely: Floats, beside: Floats,
 ) -> tuple[list[Verdict], Floats]:  # fmt: skip
     """Verdicts of T tracks, and the posterior (E,) of each of the explanations by the map.
 
     Of these `told` gives track, log evidence, and the number of the panel that they run over, -1 for none.
 
     `ats` are the tracks' rows of the log; `lonely` (T,) is the log probability that two walls throw so few single
-    returns beside it.
+    returns beside it, `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
     """
     book, scene = context.book, context.scene
     table = hypotheses(digest, known, book, scene.use_vt)
@@ -120,7 +120,7 @@ def judge(
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
-    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LEVELS.log_volume + LOG_NONE
+    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LEVELS.log_volume + LOG_NONE + beside
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
     none += np.logaddexp(np.log1p(-LEVELS.panels), np.log(LEVELS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]

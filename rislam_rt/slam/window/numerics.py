@@ -46,3 +46,9 @@ LADDER = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0])
 """Standard deviations [m/s^2] of a step's acceleration: from a rail car to a person who turns on the spot."""
 SCATTER_RATE = 0.1
 """Share of the latest residual in its running mean square."""
+BEARING = 0.01
+"""Cosine by which a track's last bearing is off its mean one."""
+SHORTER = 0.2
+"""[m] by which a way without a wall is shorter."""
+ALIGNED = 0.2
+"""Share of the paths over unknown walls that have them on the Tx leg alone."""

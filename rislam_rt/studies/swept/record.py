@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from rislam_rt.pipeline.run import library_versions
 from rislam_rt.scene import load_scene
+from rislam_rt.studies.spec import study_record
 from rislam_rt.studies.swept.cell import cell_spec
 from rislam_rt.studies.swept.spec import SweptSpec
 from rislam_rt.sweeps import Sweep
@@ -14,12 +14,4 @@ def swept_record(spec: SweptSpec, sweep: Sweep, pipeline: Path) -> dict[str, Any
     """Configuration, the main job's settings with defaults filled in, seed, versions, and the hash of every scene."""
     named = next((axis.values for axis in sweep.axes if axis.key == "scene"), [sweep.base.get("scene")])
     scenes = [load_scene(pipeline.parent / str(name)) for name in named]
-    return {
-        "kind": spec.kind,
-        "name": spec.name,
-        "seed": spec.seed,
-        "scenes": {scene.name: {"sha256": scene.digest} for scene in scenes},
-        "versions": library_versions(),
-        "config": spec.model_dump(mode="json"),
-        "settings": cell_spec({"run": spec.run, "variants": {}}).model_dump(mode="json"),
-    }
+    return study_record(spec, scenes, settings=cell_spec({"run": spec.run, "variants": {}}).model_dump(mode="json"))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rislam_rt.errors import RislamError, StoreError
-from rislam_rt.pipeline.dataset import Entry, attributes_of, read_dataset, write_dataset
 from rislam_rt.pipeline.recordings.inputs import Inputs, dataset_to_inputs, inputs_to_dataset
+from rislam_rt.storage.netcdf import Entry, read_dataset, variables, write_dataset
 from rislam_rt.studies.unseen.truth import Truth
 
 if TYPE_CHECKING:
@@ -85,12 +85,10 @@ def recording_to_dataset(recording: Recording) -> "xr.Dataset":
     truth = recording.truth
     about = {name: json.dumps(getattr(recording, name)) for name in ("config", "traits", "scores")}
     data = inputs_to_dataset(recording.inputs, **about, scheme=recording.scheme, true_panel=int(truth.panel))
-    content: dict[str, Any] = {}
-    for name, entry in TRUTH.items():
-        value = getattr(truth, name)
-        plain = value.astype(np.int8) if value.dtype == np.bool_ else value
-        content[f"true_{name}"] = (entry[0], plain, attributes_of(entry))
-    return data.assign(content)
+    values = {name: getattr(truth, name) for name in TRUTH}
+    plain = {name: v.astype(np.int8) if v.dtype == np.bool_ else v for name, v in values.items()}
+    content = variables(plain, TRUTH)
+    return data.assign({f"true_{name}": content[name] for name in content})
 
 
 def dataset_to_recording(data: "xr.Dataset") -> Recording:

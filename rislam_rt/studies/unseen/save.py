@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.model import RisCode, Scene, SchemeResult
-from rislam_rt.pipeline.dataset import write_dataset
 from rislam_rt.pipeline.run import RunSetup
 from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.pipeline.signals import SignalsSpec, build_signals
 from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.ris import rephase
 from rislam_rt.scene import write_scene
+from rislam_rt.storage.netcdf import write_dataset
 from rislam_rt.studies.unseen.file import Recording, write_recording
 
 

@@ -10,7 +10,6 @@ import xarray as xr
 from rislam_rt.errors import ResultError
 from rislam_rt.model import SlamResult
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.dataset import read_dataset
 from rislam_rt.pipeline.long import slices
 from rislam_rt.pipeline.long.join import join_paths, join_schemes
 from rislam_rt.pipeline.long.run import is_long, read_any, run_long
@@ -19,6 +18,7 @@ from rislam_rt.pipeline.recordings.own_measurements import localise, run_rng
 from rislam_rt.pipeline.scores.summary import summarise_scheme
 from rislam_rt.pipeline.store.identity import run_identity
 from rislam_rt.pipeline.store.run_folder import open_run
+from rislam_rt.storage.netcdf import read_dataset
 
 ROOT = Path(__file__).parents[3]
 BOUND = {"bound_m", "over_bound", "walls", "ghost_walls"}

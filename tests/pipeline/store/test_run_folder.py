@@ -20,10 +20,8 @@ from rislam_rt.pipeline.dataset import (
     SCHEME,
     check_dataset,
     dataset_to_scheme,
-    read_dataset,
     scheme_to_dataset,
     seal_dataset,
-    write_dataset,
 )
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.pipeline.store.identity import code_digest, run_identity
@@ -31,6 +29,7 @@ from rislam_rt.pipeline.store.run_folder import find_run, open_run, read_run, re
 from rislam_rt.scene import load_scene
 from rislam_rt.storage.files import write_atomic, write_pieces
 from rislam_rt.storage.lock import hold
+from rislam_rt.storage.netcdf import read_dataset, write_dataset
 from rislam_rt.storage.seal import file_digest, seal
 
 

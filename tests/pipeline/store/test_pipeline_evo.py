@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rislam_rt.pipeline.scores.summary import summarise
-from rislam_rt.pipeline.store.run_folder import export_files
+from rislam_rt.pipeline.store.exports import export_files
 
 
 def test_evo_ape_reads_a_run_and_agrees(short_result, tmp_path):

@@ -1,0 +1,66 @@
+"""A run in forms that others read: trajectories, maps, configuration, scores, and its room."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.model import MapEstimate, Scene, SlamResult
+from rislam_rt.scene.write import scene_files, tum_bytes
+from rislam_rt.toml import toml_bytes
+
+SUMMARY_FILE = "summary.json"
+
+
+def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, bytes]:
+    """Trajectories, maps, room, configuration and summary: name -> content."""
+    motion = result.scene.agent
+    files = {"truth.tum": tum_bytes(motion.time, motion.position, motion.heading)}
+    for name, scheme in result.schemes.items():
+        files[f"estimate_{name}.tum"] = tum_bytes(motion.time, scheme.position, scheme.heading)
+    return files | record_files(result, result.scene, summary)
+
+
+def record_files(result: SlamResult, scene: Scene, summary: Mapping[str, Any]) -> dict[str, bytes]:
+    """Maps, configuration and summary of a result, and its room: name -> content."""
+    maps = {name: map_table(scheme.map) for name, scheme in result.schemes.items()}
+    files = {"map.json": json_text(maps), "config.toml": toml_bytes(_without_none({**result.config}))}
+    files |= {f"scene/{name}": content for name, content in scene_files(scene).items()}
+    return files | {SUMMARY_FILE: json_text(summary)}
+
+
+def map_table(estimate: MapEstimate) -> dict[str, Any]:
+    """A map as plain lists: landmarks, their images, walls."""
+    std = np.sqrt(np.einsum("nii->ni", estimate.covariance))
+    features = [
+        {
+            "ident": int(estimate.ident[row]),
+            "position_m": estimate.position[row].tolist(),
+            "std_m": std[row].tolist(),
+            "image_of": int(estimate.ident[estimate.parent[row]]) if estimate.parent[row] >= 0 else None,
+            "ris_probability": float(estimate.ris_probability[row]),
+            **({} if estimate.panel is None else {"panel": int(estimate.panel[row])}),
+            "strength": float(estimate.strength[row]),
+        }
+        for row in range(len(estimate.ident))
+    ]
+    walls = [
+        {"normal": normal.tolist(), "offset_m": float(offset), "angle_std_rad": float(a), "offset_std_m": float(b)}
+        for normal, offset, (a, b) in zip(estimate.wall_normal, estimate.wall_offset, estimate.wall_std, strict=True)
+    ]
+    return {"landmarks": features, "walls": walls}
+
+
+def json_text(content: Any) -> bytes:
+    """JSON as people read it."""
+    return (json.dumps(content, indent=2, allow_nan=False) + "\n").encode()
+
+
+def _without_none(table: dict[str, Any]) -> dict[str, Any]:
+    """TOML has no null: what is not set is left out."""
+    return {
+        key: _without_none(value) if isinstance(value, dict) else value
+        for key, value in table.items()
+        if value is not None
+    }

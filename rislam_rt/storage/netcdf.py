@@ -1,0 +1,85 @@
+"""NetCDF files: arrays under names, each with its dimensions, unit and meaning, written whole or not at all."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rislam_rt.errors import StoreError
+from rislam_rt.storage.files import write_atomic
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Entry = tuple[tuple[str, ...], str, str]
+"""Dimensions, unit, meaning."""
+
+
+def variables(values: Mapping[str, Any], table: Mapping[str, Entry], prefix: str = "") -> dict[str, Any]:
+    """Variables with their attributes; NetCDF has no complex numbers, so those become `_real` and `_imag`.
+
+    A prefix comes before every name and every dimension but xyz.
+    """
+    content: dict[str, Any] = {}
+    for name, value in values.items():
+        dims, unit, meaning = table[name]
+        dims = tuple(prefix + d if prefix and not d.startswith("xyz") else d for d in dims)
+        parts = [("", value)]
+        if np.iscomplexobj(value):
+            parts = [("_real", np.real(value)), ("_imag", np.imag(value))]
+        for suffix, part in parts:
+            content[prefix + name + suffix] = (dims, part, {"units": unit, "long_name": meaning})
+    return content
+
+
+def padded(rows: Sequence[Any], fill: Any, dtype: Any = None) -> Any:
+    """Arrays (M_k, ...) of K cycles as one (K, max M, ...), filled up; of the first one's type by default."""
+    longest = max((len(row) for row in rows), default=0)
+    table = np.full((len(rows), longest, *rows[0].shape[1:]), fill, dtype=dtype or rows[0].dtype)
+    for cycle, row in enumerate(rows):
+        table[cycle, : len(row)] = row
+    return table
+
+
+def write_dataset(data: "xr.Dataset", path: Path) -> None:
+    """Write NetCDF whole or not at all.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    write_atomic(path, dataset_bytes(data))
+
+
+def dataset_bytes(data: "xr.Dataset") -> bytes:
+    """A data set as a NetCDF file."""
+    squeeze = {"zlib": True, "complevel": 1}
+    packed = {name: squeeze for name, value in data.data_vars.items() if value.size > 1000}
+    return bytes(data.to_netcdf(engine="h5netcdf", encoding=packed))
+
+
+def read_dataset(
+    path: Path, *, missing: str = "give the folder of a completed run", damaged: str = "run again"
+) -> "xr.Dataset":
+    """Read NetCDF into memory.
+
+    Parameters
+    ----------
+    missing, damaged
+        What to do about a file that is not there, or cannot be read.
+
+    Raises
+    ------
+    StoreError
+        It is one of these.
+    """
+    import xarray as xr
+
+    try:
+        return xr.load_dataset(path, engine="h5netcdf")
+    except FileNotFoundError:
+        raise StoreError(f"{path}: no such file; {missing}") from None
+    except Exception as error:  # the HDF5 library raises nearly anything on a damaged file
+        raise StoreError(f"{path}: not a readable NetCDF file ({type(error).__name__}); {damaged}") from None
