@@ -63,7 +63,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--runs", type=int, default=50)
     parser.add_argument("--cycles", type=int, default=600)
-    parser.add_argument("--filter", default="rao_blackwellised")
+    parser.add_argument("--filter", default="window")
     parser.add_argument("--scene", default="paper_room")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--set", action="append", default=[], dest="settings")

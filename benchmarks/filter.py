@@ -27,12 +27,12 @@ from rislam_rt.model import Body
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import prepare_setup, run_scheme
 from rislam_rt.scene import load_scene
-from rislam_rt.slam import SlamConfig, StartPrior
+from rislam_rt.slam import NestedConfig, SlamConfig, StartPrior
 from rislam_rt.slam.moments import poses_of
-from rislam_rt.slam.nested import belief, operations
-from rislam_rt.slam.nested.cloud import Engine, Kernel, kernel_width
-from rislam_rt.slam.nested.machine import pick_engine
-from rislam_rt.slam.nested.sightline import Sighting, linear_sightline, pack, trace_sightline
+from rislam_rt.slam.nested.particles import belief, operations
+from rislam_rt.slam.nested.particles.backend import pick_engine
+from rislam_rt.slam.nested.particles.cloud import Engine, Kernel, kernel_width
+from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, pack, trace_sightline
 from rislam_rt.slam.returns import NONE, Returns, observe
 
 BODY = Body(np.array([-0.04388, -0.02397, 0.0]), np.array([0.04388, 0.02397, 0.0]))
@@ -143,14 +143,14 @@ def walk(agents: int, points: int, landmarks: int, cycles: int) -> Floats:
     """Processor seconds of each cycle of a walk at fixed numbers of particles, all landmarks seen every cycle."""
     rng = np.random.default_rng(2)
     config = SlamConfig(
-        filter="nested", agent_particles=agents, landmark_particles=points, adaptive=False, machine="drjit"
+        filter="nested", nested=NestedConfig(num_agents=agents, num_points=points, adaptive=False, engine="drjit")
     )
     particles = operations.begin(StartPrior(START, VELOCITY, HEADING), config, rng=rng)
     places = rng.uniform([1.0, 1.0, 1.0], [5.0, 5.0, 3.0], (landmarks, 3))
     state = particles.belief
     for row, place in enumerate(places):
         at = place + 0.03 * rng.standard_normal(3)
-        state = belief.settle(
+        state = belief.initialise_landmark(
             state, np.tile(at, (agents, 1)), 0.03**2 * np.eye(3), particles.config, particles.engine, rng=rng
         )
         known = linear_sightline(state.centre[:, row] - at, np.zeros(3))
@@ -164,11 +164,11 @@ def walk(agents: int, points: int, landmarks: int, cycles: int) -> Floats:
         seen = observe(returns, places, anchor, poses).seen + STD * rng.standard_normal((landmarks, 3))
         began = time.process_time()
         particles = operations.propagate(
-            particles, CYCLE, SIGMA_A * config.axes, HEADING, cycle % config.window, config, rng=rng
+            particles, CYCLE, SIGMA_A * config.axes, HEADING, cycle % config.nested.window, config, rng=rng
         )
         std = np.tile(STD, (landmarks, 1))
         particles = operations.update(particles, returns, returns, anchor, BODY, seen, std, rng=rng).particles
-        particles, _ = operations.thin(particles, config, rng=rng)
+        particles, _ = operations.resample(particles, config, rng=rng)
         spent.append(time.process_time() - began)
     return np.array(spent)
 

@@ -41,8 +41,8 @@ from rislam_rt.model import (
 )
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
-from rislam_rt.slam import Outcome, SlamConfig, StartPrior, StepInfo, estimate, init, predict, step
-from rislam_rt.slam.filter import believed
+from rislam_rt.slam import NestedConfig, Outcome, SlamConfig, StartPrior, StepInfo, estimate, init, predict, step
+from rislam_rt.slam.nested.filter import believed
 from rislam_rt.slam.window import WindowState, gauss
 
 ROOM = Path(__file__).parents[1] / "scenes" / "paper_room"
@@ -116,27 +116,21 @@ def _stretch(paths: Paths, cycles: slice) -> Paths:
 
 def _settings(engine: str, rng: np.random.Generator) -> SlamConfig:
     """Every option that the filter has, at random; the first draw of three is the default."""
-    if rng.uniform() < 0.4:
-        config = SlamConfig(filter="rao_blackwellised")
-    else:
-        window = int(rng.choice([40, 12]))
+    config, own, headings = SlamConfig(), NestedConfig(), ("known", "estimated")
+    if rng.uniform() >= 0.4:
         config = SlamConfig(
-            filter="rao_blackwellised",
-            num_particles=int(rng.choice([1, 6])),
             sigma_a=float(rng.choice([0.01, 1e-6, 1.0])),
             use_vt=bool(rng.integers(2)),
-            heading=str(rng.choice(["known", "velocity", "estimated"])),
+            heading=str(rng.choice(headings)),
             height=str(rng.choice(["known", "estimated"])),
             max_bounces=int(rng.integers(3)),
-            birth_cycles=int(rng.choice([12, 3, 1])),
-            window=window,
         )
-    if engine == "window":
-        return replace(config, filter="window", use_vt=True, heading="known", num_particles=1)
+        own = NestedConfig(birth_cycles=int(rng.choice([12, 3, 1])), window=int(rng.choice([40, 12])))
     if engine != "nested":
         return config
     # as many as a thousand runs allow; the laws looked at here do not depend on their number
-    return replace(config, filter="nested", adaptive=False, agent_particles=100, landmark_particles=128)
+    own = replace(own, adaptive=False, num_agents=100, num_points=128, min_agents=100, min_points=128)
+    return replace(config, filter="nested", nested=own)
 
 
 def draw_case(kind: str, seed: int, engine: str, most: int = 40) -> Case:
@@ -275,7 +269,7 @@ def draw_cases(count: int, seed: int, engine: str, kinds: Sequence[str] = KINDS)
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=1000)
-    parser.add_argument("--filter", choices=("rao_blackwellised", "nested", "window"), default="rao_blackwellised")
+    parser.add_argument("--filter", choices=("window", "nested"), default="window")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kind", choices=KINDS)
     parser.add_argument("--json", type=Path)

@@ -38,7 +38,7 @@ from rislam_rt.storage.netcdf import read_dataset
 ROOT = Path(__file__).resolve().parents[1]
 SHORT = (
     *("--scene", str(ROOT / "scenes" / "paper_room"), "--set", "channel=image_source"),
-    *("--set", "slam.num_particles=40"),
+    *("--set", "slam.num_samples=40"),
 )
 RUN = (
     *("run", *SHORT, "--set", "cycles=8", "--set", "design.iterations=5"),

@@ -22,7 +22,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 SWEEP = (
-    *("--set", "channel=image_source", "--set", "cycles=5", "--set", "slam.num_particles=40"),
+    *("--set", "channel=image_source", "--set", "cycles=5", "--set", "slam.num_samples=40"),
     *("--set", 'schemes=["random"]', "--axis", "radio.reference_snr_db=-10,-5,0,5,10,15"),
     *("--axis", "slam.sigma_a=0.01,0.02,0.05,0.1", "--repeat", "5"),
 )

@@ -2,10 +2,11 @@
 
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.estimator import estimate, init, predict, revisit, smoothed, step
-from rislam_rt.slam.filter import FilterState, Outcome, StepInfo
+from rislam_rt.slam.nested_config import NestedConfig
+from rislam_rt.slam.step_info import Outcome, StepInfo
 
 __all__ = [
-    "FilterState",
+    "NestedConfig",
     "Outcome",
     "SlamConfig",
     "StartPrior",

@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.tracks import Glance, same_side
+from rislam_rt.slam.observations import Observations, same_side
 
 DIAGONAL = np.arange(3)
 
@@ -25,10 +25,10 @@ class Candidates(NamedTuple):
     log_odds: Floats
     """(C,) logarithm of the probability that it shows at all."""
     side: Integers
-    """(C,) (see `tracks.Glance`)."""
+    """(C,) (see `tracks.Observations`)."""
 
 
-def associate(candidates: Candidates, glance: Glance, gate: float, strangers: Floats | float) -> Integers:
+def associate(candidates: Candidates, observations: Observations, gate: float, strangers: Floats | float) -> Integers:
     """Measurement (C,) of each candidate, -1 for none: the assignment of the highest likelihood.
 
     A pair competes against "the candidate is missed and the measurement is new or false", of which `strangers` (M,) are
@@ -36,23 +36,23 @@ def associate(candidates: Candidates, glance: Glance, gate: float, strangers: Fl
     delay and cosines) do not compete at all.
     """
     chosen = np.full(len(candidates.seen), -1)
-    if not len(candidates.seen) or not len(glance.seen):
+    if not len(candidates.seen) or not len(observations.seen):
         return chosen
-    cost = pair_costs(candidates, glance, gate, strangers)
+    cost = pair_costs(candidates, observations, gate, strangers)
     rows, columns = scipy.optimize.linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     chosen[rows[good]] = columns[good]
     return chosen
 
 
-def pair_costs(candidates: Candidates, glance: Glance, gate: float, strangers: Floats | float) -> Floats:
+def pair_costs(candidates: Candidates, observations: Observations, gate: float, strangers: Floats | float) -> Floats:
     """(C, M): -2 log of the likelihood ratio of each pair against a stranger, 0 where it cannot be."""
-    noise = np.zeros((len(glance.seen), 3, 3))
-    noise[:, DIAGONAL, DIAGONAL] = glance.std**2
-    variance = candidates.log_amplitude_std[:, None] ** 2 + glance.log_amplitude_std**2
-    fade = (glance.log_amplitude - candidates.log_amplitude[:, None]) ** 2 / variance
-    allowed = (fade < gate) & same_side(candidates.side, glance.sides)
-    pairs = near_pairs(candidates.seen, candidates.covariance, glance.seen, noise, allowed, gate)
+    noise = np.zeros((len(observations.seen), 3, 3))
+    noise[:, DIAGONAL, DIAGONAL] = observations.std**2
+    variance = candidates.log_amplitude_std[:, None] ** 2 + observations.log_amplitude_std**2
+    fade = (observations.log_amplitude - candidates.log_amplitude[:, None]) ** 2 / variance
+    allowed = (fade < gate) & same_side(candidates.side, observations.sides)
+    pairs = near_pairs(candidates.seen, candidates.covariance, observations.seen, noise, allowed, gate)
     at = pairs.row, pairs.column
     cost = pairs.distance + fade[at] + pairs.log_det + np.log(variance[at]) + 4.0 * np.log(2.0 * np.pi)
     cost += (

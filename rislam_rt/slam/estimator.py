@@ -6,10 +6,11 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
-from rislam_rt.slam import filter as cycle
-from rislam_rt.slam import mapping, window
+from rislam_rt.slam import window
 from rislam_rt.slam.config import SlamConfig, StartPrior
-from rislam_rt.slam.filter import StepInfo
+from rislam_rt.slam.nested import filter as nested
+from rislam_rt.slam.nested import mapping as nested_map
+from rislam_rt.slam.step_info import StepInfo
 
 
 def init(
@@ -19,7 +20,7 @@ def init(
     """The start prior, and an empty map."""
     if config.filter == "window":
         return window.init(start, body, ris, sensor, config, rng=rng)
-    return cycle.init(start, body, ris, sensor, config, rng=rng)
+    return nested.init(start, body, ris, sensor, config, rng=rng)
 
 
 def step(
@@ -27,13 +28,13 @@ def step(
     *, rng: np.random.Generator,
 ) -> tuple[Any, StepInfo]:  # fmt: skip
     """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied."""
-    advance = window.step if isinstance(state, window.WindowState) else cycle.step
+    advance = window.step if isinstance(state, window.WindowState) else nested.step
     return advance(state, measurement, code, dt, heading, config, rng=rng)
 
 
 def predict(state: Any, dt: float, config: SlamConfig) -> SlamEstimate:
     """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent."""
-    ahead = window.predict if isinstance(state, window.WindowState) else mapping.predict
+    ahead = window.predict if isinstance(state, window.WindowState) else nested_map.predict
     return ahead(state, dt, config)
 
 
@@ -42,7 +43,7 @@ def revisit(state: Any, start: StartPrior, config: SlamConfig, *, rng: np.random
 
     The map keeps the covariance that it had; its frame is the earlier run's, and so must be the start's.
     """
-    again = window.revisit if isinstance(state, window.WindowState) else cycle.revisit
+    again = window.revisit if isinstance(state, window.WindowState) else nested.revisit
     return again(state, start, config, rng=rng)
 
 
@@ -55,4 +56,4 @@ def estimate(state: Any, config: SlamConfig) -> SlamEstimate:
     """Mean and covariance of the pose, equally likely samples of it, and the map."""
     if isinstance(state, window.WindowState):
         return window.estimate(state, config)
-    return mapping.estimate(state, config)
+    return nested_map.estimate(state, config)

@@ -33,9 +33,7 @@ def test_every_help_has_examples_of_options_that_are_there(name):
 
 
 def test_several_faults_are_several_lines(run, tmp_path):
-    (tmp_path / "mine.toml").write_text(
-        'name = "a"\nscheems = ["random"]\n[radio]\ncarier_ghz = 10\nnum_particles = 9\n'
-    )
+    (tmp_path / "mine.toml").write_text('name = "a"\nscheems = ["random"]\n[radio]\ncarier_ghz = 10\nnum_samples = 9\n')
     code, _, err = run("run", "mine.toml", "--scene", ROOT / "scenes" / "paper_room", "--set", "depth=-1")
     lines = err.splitlines()
     assert code == 2
@@ -45,7 +43,7 @@ def test_several_faults_are_several_lines(run, tmp_path):
     for place, meant in (
         ("scheems", "schemes"),
         ("radio.carier_ghz", "carrier_ghz"),
-        ("radio.num_particles", "slam."),
+        ("radio.num_samples", "slam."),
     ):
         assert f"mine.toml: {place}: unknown key; did you mean '{meant}" in told
     assert "error: --set: depth: " in told

@@ -10,7 +10,7 @@ from rislam_rt.cli import main
 
 ROOT = Path(__file__).parents[2]
 PIPELINE = str(ROOT / "pipelines" / "trace_then_slam.toml")
-TINY = ("--set", "channel=image_source", "--set", "cycles=3", "--set", "slam.num_particles=20",
+TINY = ("--set", "channel=image_source", "--set", "cycles=3", "--set", "slam.num_samples=20",
         "--set", 'schemes=["random"]')  # fmt: skip
 
 

@@ -7,10 +7,17 @@ import pytest
 
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.associate import Candidates, associate, inverse_3x3, pair_costs
-from rislam_rt.slam.expect import Expected
-from rislam_rt.slam.match import Merger, Outlook, candidates, hidden_tracks, merge_returns
+from rislam_rt.slam.nested.candidates import (
+    PredictedMeasurements,
+    UnresolvedGroups,
+    candidates,
+    hidden_tracks,
+    merge_returns,
+)
+from rislam_rt.slam.nested.measurement_prediction import Expected
+from rislam_rt.slam.nested.tracks import Tracks, begin, no_tracks
+from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import NONE, Returns
-from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance, Tracks, begin, no_tracks
 
 GATE, CLUTTER = 16.3, 0.016
 
@@ -33,10 +40,12 @@ def draw_candidates(count: int, *, rng: np.random.Generator) -> Candidates:
     )
 
 
-def glance(seen: Floats, log_amplitude: Floats, std: float = 0.02) -> Glance:
+def glance(seen: Floats, log_amplitude: Floats, std: float = 0.02) -> Observations:
     """Measurements as the filter looks at them."""
     count = len(seen)
-    return Glance(seen, np.full((count, 3), std), log_amplitude, np.full(count, 0.1), np.ones(count), np.zeros(count))
+    return Observations(
+        seen, np.full((count, 3), std), log_amplitude, np.full(count, 0.1), np.ones(count), np.zeros(count)
+    )
 
 
 def test_assignment_is_the_best_of_all() -> None:
@@ -109,18 +118,18 @@ def test_small_inverses(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(log_det, np.linalg.slogdet(matrix)[1], atol=1e-12)
 
 
-def outlook(seen: Floats, log_amplitude: Floats) -> Outlook:
+def outlook(seen: Floats, log_amplitude: Floats) -> PredictedMeasurements:
     """Returns that are expected there, and merge with nothing."""
     count = len(seen)
     legs = np.stack([np.arange(count), np.full(count, NONE), np.full(count, NONE)], axis=1)
     rows, ones = np.arange(count), np.ones(count, dtype=np.bool_)
-    alone = Merger(np.full(count, -1), ~ones, np.zeros((count, 3)), ~ones)
+    alone = UnresolvedGroups(np.full(count, -1), ~ones, np.zeros((count, 3)), ~ones)
     expected = Expected(
         Returns(legs, rows, rows), log_amplitude, np.full(count, 0.2), 0 * rows, rows, ones, np.full(count, -1), ones
     )
     spread = np.tile(1e-4 * np.eye(3), (count, 1, 1))
     cell = np.array([0.3, 0.5, 0.5])
-    return Outlook(
+    return PredictedMeasurements(
         expected, seen, spread, log_amplitude, np.full(count, 0.2), ones, alone, cell, np.full(count, UNTOLD)
     )
 
@@ -161,12 +170,12 @@ def test_reciprocals_come_out_halfway_and_shift_nothing() -> None:
     """A pair in one cell names each other's place; alone in its cell it is disturbed by nobody."""
     place = np.array([[5.0, 0.1, 0.1], [5.05, 0.12, 0.1], [9.0, 0.1, 0.1]])
     expected = _expected(np.array([1.0, 1.0, 1.0]))._replace(twin=np.array([1, 0, -1]))
-    merger = merge_returns(place, expected, no_tracks(4), np.array([0.3, 0.5, 0.5]), np.full(len(place), UNTOLD))
-    leader = int(np.flatnonzero(~merger.absorbed[:2])[0])
-    assert merger.partner[leader] == 1 - leader
-    assert merger.partner[2] == -1
-    assert not merger.absorbed[2]
-    np.testing.assert_array_equal(merger.disturbance[[leader, 2]], 0.0)
+    groups = merge_returns(place, expected, no_tracks(4), np.array([0.3, 0.5, 0.5]), np.full(len(place), UNTOLD))
+    leader = int(np.flatnonzero(~groups.absorbed[:2])[0])
+    assert groups.partner[leader] == 1 - leader
+    assert groups.partner[2] == -1
+    assert not groups.absorbed[2]
+    np.testing.assert_array_equal(groups.disturbance[[leader, 2]], 0.0)
 
 
 def test_disturbance_is_what_random_phases_make_of_a_weaker_path() -> None:
@@ -176,13 +185,13 @@ def test_disturbance_is_what_random_phases_make_of_a_weaker_path() -> None:
     """
     rng = np.random.default_rng(3)
     place = np.array([[5.0, 0.1, 0.1], [5.1, 0.2, 0.05]])
-    merger = merge_returns(
+    groups = merge_returns(
         place, _expected(np.array([1.0, 0.2])), no_tracks(4), np.array([0.3, 0.5, 0.5]), np.full(2, UNTOLD)
     )
     gain = np.stack([np.ones(20_000, complex), 0.2 * np.exp(2j * np.pi * rng.uniform(size=20_000))])
     total = gain.sum(axis=0)
     came = np.einsum("pn,pa->na", (gain * total.conj()).real / np.abs(total) ** 2, place)
-    np.testing.assert_allclose(merger.disturbance[0], np.sqrt(np.mean((came - place[0]) ** 2, axis=0)), rtol=0.06)
+    np.testing.assert_allclose(groups.disturbance[0], np.sqrt(np.mean((came - place[0]) ** 2, axis=0)), rtol=0.06)
 
 
 @pytest.mark.parametrize(

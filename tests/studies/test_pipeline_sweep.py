@@ -17,7 +17,7 @@ from rislam_rt.sweeps import build_cells, run_sweep
 
 ROOT = Path(__file__).parents[2]
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
-TINY = ("channel=image_source", "cycles=3", "slam.num_particles=20", 'schemes=["random"]')
+TINY = ("channel=image_source", "cycles=3", "slam.num_samples=20", 'schemes=["random"]')
 
 
 @pytest.fixture(scope="module")

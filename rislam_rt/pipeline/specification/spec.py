@@ -27,7 +27,7 @@ from rislam_rt.pipeline.specification.section import (
     Wide,
 )
 from rislam_rt.ris import PanelTolerance
-from rislam_rt.slam import SlamConfig
+from rislam_rt.slam import NestedConfig, SlamConfig
 from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
 from rislam_rt.slam.schemes.bp_slam_aoa import BpSlamAoaConfig
 from rislam_rt.slam.schemes.channel_slam import ChannelSlamConfig
@@ -44,7 +44,8 @@ def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()
     return section
 
 
-_Filter = _section("_Filter", SlamConfig, "Fields of `SlamConfig`.")
+_Filter = _section("_Filter", SlamConfig, "Fields of `SlamConfig`.", without=("nested",))
+_Nested = _section("_Nested", NestedConfig, "Fields of `NestedConfig`.")
 _Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.", without=("slot", "panels"))
 _BpSlam = _section("_BpSlam", BpSlamConfig, "Fields of `BpSlamConfig`.")
 _BpSlamAoa = _section("_BpSlamAoa", BpSlamAoaConfig, "Fields of `BpSlamAoaConfig`.")
@@ -57,6 +58,10 @@ _Hardware = _section("_Hardware", HardwareConfig, "Fields of `HardwareConfig`.")
 
 class SlamSection(_Filter):  # type: ignore[misc, valid-type]
     """The filter's settings, SI units."""
+
+
+class NestedSection(_Nested):  # type: ignore[misc, valid-type]
+    """Settings of the filter `nested` beside those of `slam`, SI units."""
 
 
 class BpSlamSection(_BpSlam):  # type: ignore[misc, valid-type]
@@ -231,6 +236,7 @@ class PipelineSpec(Section):
     start: StartSection = StartSection()
     told: AssumedSection = AssumedSection()
     slam: SlamSection = SlamSection()
+    nested: NestedSection = NestedSection()
     bp_slam: BpSlamSection = BpSlamSection()
     bp_slam_aoa: BpSlamAoaSection = BpSlamAoaSection()
     channel_slam: ChannelSlamSection = ChannelSlamSection()
@@ -315,7 +321,7 @@ def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
     return Settings(
         radio,
         receiver,
-        SlamConfig(**spec.slam.model_dump()),
+        SlamConfig(**spec.slam.model_dump(), nested=NestedConfig(**spec.nested.model_dump())),
         build_design(spec.design),
         BpSlamConfig(**spec.bp_slam.model_dump()),
         BpSlamAoaConfig(**spec.bp_slam_aoa.model_dump()),

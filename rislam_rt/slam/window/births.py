@@ -3,8 +3,8 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.returns import TX, linearise
-from rislam_rt.slam.tracks import PANEL
 from rislam_rt.slam.window import gauss, tracks
 from rislam_rt.slam.window.book import enter, idents
 from rislam_rt.slam.window.context import Context, resolve

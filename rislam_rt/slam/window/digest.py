@@ -11,7 +11,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
-from rislam_rt.slam.tracks import PANEL
+from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.window.gauss import Window, now, pose_covariance, poses
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log

@@ -9,7 +9,7 @@ a jump to where the map's returns and what is heard agree.
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.tracks import Glance
+from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window import egomotion, gauss
 from rislam_rt.slam.window.egomotion import Rates
 from rislam_rt.slam.window.factor import inverse
@@ -53,7 +53,7 @@ def advance(log_odds: float, score: float, followed: int, kept: int) -> float:
     return float(np.clip(np.log(lost / (1.0 - lost)) - score, SURE, -SURE))
 
 
-def jump(view: Look, glance: Glance) -> Floats:
+def jump(view: Look, glance: Observations) -> Floats:
     """(3,) [m] by which an agent that hears this is elsewhere than thought: on which most returns agree."""
     lead = view.groups.leader
     expected, heard = view.expected.seen[lead], glance.seen

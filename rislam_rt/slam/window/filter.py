@@ -8,10 +8,10 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig, StartPrior
-from rislam_rt.slam.filter import REMOVED, UNUSED, Outcome, StepInfo, glance_of, is_los, stranger_density
 from rislam_rt.slam.inputs import check_sides, check_step
+from rislam_rt.slam.observations import Observations, is_los, observations_of, stranger_density
 from rislam_rt.slam.returns import TX
-from rislam_rt.slam.tracks import Glance
+from rislam_rt.slam.step_info import REMOVED, UNUSED, Outcome, StepInfo
 from rislam_rt.slam.window import divergence, gauss, motion, recovery, tracks
 from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.book import Book, empty_book, idents, image_ident
@@ -68,7 +68,7 @@ def step(
     state = _move(state, dt, heading)
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
     scene, book = state.scene, state.book
-    glance = glance_of(measurement, scene.radio)
+    glance = observations_of(measurement, scene.radio)
     landmark = np.where(is_los(glance, scene.body), REMOVED, UNUSED)
     order = np.lexsort(glance.seen.T[::-1])
     free = order[landmark[order] == UNUSED]
@@ -168,7 +168,7 @@ manoeuvre is looked for."""
 
 
 def _notice(
-    state: WindowState, heading: float, code: RisCode | None, glance: Glance, strangers: Floats
+    state: WindowState, heading: float, code: RisCode | None, glance: Observations, strangers: Floats
 ) -> tuple[WindowState, Look]:
     """What is seen, and the belief that explains it best: as it was, with a manoeuvre in the last steps, or a jump.
 
@@ -293,7 +293,7 @@ def liven(state: WindowState) -> WindowState:
     return state._replace(window=window._replace(precision=precision), level=level)
 
 
-def _unexplained(state: WindowState, glance: Glance) -> float:
+def _unexplained(state: WindowState, glance: Observations) -> float:
     """Components per metre, unit of each cosine and e-fold that nothing explained in the cycle before."""
     if not len(glance.seen):
         return 0.0
@@ -313,7 +313,7 @@ class _Followed(NamedTuple):
 
 
 def _follow(
-    state: WindowState, mean: Floats, glance: Glance, free: Integers, dt: float, turn: float, bend: float
+    state: WindowState, mean: Floats, glance: Observations, free: Integers, dt: float, turn: float, bend: float
 ) -> _Followed:
     """Tracks extended, begun and ended by the components that nothing explains."""
     speed = float(np.linalg.norm(mean[3:6]))

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.moments import even_draws, poses_of
-from rislam_rt.slam.tracks import OTHER, UNTOLD
+from rislam_rt.slam.observations import OTHER, UNTOLD
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.gauss import poses

@@ -6,8 +6,8 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RisCode
+from rislam_rt.slam.observations import UNTOLD, Observations
 from rislam_rt.slam.returns import NONE, TX, Poses
-from rislam_rt.slam.tracks import UNTOLD, Glance
 from rislam_rt.slam.window.book import Book, learn_ratio
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene
 from rislam_rt.slam.window.gauss import Window
@@ -72,7 +72,7 @@ def visible(expected: Expected, groups: Clusters, clear: Floats) -> Floats:
 
 def learn(
     sights: Sights, book: Book, window: Window, expected: Expected, groups: Clusters, shows: Floats, row: Integers,
-    pick: Integers, raw: Floats, glance: Glance, poses: Poses, scene: Scene, code: RisCode | None,
+    pick: Integers, raw: Floats, glance: Observations, poses: Poses, scene: Scene, code: RisCode | None,
 ) -> tuple[Sights, Book]:  # fmt: skip
     """After clusters `row` (A,) were seen as components `pick` (A,) with residuals of mean square `raw` (A,)."""
     if not len(expected.seen):
@@ -117,8 +117,8 @@ def _existence(book: Book, expected: Expected, groups: Clusters, hit: Floats, mi
 
 
 def _strengths(
-    book: Book, window: Window, expected: Expected, groups: Clusters, row: Integers, pick: Integers, glance: Glance,
-    poses: Poses, scene: Scene, code: RisCode | None,
+    book: Book, window: Window, expected: Expected, groups: Clusters, row: Integers, pick: Integers,
+    glance: Observations, poses: Poses, scene: Scene, code: RisCode | None,
 ) -> Book:  # fmt: skip
     """Walls' losses, and who the points are, from components that came out alone."""
     lead, alone = groups.leader[row], groups.partner[row] < 0
@@ -133,8 +133,8 @@ def _strengths(
 
 
 def _identities(
-    book: Book, window: Window, expected: Expected, groups: Clusters, row: Integers, pick: Integers, glance: Glance,
-    poses: Poses, scene: Scene, code: RisCode | None,
+    book: Book, window: Window, expected: Expected, groups: Clusters, row: Integers, pick: Integers,
+    glance: Observations, poses: Poses, scene: Scene, code: RisCode | None,
 ) -> Book:  # fmt: skip
     """What amplitude or silence of points that come straight, and alone, tells of who they are."""
     component = np.full(len(groups.leader), -1)

@@ -7,8 +7,8 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.returns import linearise
-from rislam_rt.slam.tracks import Glance
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.gauss import Quadratic, Window, poses
@@ -30,7 +30,7 @@ class Log(NamedTuple):
     log_amplitude_std: Floats
     """(N,)."""
     side: Integers
-    """(N,) (see `tracks.Glance`)."""
+    """(N,) (see `tracks.Observations`)."""
     track: Integers
     """(N,) ident of the track that it belongs to, -1 for none."""
     form: Integers
@@ -58,7 +58,7 @@ def empty_log() -> Log:
     return Log(count, wide, wide, none, none, count, count, np.zeros((0, 2, 5), dtype=np.int64), none, wide)
 
 
-def append(log: Log, glance: Glance, cycle: int, first: int) -> Log:
+def append(log: Log, glance: Observations, cycle: int, first: int) -> Log:
     """The log with a cycle's components, unexplained as yet, and without those before cycle `first`."""
     count, old = len(glance.seen), log.take(slice(np.searchsorted(log.cycle, first), None))
     fresh = Log(

@@ -9,8 +9,8 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.slam.associate import Candidates, pair_costs, squared_distance
 from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import TX, Poses
-from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD, Glance
 from rislam_rt.slam.window import gauss
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, cluster, expect
@@ -44,7 +44,7 @@ class Look(NamedTuple):
     """Mean square of the innovations, normalised: about 1 when all is well."""
 
 
-def echoes(glance: Glance, cell: Floats) -> Booleans:
+def echoes(glance: Observations, cell: Floats) -> Booleans:
     """(M,) components that are others over again: what motion within the slot leaves of a strong one in the difference
     of two alternated codes.
 
@@ -64,8 +64,8 @@ FAR_STRONGER = 1.0
 
 
 def look(
-    window: Window, book: Book, sights: Sights, heading: float, scene: Scene, code: RisCode | None, glance: Glance,
-    strangers: Floats,
+    window: Window, book: Book, sights: Sights, heading: float, scene: Scene, code: RisCode | None,
+    glance: Observations, strangers: Floats,
 ) -> Look:  # fmt: skip
     """Expect, cluster, associate."""
     mean, covariance = gauss.now(window)
@@ -95,7 +95,7 @@ def return_sides(forms: Integers, book: Book) -> Integers:
 
 
 def _associate(
-    expected: Expected, groups: Clusters, shows: Floats, scatter: Floats, covariance: Floats, glance: Glance,
+    expected: Expected, groups: Clusters, shows: Floats, scatter: Floats, covariance: Floats, glance: Observations,
     sides: Integers | None, strangers: Floats,
 ) -> tuple[Integers, Integers, float, float]:  # fmt: skip
     """Rows of the clusters that were seen, the components that they were seen as, the log likelihood gained over

@@ -26,7 +26,7 @@ from rislam_rt.slam.identity import (
     weigh_silence,
 )
 from rislam_rt.slam.moments import even_draws, square_root
-from rislam_rt.slam.tracks import PANEL, UNTOLD
+from rislam_rt.slam.observations import PANEL, UNTOLD
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.numerics import CERTAIN, DRAWS
 
@@ -91,7 +91,7 @@ class Sight(NamedTuple):
     amplitude: Floats
     """(N,) measured; what it is without a measurement does not matter."""
     side: Integers
-    """(N,) of the measurement (see `tracks.Glance`)."""
+    """(N,) of the measurement (see `tracks.Observations`)."""
     seen: Booleans
     """(N,) whether there is a measurement."""
 

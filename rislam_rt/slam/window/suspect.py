@@ -5,9 +5,9 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import PanelCandidate, RisCode
 from rislam_rt.slam.moments import even_draws
+from rislam_rt.slam.observations import OTHER
 from rislam_rt.slam.returns import Poses, reflect
-from rislam_rt.slam.suspect import DEEP, DISMISSAL, PATIENCE, places
-from rislam_rt.slam.tracks import OTHER
+from rislam_rt.slam.ris_candidate import DEEP, DISMISSAL, PATIENCE, places
 from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.expect import Scene
 from rislam_rt.slam.window.levels import LEVELS

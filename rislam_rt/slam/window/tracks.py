@@ -7,7 +7,7 @@ import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.associate import Candidates, pair_costs
-from rislam_rt.slam.tracks import Glance
+from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.numerics import GATE
 from rislam_rt.slam.window.panel import Identity, unknown
@@ -79,7 +79,9 @@ def advance(tracks: Tracks, dt: float, turn: float, bend: Floats) -> Tracks:
     return tracks._replace(mean=mean, covariance=move @ tracks.covariance @ move.T + noise)
 
 
-def match(tracks: Tracks, glance: Glance, free: Integers, cycle: int, strangers: float) -> tuple[Integers, Integers]:
+def match(
+    tracks: Tracks, glance: Observations, free: Integers, cycle: int, strangers: float
+) -> tuple[Integers, Integers]:
     """Rows of tracks and the free components that continue them; `strangers` is the density of new ones."""
     count = len(tracks.ident)
     if not count or not len(free):
@@ -97,7 +99,7 @@ def match(tracks: Tracks, glance: Glance, free: Integers, cycle: int, strangers:
     return rows[good], free[columns[good]]
 
 
-def extend(tracks: Tracks, rows: Integers, glance: Glance, picks: Integers, cycle: int) -> Tracks:
+def extend(tracks: Tracks, rows: Integers, glance: Observations, picks: Integers, cycle: int) -> Tracks:
     """Tracks `rows` (A,) updated by components `picks` (A,)."""
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
     prior, spread = mean[rows], covariance[rows]
@@ -110,7 +112,7 @@ def extend(tracks: Tracks, rows: Integers, glance: Glance, picks: Integers, cycl
     return tracks._replace(mean=mean, covariance=covariance, log_amplitude=level, last=last, hits=hits)
 
 
-def start(tracks: Tracks, glance: Glance, picks: Integers, rate: Floats, cycle: int) -> tuple[Tracks, Integers]:
+def start(tracks: Tracks, glance: Observations, picks: Integers, rate: Floats, cycle: int) -> tuple[Tracks, Integers]:
     """One new track for each of the components `picks` (A,), and their idents; `rate` (A, 3) is the rates' spread."""
     count = len(picks)
     ident = tracks.next_ident + np.arange(count)

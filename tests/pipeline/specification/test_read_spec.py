@@ -12,11 +12,12 @@ from rislam_rt.pipeline import PipelineSpec, load_spec
 from rislam_rt.pipeline.specification.spec import (
     DesignSection,
     HardwareSection,
+    NestedSection,
     ReceiverSection,
     SlamSection,
     build_settings,
 )
-from rislam_rt.slam import SlamConfig
+from rislam_rt.slam import NestedConfig, SlamConfig
 
 MINIMAL = 'name = "small"\n'
 
@@ -41,7 +42,8 @@ def test_defaults_are_those_of_the_records(write):
 @pytest.mark.parametrize(
     ("section", "record", "without"),
     [
-        (SlamSection, SlamConfig, set()),
+        (SlamSection, SlamConfig, {"nested"}),  # a table of its own
+        (NestedSection, NestedConfig, set()),
         (ReceiverSection, ReceiverConfig, {"slot", "panels"}),  # it is `budget.measure_s`
         (HardwareSection, HardwareConfig, set()),
         (DesignSection, DesignConfig, {"certify"}),
@@ -80,8 +82,8 @@ def test_override_wins_over_the_file(write):
         ("", "name", "missing"),
         (MINIMAL + "[radio]\ncarier_ghz = 5.0\n", "radio.carier_ghz", "carrier_ghz"),
         (MINIMAL + "[radio.array]\nrows = 0\n", "radio.array.rows", "greater than or equal to 1"),
-        (MINIMAL + '[slam]\nnum_particles = "many"\n', "slam.num_particles", "many"),
-        (MINIMAL + "[slam]\nnum_particles = -3\n", "slam.num_particles", "-3"),
+        (MINIMAL + '[slam]\nnum_samples = "many"\n', "slam.num_samples", "many"),
+        (MINIMAL + "[slam]\nnum_samples = -3\n", "slam.num_samples", "-3"),
         (MINIMAL + "[radio]\nreference_snr_db = 1.0\nnoise_psd = 1.0\n", "radio", "not both"),
         (MINIMAL + 'schemes = ["random", "random"]\n', "schemes", "at most once"),
         (MINIMAL + 'schemes = ["bp"]\n', "schemes[0]", "optimized"),

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.nested.cloud import Engine
-from rislam_rt.slam.nested.machine import pick_engine
+from rislam_rt.slam.nested.particles.backend import pick_engine
+from rislam_rt.slam.nested.particles.cloud import Engine
 
 
 @pytest.fixture(params=["numpy", "drjit"])

@@ -7,10 +7,10 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
 from rislam_rt.slam import SlamConfig, StartPrior
-from rislam_rt.slam.birth import Birth, Verdict
-from rislam_rt.slam.engine import Engine
-from rislam_rt.slam.hypotheses import IMAGE, POINT, History, first_guess, fit_feature
 from rislam_rt.slam.moments import Moments, poses_of
+from rislam_rt.slam.nested.birth import Birth, Verdict
+from rislam_rt.slam.nested.hypotheses import IMAGE, POINT, History, fit_feature, initial_value
+from rislam_rt.slam.nested.particles import operations
 from rislam_rt.slam.returns import NONE, Returns, observe
 
 BODY = Body(np.array([-0.04388, -0.02397, 0.0]), np.array([0.04388, 0.02397, 0.0]))
@@ -47,7 +47,7 @@ class Run(NamedTuple):
     """After every cycle."""
     nees: Floats
     """(K,) of horizontal position and velocity, chi^2 with 4 degrees of freedom."""
-    particles: object
+    particles: operations.Particles
     resampled: int
 
 
@@ -73,32 +73,32 @@ def measure(truth: Truth, cycle: int, std: Floats, *, rng: np.random.Generator) 
     return np.asarray(seen + std * rng.standard_normal(seen.shape))
 
 
-def walk(
-    engine: Engine, config: SlamConfig, cycles: int, walls: int = 0, std: Floats = STD, *, rng: np.random.Generator
-) -> Run:
+def walk(config: SlamConfig, cycles: int, walls: int = 0, std: Floats = STD, *, rng: np.random.Generator) -> Run:
     """A filter led through a walk; its start prior is as wrong as it says."""
     rng, own = rng.spawn(2)
     truth = room(cycles, walls, rng=rng)
     wrong = 0.01 * rng.standard_normal((2, 3)) * [1.0, 1.0, 0.0]
     start = StartPrior(START + wrong[0], VELOCITY + wrong[1], HEADING)
-    particles = engine.begin(start, config, rng=own)
+    particles = operations.begin(start, config, rng=own)
     history: list[Floats] = []
     moments, nees, resampled = [], [], 0
     for cycle in range(1, cycles + 1):
         accelerate = SIGMA_A * config.axes
-        particles = engine.propagate(particles, CYCLE, accelerate, HEADING, cycle % config.window, config, rng=own)
+        particles = operations.propagate(
+            particles, CYCLE, accelerate, HEADING, cycle % config.nested.window, config, rng=own
+        )
         seen = measure(truth, cycle, std, rng=rng)
         if cycle <= FIRST:
             history.append(seen)
         if cycle == FIRST:
-            particles = born(engine, particles, truth, np.array(history), std, rng=own)
+            particles = born(particles, truth, np.array(history), std, rng=own)
         if cycle > FIRST:
             wide = np.tile(std, (len(seen), 1))
-            told = engine.update(particles, truth.returns, truth.returns, truth.anchor, BODY, seen, wide, rng=own)
+            told = operations.update(particles, truth.returns, truth.returns, truth.anchor, BODY, seen, wide, rng=own)
             particles = told.particles
-        particles, done = engine.thin(particles, config, rng=own)
+        particles, done = operations.resample(particles, config, rng=own)
         resampled += done
-        moments.append(engine.moments(particles))
+        moments.append(operations.moments(particles))
         nees.append(pose_nees(moments[-1], truth, cycle))
     return Run(moments, np.array(nees), particles, resampled)
 
@@ -111,23 +111,23 @@ def pose_nees(moments: Moments, truth: Truth, cycle: int) -> float:
 
 
 def born(
-    engine: Engine, particles: object, truth: Truth, history: Floats, std: Floats, *, rng: np.random.Generator
-) -> object:
+    particles: operations.Particles, truth: Truth, history: Floats, std: Floats, *, rng: np.random.Generator
+) -> operations.Particles:
     """Landmarks from the first cycles, as the front end would hand them over."""
     slots = np.arange(1, FIRST + 1)
-    position, heading = engine.trail(particles, slots)
+    position, heading = operations.trail(particles, slots)
     poses = poses_of(position, heading, BODY)
-    known = engine.moments(particles).position
+    known = operations.moments(particles).position
     for row in range(history.shape[1]):
         wall = row >= len(POINTS)
         kind, parent = (IMAGE, 0) if wall else (POINT, -1)
-        point = engine.moments(particles).features[0] if wall else None
+        point = operations.moments(particles).features[0] if wall else None
         past = History(history[:, row], np.tile(std, (FIRST, 1)), poses, np.zeros(FIRST), 0.0, np.zeros((6, 0)))
         anchor = truth.anchor[row]
-        first = first_guess(kind, point, anchor, past)
+        first = initial_value(kind, point, anchor, past)
         assert first is not None
         fit = fit_feature(kind, first, point, anchor, past, 10)
         birth = Birth(Verdict(kind, parent, fit), anchor, slots, past.seen, past.std)
-        particles = engine.settle(particles, birth, BODY, rng=rng)
+        particles = operations.initialise_landmark(particles, birth, BODY, rng=rng)
     assert known.shape == (3,)
     return particles

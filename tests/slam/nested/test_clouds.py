@@ -5,10 +5,10 @@ import pytest
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.slam.nested.cloud import HOPELESS, Cloud, Engine, Kernel, kernel_width, restoring_map
-from rislam_rt.slam.nested.machine import pick_engine
-from rislam_rt.slam.nested.numpy_engine import NumpyEngine
-from rislam_rt.slam.nested.sightline import Sighting, linear_sightline, pack, trace_sightline
+from rislam_rt.slam.nested.particles.backend import pick_engine
+from rislam_rt.slam.nested.particles.cloud import HOPELESS, Cloud, Engine, Kernel, kernel_width, restoring_map
+from rislam_rt.slam.nested.particles.numpy_engine import NumpyEngine
+from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, pack, trace_sightline
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, observe
 
 N, M = 12, 240

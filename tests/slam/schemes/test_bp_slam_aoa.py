@@ -12,12 +12,13 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Measurement, SensorModel
 from rislam_rt.slam import Outcome, StartPrior
-from rislam_rt.slam.filter import REMOVED, free_space
+from rislam_rt.slam.observations import free_space
 from rislam_rt.slam.schemes import bp_slam_aoa
 from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, born, hypothesise
 from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, Ends, GaussianFeatures, look, prune, returns_of
 from rislam_rt.slam.schemes.bp_slam_aoa.update import CandidatePairs, View, absorb, claims, likelihoods, spread_of
 from rislam_rt.slam.schemes.shared.course import Course
+from rislam_rt.slam.step_info import REMOVED
 
 CONFIG = bp_slam_aoa.BpSlamAoaConfig(sigma_a=0.01)
 SENSOR = SensorModel(RADIO, false_alarms=0.2)

@@ -11,8 +11,8 @@ from rislam_rt import slam
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import SensorModel
 from rislam_rt.slam import Outcome
-from rislam_rt.slam.filter import REMOVED
 from rislam_rt.slam.schemes import RIVALS, bp_slam, channel_slam
+from rislam_rt.slam.step_info import REMOVED
 
 SCHEMES = [
     pytest.param(bp_slam, bp_slam.BpSlamConfig(sigma_a=0.01, planes=False), id="bp_slam"),

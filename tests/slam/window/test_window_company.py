@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from rislam_rt.slam.tracks import OTHER, PANEL
+from rislam_rt.slam.observations import OTHER, PANEL
 from rislam_rt.slam.window.births import _company
 from rislam_rt.slam.window.numerics import ALIGNED
 from rislam_rt.slam.window.steps import HEAD

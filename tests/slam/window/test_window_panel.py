@@ -17,8 +17,8 @@ from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.identity import MODEL_ERROR
+from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.returns import TX as MOVING
-from rislam_rt.slam.tracks import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.window.book import empty_book, enter
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.look import return_sides

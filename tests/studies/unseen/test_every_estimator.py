@@ -39,7 +39,7 @@ class Case(NamedTuple):
 
 
 LANDMARKS = {"use_vt": False}
-NESTED = {"filter": "nested", "use_vt": False, "machine": "numpy", "agent_particles": 100, "landmark_particles": 200}
+NESTED = {"filter": "nested", "use_vt": False}
 CASES = [
     Case("default", "random", {}, 103, 0.05, 50.0, 1.0),
     Case("default", "random", {}, 233, 0.05, 20.0, 0.55),
@@ -102,6 +102,7 @@ def _run(case: Case, estimator: Estimator | None) -> dict[str, Any]:
     content = {
         "name": "accuracy", "channel": "image_source", "depth": 1, "cycles": CYCLES, "schemes": [case.scheme],
         "motion": {"sigma_a_m_s2": 0.01}, "start": {"velocity_std_m_s": 0.03}, "slam": case.settings,
+        "nested": {"engine": "numpy", "num_agents": 100, "num_points": 200},
     }  # fmt: skip
     spec = PipelineSpec.model_validate(content)
     room, setup = find_setup(case.room, trace_key(spec))

@@ -13,8 +13,8 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.config import StartPrior
-from rislam_rt.slam.filter import REMOVED, UNUSED, StepInfo, glance_of, is_los
 from rislam_rt.slam.inputs import check_step
+from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import absorb, claims, is_strong, newborn
@@ -23,6 +23,7 @@ from rislam_rt.slam.schemes.shared.ranges import Bistatic
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, outcome_of, reported
 from rislam_rt.slam.schemes.shared.scan import Odds, Scan, birth_ratio
 from rislam_rt.slam.schemes.shared.sums import Sight, Sums, born, carry, join, kinds_of, look, no_sums, prune, spread_of
+from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 FEWEST_FALSE = 1e-3
 """Mean number of false ranges a scan that is reckoned with at least, so that no range is ever held for certain."""
@@ -110,7 +111,7 @@ def step(
     check_step(dt, heading)
     odds = told(config, state.sensor)
     state = _move(state, dt, np.full(state.course.axes, config.sigma_a), config)._replace(heading=float(heading))
-    glance = glance_of(measurement, state.sensor.radio)
+    glance = observations_of(measurement, state.sensor.radio)
     free = ~is_los(glance, state.body)
     if not config.planes:
         free &= ~is_strong(glance.ratio, config.specular_ratio)

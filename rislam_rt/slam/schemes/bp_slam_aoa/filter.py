@@ -9,8 +9,8 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.config import StartPrior
-from rislam_rt.slam.filter import REMOVED, UNUSED, StepInfo, free_space, glance_of, is_los
 from rislam_rt.slam.inputs import check_step
+from rislam_rt.slam.observations import free_space, is_los, observations_of
 from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, born, hypothesise
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.features import Ends, GaussianFeatures, carry, join, look, no_features, prune
@@ -20,6 +20,7 @@ from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import is_strong
 from rislam_rt.slam.schemes.shared.course import Course, Step, advance
 from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of
+from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 LIVELY_STRIDE = 5
 """The course's stride while steps are lively."""
@@ -132,7 +133,7 @@ def estimate(state: BpSlamAoaState, config: BpSlamAoaConfig) -> SlamEstimate:
 def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConfig) -> tuple[ComponentScan, Integers]:
     """The components without the direct path (and wall returns that are set aside), and their rows."""
     sensor = state.sensor
-    glance = glance_of(measurement, sensor.radio)
+    glance = observations_of(measurement, sensor.radio)
     aside = is_los(glance, state.body) | is_strong(glance.ratio, None if config.use_vt else config.specular_ratio)
     rows = np.flatnonzero(~aside)
     glance = glance.take(rows)

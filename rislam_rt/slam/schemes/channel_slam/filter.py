@@ -16,8 +16,8 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.config import StartPrior
-from rislam_rt.slam.filter import REMOVED, UNUSED, StepInfo, glance_of, is_los
 from rislam_rt.slam.inputs import check_step
+from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.channel_slam import tracker
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
 from rislam_rt.slam.schemes.channel_slam.tracker import Tracks, assign, follow, no_tracks
@@ -28,6 +28,7 @@ from rislam_rt.slam.schemes.shared.ranges import Bistatic
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, outcome_of, reported
 from rislam_rt.slam.schemes.shared.scan import Scan
 from rislam_rt.slam.schemes.shared.sums import Sight, Sums, born, carry, join, kinds_of, look, no_sums, prune, spread_of
+from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 STRAIN_RATE = 0.1
 """Share of the latest cycle in the running means of squared innovations."""
@@ -92,7 +93,7 @@ def step(
     """
     check_step(dt, heading)
     state = _move(state, dt, config)._replace(heading=float(heading))
-    glance = glance_of(measurement, state.sensor.radio)
+    glance = observations_of(measurement, state.sensor.radio)
     strong, free = is_strong(glance.ratio, config.specular_ratio), ~is_los(glance, state.body)
     rows = np.flatnonzero(free if config.planes else free & ~strong)
     scan = Scan(glance.seen[rows, 0], np.maximum(glance.std[rows, 0], config.smallest_std))

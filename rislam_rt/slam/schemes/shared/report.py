@@ -7,10 +7,10 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body, MapEstimate, SlamEstimate
-from rislam_rt.slam.filter import Outcome
 from rislam_rt.slam.schemes.shared.course import Course
 from rislam_rt.slam.schemes.shared.gauge import over_all_turns
 from rislam_rt.slam.schemes.shared.sums import POINT, Sums, unit_of
+from rislam_rt.slam.step_info import Outcome
 
 STEP = 1e-6
 """Step of central differences [m, 1, rad]."""

@@ -1,0 +1,302 @@
+"""Agent particles, each with a cloud of landmark particles for every landmark (eqs. `landmarkRenew`, `agentRenew`)."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.angles import unit
+from rislam_rt.slam.moments import POSE, Moments, normalised, where
+from rislam_rt.slam.nested.particles import agents
+from rislam_rt.slam.nested.particles.cloud import HOPELESS, Cloud, Engine, Kernel, kernel_width
+from rislam_rt.slam.nested.particles.kld_sampling import num_agents, num_points
+from rislam_rt.slam.nested.particles.sightline import Sighting, pack
+from rislam_rt.slam.nested_config import NestedConfig
+
+PRIMES = (7919, 5003, 3001, 1009, 409, 211, 101, 53, 29, 13, 7, 5, 3)
+"""Strides of the permutations; one that does not divide M is taken."""
+SPARSE = 0.5
+"""Share of the blocks in use below which a cloud is written anew without the others."""
+PROPOSAL = 1.5
+"""Standard deviations of a new cloud over those of the Gaussian that it is drawn from."""
+
+
+class Nested(NamedTuple):
+    """N agent particles with F landmarks."""
+
+    position: Floats
+    """(N, 3) [m]."""
+    velocity: Floats
+    """(N, 3) [m/s]."""
+    heading: Floats
+    """(N,) [rad]."""
+    log_weight: Floats
+    """(N,), normalised."""
+    trail: Floats
+    """(W, N, 4) positions [m] and headings [rad] of the last W cycles, each cycle at row `cycle % W`."""
+    clouds: tuple[Cloud, ...]
+    """F of them."""
+    centre: Floats
+    """(N, F, 3) [m] where a cloud's offsets count from."""
+    mean: Floats
+    """(N, F, 3) [m] of each cloud."""
+    covariance: Floats
+    """(N, F, 3, 3) [m^2] of each cloud, given the agent particle."""
+    ess: Floats
+    """(F,) effective share of landmark particles, over the agent particles on average."""
+    updates: Integers
+    """(F,) measurements that each landmark has had."""
+    shift: Floats
+    """(3, 3) [m^2] covariance of a shift of everything together, about which no return says anything: the error of the
+    start's position. It is kept aside and exact, so that no resampling can wear it out."""
+    follow: Floats
+    """(F, 3, 3) how a landmark moves with such a shift: a point as it does, the image of a fixed anchor in a wall by
+    twice its part across the wall."""
+
+    @property
+    def weight(self) -> Floats:
+        """(N,), summing to one."""
+        return np.exp(self.log_weight)
+
+
+def start(pose: Floats, shift: Floats, window: int) -> Nested:
+    """Agent particles (N, 7) of equal weight (position, velocity, heading), and an empty map."""
+    count = len(pose)
+    trail = np.tile(pose[:, [0, 1, 2, 6]], (window, 1, 1))
+    empty, none, spread = np.zeros((count, 0, 3)), np.zeros(0, dtype=np.int64), np.zeros((count, 0, 3, 3))
+    weight = np.full(count, -np.log(count))
+    return Nested(
+        pose[:, :3],
+        pose[:, 3:6],
+        pose[:, 6],
+        weight,
+        trail,
+        (),
+        empty,
+        empty,
+        spread,
+        np.zeros(0),
+        none,
+        shift,
+        np.zeros((0, 3, 3)),
+    )
+
+
+def draw_start(mean: Floats, std: Floats, count: int, window: int, *, rng: np.random.Generator) -> Nested:
+    """Agent particles from a Gaussian over position, velocity and heading (7,), with its moments exactly.
+
+    The position's error is a shift of everything and is not sampled.
+    """
+    normal = agents.standardise(np.full(count, 1.0 / count), rng.standard_normal((count, 7)))
+    normal[:, :3] = 0.0
+    return start(mean + std * normal, np.diag(std[:3] ** 2), window)
+
+
+def propagate(belief: Nested, dt: float, accelerate: Floats, turn: float, *, rng: np.random.Generator) -> Nested:
+    """Discrete white-noise acceleration: constant over the cycle, standard deviations `accelerate` (3,) [m/s^2].
+
+    `turn` [rad] is that of a random step of the heading.
+    """
+    noise = agents.exact_noise(joint(belief), 4, rng=rng)
+    acceleration = noise[:, :3] * accelerate
+    position = belief.position + dt * belief.velocity + 0.5 * dt**2 * acceleration
+    velocity, heading = belief.velocity + dt * acceleration, belief.heading + turn * noise[:, 3]
+    return belief._replace(position=position, velocity=velocity, heading=heading)
+
+
+def absorb(belief: Nested, owner: int, sightings: Sequence[Sighting], engine: Engine) -> tuple[Nested, float]:
+    """Weights after returns that speak of landmark `owner`, and the log evidence of what was measured.
+
+    The previous weight enters once, however many returns there are. If no particle can explain them, the belief stays
+    as it was and the evidence is minus infinity.
+    """
+    cloud, count = belief.clouds[owner], len(belief.log_weight)
+    cloud, sums = engine.weigh(cloud, tuple(sighting.kind for sighting in sightings), pack(sightings, count))
+    possible = np.where(sums.log_total > 0.1 * HOPELESS, sums.log_total, -np.inf)
+    likely = belief.log_weight + possible
+    top = float(likely.max())
+    log_weight, evidence = normalised(likely - top if np.isfinite(top) else likely)
+    if not np.isfinite(evidence):
+        return belief, -np.inf
+    mean, covariance = belief.mean.copy(), belief.covariance.copy()
+    ess, updates = belief.ess.copy(), belief.updates.copy()
+    mean[:, owner] = belief.centre[:, owner] + sums.mean
+    covariance[:, owner] = sums.covariance
+    ess[owner] = np.exp(log_weight) @ sums.ess / cloud.size
+    updates[owner] += len(sightings)
+    clouds = (*belief.clouds[:owner], cloud, *belief.clouds[owner + 1 :])
+    moved = belief._replace(mean=mean, covariance=covariance, ess=ess, updates=updates)
+    return moved._replace(log_weight=log_weight, clouds=clouds), evidence + top
+
+
+def renew(
+    belief: Nested, spans: Floats, config: NestedConfig, engine: Engine, *, rng: np.random.Generator
+) -> tuple[Nested, bool]:
+    """Resample what has degenerated: clouds first, then agent particles (whether these were is told).
+
+    Parameters
+    ----------
+    spans
+        (W,) time [s] from each row of the trail to now.
+    """
+    for owner in np.flatnonzero(belief.ess < config.resample_below):
+        belief = _renew_cloud(belief, int(owner), config, engine, rng=rng)
+    if effective_size(belief) >= config.resample_below * len(belief.log_weight):
+        return belief, False
+    return _renew_agents(belief, spans, config, engine, rng=rng), True
+
+
+def initialise_landmark(
+    belief: Nested,
+    mean: Floats,
+    covariance: Floats,
+    config: NestedConfig,
+    engine: Engine,
+    *,
+    wall: Floats | None = None,
+    rng: np.random.Generator,
+) -> Nested:
+    """A new landmark, of which nothing is known: particles about a Gaussian, weighed to stand for a flat prior.
+
+    They are drawn `PROPOSAL` times as wide as the Gaussian that the landmark's measurements will give, so that these
+    find enough of them. All agent particles share one block of offsets, and differ in their centres.
+
+    Parameters
+    ----------
+    mean
+        (N, 3) [m], one for each agent particle.
+    covariance
+        (3, 3) [m^2] of the landmark given an agent particle's trajectory.
+    wall
+        (3,) anchor of a wall; None for a point.
+    """
+    count, features = len(belief.log_weight), len(belief.clouds)
+    size = num_points(covariance, count, features + 1, config)
+    normal = agents.standardise(np.full(size, 1.0 / size), rng.standard_normal((size, 3)))
+    zero = np.zeros(count, dtype=np.int64)
+    cloud = engine.build(
+        PROPOSAL * normal[None] @ _root(covariance).T, 0.5 * np.sum(normal**2, axis=1)[None], zero, zero
+    )
+    cloud, sums = engine.weigh(cloud, (), np.zeros((0, count)))
+    return belief._replace(
+        clouds=(*belief.clouds, cloud),
+        centre=np.concatenate([belief.centre, mean[:, None]], axis=1),
+        mean=np.concatenate([belief.mean, (mean + sums.mean)[:, None]], axis=1),
+        covariance=np.concatenate([belief.covariance, sums.covariance[:, None]], axis=1),
+        ess=np.append(belief.ess, 1.0),
+        updates=np.append(belief.updates, 0),
+        follow=np.concatenate([belief.follow, _follow(mean.mean(axis=0), wall)[None]]),
+    )
+
+
+def drop(belief: Nested, keep: Booleans) -> Nested:
+    """Only some of the landmarks."""
+    rows = np.flatnonzero(keep)
+    return belief._replace(
+        clouds=tuple(belief.clouds[row] for row in rows),
+        centre=belief.centre[:, rows],
+        mean=belief.mean[:, rows],
+        covariance=belief.covariance[:, rows],
+        ess=belief.ess[rows],
+        updates=belief.updates[rows],
+        follow=belief.follow[rows],
+    )
+
+
+def gaussian(belief: Nested) -> Moments:
+    """Joint mean and covariance: the agent particles' own, their clouds' on average, and the common shift's."""
+    mean, covariance = agents.moments(belief.weight, joint(belief))
+    moves = np.concatenate([np.eye(3), np.zeros((POSE - 3, 3)), belief.follow.reshape(-1, 3)])
+    covariance = covariance + moves @ belief.shift @ moves.T
+    for feature, block in enumerate(mean_covariances(belief)):
+        covariance[where(feature), where(feature)] += block
+    return Moments(mean, covariance)
+
+
+def mean_covariances(belief: Nested) -> Floats:
+    """(F, 3, 3) [m^2] of every landmark given the agent's trajectory, on average."""
+    return np.einsum("n,nfij->fij", belief.weight, belief.covariance)
+
+
+def effective_size(belief: Nested) -> float:
+    """Effective number of agent particles, `1 / sum w^2`."""
+    return float(1.0 / np.sum(np.exp(2.0 * belief.log_weight)))
+
+
+def num_particles(belief: Nested) -> int:
+    """Landmark particles in all, shared ones counted for each that shares them."""
+    return sum(cloud.size for cloud in belief.clouds) * len(belief.log_weight)
+
+
+def joint(belief: Nested) -> Floats:
+    """(N, 7 + 3F) position, velocity, heading, and the clouds' means."""
+    count = len(belief.log_weight)
+    pose = [belief.position, belief.velocity, belief.heading[:, None]]
+    return np.concatenate([*pose, belief.mean.reshape(count, -1)], axis=1)
+
+
+def _renew_cloud(
+    belief: Nested, owner: int, config: NestedConfig, engine: Engine, *, rng: np.random.Generator
+) -> Nested:
+    """Landmark particles of one landmark, resampled within every agent particle."""
+    count, cloud = len(belief.log_weight), belief.clouds[owner]
+    size = num_points(mean_covariances(belief)[owner], count, len(belief.clouds), config)
+    stride = next((p for p in PRIMES if np.gcd(p, size) == 1), 1)
+    offset = 4 * int(rng.integers(size // 16, size // 4 + 1)) % size
+    kernel = Kernel(rng.random(count), stride % size, offset, kernel_width(size, 3))
+    cloud = engine.resample(cloud, belief.covariance[:, owner], size, kernel)
+    centre, ess = belief.centre.copy(), belief.ess.copy()
+    centre[:, owner], ess[owner] = belief.mean[:, owner], 1.0
+    clouds = (*belief.clouds[:owner], cloud, *belief.clouds[owner + 1 :])
+    return belief._replace(clouds=clouds, centre=centre, ess=ess)
+
+
+def _renew_agents(
+    belief: Nested, spans: Floats, config: NestedConfig, engine: Engine, *, rng: np.random.Generator
+) -> Nested:
+    """Agent particles resampled: clouds follow by index, moved as a whole with the kernel; so is the trail."""
+    count = num_agents(agents.moments(belief.weight, belief.position)[1], config)
+    ancestors, moved = agents.resample(belief.log_weight, joint(belief), count, rng=rng)
+    position, velocity, heading = moved[:, :3], moved[:, 3:6], moved[:, 6]
+    mean = moved[:, POSE:].reshape(count, -1, 3)
+    trail = belief.trail[:, ancestors]
+    slew = velocity - belief.velocity[ancestors]
+    trail[..., :3] += position - belief.position[ancestors] - spans[:, None, None] * slew
+    trail[..., 3] += heading - belief.heading[ancestors]
+    return Nested(
+        position,
+        velocity,
+        heading,
+        np.full(count, -np.log(count)),
+        trail,
+        tuple(_inherit(cloud, ancestors, engine) for cloud in belief.clouds),
+        belief.centre[ancestors] + mean - belief.mean[ancestors],
+        mean,
+        belief.covariance[ancestors],
+        belief.ess,
+        belief.updates,
+        belief.shift,
+        belief.follow,
+    )
+
+
+def _inherit(cloud: Cloud, ancestors: Integers, engine: Engine) -> Cloud:
+    """A cloud as the children see it; written anew only if most of it is nobody's any more."""
+    block, row = cloud.block[ancestors], cloud.row[ancestors]
+    cloud = cloud._replace(block=block, row=row, log_total=cloud.log_total[ancestors])
+    written = int(cloud.block.max(initial=0)) + 1
+    return engine.compact(cloud) if len(np.unique(block)) < SPARSE * written else cloud
+
+
+def _follow(mean: Floats, wall: Floats | None) -> Floats:
+    """(3, 3) motion of a landmark when everything is shifted."""
+    if wall is None:
+        return np.eye(3)
+    across = unit(mean - wall)
+    return 2.0 * np.outer(across, across)
+
+
+def _root(covariance: Floats) -> Floats:
+    """Lower Cholesky factor, of a matrix that may be singular by a hair."""
+    return np.linalg.cholesky(covariance + 1e-12 * (np.trace(covariance) + 1e-12) * np.eye(3))

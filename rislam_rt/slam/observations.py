@@ -1,0 +1,118 @@
+"""One cycle's components in the units of the filters, and on which side of the panels they are."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.model import Body, Measurement, RadioConfig, SensorModel
+
+LOS_MARGIN = 0.1
+"""Length [m] beyond the baseline below which a component is the direct path: no landmark can be that near."""
+FAR = 1e5
+"""Length [m], and standard deviation of anything, that stands for an infinite one."""
+SIDED = 3.0
+"""Log odds beyond which a component is held for the panel's, or for another's: 19 in 20."""
+UNTOLD, OTHER, PANEL = -1, 0, 1
+"""Which side a component is on, where the receiver sets the panel's paths apart by alternating codes; `PANEL` + q for
+panel q of several."""
+
+
+class Observations(NamedTuple):
+    """One cycle's measurement in the units of the filter."""
+
+    seen: Floats
+    """(M, 3) length [m] and two cosines."""
+    std: Floats
+    """(M, 3)."""
+    log_amplitude: Floats
+    """(M,)."""
+    log_amplitude_std: Floats
+    """(M,)."""
+    amplitude_std: Floats
+    """(M,)."""
+    ratio: Floats
+    """(M,) amplitude over that of free space of the same length."""
+    side: Integers | None = None
+    """(M,) `PANEL`, `OTHER` or, where either may be, `UNTOLD`; None where the receiver does not tell."""
+    panel_odds: Floats | None = None
+    """(M,) log odds of having run over the panel, of several the likeliest, likewise."""
+    panel: Integers | None = None
+    """(M,) which panel that is; None where there is one."""
+
+    @property
+    def sides(self) -> Integers:
+        """(M,) with `UNTOLD` where the receiver does not tell."""
+        return np.full(len(self.ratio), UNTOLD) if self.side is None else self.side
+
+    @property
+    def odds(self) -> Floats:
+        """(M,) log odds of having run over the panel, 0 where the receiver does not tell."""
+        return np.zeros(len(self.ratio)) if self.panel_odds is None else self.panel_odds
+
+    def odds_of(self, panels: int) -> Floats:
+        """(M, Q) log odds of having run over each of the panels; over those that are not the likeliest: no better."""
+        number = np.zeros(len(self.ratio), dtype=np.int64) if self.panel is None else self.panel
+        return np.where(number[:, None] == np.arange(panels), self.odds[:, None], -np.abs(self.odds)[:, None])
+
+    def take(self, rows: Integers) -> "Observations":
+        """Only some of the measurements."""
+        return Observations._make(None if field is None else field[rows] for field in self)
+
+
+def same_side(first: Integers, second: Integers) -> Booleans:
+    """(A, B) whether things of two sides (A,), (B,) may be one."""
+    return np.asarray((first[:, None] == second) | (first[:, None] == UNTOLD) | (second == UNTOLD))
+
+
+def observations_of(measurement: Measurement, radio: RadioConfig) -> Observations:
+    """A measurement in the filter's units; nothing stays infinite, no standard deviation zero."""
+    length = np.clip(SPEED_OF_LIGHT * measurement.tau, 0.0, FAR)
+    amplitude = np.clip(measurement.amplitude, 1e-30, 1e30)
+    free = np.exp(free_space(radio)) / np.maximum(length, 1e-3)
+    std = np.concatenate([SPEED_OF_LIGHT * measurement.tau_std[:, None], measurement.cosines_std], axis=1)
+    return Observations(
+        np.concatenate([length[:, None], np.clip(measurement.cosines, -FAR, FAR)], axis=1),
+        np.clip(std, 1e-5, FAR),
+        np.log(amplitude),
+        np.minimum(measurement.amplitude_std / amplitude, 1.0),
+        np.clip(measurement.amplitude_std, 1e-30, 1e30),
+        amplitude / free,
+        *side_of(measurement.from_panel, measurement.panel),
+        measurement.panel,
+    )
+
+
+def stranger_density(observations: Observations, sensor: SensorModel, new_density: float) -> Floats:
+    """(M,) expected new or false components per metre, unit of each cosine and e-fold of amplitude, where each lies.
+
+    False ones are as strong as noise that passes the threshold, hence rare where a component is strong.
+    """
+    snr = sensor.radio.integrated_snr(np.exp(observations.log_amplitude))
+    false = (
+        sensor.false_alarm_density(observations.seen[:, 0] / SPEED_OF_LIGHT, observations.seen[:, 1:]) / SPEED_OF_LIGHT
+    )
+    return new_density + false * 2.0 * snr * sensor.false_alarm_snr_density(snr)
+
+
+def side_of(probability: Floats | None, panel: Integers | None = None) -> tuple[Integers | None, Floats | None]:
+    """Side (M,) of components that ran over a panel with a probability (M,), and its log odds; None without them.
+
+    What may be either is left open. `panel` (M,): which of several panels that is.
+    """
+    if probability is None:
+        return None, None
+    odds = np.log(probability / (1.0 - probability))
+    return np.where(odds > SIDED, PANEL + (0 if panel is None else panel), np.where(odds < -SIDED, OTHER, UNTOLD)), odds
+
+
+def free_space(radio: RadioConfig) -> float:
+    """Log amplitude of a path of 1 m in free space."""
+    return float(np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi)))
+
+
+def is_los(observations: Observations, body: Body) -> Booleans:
+    """(M,) whether a component is no longer than the direct path, which the body's drawing tells."""
+    baseline = float(np.linalg.norm(body.tx_offset - body.rx_offset))
+    return observations.seen[:, 0] < baseline + LOS_MARGIN + 3.0 * np.minimum(observations.std[:, 0], LOS_MARGIN)

@@ -1,0 +1,33 @@
+"""Where a component would end if it came straight from a point, and when such a point is a candidate for a panel."""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.slam.returns import Poses
+
+DISMISSAL = -2.0
+"""Log odds of panel against scatterer below which a suspect is none: under one code they tell little."""
+DEEP = 0.5
+"""Distance [m] behind a mirror at which what is seen there is held for an image; the panel hangs on a mirror itself."""
+PATIENCE = 2
+"""Cycles for which a track that is silent is still a suspect, if it was seen more often than that."""
+
+
+def places(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:
+    """Points (..., 3) at which lengths and cosines (..., 3) end, and their distances (...,) from the Rx.
+
+    A point on the ray `u` from the Rx lies as far out as the two legs have length for: `|r u - b| = l - r` with `b`
+    from Rx to Tx.
+    """
+    ray, base = rays(seen, poses.heading), poses.tx - poses.rx
+    length = np.maximum(seen[..., 0], np.linalg.norm(base) + 1e-3)
+    reach = (length**2 - base @ base) / (2.0 * (length - ray @ base))
+    return poses.rx + reach[..., None] * ray, reach
+
+
+def rays(seen: Floats, heading: Floats) -> Floats:
+    """Unit vectors (..., 3) towards what arrives from above with lengths and cosines (..., 3), in the room's axes."""
+    flat = seen[..., 1:] / np.maximum(1.0, np.linalg.norm(seen[..., 1:], axis=-1))[..., None]
+    up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=-1), 0.0))
+    return np.concatenate([flat, up[..., None]], axis=-1) @ rotation_z(np.asarray(heading)).T
