@@ -7,10 +7,10 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.design.designers import designer
+from rislam_rt.design.genie import problem_from_paths
 from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.result import DesignConfig
 from rislam_rt.design.single_path import exact_code
-from rislam_rt.design.truth import problem_from_paths
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import DataSheet, PathKind, Paths, RadioConfig, RisCode
 
