@@ -18,12 +18,6 @@ def angles_from_direction(direction: Floats) -> tuple[Floats, Floats]:
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
 
-def direction_from_angles(theta: Floats, phi: Floats) -> Floats:
-    """Unit vectors (..., 3) of zenith and azimuth (...,) [rad]."""
-    theta, phi = np.broadcast_arrays(np.asarray(theta, dtype=np.float64), np.asarray(phi, dtype=np.float64))
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
-
-
 def wrap(angle: Floats) -> Floats:
     """Angles (...,) [rad] brought to (-pi, pi]."""
     return -((-np.asarray(angle, dtype=np.float64) + np.pi) % (2.0 * np.pi) - np.pi)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, freeze
 from rislam_rt.errors import ConfigError
 from rislam_rt.slam.nested_config import NestedConfig
 
@@ -74,15 +74,26 @@ class SlamConfig:
         return np.array([1.0, 1.0, 1.0 if self.height == "estimated" else 0.0])
 
 
-GONE = {
-    name: f"it is now 'nested.{name}', and of the filter 'nested' alone"
-    for name in ("gate", "specular_ratio", "classifier", "birth_cycles", "window", "birth_margin", "max_misses",
-                 "merge_distance", "resample_below", "adaptive", "weighting")
-} | {
-    "agent_particles": "it is now 'nested.num_agents'",
-    "landmark_particles": "it is now 'nested.num_points'",
-    "machine": "it is now 'nested.engine'",
-    "num_particles": "the default filter holds one Gaussian, whatever the start's spread; remove it",
-    "particle_share": "the default filter holds one Gaussian, whatever the start's spread; remove it",
-}  # fmt: skip
-"""Settings of `[slam]` that there were, and where each went."""
+@dataclass(frozen=True, slots=True, eq=False)
+class StartPrior:
+    """What the agent is told about its first pose: a Gaussian about it."""
+
+    position: Floats
+    """(3,) [m]."""
+    velocity: Floats
+    """(3,) [m/s]."""
+    heading: float
+    """[rad]."""
+    position_std: float = 0.01
+    """[m], each axis; the height is exact when it is known."""
+    velocity_std: float = 0.01
+    """[m/s], each axis."""
+    heading_std: float = 0.0
+    """[rad], where the heading is estimated."""
+
+    def __post_init__(self) -> None:
+        freeze(self, "position", np.float64, (3,))
+        freeze(self, "velocity", np.float64, (3,))
+        for name in ("position_std", "velocity_std", "heading_std"):
+            if not getattr(self, name) >= 0.0:
+                raise ConfigError(f"start.{name}: {getattr(self, name)} received; give a number that is not negative")

@@ -26,8 +26,6 @@ from rislam_rt.sweeps.store import DONE, MISSING, Row, csv_bytes
 from rislam_rt.sweeps.sweep import Sweep
 
 FUNCTION = f"{__name__}:run_cell"
-STORED_AS = "rislam_rt.pipeline.sweeps.slam:run_cell"
-"""Its first name, by which stored cells know it."""
 
 
 class SweepSection(Section):
@@ -137,7 +135,6 @@ def slam_sweep(
         {"beside": os.path.abspath(path.parent)},
         _depends(path, tuple(found)),
         spec.name,
-        STORED_AS,
     )
 
 

@@ -177,7 +177,7 @@ class _Board:
     def take(self, ident: str, outcome: CellOutcome) -> None:
         """A cell has ended."""
         cell = self.rows[ident].cell
-        self.rows[ident] = row = write_cell(self.folder, cell, self.sweep.label, outcome)
+        self.rows[ident] = row = write_cell(self.folder, cell, self.sweep.function, outcome)
         append_timing(self.folder, cell, outcome)
         self.timings.append({"point": cell.point, "seconds": outcome.seconds})
         self.left.pop(ident)

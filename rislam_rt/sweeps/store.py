@@ -104,7 +104,7 @@ def write_sweep(folder: Path, sweep: Sweep) -> None:
     """
     about = {
         "name": sweep.name,
-        "function": sweep.label,
+        "function": sweep.function,
         "axes": [{"key": axis.key, "values": list(axis.values)} for axis in sweep.axes],
         "base": dict(sweep.base),
         "repetitions": sweep.repetitions,

@@ -32,14 +32,6 @@ class Sweep:
     depends: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None
     """What else a cell's result depends on, from its settings: versions, the hash of a room."""
     name: str = "sweep"
-    stored_as: str = ""
-    """The function's name in files and in cells' names, if that is another: the one it had when first stored, so that
-    a function that has moved finds its results."""
-
-    @property
-    def label(self) -> str:
-        """The function's name in files."""
-        return self.stored_as or self.function
 
     def __post_init__(self) -> None:
         module, colon, function = self.function.partition(":")
@@ -90,7 +82,7 @@ def build_cells(sweep: Sweep) -> list[Cell]:
         drawn = {key: value for key, value in point.items() if key not in sweep.paired}
         for repetition in range(sweep.repetitions):
             seed = int.from_bytes(_digest([drawn, repetition, sweep.seed])[:8]) >> 1
-            ident = _digest([sweep.label, settings, repetition, seed, depends]).hex()[:32]
+            ident = _digest([sweep.function, settings, repetition, seed, depends]).hex()[:32]
             cells.append(Cell(ident, point, repetition, settings, seed, depends))
     return cells
 

@@ -92,7 +92,7 @@ def learn(
 
 
 def _name(table: LandmarkTable, expected: Expected, rows: Integers) -> tuple[LandmarkTable, Integers]:
-    """Idents in the table of the landmarks (point, image, wall of a moving image) that returns are predicted from."""
+    """The ident of the landmark (point, image, or wall of a moving image) that each of the returns belongs to."""
     returns, owner = expected.returns, expected.owner[rows]
     names, point = table.ident[owner], returns.point[rows]
     images = ((point != TX) & (expected.bounces[rows] > 0)).nonzero()[0]

@@ -7,11 +7,10 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
-from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.observations import Observations, is_los, observations_of, stranger_density
 from rislam_rt.slam.returns import TX
-from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import REMOVED, UNUSED, Outcome, StepInfo
 from rislam_rt.slam.window import divergence, gauss, motion, recovery, tracks
 from rislam_rt.slam.window.births import births

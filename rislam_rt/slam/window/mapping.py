@@ -6,11 +6,10 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
-from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.map_geometry import MAX_LEAN, images_in, wall_planes
 from rislam_rt.slam.moments import even_draws, poses_of, square_root
 from rislam_rt.slam.returns import AXES
-from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.window import gauss
 from rislam_rt.slam.window.book import Book, image_ident
 from rislam_rt.slam.window.filter import init

@@ -15,6 +15,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
+from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.channel_slam import tracker
@@ -27,7 +28,6 @@ from rislam_rt.slam.schemes.shared.ranges import Bistatic
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, outcome_of, reported
 from rislam_rt.slam.schemes.shared.scan import Scan
 from rislam_rt.slam.schemes.shared.sums import Sight, Sums, born, carry, join, kinds_of, look, no_sums, prune, spread_of
-from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 STRAIN_RATE = 0.1
