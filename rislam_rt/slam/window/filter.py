@@ -14,11 +14,11 @@ from rislam_rt.slam.returns import TX
 from rislam_rt.slam.step_info import REMOVED, UNUSED, Outcome, StepInfo
 from rislam_rt.slam.window import divergence, gauss, motion, recovery, tracks
 from rislam_rt.slam.window.births import births
-from rislam_rt.slam.window.book import Book, empty_book, idents, image_ident
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.excess import grow, take_in
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, conditioned_share
 from rislam_rt.slam.window.gauss import Window
+from rislam_rt.slam.window.landmark_table import Book, empty_book, idents, image_ident
 from rislam_rt.slam.window.learn import learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew

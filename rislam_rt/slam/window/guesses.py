@@ -7,8 +7,8 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.moments import square_root
 from rislam_rt.slam.returns import AXES, NONE, reflect
-from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.digest import Digest
+from rislam_rt.slam.window.landmark_table import Book
 from rislam_rt.slam.window.trial import Trials
 
 KINDS = (

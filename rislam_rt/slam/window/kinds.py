@@ -7,7 +7,6 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.returns import AXES, NONE, TX
-from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.digest import Digest
 from rislam_rt.slam.window.expect import Scene
@@ -27,6 +26,7 @@ from rislam_rt.slam.window.guesses import (
     hypotheses,
 )
 from rislam_rt.slam.window.identify import identify
+from rislam_rt.slam.window.landmark_table import Book
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.panel import Identity, unknown

@@ -12,9 +12,9 @@ from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import TX, Poses
 from rislam_rt.slam.window import gauss
-from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, cluster, expect
 from rislam_rt.slam.window.gauss import Window
+from rislam_rt.slam.window.landmark_table import Book
 from rislam_rt.slam.window.learn import Sights, recall, visible
 from rislam_rt.slam.window.numerics import GATE
 from rislam_rt.slam.window.steps import HEAD

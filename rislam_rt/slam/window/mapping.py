@@ -11,8 +11,8 @@ from rislam_rt.slam.map_geometry import MAX_LEAN, images_in, wall_planes
 from rislam_rt.slam.moments import even_draws, poses_of, square_root
 from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window import gauss
-from rislam_rt.slam.window.book import Book, image_ident
 from rislam_rt.slam.window.filter import init
+from rislam_rt.slam.window.landmark_table import Book, image_ident
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.suspect import find_suspect

@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.window import divergence, gauss, motion, tracks
-from rislam_rt.slam.window.book import empty_book
+from rislam_rt.slam.window.landmark_table import empty_book
 from rislam_rt.slam.window.learn import no_sights
 from rislam_rt.slam.window.log import empty_log
 from rislam_rt.slam.window.state import WindowState
