@@ -9,7 +9,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.slam.window import gauss
 from rislam_rt.slam.window.expect import Scene
 from rislam_rt.slam.window.gauss import Window
-from rislam_rt.slam.window.landmark_table import Book
+from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.learn import Sights
 from rislam_rt.slam.window.log import Log, Residuals, renew
 from rislam_rt.slam.window.tracks import Tracks
@@ -19,7 +19,7 @@ class Context(NamedTuple):
     """The belief, the window's components, and the tracks among them."""
 
     window: Window
-    book: Book
+    book: WindowTable
     log: Log
     tracks: Tracks
     heading: Floats

@@ -11,7 +11,7 @@ from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
 from rislam_rt.slam.window.forms import enumerate_forms, forms_of, possible_legs
-from rislam_rt.slam.window.landmark_table import Book
+from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.numerics import EDGE, FAINT, LEVEL
 from rislam_rt.slam.window.steps import HEAD
@@ -56,7 +56,7 @@ class Expected(NamedTuple):
 
 
 def expect(
-    features: Floats, book: Book, poses: Poses, position: Floats, scene: Scene, code: RisCode | None
+    features: Floats, book: WindowTable, poses: Poses, position: Floats, scene: Scene, code: RisCode | None
 ) -> Expected:
     """All forms that are possible at the mean belief, arrive from above, and may be detected."""
     legs = enumerate_forms(tuple(book.points.tolist()), tuple(book.walls.tolist()), scene.max_bounces, True)
@@ -81,7 +81,7 @@ def expect(
 
 
 def amplitudes(
-    returns: Returns, features: Floats, book: Book, tx_length: Floats, rx_length: Floats, poses: Poses, scene: Scene,
+    returns: Returns, features: Floats, book: WindowTable, tx_length: Floats, rx_length: Floats, poses: Poses, scene: Scene,
     code: RisCode | None,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Log amplitude (R,) and its standard deviation (R,)."""
@@ -111,7 +111,13 @@ def amplitudes(
 
 
 def panel_gains(
-    returns: Returns, features: Floats, book: Book, poses: Poses, radio: RadioConfig, spec: RisSpec, code: RisCode
+    returns: Returns,
+    features: Floats,
+    book: WindowTable,
+    poses: Poses,
+    radio: RadioConfig,
+    spec: RisSpec,
+    code: RisCode,
 ) -> Floats:
     """|gain| (R,) of a panel's returns with perfect walls."""
     legs, center = returns.legs, features[returns.legs[:, 0]]

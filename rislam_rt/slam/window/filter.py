@@ -18,7 +18,7 @@ from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.excess import grow, take_in
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, conditioned_share
 from rislam_rt.slam.window.gauss import Window
-from rislam_rt.slam.window.landmark_table import Book, empty_book, idents, image_ident
+from rislam_rt.slam.window.landmark_table import WindowTable, empty_table, idents, image_ident
 from rislam_rt.slam.window.learn import learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
@@ -46,7 +46,7 @@ def init(
     lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if turns else ()))
     gait = np.stack([motion.first_gait(level) for level in lively])
     return WindowState(
-        0, config, window, empty_book(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_sights(),
+        0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_sights(),
         gait, gait,
         np.array([start.heading]), start.position_std * free, scene, divergence.SURE, False, 0.0,
         (None,), np.zeros((6, 6)), np.zeros((0, 3)),
@@ -238,7 +238,7 @@ def _explain(
     log: Log,
     expected: Expected,
     groups: Clusters,
-    book: Book,
+    book: WindowTable,
     scatter: Floats,
     row: Integers,
     pick: Integers,
@@ -336,7 +336,7 @@ def _follow(
     return _Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()))
 
 
-def _names(book: Book, expected: Expected, groups: Clusters, row: Integers) -> Integers:
+def _names(book: WindowTable, expected: Expected, groups: Clusters, row: Integers) -> Integers:
     """Ident of what each of the clusters `row` (A,) came over first: a point, its image in a wall, a wall."""
     if not len(row):
         return np.zeros(0, dtype=np.int64)

@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.moments import square_root
 from rislam_rt.slam.returns import AXES, NONE, reflect
 from rislam_rt.slam.window.digest import Digest
-from rislam_rt.slam.window.landmark_table import Book
+from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.trial import Trials
 
 KINDS = (
@@ -45,7 +45,7 @@ class Hypotheses(NamedTuple):
     trials: Trials
 
 
-def known_features(mean: Floats, covariance: Floats, book: Book, middle: Floats) -> Known:
+def known_features(mean: Floats, covariance: Floats, book: WindowTable, middle: Floats) -> Known:
     """The map's features (F, 3), walls as images of `middle`, with their covariances (3F, 3F) block by block."""
     place, count = mean.copy(), len(mean)
     blocks = covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
@@ -75,7 +75,7 @@ def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
     return np.asarray(-2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]))
 
 
-def hypotheses(digest: Digest, known: Known, book: Book, use_vt: bool) -> Hypotheses:
+def hypotheses(digest: Digest, known: Known, book: WindowTable, use_vt: bool) -> Hypotheses:
     """Every kind for every track, with its first guess; images of known points where wall returns tell no walls."""
     count, walls = len(digest.seen), book.walls
     seen, tx, rx = digest.mean

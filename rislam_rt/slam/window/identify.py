@@ -10,7 +10,7 @@ from rislam_rt.slam.observations import OTHER, UNTOLD
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.gauss import poses
 from rislam_rt.slam.window.guesses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
-from rislam_rt.slam.window.landmark_table import Book
+from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.numerics import CERTAIN
 from rislam_rt.slam.window.panel import Identity, Sight, gains, spread_places, unknown, weigh
@@ -87,7 +87,7 @@ def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows
     return found
 
 
-def _ratio(table: Hypotheses, book: Book, rows: Integers) -> Floats:
+def _ratio(table: Hypotheses, book: WindowTable, rows: Integers) -> Floats:
     """(R,) amplitude that the known walls of hypotheses leave."""
     if not len(book.ident):
         return np.ones(len(rows))

@@ -26,7 +26,7 @@ from rislam_rt.slam.window.guesses import (
     hypotheses,
 )
 from rislam_rt.slam.window.identify import identify
-from rislam_rt.slam.window.landmark_table import Book
+from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.panel import Identity, unknown
@@ -174,7 +174,7 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
     return np.where(table.trials.is_wall, wall, -LEVELS.log_volume - np.where(table.trials.is_pair, np.log(8.0), 0.0))
 
 
-def _beside(table: Hypotheses, digest: Digest, known: Known, book: Book, scene: Scene) -> Floats:
+def _beside(table: Hypotheses, digest: Digest, known: Known, book: WindowTable, scene: Scene) -> Floats:
     """(H,) log probability that a wall's return comes out by itself, or as one with its edge at a level wall.
 
     It hangs on how far apart the two would be.
@@ -238,7 +238,7 @@ COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(4 + 3) log(1 + chi^2 / 4)` for chi^2 with 3 degrees of freedom."""
 
 
-def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: Book, scene: Scene) -> Floats:
+def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: WindowTable, scene: Scene) -> Floats:
     """(H,) log density of the tracks' mean amplitudes, given what walls leave and how points scatter."""
     radio, track = scene.radio, table.trials.track
     level, seen, rx = digest.log_amplitude[track], digest.mean[0][track], digest.mean[2][track]
@@ -266,7 +266,7 @@ def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: Book, scene
     return amplitude
 
 
-def _image_amplitudes(table: Hypotheses, rows: Integers, digest: Digest, book: Book, scene: Scene) -> Floats:
+def _image_amplitudes(table: Hypotheses, rows: Integers, digest: Digest, book: WindowTable, scene: Scene) -> Floats:
     """The same of images of known points in new walls, hypotheses `rows` (R,); the panel's hangs on codes."""
     track, point = table.trials.track[rows], table.known[rows]
     first = np.maximum(np.linalg.norm(table.trials.shift[rows, 0] - digest.mean[1][track], axis=1), 0.05)
@@ -277,7 +277,7 @@ def _image_amplitudes(table: Hypotheses, rows: Integers, digest: Digest, book: B
     return np.asarray(-0.5 * off**2 / variance - 0.5 * np.log(variance))
 
 
-def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: Book) -> Floats:
+def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: WindowTable) -> Floats:
     """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known."""
     middle, walls, wall = digest.middle, book.walls, table.trials.is_wall
     pair, tx = table.trials.is_pair[:, None], digest.mean[1][table.trials.track]
@@ -302,7 +302,7 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
     return total
 
 
-def beliefs(place: Floats, digest: Digest, known: Known, book: Book) -> Holds:
+def beliefs(place: Floats, digest: Digest, known: Known, book: WindowTable) -> Holds:
     """What may be held beforehand of a wall at `place` (3,): upright, at right angles to another; or level."""
     span = place - digest.middle
     reach = max(float(np.linalg.norm(span)), 0.1)
@@ -332,7 +332,7 @@ def beliefs(place: Floats, digest: Digest, known: Known, book: Book) -> Holds:
     )  # fmt: skip
 
 
-def _upright(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: Book) -> Floats:
+def _upright(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: WindowTable) -> Floats:
     """Gain (H,) in log evidence by what walls are beforehand: each direction held, or anywhere in its width."""
     gain = np.zeros(len(fits.cost))
     trials, tx = table.trials, digest.mean[1]

@@ -10,7 +10,7 @@ from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.panel import Identity
 
 
-class Book(NamedTuple):
+class WindowTable(NamedTuple):
     """F features."""
 
     ident: Integers
@@ -77,16 +77,18 @@ class Book(NamedTuple):
         return np.where(idents < 0, idents, place)
 
 
-def empty_book(panels: int = 1) -> Book:
+def empty_table(panels: int = 1) -> WindowTable:
     """Nothing known, in a room of so many panels."""
     none, count = np.zeros(0), np.zeros(0, dtype=np.int64)
-    return Book(
+    return WindowTable(
         count, np.zeros(0, dtype=np.bool_), np.zeros((0, 3)), count, none, none, none,
         np.zeros((0, len(STRENGTHS))), np.zeros((0, panels)), np.zeros((0, panels + 1)), 0,
     )  # fmt: skip
 
 
-def enter(book: Book, is_wall: bool, anchor: Floats, hits: int, log_odds: float, identity: Identity) -> Book:
+def enter(
+    book: WindowTable, is_wall: bool, anchor: Floats, hits: int, log_odds: float, identity: Identity
+) -> WindowTable:
     """The book with one more feature, in the last row; `identity` (1,) of a point."""
     return book._replace(
         ident=np.append(book.ident, book.next_ident),
@@ -101,7 +103,7 @@ def enter(book: Book, is_wall: bool, anchor: Floats, hits: int, log_odds: float,
     )
 
 
-def idents(book: Book, forms: Integers) -> Integers:
+def idents(book: WindowTable, forms: Integers) -> Integers:
     """Forms (..., 5) of feature rows as forms of idents."""
     if not len(book.ident):
         return forms
@@ -113,13 +115,13 @@ def image_ident(point: Integers, wall: Integers) -> Integers:
     return np.asarray(10_000 + 1000 * point + wall)
 
 
-def strike(book: Book, keep: Booleans) -> Book:
+def remove_features(book: WindowTable, keep: Booleans) -> WindowTable:
     """The book without some of its features."""
     fields: dict[str, Any] = {name: getattr(book, name)[keep] for name in book._fields if name != "next_ident"}
     return book._replace(**fields)
 
 
-def learn_ratio(book: Book, wall: int, log_ratio: float) -> Book:
+def learn_ratio(book: WindowTable, wall: int, log_ratio: float) -> WindowTable:
     """A wall's log amplitude ratio after one more return over it."""
     gain = book.ratio_variance[wall] / (book.ratio_variance[wall] + LEVELS.fading**2)
     ratio, variance = book.ratio.copy(), book.ratio_variance.copy()

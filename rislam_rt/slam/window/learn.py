@@ -10,7 +10,7 @@ from rislam_rt.slam.observations import UNTOLD, Observations
 from rislam_rt.slam.returns import NONE, TX, Poses
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene
 from rislam_rt.slam.window.gauss import Window
-from rislam_rt.slam.window.landmark_table import Book, learn_ratio
+from rislam_rt.slam.window.landmark_table import WindowTable, learn_ratio
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.numerics import SCATTER_RATE
 from rislam_rt.slam.window.panel import Sight, gains, spread_places, weigh
@@ -33,7 +33,7 @@ def no_sights() -> Sights:
     return Sights(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
 
 
-def pack(forms: Integers, book: Book) -> Integers:
+def pack(forms: Integers, book: WindowTable) -> Integers:
     """Forms (R, 5) of rows as one number each, by ident."""
     known = np.where(forms >= 0, book.ident[np.maximum(forms, 0)], forms) if len(book.ident) else forms
     code = np.zeros(len(forms), dtype=np.int64)
@@ -42,7 +42,7 @@ def pack(forms: Integers, book: Book) -> Integers:
     return code
 
 
-def recall(sights: Sights, expected: Expected, book: Book) -> tuple[Floats, Floats]:
+def recall(sights: Sights, expected: Expected, book: WindowTable) -> tuple[Floats, Floats]:
     """Probability (R,) that nothing stands in the way of each return now, and its scatter (R,)."""
     first, scatter = LEVELS.steady ** (1.0 + expected.bounces), np.full(len(expected.seen), LEVELS.crowd)
     if len(sights.code):
@@ -53,7 +53,7 @@ def recall(sights: Sights, expected: Expected, book: Book) -> tuple[Floats, Floa
     return np.asarray(first * (1.0 - LEVELS.blocked) + (1.0 - first) * LEVELS.cleared), scatter
 
 
-def seed(sights: Sights, forms: Integers, book: Book, scatter: float) -> Sights:
+def seed(sights: Sights, forms: Integers, book: WindowTable, scatter: float) -> Sights:
     """A form that a new feature was found by: nothing hides it, and it scatters so much."""
     code = np.append(sights.code, pack(forms, book))
     order = np.argsort(code, kind="stable")
@@ -71,9 +71,9 @@ def visible(expected: Expected, groups: Clusters, clear: Floats) -> Floats:
 
 
 def learn(
-    sights: Sights, book: Book, window: Window, expected: Expected, groups: Clusters, shows: Floats, row: Integers,
+    sights: Sights, book: WindowTable, window: Window, expected: Expected, groups: Clusters, shows: Floats, row: Integers,
     pick: Integers, raw: Floats, glance: Observations, poses: Poses, scene: Scene, code: RisCode | None,
-) -> tuple[Sights, Book]:  # fmt: skip
+) -> tuple[Sights, WindowTable]:  # fmt: skip
     """After clusters `row` (A,) were seen as components `pick` (A,) with residuals of mean square `raw` (A,)."""
     if not len(expected.seen):
         return sights, book
@@ -98,7 +98,9 @@ def learn(
     return Sights(packed[order], cleared[order], scattered[order]), book
 
 
-def _existence(book: Book, expected: Expected, groups: Clusters, hit: Floats, missed: Floats, shows: Floats) -> Book:
+def _existence(
+    book: WindowTable, expected: Expected, groups: Clusters, hit: Floats, missed: Floats, shows: Floats
+) -> WindowTable:
     """Every feature by the returns that only it explains: those over the fewest other features."""
     odds, hits = book.log_odds.copy(), book.hits.copy()
     for where, tell in ((hit, 1.0), (missed, 0.0)):
@@ -117,9 +119,9 @@ def _existence(book: Book, expected: Expected, groups: Clusters, hit: Floats, mi
 
 
 def _strengths(
-    book: Book, window: Window, expected: Expected, groups: Clusters, row: Integers, pick: Integers,
+    book: WindowTable, window: Window, expected: Expected, groups: Clusters, row: Integers, pick: Integers,
     glance: Observations, poses: Poses, scene: Scene, code: RisCode | None,
-) -> Book:  # fmt: skip
+) -> WindowTable:  # fmt: skip
     """Walls' losses, and who the points are, from components that came out alone."""
     lead, alone = groups.leader[row], groups.partner[row] < 0
     quiet = (groups.disturbance[row] < 0.25 * scene.sensor.cell_length**2).all(axis=1)
@@ -133,9 +135,9 @@ def _strengths(
 
 
 def _identities(
-    book: Book, window: Window, expected: Expected, groups: Clusters, row: Integers, pick: Integers,
+    book: WindowTable, window: Window, expected: Expected, groups: Clusters, row: Integers, pick: Integers,
     glance: Observations, poses: Poses, scene: Scene, code: RisCode | None,
-) -> Book:  # fmt: skip
+) -> WindowTable:  # fmt: skip
     """What amplitude or silence of points that come straight, and alone, tells of who they are."""
     component = np.full(len(groups.leader), -1)
     component[row] = pick

@@ -11,7 +11,7 @@ from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.returns import linearise
 from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.gauss import Quadratic, Window, poses
-from rislam_rt.slam.window.landmark_table import Book
+from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.steps import POSE
 
@@ -81,7 +81,7 @@ class Residuals(NamedTuple):
     """(A, 3, 4 + 3F) of the prediction by its pose and the features, likewise."""
 
 
-def residuals(log: Log, window: Window, book: Book, body: Body, heading: Floats, rows: Integers) -> Residuals:
+def residuals(log: Log, window: Window, book: WindowTable, body: Body, heading: Floats, rows: Integers) -> Residuals:
     """Of some explained rows of the log, at the present estimate; `heading` (K,) as the compass tells."""
     first = int(log.cycle[-1]) - window.num_poses + 1
     slot = log.cycle[rows] - first
@@ -132,7 +132,7 @@ def trust(left: Floats) -> Floats:
 
 
 def renew(
-    window: Window, log: Log, book: Book, body: Body, heading: Floats, slots: Integers, *, even: bool = False
+    window: Window, log: Log, book: WindowTable, body: Body, heading: Floats, slots: Integers, *, even: bool = False
 ) -> tuple[Window, Residuals]:
     """The quadratics of some slots, made at the present estimate; `even`: every component counts in full."""
     first = int(log.cycle[-1]) - window.num_poses + 1 if len(log.cycle) else 0

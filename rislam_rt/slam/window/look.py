@@ -14,7 +14,7 @@ from rislam_rt.slam.returns import TX, Poses
 from rislam_rt.slam.window import gauss
 from rislam_rt.slam.window.expect import Clusters, Expected, Scene, cluster, expect
 from rislam_rt.slam.window.gauss import Window
-from rislam_rt.slam.window.landmark_table import Book
+from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.learn import Sights, recall, visible
 from rislam_rt.slam.window.numerics import GATE
 from rislam_rt.slam.window.steps import HEAD
@@ -64,7 +64,7 @@ FAR_STRONGER = 1.0
 
 
 def look(
-    window: Window, book: Book, sights: Sights, heading: float, scene: Scene, code: RisCode | None,
+    window: Window, book: WindowTable, sights: Sights, heading: float, scene: Scene, code: RisCode | None,
     glance: Observations, strangers: Floats,
 ) -> Look:  # fmt: skip
     """Expect, cluster, associate."""
@@ -83,7 +83,7 @@ def look(
     return Look(mean, poses, expected, groups, shows, scatter, row, pick, gain + miss, float(surprise), strain)
 
 
-def return_sides(forms: Integers, book: Book) -> Integers:
+def return_sides(forms: Integers, book: WindowTable) -> Integers:
     """(R,) which of the forms (R, 5) run over a panel; what does not is known for that once all panels are."""
     held = [panel for panel in enumerate(book.panels) if panel[1] >= 0]
     if not held:

@@ -12,7 +12,7 @@ from rislam_rt.slam.moments import even_draws, poses_of, square_root
 from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window import gauss
 from rislam_rt.slam.window.filter import init
-from rislam_rt.slam.window.landmark_table import Book, image_ident
+from rislam_rt.slam.window.landmark_table import WindowTable, image_ident
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.suspect import find_suspect
@@ -49,7 +49,7 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
     )
 
 
-def shift_covariance(features: Floats, book: Book, shift: Floats) -> Floats:
+def shift_covariance(features: Floats, book: WindowTable, shift: Floats) -> Floats:
     """(3F, 3F) of features (F, 3) that all move with the start's error, of standard deviation `shift` (3,).
 
     A wall's three numbers, the image of an anchor that stays, move by `2 n n^T` of what the wall itself does.
@@ -80,7 +80,7 @@ def revisit(
     return fresh._replace(window=window, book=book, shift=np.zeros(3))
 
 
-def build_map(features: Floats, covariance: Floats, book: Book, shift: Floats) -> MapEstimate:
+def build_map(features: Floats, covariance: Floats, book: WindowTable, shift: Floats) -> MapEstimate:
     """Points, their images in each wall, and the walls; the start's error moves all of it together."""
     if not len(book.ident):
         return empty_map()

@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.window import divergence, gauss, motion, tracks
-from rislam_rt.slam.window.landmark_table import empty_book
+from rislam_rt.slam.window.landmark_table import empty_table
 from rislam_rt.slam.window.learn import no_sights
 from rislam_rt.slam.window.log import empty_log
 from rislam_rt.slam.window.state import WindowState
@@ -47,7 +47,7 @@ def restart(state: WindowState) -> WindowState:
     fresh = gauss.begin(mean[:3], mean[3:6], std, turns=window.turns)
     fresh = fresh._replace(head=mean[:HEAD], prior=fresh.prior._replace(middle=mean[:HEAD]))
     return state._replace(
-        window=fresh, book=empty_book(state.scene.num_panels)._replace(next_ident=state.book.next_ident),
+        window=fresh, book=empty_table(state.scene.num_panels)._replace(next_ident=state.book.next_ident),
         log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), sights=no_sights(), gait=state.level,
         heading=state.heading[-1:], shift=np.hypot(state.shift, away), doubt=0.0, asked=False,
         codes=state.codes[-1:], passed=np.concatenate([state.passed, gauss.poses(window)[:-1, :3]]),

@@ -8,7 +8,7 @@ from rislam_rt.slam.window import gauss
 from rislam_rt.slam.window.context import Context, resolve
 from rislam_rt.slam.window.expect import Expected
 from rislam_rt.slam.window.forms import UNKNOWN
-from rislam_rt.slam.window.landmark_table import Book, strike
+from rislam_rt.slam.window.landmark_table import WindowTable, remove_features
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals
 from rislam_rt.slam.window.numerics import FEWEST, RECENT
@@ -26,7 +26,7 @@ def release(context: Context, keep: Booleans) -> Context:
     form = log.form.copy()
     form[lost] = UNKNOWN
     log = log._replace(form=form)
-    window, book = gauss.drop_features(context.window, keep), strike(book, keep)
+    window, book = gauss.drop_features(context.window, keep), remove_features(book, keep)
     context = context._replace(window=window, book=book, log=log, tracks=tracks)
     return context._replace(window=resolve(context, 2)[0])
 
@@ -61,7 +61,7 @@ def _resume(tracks: Tracks, log: Log, lost: Booleans, cycle: int, step: Floats) 
     return Tracks._make([*joined, ident]), log._replace(track=track)
 
 
-def condemned(book: Book, left: Residuals, log: Log, expected: Expected, covariance: Floats) -> Booleans:
+def condemned(book: WindowTable, left: Residuals, log: Log, expected: Expected, covariance: Floats) -> Booleans:
     """(F,) features to take back: that do not exist, that their measurements contradict, or that follow from others."""
     gone = book.log_odds < np.log(LEVELS.dead / (1.0 - LEVELS.dead))
     square = np.vecdot(left.left, left.left)
@@ -74,7 +74,7 @@ def condemned(book: Book, left: Residuals, log: Log, expected: Expected, covaria
     return np.asarray(gone | derived(book, expected, covariance))
 
 
-def derived(book: Book, expected: Expected, covariance: Floats) -> Booleans:
+def derived(book: WindowTable, expected: Expected, covariance: Floats) -> Booleans:
     """(F,) young features whose own return is one that others throw as well, without anything free in it."""
     found = np.zeros(len(book.ident), dtype=np.bool_)
     forms = expected.forms

@@ -7,7 +7,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.window.expect import Scene
 from rislam_rt.slam.window.gauss import Window
-from rislam_rt.slam.window.landmark_table import Book
+from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.learn import Sights
 from rislam_rt.slam.window.log import Log
 from rislam_rt.slam.window.tracks import Tracks
@@ -19,7 +19,7 @@ class WindowState(NamedTuple):
     cycle: int
     config: SlamConfig
     window: Window
-    book: Book
+    book: WindowTable
     log: Log
     tracks: Tracks
     sights: Sights

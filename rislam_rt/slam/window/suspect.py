@@ -9,7 +9,7 @@ from rislam_rt.slam.observations import OTHER
 from rislam_rt.slam.returns import Poses, reflect
 from rislam_rt.slam.ris_candidate import DEEP, DISMISSAL, PATIENCE, places
 from rislam_rt.slam.window.expect import Scene
-from rislam_rt.slam.window.landmark_table import Book
+from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.numerics import DRAWS
 from rislam_rt.slam.window.panel import Sight, gains, weigh
@@ -36,7 +36,7 @@ def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: Scene, code: R
 
 
 def find_suspect(
-    tracks: Tracks, book: Book, mean: Floats, cycle: int, poses: Poses, panel: int = 0
+    tracks: Tracks, book: WindowTable, mean: Floats, cycle: int, poses: Poses, panel: int = 0
 ) -> PanelCandidate | None:
     """The point or track that is the likeliest to be a panel; None if nothing is likelier the panel than not.
 

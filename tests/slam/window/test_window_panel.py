@@ -19,7 +19,7 @@ from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.identity import MODEL_ERROR
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.returns import TX as MOVING
-from rislam_rt.slam.window.landmark_table import empty_book, enter
+from rislam_rt.slam.window.landmark_table import empty_table, enter
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.look import return_sides
 from rislam_rt.slam.window.panel import Sight, gains, spread_places, unknown, weigh
@@ -111,7 +111,7 @@ def test_forms_take_the_side_of_the_panel_that_their_point_is_held_for():
     forms[:, 0] = [0, 1, 2, MOVING]
 
     def sides(odds):
-        book = empty_book(2)
+        book = empty_table(2)
         for row in odds:
             book = enter(book, False, np.zeros(3), 1, 0.0, unknown(1, 2)._replace(log_ris=np.array([row])))
         return return_sides(forms, book), book.panels
