@@ -16,13 +16,13 @@ from rislam_rt.slam.window import divergence, gauss, motion, recovery, tracks
 from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.excess import grow, take_in
-from rislam_rt.slam.window.expect import Clusters, Expected, Scene, conditioned_share
 from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.landmark_table import WindowTable, empty_table, idents, image_ident
 from rislam_rt.slam.window.learn import learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.look import Look, echoes, look
+from rislam_rt.slam.window.measurement_prediction import Clusters, Expected, Scene, conditioned_share
 from rislam_rt.slam.window.numerics import DAMPING, REFRESH
 from rislam_rt.slam.window.retract import condemned, release
 from rislam_rt.slam.window.state import WindowState

@@ -9,7 +9,6 @@ from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.digest import Digest
-from rislam_rt.slam.window.expect import Scene
 from rislam_rt.slam.window.gauss import Holds, no_holds
 from rislam_rt.slam.window.guesses import (
     BESIDE,
@@ -28,6 +27,7 @@ from rislam_rt.slam.window.guesses import (
 from rislam_rt.slam.window.identify import identify
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.measurement_prediction import Scene
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.panel import Identity, unknown
 from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all

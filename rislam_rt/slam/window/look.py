@@ -12,10 +12,10 @@ from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import TX, Poses
 from rislam_rt.slam.window import gauss
-from rislam_rt.slam.window.expect import Clusters, Expected, Scene, cluster, expect
 from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.learn import Sights, recall, visible
+from rislam_rt.slam.window.measurement_prediction import Clusters, Expected, Scene, cluster, expect
 from rislam_rt.slam.window.numerics import GATE
 from rislam_rt.slam.window.steps import HEAD
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam import window
-from rislam_rt.slam.window.expect import PANEL_STD
 from rislam_rt.slam.window.factor import factorise, inverse
 from rislam_rt.slam.window.levels import LEVELS, Levels
+from rislam_rt.slam.window.measurement_prediction import PANEL_STD
 
 SOURCES = [path.read_text() for path in Path(window.__file__).parent.glob("*.py")]
 
