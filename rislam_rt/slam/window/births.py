@@ -14,13 +14,13 @@ from rislam_rt.slam.window.kinds import NEW, Verdict, judge, wanted
 from rislam_rt.slam.window.landmark_table import enter, idents
 from rislam_rt.slam.window.learn import seed
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.measurement_prediction import Clusters, Expected
+from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, UnresolvedClusters
 from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER, STRIDE
 from rislam_rt.slam.window.retract import behind, release
 from rislam_rt.slam.window.steps import HEAD
 
 
-def births(context: Context, expected: Expected, groups: Clusters) -> Context:
+def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClusters) -> Context:
     """Every track whose time has come is weighed; the shortest of those that are clear enters."""
     rows = tracks.due(context.tracks, context.cycle)
     if not len(rows) or (context.cycle % STRIDE and context.cycle > 12):
@@ -136,7 +136,7 @@ LEG = 0.04
 
 
 def explanations(
-    context: Context, rows: Integers, histories: Digest, expected: Expected, groups: Clusters, mean: Floats,
+    context: Context, rows: Integers, histories: Digest, expected: ExpectedComponents, groups: UnresolvedClusters, mean: Floats,
     covariance: Floats,
 ) -> list[tuple[int, float, Integers, int]]:  # fmt: skip
     """(track, log evidence, forms (2, 5) of feature rows, cluster) of returns of the map: nothing is free in them."""
@@ -165,7 +165,7 @@ def explanations(
 
 
 def _explain(
-    context: Context, histories: Digest, row: int, forms: Integers, groups: Clusters, column: int, gap: Floats,
+    context: Context, histories: Digest, row: int, forms: Integers, groups: UnresolvedClusters, column: int, gap: Floats,
     features: Floats, root: Floats,
 ) -> float:  # fmt: skip
     """Log evidence of one explanation."""

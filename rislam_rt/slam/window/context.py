@@ -11,7 +11,7 @@ from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.learn import Sights
 from rislam_rt.slam.window.log import Log, Residuals, renew
-from rislam_rt.slam.window.measurement_prediction import Scene
+from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.tracks import Tracks
 
 
@@ -23,7 +23,7 @@ class Context(NamedTuple):
     log: Log
     tracks: Tracks
     heading: Floats
-    scene: Scene
+    scene: KnownEnvironment
     cycle: int
     sights: Sights
     codes: tuple[RisCode | None, ...]

@@ -22,7 +22,12 @@ from rislam_rt.slam.window.learn import learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.look import Look, echoes, look
-from rislam_rt.slam.window.measurement_prediction import Clusters, Expected, Scene, conditioned_share
+from rislam_rt.slam.window.measurement_prediction import (
+    ExpectedComponents,
+    KnownEnvironment,
+    UnresolvedClusters,
+    conditioned_share,
+)
 from rislam_rt.slam.window.numerics import DAMPING, REFRESH
 from rislam_rt.slam.window.retract import condemned, release
 from rislam_rt.slam.window.state import WindowState
@@ -41,7 +46,7 @@ def init(
     turns = config.heading != "known"
     std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [offset]])
     window = gauss.begin(start.position, start.velocity, std, turns=turns)
-    scene = Scene(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
+    scene = KnownEnvironment(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
     lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if turns else ()))
     gait = np.stack([motion.first_gait(level) for level in lively])
@@ -117,7 +122,9 @@ def step(
     return state._replace(cycle=state.cycle + 1), info
 
 
-def _grown(state: WindowState, left: Residuals, expected: Expected, groups: Clusters) -> WindowState:
+def _grown(
+    state: WindowState, left: Residuals, expected: ExpectedComponents, groups: UnresolvedClusters
+) -> WindowState:
     """With what the evidence has turned against taken back, or else with what is born."""
     context = Context(
         state.window, state.book, state.log, state.tracks, state.heading, state.scene, state.cycle, state.sights,
@@ -236,8 +243,8 @@ def _told_precision(config: SlamConfig, dt: float) -> Floats:
 
 def _explain(
     log: Log,
-    expected: Expected,
-    groups: Clusters,
+    expected: ExpectedComponents,
+    groups: UnresolvedClusters,
     book: WindowTable,
     scatter: Floats,
     row: Integers,
@@ -336,7 +343,7 @@ def _follow(
     return _Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()))
 
 
-def _names(book: WindowTable, expected: Expected, groups: Clusters, row: Integers) -> Integers:
+def _names(book: WindowTable, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers) -> Integers:
     """Ident of what each of the clusters `row` (A,) came over first: a point, its image in a wall, a wall."""
     if not len(row):
         return np.zeros(0, dtype=np.int64)

@@ -27,7 +27,7 @@ from rislam_rt.slam.window.guesses import (
 from rislam_rt.slam.window.identify import identify
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.measurement_prediction import Scene
+from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.panel import Identity, unknown
 from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
@@ -174,7 +174,7 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
     return np.where(table.trials.is_wall, wall, -LEVELS.log_volume - np.where(table.trials.is_pair, np.log(8.0), 0.0))
 
 
-def _beside(table: Hypotheses, digest: Digest, known: Known, book: WindowTable, scene: Scene) -> Floats:
+def _beside(table: Hypotheses, digest: Digest, known: Known, book: WindowTable, scene: KnownEnvironment) -> Floats:
     """(H,) log probability that a wall's return comes out by itself, or as one with its edge at a level wall.
 
     It hangs on how far apart the two would be.
@@ -238,7 +238,7 @@ COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(4 + 3) log(1 + chi^2 / 4)` for chi^2 with 3 degrees of freedom."""
 
 
-def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: WindowTable, scene: Scene) -> Floats:
+def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: WindowTable, scene: KnownEnvironment) -> Floats:
     """(H,) log density of the tracks' mean amplitudes, given what walls leave and how points scatter."""
     radio, track = scene.radio, table.trials.track
     level, seen, rx = digest.log_amplitude[track], digest.mean[0][track], digest.mean[2][track]
@@ -266,7 +266,9 @@ def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: WindowTable
     return amplitude
 
 
-def _image_amplitudes(table: Hypotheses, rows: Integers, digest: Digest, book: WindowTable, scene: Scene) -> Floats:
+def _image_amplitudes(
+    table: Hypotheses, rows: Integers, digest: Digest, book: WindowTable, scene: KnownEnvironment
+) -> Floats:
     """The same of images of known points in new walls, hypotheses `rows` (R,); the panel's hangs on codes."""
     track, point = table.trials.track[rows], table.known[rows]
     first = np.maximum(np.linalg.norm(table.trials.shift[rows, 0] - digest.mean[1][track], axis=1), 0.05)

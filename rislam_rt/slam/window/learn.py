@@ -11,7 +11,7 @@ from rislam_rt.slam.returns import NONE, TX, Poses
 from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.landmark_table import WindowTable, learn_ratio
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.measurement_prediction import Clusters, Expected, Scene
+from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, KnownEnvironment, UnresolvedClusters
 from rislam_rt.slam.window.numerics import SCATTER_RATE
 from rislam_rt.slam.window.panel import Sight, gains, spread_places, weigh
 from rislam_rt.slam.window.steps import HEAD
@@ -42,7 +42,7 @@ def pack(forms: Integers, book: WindowTable) -> Integers:
     return code
 
 
-def recall(sights: Sights, expected: Expected, book: WindowTable) -> tuple[Floats, Floats]:
+def recall(sights: Sights, expected: ExpectedComponents, book: WindowTable) -> tuple[Floats, Floats]:
     """Probability (R,) that nothing stands in the way of each return now, and its scatter (R,)."""
     first, scatter = LEVELS.steady ** (1.0 + expected.bounces), np.full(len(expected.seen), LEVELS.crowd)
     if len(sights.code):
@@ -63,7 +63,7 @@ def seed(sights: Sights, forms: Integers, book: WindowTable, scatter: float) -> 
     )  # fmt: skip
 
 
-def visible(expected: Expected, groups: Clusters, clear: Floats) -> Floats:
+def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Floats) -> Floats:
     """(C,) probability that each cluster shows."""
     return np.asarray(LEVELS.shown * (expected.detection * clear)[groups.leader] * groups.by_itself).clip(
         1e-4, LEVELS.shown
@@ -71,8 +71,8 @@ def visible(expected: Expected, groups: Clusters, clear: Floats) -> Floats:
 
 
 def learn(
-    sights: Sights, book: WindowTable, window: Window, expected: Expected, groups: Clusters, shows: Floats, row: Integers,
-    pick: Integers, raw: Floats, glance: Observations, poses: Poses, scene: Scene, code: RisCode | None,
+    sights: Sights, book: WindowTable, window: Window, expected: ExpectedComponents, groups: UnresolvedClusters, shows: Floats, row: Integers,
+    pick: Integers, raw: Floats, glance: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
 ) -> tuple[Sights, WindowTable]:  # fmt: skip
     """After clusters `row` (A,) were seen as components `pick` (A,) with residuals of mean square `raw` (A,)."""
     if not len(expected.seen):
@@ -99,7 +99,12 @@ def learn(
 
 
 def _existence(
-    book: WindowTable, expected: Expected, groups: Clusters, hit: Floats, missed: Floats, shows: Floats
+    book: WindowTable,
+    expected: ExpectedComponents,
+    groups: UnresolvedClusters,
+    hit: Floats,
+    missed: Floats,
+    shows: Floats,
 ) -> WindowTable:
     """Every feature by the returns that only it explains: those over the fewest other features."""
     odds, hits = book.log_odds.copy(), book.hits.copy()
@@ -119,8 +124,8 @@ def _existence(
 
 
 def _strengths(
-    book: WindowTable, window: Window, expected: Expected, groups: Clusters, row: Integers, pick: Integers,
-    glance: Observations, poses: Poses, scene: Scene, code: RisCode | None,
+    book: WindowTable, window: Window, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers, pick: Integers,
+    glance: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
 ) -> WindowTable:  # fmt: skip
     """Walls' losses, and who the points are, from components that came out alone."""
     lead, alone = groups.leader[row], groups.partner[row] < 0
@@ -135,8 +140,8 @@ def _strengths(
 
 
 def _identities(
-    book: WindowTable, window: Window, expected: Expected, groups: Clusters, row: Integers, pick: Integers,
-    glance: Observations, poses: Poses, scene: Scene, code: RisCode | None,
+    book: WindowTable, window: Window, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers, pick: Integers,
+    glance: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
 ) -> WindowTable:  # fmt: skip
     """What amplitude or silence of points that come straight, and alone, tells of who they are."""
     component = np.full(len(groups.leader), -1)

@@ -15,7 +15,13 @@ from rislam_rt.slam.window import gauss
 from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.learn import Sights, recall, visible
-from rislam_rt.slam.window.measurement_prediction import Clusters, Expected, Scene, cluster, expect
+from rislam_rt.slam.window.measurement_prediction import (
+    ExpectedComponents,
+    KnownEnvironment,
+    UnresolvedClusters,
+    cluster,
+    predict_returns,
+)
 from rislam_rt.slam.window.numerics import GATE
 from rislam_rt.slam.window.steps import HEAD
 
@@ -26,8 +32,8 @@ class Look(NamedTuple):
     mean: Floats
     """(7 + 3F,) of the present."""
     poses: Poses
-    expected: Expected
-    groups: Clusters
+    expected: ExpectedComponents
+    groups: UnresolvedClusters
     shows: Floats
     """(C,) probability that each cluster shows."""
     scatter: Floats
@@ -64,13 +70,13 @@ FAR_STRONGER = 1.0
 
 
 def look(
-    window: Window, book: WindowTable, sights: Sights, heading: float, scene: Scene, code: RisCode | None,
+    window: Window, book: WindowTable, sights: Sights, heading: float, scene: KnownEnvironment, code: RisCode | None,
     glance: Observations, strangers: Floats,
 ) -> Look:  # fmt: skip
     """Expect, cluster, associate."""
     mean, covariance = gauss.now(window)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
-    expected = expect(mean[HEAD:].reshape(-1, 3), book, poses, mean[:3], scene, code)
+    expected = predict_returns(mean[HEAD:].reshape(-1, 3), book, poses, mean[:3], scene, code)
     sides = return_sides(expected.forms, book) if glance.side is not None else None
     clear, scatter = recall(sights, expected, book)
     groups = cluster(expected, scene.sensor.cell_length, clear, None if sides is None else np.maximum(sides, OTHER))
@@ -95,7 +101,7 @@ def return_sides(forms: Integers, book: WindowTable) -> Integers:
 
 
 def _associate(
-    expected: Expected, groups: Clusters, shows: Floats, scatter: Floats, covariance: Floats, glance: Observations,
+    expected: ExpectedComponents, groups: UnresolvedClusters, shows: Floats, scatter: Floats, covariance: Floats, glance: Observations,
     sides: Integers | None, strangers: Floats,
 ) -> tuple[Integers, Integers, float, float]:  # fmt: skip
     """Rows of the clusters that were seen, the components that they were seen as, the log likelihood gained over

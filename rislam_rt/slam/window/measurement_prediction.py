@@ -20,7 +20,7 @@ PANEL_STD = float(np.pi / np.sqrt(24.0))
 """Spread of the panel's predicted log amplitude: that of a Rayleigh variable, as phases hang on millimetres."""
 
 
-class Scene(NamedTuple):
+class KnownEnvironment(NamedTuple):
     """What the filter knows of the world beside its features."""
 
     body: Body
@@ -36,7 +36,7 @@ class Scene(NamedTuple):
         return 1 if self.ris is None else len(self.ris.panels)
 
 
-class Expected(NamedTuple):
+class ExpectedComponents(NamedTuple):
     """R returns worth looking for, at the mean belief."""
 
     forms: Integers
@@ -55,9 +55,9 @@ class Expected(NamedTuple):
     """(R,) probability that it shows, were nothing in its way and it alone."""
 
 
-def expect(
-    features: Floats, book: WindowTable, poses: Poses, position: Floats, scene: Scene, code: RisCode | None
-) -> Expected:
+def predict_returns(
+    features: Floats, book: WindowTable, poses: Poses, position: Floats, scene: KnownEnvironment, code: RisCode | None
+) -> ExpectedComponents:
     """All forms that are possible at the mean belief, arrive from above, and may be detected."""
     legs = enumerate_forms(tuple(book.points.tolist()), tuple(book.walls.tolist()), scene.max_bounces, True)
     returns, bounces = legs.returns, legs.bounces
@@ -75,13 +75,13 @@ def expect(
     jacobian = np.zeros((count, 3, HEAD + 3 * len(features)))
     jacobian[..., :3], jacobian[..., 6] = linear.by_pose, linear.by_heading(poses, position)
     jacobian[..., HEAD:] = linear.by_feature.reshape(count, 3, features.size)
-    return Expected(
+    return ExpectedComponents(
         forms_of(returns), linear.seen, jacobian, level[audible], spread[audible], bounces[audible], detection[audible]
     )
 
 
 def amplitudes(
-    returns: Returns, features: Floats, book: WindowTable, tx_length: Floats, rx_length: Floats, poses: Poses, scene: Scene,
+    returns: Returns, features: Floats, book: WindowTable, tx_length: Floats, rx_length: Floats, poses: Poses, scene: KnownEnvironment,
     code: RisCode | None,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Log amplitude (R,) and its standard deviation (R,)."""
@@ -139,7 +139,7 @@ def detection_probability(log_amplitude: Floats, spread: Floats, sensor: SensorM
     return np.asarray(each @ np.array([1.0, 4.0, 1.0]) / 6.0)
 
 
-class Clusters(NamedTuple):
+class UnresolvedClusters(NamedTuple):
     """C components that R expected returns come out as: the strongest of each cell leads."""
 
     leader: Integers
@@ -160,7 +160,9 @@ class Clusters(NamedTuple):
     """(C,) probability that it comes out by itself: 1 for leaders, less for what a leader should take in."""
 
 
-def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | None = None) -> Clusters:
+def cluster(
+    expected: ExpectedComponents, cell: Floats, clear: Floats, sides: Integers | None = None
+) -> UnresolvedClusters:
     """From the strongest down, each return takes in all that is in its cell; neighbours on the cell's edge disturb."""
     count = len(expected.seen)
     place, strength = expected.seen / cell, expected.log_amplitude
@@ -207,7 +209,7 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
     )
     share[twins], spread[twins] = 0.5, TWIN_STD**2
     fade = np.where(both, 0.7 * np.minimum(ratio, 1.0), 0.0)
-    return Clusters(
+    return UnresolvedClusters(
         leader,
         mate,
         share,
@@ -233,7 +235,11 @@ def _above(z: Floats) -> Floats:
 
 
 def conditioned_share(
-    clusters: Clusters, expected: Expected, row: Integers, log_amplitude: Floats, log_amplitude_std: Floats
+    clusters: UnresolvedClusters,
+    expected: ExpectedComponents,
+    row: Integers,
+    log_amplitude: Floats,
+    log_amplitude_std: Floats,
 ) -> tuple[Floats, Floats]:
     """Mean and variance (A,) of the partner's share in clusters `row` (A,), given the amplitudes measured.
 

@@ -10,7 +10,7 @@ from rislam_rt.slam.window.forms import UNKNOWN
 from rislam_rt.slam.window.landmark_table import WindowTable, remove_features
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals
-from rislam_rt.slam.window.measurement_prediction import Expected
+from rislam_rt.slam.window.measurement_prediction import ExpectedComponents
 from rislam_rt.slam.window.numerics import FEWEST, RECENT
 from rislam_rt.slam.window.panel import unknown
 from rislam_rt.slam.window.tracks import Tracks
@@ -61,7 +61,9 @@ def _resume(tracks: Tracks, log: Log, lost: Booleans, cycle: int, step: Floats) 
     return Tracks._make([*joined, ident]), log._replace(track=track)
 
 
-def condemned(book: WindowTable, left: Residuals, log: Log, expected: Expected, covariance: Floats) -> Booleans:
+def condemned(
+    book: WindowTable, left: Residuals, log: Log, expected: ExpectedComponents, covariance: Floats
+) -> Booleans:
     """(F,) features to take back: that do not exist, that their measurements contradict, or that follow from others."""
     gone = book.log_odds < np.log(LEVELS.dead / (1.0 - LEVELS.dead))
     square = np.vecdot(left.left, left.left)
@@ -74,7 +76,7 @@ def condemned(book: WindowTable, left: Residuals, log: Log, expected: Expected, 
     return np.asarray(gone | derived(book, expected, covariance))
 
 
-def derived(book: WindowTable, expected: Expected, covariance: Floats) -> Booleans:
+def derived(book: WindowTable, expected: ExpectedComponents, covariance: Floats) -> Booleans:
     """(F,) young features whose own return is one that others throw as well, without anything free in it."""
     found = np.zeros(len(book.ident), dtype=np.bool_)
     forms = expected.forms

@@ -9,7 +9,7 @@ from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.learn import Sights
 from rislam_rt.slam.window.log import Log
-from rislam_rt.slam.window.measurement_prediction import Scene
+from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.tracks import Tracks
 
 
@@ -32,7 +32,7 @@ class WindowState(NamedTuple):
     """(K,) [rad] that the compass told; where it is not asked, what offsets are against."""
     shift: Floats
     """(3,) [m] standard deviation of the start's position: what no measurement tells."""
-    scene: Scene
+    scene: KnownEnvironment
     doubt: float
     """Log odds that the agent is lost: that the map explains nothing of what is heard (see `divergence`)."""
     asked: bool

@@ -10,14 +10,14 @@ from rislam_rt.slam.returns import Poses, reflect
 from rislam_rt.slam.ris_candidate import DEEP, DISMISSAL, PATIENCE, places
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.measurement_prediction import Scene
+from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.numerics import DRAWS
 from rislam_rt.slam.window.panel import Sight, gains, weigh
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.tracks import Tracks
 
 
-def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: Scene, code: RisCode | None) -> Tracks:
+def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: KnownEnvironment, code: RisCode | None) -> Tracks:
     """The tracks after what this cycle tells of each, were it a point: is it a panel?"""
     rows = (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
