@@ -8,7 +8,6 @@ from rislam_rt.slam.returns import TX, linearise
 from rislam_rt.slam.window import gauss, tracks
 from rislam_rt.slam.window.context import Context, resolve
 from rislam_rt.slam.window.digest import Digest, digest
-from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.guesses import BESIDE, known_features
 from rislam_rt.slam.window.kinds import NEW, Verdict, judge, wanted
 from rislam_rt.slam.window.landmark_table import enter, idents
@@ -16,6 +15,7 @@ from rislam_rt.slam.window.learn import seed
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, UnresolvedClusters
 from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER, STRIDE
+from rislam_rt.slam.window.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.retract import behind, release
 from rislam_rt.slam.window.steps import HEAD
 

@@ -5,8 +5,8 @@ import pytest
 
 from rislam_rt.slam.window import divergence, egomotion, gauss
 from rislam_rt.slam.window.egomotion import Rates
-from rislam_rt.slam.window.forms import UNKNOWN
 from rislam_rt.slam.window.log import Log
+from rislam_rt.slam.window.path_forms import UNKNOWN
 from rislam_rt.slam.window.steps import HEAD
 
 TOLD, STD = np.array([0.3, 0.1, 0.0]), np.full(3, 0.01)
