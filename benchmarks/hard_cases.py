@@ -43,7 +43,7 @@ from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import NestedConfig, Outcome, SlamConfig, StartPrior, StepInfo, estimate, init, predict, step
 from rislam_rt.slam.nested.filter import believed
-from rislam_rt.slam.window import WindowState, gauss
+from rislam_rt.slam.window import WindowState, window_gaussian
 
 ROOM = Path(__file__).parents[1] / "scenes" / "paper_room"
 ROUNDING = 1e-10
@@ -218,7 +218,7 @@ def run_case(case: Case) -> Verdict:
 
 def _believed(state: Any) -> Floats:
     """Covariance of all that the filter holds of the present."""
-    return gauss.now(state.window)[1] if isinstance(state, WindowState) else believed(state).covariance
+    return window_gaussian.now(state.window)[1] if isinstance(state, WindowState) else believed(state).covariance
 
 
 def faults_of(belief: SlamEstimate, info: StepInfo, count: int, covariance: Floats | None = None) -> list[str]:

@@ -50,7 +50,7 @@ class Mutant(NamedTuple):
 MUTANTS = (
     Mutant("nothing", "constants.py", "", ""),
     Mutant(
-        "no update of the pose", "slam/window/gauss.py",
+        "no update of the pose", "slam/window/window_gaussian.py",
         "        accel=window.accel + change[size:].reshape(window.accel.shape),",
         "        accel=window.accel,",
     ),

@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.returns import TX, linearise
-from rislam_rt.slam.window import gauss, tracks
+from rislam_rt.slam.window import tracks, window_gaussian
 from rislam_rt.slam.window.context import Context, resolve
 from rislam_rt.slam.window.digest import Digest, digest
 from rislam_rt.slam.window.guesses import BESIDE, known_features
@@ -31,7 +31,7 @@ def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClu
     if not full:
         return context
     rows, ats = rows[full], [ats[place] for place in full]
-    mean, covariance = gauss.now(context.window)
+    mean, covariance = window_gaussian.now(context.window)
     known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.book, mean[:3])
     histories = digest(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
     told = explanations(context, rows, histories, expected, groups, mean, covariance)
@@ -223,7 +223,7 @@ def _enter(context: Context, at: Integers, verdict: Verdict, histories: Digest, 
     """The map with a new feature and its history, solved anew; as it was, if they do not agree."""
     new = len(context.book.ident)
     holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))
-    window = gauss.add_feature(context.window, verdict.place, holds)
+    window = window_gaussian.add_feature(context.window, verdict.place, holds)
     book = enter(context.book, verdict.is_wall, histories.middle, len(at), 5.0, verdict.identity)
     forms = np.full((2, 5), UNKNOWN)
     forms[0] = [new if part == NEW else part for part in verdict.form]

@@ -6,13 +6,13 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import RisCode
-from rislam_rt.slam.window import gauss
-from rislam_rt.slam.window.gauss import Window
+from rislam_rt.slam.window import window_gaussian
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.learn import Sights
 from rislam_rt.slam.window.log import Log, Residuals, renew
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window.window_gaussian import Window
 
 
 class Context(NamedTuple):
@@ -34,5 +34,5 @@ def resolve(context: Context, steps: int) -> tuple[Window, Residuals]:
     window, every = context.window, np.arange(context.window.num_poses)
     for _ in range(steps):
         window, left = renew(window, context.log, context.book, context.scene.body, context.heading, every)
-        window = gauss.weigh_holds(gauss.solve(window))
+        window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return window, left

@@ -10,16 +10,16 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.window import egomotion, gauss
+from rislam_rt.slam.window import egomotion, window_gaussian
 from rislam_rt.slam.window.egomotion import Rates
 from rislam_rt.slam.window.factor import inverse
-from rislam_rt.slam.window.gauss import Quadratic, Window
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log
 from rislam_rt.slam.window.look import Look
 from rislam_rt.slam.window.numerics import LADDER
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.tracks import CYCLE
+from rislam_rt.slam.window.window_gaussian import Quadratic, Window
 
 RATE = 1e-4
 """Probability that a cycle is the one in which the agent is lost: once in 1000 s."""
@@ -82,7 +82,7 @@ def shifted(window: Window, by: Floats) -> Window:
 def landed(window: Window, by: Floats) -> Window:
     """The window after a jump: its last pose alone, elsewhere within `JUMP`; velocity and map as they were."""
     while window.num_poses > 1:
-        window = gauss.slide(window)
+        window = window_gaussian.slide(window)
     head, size = window.head.copy(), len(window.head)
     head[:3] += by
     covariance = inverse(window.prior.hessian)
@@ -117,9 +117,9 @@ def ask_picture(window: Window, log: Log, heading: Floats, baseline: float, live
     found = egomotion.rates(log, heading[-PAST - 1 :], time / PAST, baseline)
     if len(found.rate) < egomotion.FEWEST:
         return 0.0
-    place = gauss.poses(window)[-PAST - 1 :, :3]
+    place = window_gaussian.poses(window)[-PAST - 1 :, :3]
     # what a clock that stands still does not allow for was not foreseen
-    std = passed / time * np.sqrt(np.diag(gauss.now(window)[1])[3:6] + (lively * time) ** 2) + 1e-6
+    std = passed / time * np.sqrt(np.diag(window_gaussian.now(window)[1])[3:6] + (lively * time) ** 2) + 1e-6
     return egomotion.weigh(found, (place[-1] - place[0]) / time, std).log_odds - egomotion.LOG_WRONG
 
 
@@ -144,7 +144,7 @@ def with_free_compass(window: Window, std: float) -> Window:
 
 
 def _begun(window: Window, head: Floats, hessian: Floats) -> Window:
-    return gauss.solve(window._replace(head=head, prior=Quadratic(hessian, np.zeros(len(head)), head)))
+    return window_gaussian.solve(window._replace(head=head, prior=Quadratic(hessian, np.zeros(len(head)), head)))
 
 
 def is_lost(log_odds: float) -> bool:

@@ -12,11 +12,10 @@ from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.observations import Observations, is_los, observations_of, stranger_density
 from rislam_rt.slam.returns import TX
 from rislam_rt.slam.step_info import REMOVED, UNUSED, Outcome, StepInfo
-from rislam_rt.slam.window import divergence, gauss, motion, recovery, tracks
+from rislam_rt.slam.window import divergence, motion, recovery, tracks, window_gaussian
 from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.excess import grow, take_in
-from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.landmark_table import WindowTable, empty_table, idents, image_ident
 from rislam_rt.slam.window.learn import learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
@@ -34,6 +33,7 @@ from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import TURN
 from rislam_rt.slam.window.suspect import weigh_tracks
 from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window.window_gaussian import Window
 
 
 def init(
@@ -45,7 +45,7 @@ def init(
     offset = start.heading_std if config.heading == "estimated" else 0.0
     turns = config.heading != "known"
     std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [offset]])
-    window = gauss.begin(start.position, start.velocity, std, turns=turns)
+    window = window_gaussian.begin(start.position, start.velocity, std, turns=turns)
     scene = KnownEnvironment(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
     lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if turns else ()))
@@ -84,7 +84,7 @@ def step(
     state, view = _notice(state, heading, code, glance, strangers)
     mean, poses, expected, groups = view.mean, view.poses, view.expected, view.groups
     shows, scatter, row, pick = view.shows, view.scatter, view.row, view.pick
-    before = gauss.now(state.window)[1]
+    before = window_gaussian.now(state.window)[1]
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(LEVELS.stay))))
 
     log = append(state.log, glance, state.cycle, state.cycle - state.window.num_poses + 1)
@@ -98,7 +98,7 @@ def step(
 
     taken = np.zeros(len(glance.seen), dtype=np.bool_)
     taken[pick] = True
-    turn += float(np.diff(gauss.poses(state.window)[-2:, 3]).sum())
+    turn += float(np.diff(window_gaussian.poses(state.window)[-2:, 3]).sum())
     followed = _follow(state, mean, glance, (~taken).nonzero()[0], dt, turn, bend)
     state = state._replace(tracks=followed.tracks, log=followed.log)
     jumped = state.doubt == 0.0
@@ -114,7 +114,7 @@ def step(
 
     state, wrong = recovery.ask(state)
     state = _grown(state, left, expected, groups)
-    state = state._replace(excess=take_in(state.excess, before[:6, :6], gauss.now(state.window)[1][:6, :6]))
+    state = state._replace(excess=take_in(state.excess, before[:6, :6], window_gaussian.now(state.window)[1][:6, :6]))
     outcome = _outcome(len(measurement), len(state.book.ident), wrong or jumped or state.doubt >= 0.0)
     if divergence.is_lost(state.doubt) and len(state.book.ident):
         state = recovery.restart(state)
@@ -131,7 +131,7 @@ def _grown(
         state.codes,
     )  # fmt: skip
     if state.cycle % REFRESH == 0 and len(state.book.ident):
-        gone = condemned(context.book, left, context.log, expected, gauss.now(context.window)[1])
+        gone = condemned(context.book, left, context.log, expected, window_gaussian.now(context.window)[1])
         context, fresh = release(context, ~gone), not gone.any()
     else:
         fresh = True
@@ -150,12 +150,12 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     while window.num_poses >= LEVELS.window:
         gait = motion.forward(gait, _likelihoods(window, 1)[:, 0], LEVELS.stay)
         passed = np.concatenate([passed, window.head[None, :3]])
-        window, headings = gauss.slide(window), headings[1:]
+        window, headings = window_gaussian.slide(window), headings[1:]
     level = state.level @ motion.transition(LEVELS.stay)
     if state.config.motion == "told":
-        window, excess = gauss.extend(window, dt, _told_precision(state.config, dt)), state.excess
+        window, excess = window_gaussian.extend(window, dt, _told_precision(state.config, dt)), state.excess
     else:
-        window = gauss.extend(window, dt, precision := _precisions(level))
+        window = window_gaussian.extend(window, dt, precision := _precisions(level))
         excess = grow(state.excess, dt, motion.expected_variance(level)[COLUMNS[:3]] - 1.0 / precision[:3])
     return state._replace(
         window=window, gait=gait, heading=np.append(headings, heading), excess=excess, passed=passed
@@ -164,7 +164,7 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
 
 def smoothed(state: WindowState) -> Floats:
     """(K, 3) [m] positions of all cycles with hindsight: of the window's length, less for the last ones."""
-    return np.concatenate([state.passed, gauss.poses(state.window)[:, :3]])
+    return np.concatenate([state.passed, window_gaussian.poses(state.window)[:, :3]])
 
 
 START = ((3, 0.5), (10, 1.0))
@@ -192,7 +192,7 @@ def _notice(
             precision = state.window.precision.copy()
             lively = COLUMNS[: precision.shape[1]] != 1
             precision[-steps:, lively] = np.minimum(precision[-steps:, lively], liveliness**-2.0)
-            trial = gauss.solve(state.window._replace(precision=precision))
+            trial = window_gaussian.solve(state.window._replace(precision=precision))
             view = view_of(trial)
             if view.score + LEVELS.log_rare > best.score:
                 best, window = view, trial
@@ -281,10 +281,10 @@ def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
     last = np.array([window.num_poses - 1])
     window, found = renew(window, log, book, body, state.heading, last, even=True)
     nis = float(np.sum(found.left**2))
-    window = gauss.solve(window, spread=False)
+    window = window_gaussian.solve(window, spread=False)
     slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else last
     window, left = renew(window, log, book, body, state.heading, slots)
-    window = gauss.weigh_holds(gauss.solve(window))
+    window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return liven(state._replace(window=window)), left, nis
 
 

@@ -8,13 +8,13 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.moments import even_draws, poses_of
 from rislam_rt.slam.observations import OTHER, UNTOLD
 from rislam_rt.slam.window.context import Context
-from rislam_rt.slam.window.gauss import poses
 from rislam_rt.slam.window.guesses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.numerics import CERTAIN
 from rislam_rt.slam.window.panel import Identity, Sight, gains, spread_places, unknown, weigh
 from rislam_rt.slam.window.trial import Fits
+from rislam_rt.slam.window.window_gaussian import poses
 
 ASIDE = 12.0
 """Log evidence behind a track's best point from which on another place is not asked whether it is the panel's."""

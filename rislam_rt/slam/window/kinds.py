@@ -9,7 +9,6 @@ from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.digest import Digest
-from rislam_rt.slam.window.gauss import Holds, no_holds
 from rislam_rt.slam.window.guesses import (
     BESIDE,
     IMAGE,
@@ -31,6 +30,7 @@ from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.panel import Identity, unknown
 from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
+from rislam_rt.slam.window.window_gaussian import Holds, no_holds
 
 LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 0.2]))
 """Log prior of each kind; over known walls, of all walls together; of known points in walls, of all points together."""

@@ -11,8 +11,7 @@ from rislam_rt.slam.associate import Candidates, pair_costs, squared_distance
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import TX, Poses
-from rislam_rt.slam.window import gauss
-from rislam_rt.slam.window.gauss import Window
+from rislam_rt.slam.window import window_gaussian
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.learn import Sights, recall, visible
 from rislam_rt.slam.window.measurement_prediction import (
@@ -24,6 +23,7 @@ from rislam_rt.slam.window.measurement_prediction import (
 )
 from rislam_rt.slam.window.numerics import GATE
 from rislam_rt.slam.window.steps import HEAD
+from rislam_rt.slam.window.window_gaussian import Window
 
 
 class Look(NamedTuple):
@@ -74,7 +74,7 @@ def look(
     glance: Observations, strangers: Floats,
 ) -> Look:  # fmt: skip
     """Expect, cluster, associate."""
-    mean, covariance = gauss.now(window)
+    mean, covariance = window_gaussian.now(window)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
     expected = predict_returns(mean[HEAD:].reshape(-1, 3), book, poses, mean[:3], scene, code)
     sides = return_sides(expected.forms, book) if glance.side is not None else None

@@ -10,7 +10,7 @@ from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.map_geometry import MAX_LEAN, images_in, wall_planes
 from rislam_rt.slam.moments import even_draws, poses_of, square_root
 from rislam_rt.slam.returns import AXES
-from rislam_rt.slam.window import gauss
+from rislam_rt.slam.window import window_gaussian
 from rislam_rt.slam.window.filter import init
 from rislam_rt.slam.window.landmark_table import WindowTable, image_ident
 from rislam_rt.slam.window.state import WindowState
@@ -24,7 +24,7 @@ def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
     unknown = [panel for panel, row in enumerate(state.book.panels) if row < 0]
     if state.scene.ris is None or not unknown:
         return ahead
-    mean, _ = gauss.now(state.window)
+    mean, _ = window_gaussian.now(state.window)
     poses = poses_of(mean[:3], np.asarray(state.heading[-1] + mean[6]), state.scene.body)
     found = [find_suspect(state.tracks, state.book, mean, state.cycle - 1, poses, panel) for panel in unknown]
     return replace(ahead, suspects=tuple(suspect for suspect in found if suspect is not None))
@@ -32,7 +32,7 @@ def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
 
 def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> SlamEstimate:
     """Mean and covariance of the pose, equally likely samples of it, and the map."""
-    mean, covariance = gauss.now(state.window)
+    mean, covariance = window_gaussian.now(state.window)
     spread = covariance.copy()
     spread[:6, :6] += state.excess
     spread[:3, :3] += np.diag(state.shift**2)
@@ -71,11 +71,13 @@ def revisit(
     """
     scene = state.scene
     fresh = init(start, scene.body, scene.ris, scene.sensor, config, rng=rng)
-    mean, covariance = gauss.now(state.window)
+    mean, covariance = window_gaussian.now(state.window)
     features = mean[HEAD:].reshape(-1, 3)
     spread = covariance[HEAD:, HEAD:] + shift_covariance(features, state.book, state.shift)
     std = np.concatenate([np.maximum(fresh.shift, 1e-5), np.sqrt(np.diag(fresh.window.covariance))[3:HEAD]])
-    window = gauss.begin_with(start.position, start.velocity, std, mean[HEAD:], spread, turns=fresh.window.turns)
+    window = window_gaussian.begin_with(
+        start.position, start.velocity, std, mean[HEAD:], spread, turns=fresh.window.turns
+    )
     book = state.book._replace(hidden=np.zeros(state.book.hidden.shape))
     return fresh._replace(window=window, book=book, shift=np.zeros(3))
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.slam.returns import NONE, TX
-from rislam_rt.slam.window import gauss
+from rislam_rt.slam.window import window_gaussian
 from rislam_rt.slam.window.context import Context, resolve
 from rislam_rt.slam.window.landmark_table import WindowTable, remove_features
 from rislam_rt.slam.window.levels import LEVELS
@@ -26,7 +26,7 @@ def release(context: Context, keep: Booleans) -> Context:
     form = log.form.copy()
     form[lost] = UNKNOWN
     log = log._replace(form=form)
-    window, book = gauss.drop_features(context.window, keep), remove_features(book, keep)
+    window, book = window_gaussian.drop_features(context.window, keep), remove_features(book, keep)
     context = context._replace(window=window, book=book, log=log, tracks=tracks)
     return context._replace(window=resolve(context, 2)[0])
 
@@ -103,7 +103,7 @@ def derived(book: WindowTable, expected: ExpectedComponents, covariance: Floats)
 def behind(context: Context, wall: int) -> Booleans:
     """(F,) features that the newest wall stands before: what was held for them may be its doing."""
     book, features = context.book, context.window.features
-    middle = gauss.now(context.window)[0][:3]
+    middle = window_gaussian.now(context.window)[0][:3]
     anchor = book.anchor[wall]
     span = features[wall] - anchor
     normal = span / np.linalg.norm(span)

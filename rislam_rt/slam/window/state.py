@@ -5,12 +5,12 @@ from typing import NamedTuple
 from rislam_rt.arrays import Floats
 from rislam_rt.model import RisCode
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.window.gauss import Window
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.learn import Sights
 from rislam_rt.slam.window.log import Log
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window.window_gaussian import Window
 
 
 class WindowState(NamedTuple):
