@@ -30,7 +30,7 @@ from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.panel import Identity, unknown
 from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
-from rislam_rt.slam.window.window_gaussian import Holds, no_holds
+from rislam_rt.slam.window.window_gaussian import DirectionPriors, no_holds
 
 LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 0.2]))
 """Log prior of each kind; over known walls, of all walls together; of known points in walls, of all points together."""
@@ -50,7 +50,7 @@ class Verdict(NamedTuple):
     """(3,) of the new feature."""
     covariance: Floats
     """(3, 3), the poses held."""
-    holds: Holds
+    holds: DirectionPriors
     """What may be held of it beforehand; its row is 0."""
     share: float
     """Of the edge with the known wall in its place, where it comes out as one with that."""
@@ -304,7 +304,7 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
     return total
 
 
-def beliefs(place: Floats, digest: Digest, known: Known, book: WindowTable) -> Holds:
+def beliefs(place: Floats, digest: Digest, known: Known, book: WindowTable) -> DirectionPriors:
     """What may be held beforehand of a wall at `place` (3,): upright, at right angles to another; or level."""
     span = place - digest.middle
     reach = max(float(np.linalg.norm(span)), 0.1)
@@ -328,7 +328,7 @@ def beliefs(place: Floats, digest: Digest, known: Known, book: WindowTable) -> H
                 log_odds.append(np.log(LEVELS.square / (1.0 - LEVELS.square)) + np.log(np.pi / 2.0 * reach))
     count = len(axes)
     axis = np.array(axes).reshape(count, 3)
-    return Holds(
+    return DirectionPriors(
         np.zeros(count, dtype=np.int64), axis, axis @ digest.middle, np.full(count, std), np.array(log_odds),
         np.full(count, 0.5),
     )  # fmt: skip

@@ -5,7 +5,7 @@ import pytest
 
 from rislam_rt.slam.window import motion, window_gaussian
 from rislam_rt.slam.window.steps import HEAD, POSE
-from rislam_rt.slam.window.window_gaussian import Holds, Quadratic
+from rislam_rt.slam.window.window_gaussian import DirectionPriors, Quadratic
 
 DT, CYCLES, SIGMA_A = 0.1, 12, 0.5
 
@@ -20,7 +20,7 @@ def _sighting(rng):
 def _filtered(sightings, start, std, keep):
     """The window's answer, at most `keep` poses long."""
     window = window_gaussian.begin(start[:3], start[3:6], std)
-    nothing = Holds(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), *(np.zeros(0) for _ in range(4)))
+    nothing = DirectionPriors(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), *(np.zeros(0) for _ in range(4)))
     window = window_gaussian.add_feature(window, np.ones(3), nothing, ridge=1.0)
     for cycle, (rows, value, weight) in enumerate(sightings):
         if cycle:
@@ -84,7 +84,7 @@ def test_a_linear_window_is_the_batch_and_loses_nothing_when_it_slides(keep):
 def test_a_belief_about_a_wall_gives_way_to_what_contradicts_it():
     rng = np.random.default_rng(4)
     window = window_gaussian.begin(np.zeros(3), np.zeros(3), np.full(7, 1e-3))
-    hold = Holds(
+    hold = DirectionPriors(
         np.zeros(1, dtype=np.int64), np.array([[0.0, 0.0, 1.0]]), np.zeros(1), np.full(1, 0.05),
         np.array([np.log(9.0) + np.log(5.0)]), np.full(1, 0.5),
     )  # fmt: skip
