@@ -8,7 +8,7 @@ from rislam_rt.slam.returns import TX, linearise
 from rislam_rt.slam.window import tracks, window_gaussian
 from rislam_rt.slam.window.context import Context, resolve
 from rislam_rt.slam.window.digest import Digest, digest
-from rislam_rt.slam.window.guesses import BESIDE, known_features
+from rislam_rt.slam.window.hypotheses import BESIDE, known_features
 from rislam_rt.slam.window.kinds import NEW, Verdict, judge, wanted
 from rislam_rt.slam.window.landmark_table import enter, idents
 from rislam_rt.slam.window.learn import seed

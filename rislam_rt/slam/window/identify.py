@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.moments import even_draws, poses_of
 from rislam_rt.slam.observations import OTHER, UNTOLD
 from rislam_rt.slam.window.context import Context
-from rislam_rt.slam.window.guesses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
+from rislam_rt.slam.window.hypotheses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.numerics import CERTAIN

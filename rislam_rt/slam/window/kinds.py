@@ -9,7 +9,7 @@ from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.digest import Digest
-from rislam_rt.slam.window.guesses import (
+from rislam_rt.slam.window.hypotheses import (
     BESIDE,
     IMAGE,
     LEVEL_TURN,
