@@ -22,7 +22,7 @@ WALLS = (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE, IMAGE)
 """Kinds whose new feature is a wall."""
 
 
-class Known(NamedTuple):
+class KnownFeatures(NamedTuple):
     """Features of the map as affine maps and places; walls as images of the agent's present place."""
 
     place: Floats
@@ -45,7 +45,7 @@ class Hypotheses(NamedTuple):
     trials: Trials
 
 
-def known_features(mean: Floats, covariance: Floats, book: WindowTable, middle: Floats) -> Known:
+def known_features(mean: Floats, covariance: Floats, book: WindowTable, middle: Floats) -> KnownFeatures:
     """The map's features (F, 3), walls as images of `middle`, with their covariances (3F, 3F) block by block."""
     place, count = mean.copy(), len(mean)
     blocks = covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
@@ -63,7 +63,7 @@ def known_features(mean: Floats, covariance: Floats, book: WindowTable, middle: 
     for row in range(count):
         root = square_root(blocks[row])
         roots[row, :, : root.shape[1]] = root
-    return Known(place, roots, turn, shift)
+    return KnownFeatures(place, roots, turn, shift)
 
 
 def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
@@ -75,7 +75,7 @@ def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
     return np.asarray(-2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]))
 
 
-def hypotheses(digest: Digest, known: Known, book: WindowTable, use_vt: bool) -> Hypotheses:
+def hypotheses(digest: Digest, known: KnownFeatures, book: WindowTable, use_vt: bool) -> Hypotheses:
     """Every kind for every track, with its first guess; images of known points where wall returns tell no walls."""
     count, walls = len(digest.seen), book.walls
     seen, tx, rx = digest.mean
@@ -128,7 +128,7 @@ def hypotheses(digest: Digest, known: Known, book: WindowTable, use_vt: bool) ->
     return Hypotheses(kind, walled, trials)
 
 
-def _over(known: Known, legs: Integers, spots: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
+def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
     """Turns (N, T, 2, 3, 3), shifts (N, T, 2, 3) and doubts (N, T, 2, 3, 3) of the walls that N kinds go over on either
     leg (N, 2), `NONE` for none, at about the places (N, 2, T, 3) of T tracks."""
     count, nowhere = spots.shape[2], (middle + 1.0, np.zeros((3, 3)), AXES, np.zeros(3))
@@ -150,7 +150,7 @@ def _image(digest: Digest, spot: Floats, root: Floats) -> tuple[Floats, Floats, 
     return start, turn, shift, doubt
 
 
-def _beyond(kind: Integers, walled: Integers, known: Known) -> Floats:
+def _beyond(kind: Integers, walled: Integers, known: KnownFeatures) -> Floats:
     """(H, 3, 4) turn and shift of the known walls beside whose edges walls are sought; zero elsewhere."""
     found, rows = np.zeros((len(kind), 3, 4)), (kind == BESIDE).nonzero()[0]
     if len(rows):

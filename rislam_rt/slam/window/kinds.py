@@ -20,7 +20,7 @@ from rislam_rt.slam.window.hypotheses import (
     WALL,
     WALLS,
     Hypotheses,
-    Known,
+    KnownFeatures,
     hypotheses,
 )
 from rislam_rt.slam.window.identify import identify
@@ -90,7 +90,7 @@ _TEMPLATES = (
 
 
 def judge(
-    context: Context, ats: list[Integers], digest: Digest, known: Known, told: list[tuple[int, float, int]],
+    context: Context, ats: list[Integers], digest: Digest, known: KnownFeatures, told: list[tuple[int, float, int]],
     lonely: Floats, beside: Floats,
 ) -> tuple[list[Verdict], Floats]:  # fmt: skip
     """Verdicts of T tracks, and the posterior (E,) of each of the explanations by the map.
@@ -174,7 +174,9 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
     return np.where(table.trials.is_wall, wall, -LEVELS.log_volume - np.where(table.trials.is_pair, np.log(8.0), 0.0))
 
 
-def _beside(table: Hypotheses, digest: Digest, known: Known, book: WindowTable, scene: KnownEnvironment) -> Floats:
+def _beside(
+    table: Hypotheses, digest: Digest, known: KnownFeatures, book: WindowTable, scene: KnownEnvironment
+) -> Floats:
     """(H,) log probability that a wall's return comes out by itself, or as one with its edge at a level wall.
 
     It hangs on how far apart the two would be.
@@ -279,7 +281,7 @@ def _image_amplitudes(
     return np.asarray(-0.5 * off**2 / variance - 0.5 * np.log(variance))
 
 
-def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: WindowTable) -> Floats:
+def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: KnownFeatures, book: WindowTable) -> Floats:
     """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known."""
     middle, walls, wall = digest.middle, book.walls, table.trials.is_wall
     pair, tx = table.trials.is_pair[:, None], digest.mean[1][table.trials.track]
@@ -304,7 +306,7 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
     return total
 
 
-def beliefs(place: Floats, digest: Digest, known: Known, book: WindowTable) -> DirectionPriors:
+def beliefs(place: Floats, digest: Digest, known: KnownFeatures, book: WindowTable) -> DirectionPriors:
     """What may be held beforehand of a wall at `place` (3,): upright, at right angles to another; or level."""
     span = place - digest.middle
     reach = max(float(np.linalg.norm(span)), 0.1)
@@ -334,7 +336,7 @@ def beliefs(place: Floats, digest: Digest, known: Known, book: WindowTable) -> D
     )  # fmt: skip
 
 
-def _upright(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: WindowTable) -> Floats:
+def _upright(table: Hypotheses, fits: Fits, digest: Digest, known: KnownFeatures, book: WindowTable) -> Floats:
     """Gain (H,) in log evidence by what walls are beforehand: each direction held, or anywhere in its width."""
     gain = np.zeros(len(fits.cost))
     trials, tx = table.trials, digest.mean[1]
