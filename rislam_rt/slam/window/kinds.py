@@ -23,12 +23,12 @@ from rislam_rt.slam.window.hypotheses import (
     KnownFeatures,
     hypotheses,
 )
-from rislam_rt.slam.window.identify import identify
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.panel import Identity, unknown
+from rislam_rt.slam.window.point_identification import identify
 from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
 from rislam_rt.slam.window.window_gaussian import DirectionPriors, no_holds
 
