@@ -17,7 +17,7 @@ from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER
 from rislam_rt.slam.window.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.retract import behind, release
 from rislam_rt.slam.window.steps import HEAD
-from rislam_rt.slam.window.track_classification import NEW, Verdict, judge, wanted
+from rislam_rt.slam.window.track_classification import NEW, TrackDecision, judge, wanted
 
 
 def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClusters) -> Context:
@@ -219,7 +219,7 @@ def _assign(context: Context, at: Integers, forms: Integers, scatter: Floats, pa
     return context._replace(log=log._replace(form=form, share=share, extra=extra))
 
 
-def _enter(context: Context, at: Integers, verdict: Verdict, histories: Digest, row: int) -> tuple[Context, bool]:
+def _enter(context: Context, at: Integers, verdict: TrackDecision, histories: Digest, row: int) -> tuple[Context, bool]:
     """The map with a new feature and its history, solved anew; as it was, if they do not agree."""
     new = len(context.book.ident)
     holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))

@@ -38,7 +38,7 @@ LOG_NONE = np.log(0.05)
 """Of a path of no kind here: over walls that the map lacks."""
 
 
-class Verdict(NamedTuple):
+class TrackDecision(NamedTuple):
     """What a track is held to be."""
 
     kind: int
@@ -92,7 +92,7 @@ _TEMPLATES = (
 def judge(
     context: Context, ats: list[Integers], digest: Digest, known: KnownFeatures, told: list[tuple[int, float, int]],
     lonely: Floats, beside: Floats,
-) -> tuple[list[Verdict], Floats]:  # fmt: skip
+) -> tuple[list[TrackDecision], Floats]:  # fmt: skip
     """Verdicts of T tracks, and the posterior (E,) of each of the explanations by the map.
 
     Of these `told` gives track, log evidence, and the number of the panel that they run over, -1 for none.
@@ -137,13 +137,13 @@ def judge(
         weighed = np.append(weight[best], weight[1 : 1 + len(own)][same])
         probability = float(np.exp(np.logaddexp.reduce(weighed) - total))
         if best == 0:
-            verdicts.append(Verdict(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody))
+            verdicts.append(TrackDecision(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody))
             continue
         at = own[best - 1]
         count = int((digest.weight[row, :, 0] > 0.0).sum())
         misfit = (fits.cost[at] - COST_MEAN * (count - 1.0)) / (COST_STD * np.sqrt(count))
         verdicts.append(
-            Verdict(
+            TrackDecision(
                 int(table.kind[at]), probability, int(table.known[at]), fits.place[at], fits.held[at],
                 beliefs(fits.place[at], digest, known, book) if table.trials.is_wall[at] else no_holds(),
                 float(fits.share[at]), float(misfit), over.identity.take(np.array([at])),
@@ -357,7 +357,7 @@ def _upright(table: Hypotheses, fits: Fits, digest: Digest, known: KnownFeatures
     return gain
 
 
-def wanted(verdict: Verdict, length: float) -> bool:
+def wanted(verdict: TrackDecision, length: float) -> bool:
     """Whether a verdict is clear enough to enter the map: likely, a fit, and known well enough to be linear in."""
     if verdict.kind < 0 or verdict.kind == TWO_WALLS:
         return False
