@@ -10,7 +10,7 @@ from rislam_rt.slam.window.context import Context, resolve
 from rislam_rt.slam.window.digest import Digest, digest
 from rislam_rt.slam.window.hypotheses import BESIDE, known_features
 from rislam_rt.slam.window.landmark_table import enter, idents
-from rislam_rt.slam.window.learn import seed
+from rislam_rt.slam.window.landmark_update import seed
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, UnresolvedClusters
 from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER, STRIDE

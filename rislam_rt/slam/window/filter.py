@@ -17,7 +17,7 @@ from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.excess import grow, take_in
 from rislam_rt.slam.window.landmark_table import WindowTable, empty_table, idents, image_ident
-from rislam_rt.slam.window.learn import learn, no_sights
+from rislam_rt.slam.window.landmark_update import learn, no_sights
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.look import Look, echoes, look

@@ -13,7 +13,7 @@ from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import TX, Poses
 from rislam_rt.slam.window import window_gaussian
 from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.learn import Sights, recall, visible
+from rislam_rt.slam.window.landmark_update import Sights, recall, visible
 from rislam_rt.slam.window.measurement_prediction import (
     ExpectedComponents,
     KnownEnvironment,
