@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.model import RisCode
 from rislam_rt.slam.window import window_gaussian
 from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.landmark_update import Sights
+from rislam_rt.slam.window.landmark_update import VisibilityObservations
 from rislam_rt.slam.window.log import Log, Residuals, renew
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.tracks import Tracks
@@ -25,7 +25,7 @@ class Context(NamedTuple):
     heading: Floats
     scene: KnownEnvironment
     cycle: int
-    sights: Sights
+    sights: VisibilityObservations
     codes: tuple[RisCode | None, ...]
 
 

@@ -17,7 +17,7 @@ from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.excess import grow, take_in
 from rislam_rt.slam.window.landmark_table import WindowTable, empty_table, idents, image_ident
-from rislam_rt.slam.window.landmark_update import learn, no_sights
+from rislam_rt.slam.window.landmark_update import learn, no_observations
 from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.look import Look, echoes, look
@@ -51,7 +51,7 @@ def init(
     lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if turns else ()))
     gait = np.stack([motion.first_gait(level) for level in lively])
     return WindowState(
-        0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_sights(),
+        0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_observations(),
         gait, gait,
         np.array([start.heading]), start.position_std * free, scene, divergence.SURE, False, 0.0,
         (None,), np.zeros((6, 6)), np.zeros((0, 3)),

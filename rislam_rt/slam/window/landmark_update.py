@@ -17,7 +17,7 @@ from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.window_gaussian import Window
 
 
-class Sights(NamedTuple):
+class VisibilityObservations(NamedTuple):
     """V forms that were looked for, and whether something stands in the way of each."""
 
     code: Integers
@@ -28,9 +28,9 @@ class Sights(NamedTuple):
     """(V,) running mean square of its residuals in reported deviations: what the map lacks in its cell."""
 
 
-def no_sights() -> Sights:
+def no_observations() -> VisibilityObservations:
     """Nothing looked for yet."""
-    return Sights(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+    return VisibilityObservations(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
 
 
 def pack(forms: Integers, book: WindowTable) -> Integers:
@@ -42,7 +42,7 @@ def pack(forms: Integers, book: WindowTable) -> Integers:
     return code
 
 
-def recall(sights: Sights, expected: ExpectedComponents, book: WindowTable) -> tuple[Floats, Floats]:
+def recall(sights: VisibilityObservations, expected: ExpectedComponents, book: WindowTable) -> tuple[Floats, Floats]:
     """Probability (R,) that nothing stands in the way of each return now, and its scatter (R,)."""
     first, scatter = LEVELS.steady ** (1.0 + expected.bounces), np.full(len(expected.seen), LEVELS.crowd)
     if len(sights.code):
@@ -53,11 +53,11 @@ def recall(sights: Sights, expected: ExpectedComponents, book: WindowTable) -> t
     return np.asarray(first * (1.0 - LEVELS.blocked) + (1.0 - first) * LEVELS.cleared), scatter
 
 
-def seed(sights: Sights, forms: Integers, book: WindowTable, scatter: float) -> Sights:
+def seed(sights: VisibilityObservations, forms: Integers, book: WindowTable, scatter: float) -> VisibilityObservations:
     """A form that a new feature was found by: nothing hides it, and it scatters so much."""
     code = np.append(sights.code, pack(forms, book))
     order = np.argsort(code, kind="stable")
-    return Sights(
+    return VisibilityObservations(
         code[order], np.append(sights.clear, np.full(len(forms), 0.99))[order],
         np.append(sights.scatter, np.full(len(forms), scatter))[order],
     )  # fmt: skip
@@ -71,9 +71,9 @@ def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Flo
 
 
 def learn(
-    sights: Sights, book: WindowTable, window: Window, expected: ExpectedComponents, groups: UnresolvedClusters, shows: Floats, row: Integers,
+    sights: VisibilityObservations, book: WindowTable, window: Window, expected: ExpectedComponents, groups: UnresolvedClusters, shows: Floats, row: Integers,
     pick: Integers, raw: Floats, glance: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
-) -> tuple[Sights, WindowTable]:  # fmt: skip
+) -> tuple[VisibilityObservations, WindowTable]:  # fmt: skip
     """After clusters `row` (A,) were seen as components `pick` (A,) with residuals of mean square `raw` (A,)."""
     if not len(expected.seen):
         return sights, book
@@ -95,7 +95,7 @@ def learn(
     packed = np.concatenate([sights.code[keep], fresh])
     order = np.argsort(packed, kind="stable")
     cleared, scattered = np.concatenate([sights.clear[keep], after]), np.concatenate([sights.scatter[keep], scatter])
-    return Sights(packed[order], cleared[order], scattered[order]), book
+    return VisibilityObservations(packed[order], cleared[order], scattered[order]), book
 
 
 def _existence(

@@ -13,7 +13,7 @@ from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import TX, Poses
 from rislam_rt.slam.window import window_gaussian
 from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.landmark_update import Sights, recall, visible
+from rislam_rt.slam.window.landmark_update import VisibilityObservations, recall, visible
 from rislam_rt.slam.window.measurement_prediction import (
     ExpectedComponents,
     KnownEnvironment,
@@ -70,7 +70,7 @@ FAR_STRONGER = 1.0
 
 
 def look(
-    window: Window, book: WindowTable, sights: Sights, heading: float, scene: KnownEnvironment, code: RisCode | None,
+    window: Window, book: WindowTable, sights: VisibilityObservations, heading: float, scene: KnownEnvironment, code: RisCode | None,
     glance: Observations, strangers: Floats,
 ) -> Look:  # fmt: skip
     """Expect, cluster, associate."""

@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.window import divergence, motion, tracks, window_gaussian
 from rislam_rt.slam.window.landmark_table import empty_table
-from rislam_rt.slam.window.landmark_update import no_sights
+from rislam_rt.slam.window.landmark_update import no_observations
 from rislam_rt.slam.window.log import empty_log
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import HEAD
@@ -48,7 +48,7 @@ def restart(state: WindowState) -> WindowState:
     fresh = fresh._replace(head=mean[:HEAD], prior=fresh.prior._replace(middle=mean[:HEAD]))
     return state._replace(
         window=fresh, book=empty_table(state.scene.num_panels)._replace(next_ident=state.book.next_ident),
-        log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), sights=no_sights(), gait=state.level,
+        log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), sights=no_observations(), gait=state.level,
         heading=state.heading[-1:], shift=np.hypot(state.shift, away), doubt=0.0, asked=False,
         codes=state.codes[-1:], passed=np.concatenate([state.passed, window_gaussian.poses(window)[:-1, :3]]),
     )  # fmt: skip

@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.model import RisCode
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.landmark_update import Sights
+from rislam_rt.slam.window.landmark_update import VisibilityObservations
 from rislam_rt.slam.window.log import Log
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.tracks import Tracks
@@ -22,7 +22,7 @@ class WindowState(NamedTuple):
     book: WindowTable
     log: Log
     tracks: Tracks
-    sights: Sights
+    sights: VisibilityObservations
     gait: Floats
     """(2, L) probabilities of the liveliness of the step before the window's first, across and upwards; (3, L) with
     the rate of turn, where the heading is not known."""
