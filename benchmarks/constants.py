@@ -20,7 +20,7 @@ import numpy as np
 import rislam_rt.slam.window  # noqa: F401  every module that reads the table
 from rislam_rt import read_recording, replay
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.window.levels import LEVELS, Levels
+from rislam_rt.slam.window.model_constants import LEVELS, Levels
 
 PROBABILITIES = ("rare", "cleared", "shown", "square", "upright", "born")
 """Constants whose odds are halved and doubled."""

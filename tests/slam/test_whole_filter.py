@@ -14,7 +14,7 @@ from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import Outcome, SlamConfig, StartPrior, StepInfo, estimate, init, step
 from rislam_rt.slam.window import motion as model
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.model_constants import LEVELS
 
 ROOM = Path(__file__).parents[2] / "scenes" / "paper_room"
 CYCLES = slice(180, 300)

@@ -11,8 +11,8 @@ from rislam_rt.slam.window.digest import Digest, digest
 from rislam_rt.slam.window.hypotheses import BESIDE, known_features
 from rislam_rt.slam.window.landmark_table import enter, idents
 from rislam_rt.slam.window.landmark_update import seed
-from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, UnresolvedClusters
+from rislam_rt.slam.window.model_constants import LEVELS
 from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER, STRIDE
 from rislam_rt.slam.window.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.retract import behind, release

@@ -12,8 +12,8 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import PANEL
-from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log
+from rislam_rt.slam.window.model_constants import LEVELS
 from rislam_rt.slam.window.numerics import POINTS
 from rislam_rt.slam.window.steps import TURN
 from rislam_rt.slam.window.window_gaussian import Window, now, pose_covariance, poses

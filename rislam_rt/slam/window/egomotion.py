@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, unique_forms
+from rislam_rt.slam.window.model_constants import LEVELS
 from rislam_rt.slam.window.path_forms import UNKNOWN
 
 WALK = 1.0

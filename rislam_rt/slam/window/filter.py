@@ -18,7 +18,6 @@ from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.excess import grow, take_in
 from rislam_rt.slam.window.landmark_table import WindowTable, empty_table, idents, image_ident
 from rislam_rt.slam.window.landmark_update import learn, no_observations
-from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.look import Look, echoes, look
 from rislam_rt.slam.window.measurement_prediction import (
@@ -27,6 +26,7 @@ from rislam_rt.slam.window.measurement_prediction import (
     UnresolvedClusters,
     conditioned_share,
 )
+from rislam_rt.slam.window.model_constants import LEVELS
 from rislam_rt.slam.window.numerics import DAMPING, REFRESH
 from rislam_rt.slam.window.retract import condemned, release
 from rislam_rt.slam.window.state import WindowState

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.identity import STRENGTHS, panel_probabilities, strength_moments
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.model_constants import LEVELS
 from rislam_rt.slam.window.panel import Identity
 
 

@@ -9,8 +9,8 @@ from rislam_rt.model import RisCode
 from rislam_rt.slam.observations import UNTOLD, Observations
 from rislam_rt.slam.returns import NONE, TX, Poses
 from rislam_rt.slam.window.landmark_table import WindowTable, learn_ratio
-from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, KnownEnvironment, UnresolvedClusters
+from rislam_rt.slam.window.model_constants import LEVELS
 from rislam_rt.slam.window.numerics import SCATTER_RATE
 from rislam_rt.slam.window.panel import Sight, gains, spread_places, weigh
 from rislam_rt.slam.window.steps import HEAD

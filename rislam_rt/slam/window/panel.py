@@ -27,7 +27,7 @@ from rislam_rt.slam.identity import (
 )
 from rislam_rt.slam.moments import even_draws, square_root
 from rislam_rt.slam.observations import PANEL, UNTOLD
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.model_constants import LEVELS
 from rislam_rt.slam.window.numerics import CERTAIN, DRAWS
 
 

@@ -10,7 +10,7 @@ from rislam_rt.slam.observations import OTHER, UNTOLD
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.hypotheses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
 from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.model_constants import LEVELS
 from rislam_rt.slam.window.numerics import CERTAIN
 from rislam_rt.slam.window.panel import Identity, Sight, gains, spread_places, unknown, weigh
 from rislam_rt.slam.window.trial import Fits

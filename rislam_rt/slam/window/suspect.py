@@ -9,8 +9,8 @@ from rislam_rt.slam.observations import OTHER
 from rislam_rt.slam.returns import Poses, reflect
 from rislam_rt.slam.ris_candidate import DEEP, DISMISSAL, PATIENCE, places
 from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
+from rislam_rt.slam.window.model_constants import LEVELS
 from rislam_rt.slam.window.numerics import DRAWS
 from rislam_rt.slam.window.panel import Sight, gains, weigh
 from rislam_rt.slam.window.steps import HEAD

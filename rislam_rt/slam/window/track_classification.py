@@ -24,8 +24,8 @@ from rislam_rt.slam.window.hypotheses import (
     hypotheses,
 )
 from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.levels import LEVELS
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
+from rislam_rt.slam.window.model_constants import LEVELS
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.panel import Identity, unknown
 from rislam_rt.slam.window.point_identification import identify

@@ -8,7 +8,7 @@ import scipy
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.associate import Candidates, pair_costs
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.model_constants import LEVELS
 from rislam_rt.slam.window.numerics import GATE
 from rislam_rt.slam.window.panel import Identity, unknown
 

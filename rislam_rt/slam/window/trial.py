@@ -14,7 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window.digest import Digest
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.model_constants import LEVELS
 from rislam_rt.slam.window.numerics import HOPELESS, RIDGE, STEPS
 
 

@@ -7,7 +7,7 @@ from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.returns import AXES, NONE, TX, Poses, linearise, reflect
 from rislam_rt.slam.window import trial
 from rislam_rt.slam.window.digest import Digest, scatter_of
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.model_constants import LEVELS
 from rislam_rt.slam.window.path_forms import compile_forms
 from rislam_rt.slam.window.trial import COMMON, Trials, smooth_paths, try_all
 

@@ -7,8 +7,8 @@ import pytest
 
 from rislam_rt.slam import window
 from rislam_rt.slam.window.factor import factorise, inverse
-from rislam_rt.slam.window.levels import LEVELS, Levels
 from rislam_rt.slam.window.measurement_prediction import PANEL_STD
+from rislam_rt.slam.window.model_constants import LEVELS, Levels
 
 SOURCES = [path.read_text() for path in Path(window.__file__).parent.glob("*.py")]
 
