@@ -14,7 +14,7 @@ from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import Outcome, SlamConfig, StartPrior, StepInfo, estimate, init, step
 from rislam_rt.slam.window import motion as model
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 
 ROOM = Path(__file__).parents[2] / "scenes" / "paper_room"
 CYCLES = slice(180, 300)
@@ -183,7 +183,7 @@ def test_labels_are_idents_of_the_map(clear: tuple[Heard, Course]) -> None:
 
 def motion_prior(level: float) -> float:
     """Variance of the first step's acceleration, of a liveliness told to be `level`."""
-    gait = model.first_gait(level) @ model.transition(LEVELS.stay)
+    gait = model.first_gait(level) @ model.transition(CONSTANTS.stay)
     return float(1.0 / model.prior_precision(gait, False))
 
 

@@ -12,7 +12,7 @@ from rislam_rt.slam.window.hypotheses import BESIDE, known_features
 from rislam_rt.slam.window.landmark_table import enter, idents
 from rislam_rt.slam.window.landmark_update import seed
 from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, UnresolvedClusters
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER, STRIDE
 from rislam_rt.slam.window.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.retract import behind, release
@@ -44,7 +44,7 @@ def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClu
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked, returns = context.tracks.looked.copy(), context.scene.use_vt
     for (row, _, forms, column), share in zip(told, shares, strict=True):
-        if share > LEVELS.born:
+        if share > CONSTANTS.born:
             if not returns and forms[0, 0] == TX:  # what it is is known, and that is all it is asked for
                 gone[rows[row]] = True
                 continue
@@ -96,7 +96,7 @@ def _missing_legs(context: Context, histories: Digest, mean: Floats) -> Floats:
     along, share = ray @ away.T, reach / length[:, None]
     leg = (np.abs(along - share) < LEG) | (np.abs(along) > 1.0 - LEG)
     found = (leg & (share < 0.995) & bright).sum(axis=1)
-    missing = np.array([LEVELS.log_rare, np.log1p(-LEVELS.steady), 0.0])  # both, one of them, none
+    missing = np.array([CONSTANTS.log_rare, np.log1p(-CONSTANTS.steady), 0.0])  # both, one of them, none
     return missing[np.minimum(found, 2)]
 
 
@@ -193,11 +193,11 @@ def _explain(
         normal = heavy.T @ flat + np.eye(flat.shape[1])
         error = np.linalg.solve(normal, heavy.T @ left.ravel())
         squared = np.sum((left - (flat @ error).reshape(-1, 3)) ** 2, axis=1)
-        trust = (LEVELS.tail + 3.0) / (LEVELS.tail + squared)
-    cost = (LEVELS.tail + 3.0) * np.log1p(squared / LEVELS.tail).sum() + error @ error
+        trust = (CONSTANTS.tail + 3.0) / (CONSTANTS.tail + squared)
+    cost = (CONSTANTS.tail + 3.0) * np.log1p(squared / CONSTANTS.tail).sum() + error @ error
     cost += 2.0 * np.log(std / reported).sum()
     level = histories.log_amplitude[row] - groups.log_amplitude[column]
-    variance = groups.log_amplitude_std[column] ** 2 + LEVELS.fading**2
+    variance = groups.log_amplitude_std[column] ** 2 + CONSTANTS.fading**2
     evidence = -0.5 * cost - 0.5 * np.linalg.slogdet(normal)[1] - 0.5 * level**2 / variance - 0.5 * np.log(variance)
     return float(evidence)
 
@@ -215,7 +215,7 @@ def _assign(context: Context, at: Integers, forms: Integers, scatter: Floats, pa
     form, share, extra = log.form.copy(), log.share.copy(), log.extra.copy()
     form[at] = forms
     share[at] = part if forms[1, 0] != UNKNOWN else 0.0
-    extra[at] = LEVELS.memory * log.std[at] ** 2 * (scatter**2 - 1.0)
+    extra[at] = CONSTANTS.memory * log.std[at] ** 2 * (scatter**2 - 1.0)
     return context._replace(log=log._replace(form=form, share=share, extra=extra))
 
 
@@ -236,7 +236,7 @@ def _enter(context: Context, at: Integers, verdict: TrackDecision, histories: Di
     if not np.isfinite(window.head).all():
         return context, False
     fresh = np.isin(left.row, at)
-    if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > 3.0 * LEVELS.fit:
+    if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > 3.0 * CONSTANTS.fit:
         return context, False
     square = float(np.mean(histories.scatter[row] ** 2))
     grown = grown._replace(window=window, sights=seed(context.sights, forms[:1], book, square))

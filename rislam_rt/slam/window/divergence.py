@@ -15,7 +15,7 @@ from rislam_rt.slam.window.egomotion import Rates
 from rislam_rt.slam.window.factor import inverse
 from rislam_rt.slam.window.log import Log
 from rislam_rt.slam.window.look import Look
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import LADDER
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.tracks import CYCLE
@@ -149,4 +149,4 @@ def _begun(window: Window, head: Floats, hessian: Floats) -> Window:
 
 def is_lost(log_odds: float) -> bool:
     """Whether the map is given up."""
-    return log_odds > np.log(LEVELS.born / (1.0 - LEVELS.born))
+    return log_odds > np.log(CONSTANTS.born / (1.0 - CONSTANTS.born))

@@ -26,7 +26,7 @@ from rislam_rt.slam.window.measurement_prediction import (
     UnresolvedClusters,
     conditioned_share,
 )
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import DAMPING, REFRESH
 from rislam_rt.slam.window.retract import condemned, release
 from rislam_rt.slam.window.state import WindowState
@@ -85,7 +85,7 @@ def step(
     mean, poses, expected, groups = view.mean, view.poses, view.expected, view.groups
     shows, scatter, row, pick = view.shows, view.scatter, view.row, view.pick
     before = window_gaussian.now(state.window)[1]
-    bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(LEVELS.stay))))
+    bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
 
     log = append(state.log, glance, state.cycle, state.cycle - state.window.num_poses + 1)
     # wall returns that are thrown away are known for what they are, and move nothing
@@ -147,11 +147,11 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     if dt <= 0.0 and state.cycle == 0:
         return state._replace(heading=np.array([heading]))
     window, gait, headings, passed = state.window, state.gait, state.heading, state.passed
-    while window.num_poses >= LEVELS.window:
-        gait = motion.forward(gait, _likelihoods(window, 1)[:, 0], LEVELS.stay)
+    while window.num_poses >= CONSTANTS.window:
+        gait = motion.forward(gait, _likelihoods(window, 1)[:, 0], CONSTANTS.stay)
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = window_gaussian.slide(window), headings[1:]
-    level = state.level @ motion.transition(LEVELS.stay)
+    level = state.level @ motion.transition(CONSTANTS.stay)
     if state.config.motion == "told":
         window, excess = window_gaussian.extend(window, dt, _told_precision(state.config, dt)), state.excess
     else:
@@ -194,7 +194,7 @@ def _notice(
             precision[-steps:, lively] = np.minimum(precision[-steps:, lively], liveliness**-2.0)
             trial = window_gaussian.solve(state.window._replace(precision=precision))
             view = view_of(trial)
-            if view.score + LEVELS.log_rare > best.score:
+            if view.score + CONSTANTS.log_rare > best.score:
                 best, window = view, trial
     if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
         by = divergence.jump(best, glance)
@@ -263,7 +263,7 @@ def _explain(
     form[at[both], 1] = idents(book, expected.forms[mate[both]])
     gap = np.where(both[:, None], expected.seen[mate] - expected.seen[lead], 0.0)
     shares[at], extra[at] = np.where(both, share, 0.0), groups.disturbance[row] + variance[:, None] * gap**2
-    extra[at] += LEVELS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
+    extra[at] += CONSTANTS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
     return log._replace(form=form, share=shares, extra=extra)
 
 
@@ -293,7 +293,7 @@ def liven(state: WindowState) -> WindowState:
     window = state.window
     if not len(window.accel) or state.config.motion == "told":
         return state
-    posterior, level = motion.smooth(state.gait, _likelihoods(window, len(window.accel)), LEVELS.stay)
+    posterior, level = motion.smooth(state.gait, _likelihoods(window, len(window.accel)), CONSTANTS.stay)
     fresh = _precisions(posterior)
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.identity import STRENGTHS, panel_probabilities, strength_moments
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.panel import Identity
 
 
@@ -96,8 +96,8 @@ def enter(
         anchor=np.concatenate([book.anchor, anchor[None]]),
         hits=np.append(book.hits, hits),
         log_odds=np.append(book.log_odds, log_odds),
-        ratio=np.append(book.ratio, LEVELS.wall_ratio if is_wall else 0.0),
-        ratio_variance=np.append(book.ratio_variance, LEVELS.wall_ratio_std**2 if is_wall else 0.0),
+        ratio=np.append(book.ratio, CONSTANTS.wall_ratio if is_wall else 0.0),
+        ratio_variance=np.append(book.ratio_variance, CONSTANTS.wall_ratio_std**2 if is_wall else 0.0),
         **book.identity.join(identity)._asdict(),
         next_ident=book.next_ident + 1,
     )
@@ -123,8 +123,8 @@ def remove_features(book: WindowTable, keep: Booleans) -> WindowTable:
 
 def learn_ratio(book: WindowTable, wall: int, log_ratio: float) -> WindowTable:
     """A wall's log amplitude ratio after one more return over it."""
-    gain = book.ratio_variance[wall] / (book.ratio_variance[wall] + LEVELS.fading**2)
+    gain = book.ratio_variance[wall] / (book.ratio_variance[wall] + CONSTANTS.fading**2)
     ratio, variance = book.ratio.copy(), book.ratio_variance.copy()
     ratio[wall] += gain * (log_ratio - ratio[wall])
-    variance[wall] = max((1.0 - gain) * variance[wall], LEVELS.fading**2 / 10.0)
+    variance[wall] = max((1.0 - gain) * variance[wall], CONSTANTS.fading**2 / 10.0)
     return book._replace(ratio=ratio, ratio_variance=variance)

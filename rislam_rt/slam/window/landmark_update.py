@@ -10,7 +10,7 @@ from rislam_rt.slam.observations import UNTOLD, Observations
 from rislam_rt.slam.returns import NONE, TX, Poses
 from rislam_rt.slam.window.landmark_table import WindowTable, learn_ratio
 from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, KnownEnvironment, UnresolvedClusters
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import SCATTER_RATE
 from rislam_rt.slam.window.panel import Sight, gains, spread_places, weigh
 from rislam_rt.slam.window.steps import HEAD
@@ -44,13 +44,13 @@ def pack(forms: Integers, book: WindowTable) -> Integers:
 
 def recall(sights: VisibilityObservations, expected: ExpectedComponents, book: WindowTable) -> tuple[Floats, Floats]:
     """Probability (R,) that nothing stands in the way of each return now, and its scatter (R,)."""
-    first, scatter = LEVELS.steady ** (1.0 + expected.bounces), np.full(len(expected.seen), LEVELS.crowd)
+    first, scatter = CONSTANTS.steady ** (1.0 + expected.bounces), np.full(len(expected.seen), CONSTANTS.crowd)
     if len(sights.code):
         code = pack(expected.forms, book)
         place = np.minimum(np.searchsorted(sights.code, code), len(sights.code) - 1)
         known = sights.code[place] == code
         first, scatter = np.where(known, sights.clear[place], first), np.where(known, sights.scatter[place], scatter)
-    return np.asarray(first * (1.0 - LEVELS.blocked) + (1.0 - first) * LEVELS.cleared), scatter
+    return np.asarray(first * (1.0 - CONSTANTS.blocked) + (1.0 - first) * CONSTANTS.cleared), scatter
 
 
 def seed(sights: VisibilityObservations, forms: Integers, book: WindowTable, scatter: float) -> VisibilityObservations:
@@ -65,8 +65,8 @@ def seed(sights: VisibilityObservations, forms: Integers, book: WindowTable, sca
 
 def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Floats) -> Floats:
     """(C,) probability that each cluster shows."""
-    return np.asarray(LEVELS.shown * (expected.detection * clear)[groups.leader] * groups.by_itself).clip(
-        1e-4, LEVELS.shown
+    return np.asarray(CONSTANTS.shown * (expected.detection * clear)[groups.leader] * groups.by_itself).clip(
+        1e-4, CONSTANTS.shown
     )
 
 
@@ -80,7 +80,7 @@ def learn(
     hit = np.zeros(len(groups.leader), dtype=np.bool_)
     hit[row] = True
     before, scatter = recall(sights, expected, book)
-    detection = LEVELS.shown * expected.detection
+    detection = CONSTANTS.shown * expected.detection
     missed = before * (1.0 - detection) / (1.0 - before * detection)
     after = before.copy()
     told = hit | (groups.by_itself == 1.0)

@@ -10,7 +10,7 @@ from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.returns import linearise
 from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.steps import POSE
 from rislam_rt.slam.window.window_gaussian import Quadratic, Window, poses
@@ -128,7 +128,7 @@ def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
 
 def trust(left: Floats) -> Floats:
     """(A,) weight that Student's t gives residuals (A, 3)."""
-    return np.asarray((LEVELS.tail + 3.0) / (LEVELS.tail + np.vecdot(left, left)))
+    return np.asarray((CONSTANTS.tail + 3.0) / (CONSTANTS.tail + np.vecdot(left, left)))
 
 
 def renew(

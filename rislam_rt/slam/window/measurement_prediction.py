@@ -11,7 +11,7 @@ from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
 from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import EDGE, FAINT, LEVEL
 from rislam_rt.slam.window.path_forms import enumerate_forms, forms_of, possible_legs
 from rislam_rt.slam.window.steps import HEAD
@@ -98,7 +98,7 @@ def amplitudes(
     free = np.log(image_amplitude(rx_length, radio)) + ratio
     unit = point_amplitude(np.ones(()), np.maximum(tx_length, 1e-3), rx_length, radio)
     level = np.where(moving, free, np.log(unit) + ratio + strength[point])
-    spread = np.sqrt(np.where(moving, 0.0, strength_std[point] ** 2) + variance + (0.3 * LEVELS.fading) ** 2)
+    spread = np.sqrt(np.where(moving, 0.0, strength_std[point] ** 2) + variance + (0.3 * CONSTANTS.fading) ** 2)
     if scene.ris is None or code is None:
         return level, spread
     for panel, spec, part in zip(book.panels, scene.ris.panels, scene.ris.parts(code), strict=True):
@@ -183,7 +183,7 @@ def cluster(
         if taken[leader] or not len(members):
             continue
         taken[members] = True
-        by_itself[members] = np.maximum(1.0 - clear[leader], LEVELS.rare)
+        by_itself[members] = np.maximum(1.0 - clear[leader], CONSTANTS.rare)
         partner[leader] = members[np.argmax(strength[members])]
         total[leader] += power[members].sum()
     paired = (partner >= 0).nonzero()[0]

@@ -27,7 +27,7 @@ from rislam_rt.slam.identity import (
 )
 from rislam_rt.slam.moments import even_draws, square_root
 from rislam_rt.slam.observations import PANEL, UNTOLD
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import CERTAIN, DRAWS
 
 
@@ -71,8 +71,8 @@ def _strength_prior(middle: float, spread: float) -> Floats:
 def unknown(count: int, panels: int = 1) -> Identity:
     """Points of which nothing is known but that panels are fewer than scatterers."""
     return Identity(
-        np.tile(_strength_prior(LEVELS.strength, LEVELS.strength_std), (count, 1)),
-        np.full((count, panels), np.log(LEVELS.panels)),
+        np.tile(_strength_prior(CONSTANTS.strength, CONSTANTS.strength_std), (count, 1)),
+        np.full((count, panels), np.log(CONSTANTS.panels)),
         np.zeros((count, panels + 1)),
     )  # fmt: skip
 

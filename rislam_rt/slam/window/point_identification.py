@@ -10,7 +10,7 @@ from rislam_rt.slam.observations import OTHER, UNTOLD
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.hypotheses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
 from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import CERTAIN
 from rislam_rt.slam.window.panel import Identity, Sight, gains, spread_places, unknown, weigh
 from rislam_rt.slam.window.trial import Fits
@@ -50,7 +50,7 @@ def identify(context: Context, ats: list[Integers], table: Hypotheses, fits: Fit
         fresh = _history(context, at, table, fits, np.append(near, rows[0]))
         fresh.log_ris[:-1] += taken
         found.gain[near] = np.logaddexp.reduce(np.pad(fresh.log_ris[:-1], ((0, 0), (1, 0))), axis=1)
-        found.gain[near] -= np.log1p(panels * LEVELS.panels)
+        found.gain[near] -= np.log1p(panels * CONSTANTS.panels)
         found.elsewhere[track] = fresh.log_ris[-1]
         found = found._replace(identity=found.identity.put(near, fresh.take(np.arange(len(near)))))
     # what is heard over walls alone may well be hidden straight ahead: silence there tells nothing
@@ -69,7 +69,7 @@ def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows
     turn, shift = np.swapaxes(table.trials.turn[rows], 2, 3), table.trials.shift[rows]
     spots, ratio = spread_places(fits.place[rows], fits.held[rows]), _ratio(table, context.book, rows)
     level = log.log_amplitude[at]
-    anywhere = np.exp(level.mean() + max(float(level.std()), LEVELS.fading) * even_draws(spots.shape[1], 1)[:, 0])
+    anywhere = np.exp(level.mean() + max(float(level.std()), CONSTANTS.fading) * even_draws(spots.shape[1], 1)[:, 0])
     first = context.cycle - window.num_poses + 1
     heard = {int(log.cycle[row] - first): row for row in at}
     found = unknown(count, scene.num_panels)

@@ -9,7 +9,7 @@ from rislam_rt.slam.window.context import Context, resolve
 from rislam_rt.slam.window.landmark_table import WindowTable, remove_features
 from rislam_rt.slam.window.log import Log, Residuals
 from rislam_rt.slam.window.measurement_prediction import ExpectedComponents
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import FEWEST, RECENT
 from rislam_rt.slam.window.panel import unknown
 from rislam_rt.slam.window.path_forms import UNKNOWN
@@ -65,13 +65,13 @@ def condemned(
     book: WindowTable, left: Residuals, log: Log, expected: ExpectedComponents, covariance: Floats
 ) -> Booleans:
     """(F,) features to take back: that do not exist, that their measurements contradict, or that follow from others."""
-    gone = book.log_odds < np.log(LEVELS.dead / (1.0 - LEVELS.dead))
+    gone = book.log_odds < np.log(CONSTANTS.dead / (1.0 - CONSTANTS.dead))
     square = np.vecdot(left.left, left.left)
     form = log.form[left.row, 0]
     for row, ident in enumerate(book.ident):
         own = form[:, 0] == ident if not book.is_wall[row] else (form[:, 1:] == ident).any(axis=1)
         alone = own & ((form[:, 1:] != NONE).sum(axis=1) <= int(book.is_wall[row]))
-        if alone.sum() >= FEWEST and np.median(square[alone]) > LEVELS.against:
+        if alone.sum() >= FEWEST and np.median(square[alone]) > CONSTANTS.against:
             gone[row] = True
     return np.asarray(gone | derived(book, expected, covariance))
 
@@ -80,7 +80,7 @@ def derived(book: WindowTable, expected: ExpectedComponents, covariance: Floats)
     """(F,) young features whose own return is one that others throw as well, without anything free in it."""
     found = np.zeros(len(book.ident), dtype=np.bool_)
     forms = expected.forms
-    for row in (book.hits < 3 * LEVELS.window).nonzero()[0]:
+    for row in (book.hits < 3 * CONSTANTS.window).nonzero()[0]:
         own = [row, NONE, NONE, NONE, NONE] if not book.is_wall[row] else [TX, NONE, NONE, row, NONE]
         place = (forms == own).all(axis=1).nonzero()[0]
         if not len(place):
@@ -111,7 +111,7 @@ def behind(context: Context, wall: int) -> Booleans:
     sign = 1.0 if depth > 0 else -1.0
     found = np.zeros(len(book.ident), dtype=np.bool_)
     for row in range(len(book.ident)):
-        if row == wall or book.hits[row] > 2 * LEVELS.window:
+        if row == wall or book.hits[row] > 2 * CONSTANTS.window:
             continue  # what has stood for long stands: rooms that are not convex have walls before walls
         foot = features[row]
         if book.is_wall[row]:
@@ -119,6 +119,6 @@ def behind(context: Context, wall: int) -> Booleans:
             out = out / np.linalg.norm(out)
             foot = middle + ((0.5 * (features[row] + book.anchor[row]) - middle) @ out) * out
         at = slice(7 + 3 * row, 10 + 3 * row)
-        slack = LEVELS.depth + 2.0 * float(np.sqrt(np.trace(context.window.covariance[at, at])))
+        slack = CONSTANTS.depth + 2.0 * float(np.sqrt(np.trace(context.window.covariance[at, at])))
         found[row] = sign * ((foot - middle) @ normal) > abs(depth) + slack
     return found

@@ -10,7 +10,7 @@ from rislam_rt.slam.returns import Poses, reflect
 from rislam_rt.slam.ris_candidate import DEEP, DISMISSAL, PATIENCE, places
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import DRAWS
 from rislam_rt.slam.window.panel import Sight, gains, weigh
 from rislam_rt.slam.window.steps import HEAD
@@ -46,7 +46,7 @@ def find_suspect(
     points = book.points[~np.isin(book.points, book.panels)]  # what is another panel is not this one
     patience = np.where(tracks.hits > 3, np.inf, np.minimum(tracks.hits - 1, PATIENCE))
     least = np.where(tracks.hits > 1, DISMISSAL, 0.0)
-    few = np.log(LEVELS.panels)  # the design asks what was measured, not how many panels there are
+    few = np.log(CONSTANTS.panels)  # the design asks what was measured, not how many panels there are
     told = tracks.log_ris[:, panel] - few
     rows = ((tracks.side != OTHER) & (cycle - tracks.last <= patience) & (told > least)).nonzero()[0]
     spots, _ = places(tracks.mean[rows, :, 0], poses)

@@ -25,7 +25,7 @@ from rislam_rt.slam.window.hypotheses import (
 )
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.panel import Identity, unknown
 from rislam_rt.slam.window.point_identification import identify
@@ -120,9 +120,9 @@ def judge(
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
-    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LEVELS.log_volume + LOG_NONE + beside
+    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - CONSTANTS.log_volume + LOG_NONE + beside
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
-    none += np.logaddexp(np.log1p(-LEVELS.panels), np.log(LEVELS.panels) + over_panels)
+    none += np.logaddexp(np.log1p(-CONSTANTS.panels), np.log(CONSTANTS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
     evidence += _shared(table, fits, evidence, none, explained, digest.middle)
     verdicts, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
@@ -169,9 +169,11 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
 
     Walls at any distance up to the ball's radius, in any direction: their places are images of the agent's, `middle`.
     """
-    reach = np.maximum(np.linalg.norm(place - middle, axis=1), 2.0 * LEVELS.depth)
-    wall = -np.log(4.0 * np.pi * reach**2 * 2.0 * LEVELS.size)
-    return np.where(table.trials.is_wall, wall, -LEVELS.log_volume - np.where(table.trials.is_pair, np.log(8.0), 0.0))
+    reach = np.maximum(np.linalg.norm(place - middle, axis=1), 2.0 * CONSTANTS.depth)
+    wall = -np.log(4.0 * np.pi * reach**2 * 2.0 * CONSTANTS.size)
+    return np.where(
+        table.trials.is_wall, wall, -CONSTANTS.log_volume - np.where(table.trials.is_pair, np.log(8.0), 0.0)
+    )
 
 
 def _beside(
@@ -248,8 +250,8 @@ def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: WindowTable
     has = (table.known >= 0) & (table.kind != BESIDE)
     ratio = np.where(has, book.ratio[table.known], 0.0) if len(book.ident) else np.zeros(len(track))
     variance = np.where(has, book.ratio_variance[table.known], 0.0) if len(book.ident) else np.zeros(len(track))
-    mirror = free + ratio + LEVELS.wall_ratio
-    spread = variance + LEVELS.wall_ratio_std**2 + LEVELS.fading**2
+    mirror = free + ratio + CONSTANTS.wall_ratio
+    spread = variance + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
     surplus = np.maximum(level - free - 0.2, 0.0)  # a mirror does not amplify
     wall = -0.5 * (level - mirror) ** 2 / spread - 0.5 * np.log(spread) - 20.0 * surplus**2
     reach = np.linalg.norm(fits.place - rx, axis=1)
@@ -257,10 +259,10 @@ def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: WindowTable
     far = np.clip(far, 0.05, np.maximum(seen[:, 0] - 0.05, 0.06))
     unit = np.log(point_amplitude(np.ones(len(far)), np.maximum(seen[:, 0] - far, 0.05), far, radio))
     bounces = np.where(table.kind == OVER_SAME, 2.0, 1.0)
-    mean = unit + np.log(LEVELS.strength) + ratio * bounces
-    spread = LEVELS.strength_std**2 + variance * bounces**2 + LEVELS.fading**2
+    mean = unit + np.log(CONSTANTS.strength) + ratio * bounces
+    spread = CONSTANTS.strength_std**2 + variance * bounces**2 + CONSTANTS.fading**2
     point = -0.5 * (level - mean) ** 2 / spread - 0.5 * np.log(spread)
-    double, wide = free + 2.0 * LEVELS.wall_ratio, 2.0 * LEVELS.wall_ratio_std**2 + LEVELS.fading**2
+    double, wide = free + 2.0 * CONSTANTS.wall_ratio, 2.0 * CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
     pair = -0.5 * (level - double) ** 2 / wide - 0.5 * np.log(wide) - 20.0 * surplus**2
     amplitude = np.where(table.trials.is_wall, wall, np.where(table.trials.is_pair, pair, point))
     image = (table.kind == IMAGE).nonzero()[0]
@@ -276,7 +278,10 @@ def _image_amplitudes(
     first = np.maximum(np.linalg.norm(table.trials.shift[rows, 0] - digest.mean[1][track], axis=1), 0.05)
     unit = point_amplitude(np.ones(len(rows)), first, np.maximum(digest.mean[0][track, 0] - first, 0.05), scene.radio)
     strength, doubt = (field[point] for field in book.log_strength)
-    mean, variance = np.log(unit) + strength + LEVELS.wall_ratio, doubt**2 + LEVELS.wall_ratio_std**2 + LEVELS.fading**2
+    mean, variance = (
+        np.log(unit) + strength + CONSTANTS.wall_ratio,
+        doubt**2 + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2,
+    )
     off = np.where(np.isin(point, book.panels), 0.0, digest.log_amplitude[track] - mean)
     return np.asarray(-0.5 * off**2 / variance - 0.5 * np.log(variance))
 
@@ -288,7 +293,7 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: KnownFeatures
     image = (table.trials.turn[:, 0] @ tx[..., None])[..., 0] + fits.place
     # the last of two walls is somewhere on the ray to the image of both: as far as a single wall would be
     foot = np.where(wall[:, None], 0.5 * (fits.place + middle), np.where(pair, 0.5 * (image + middle), fits.place))
-    slack = LEVELS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
+    slack = CONSTANTS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
     total = np.zeros(len(foot))
     span = fits.place - middle
     normal = span / np.maximum(np.linalg.norm(span, axis=1), 1e-6)[:, None]
@@ -297,12 +302,12 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: KnownFeatures
         reach = np.linalg.norm(out, axis=1)
         feet = 0.5 * (known.place[walls] + middle)
         depth = foot @ (out / reach[:, None]).T - np.vecdot(feet, out) / reach
-        total += LEVELS.log_rare * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        total += CONSTANTS.log_rare * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
         before = normal @ feet.T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, LEVELS.log_rare, 0.0) * (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        total += np.where(wall, CONSTANTS.log_rare, 0.0) * (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
     if len(book.points):
         depth = normal @ known.place[book.points].T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, LEVELS.log_rare, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        total += np.where(wall, CONSTANTS.log_rare, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
     return total
 
 
@@ -310,15 +315,15 @@ def beliefs(place: Floats, digest: Digest, known: KnownFeatures, book: WindowTab
     """What may be held beforehand of a wall at `place` (3,): upright, at right angles to another; or level."""
     span = place - digest.middle
     reach = max(float(np.linalg.norm(span)), 0.1)
-    rise, std = abs(span[2]) / reach, LEVELS.lean * reach
+    rise, std = abs(span[2]) / reach, CONSTANTS.lean * reach
     axes: list[Floats] = []
     log_odds: list[float] = []
     if rise > 0.9:
         axes += [AXES[0], AXES[1]]
-        log_odds += 2 * [LEVELS.log_upright + np.log(reach)]
+        log_odds += 2 * [CONSTANTS.log_upright + np.log(reach)]
     elif rise < 0.35:
         axes.append(AXES[2])
-        log_odds.append(LEVELS.log_upright + np.log(reach))
+        log_odds.append(CONSTANTS.log_upright + np.log(reach))
         others = known.place[book.walls] - digest.middle
         if len(others):
             flat = np.linalg.norm(others[:, :2], axis=1) > 0.95 * np.linalg.norm(others, axis=1)
@@ -327,7 +332,7 @@ def beliefs(place: Floats, digest: Digest, known: KnownFeatures, book: WindowTab
             if len(off) and np.min(np.abs(off)) < 0.15:
                 aim = np.arctan2(span[1], span[0]) + off[np.argmin(np.abs(off))]
                 axes.append(np.array([-np.sin(aim), np.cos(aim), 0.0]))
-                log_odds.append(np.log(LEVELS.square / (1.0 - LEVELS.square)) + np.log(np.pi / 2.0 * reach))
+                log_odds.append(np.log(CONSTANTS.square / (1.0 - CONSTANTS.square)) + np.log(np.pi / 2.0 * reach))
     count = len(axes)
     axis = np.array(axes).reshape(count, 3)
     return DirectionPriors(
@@ -352,7 +357,7 @@ def _upright(table: Hypotheses, fits: Fits, digest: Digest, known: KnownFeatures
         variance = np.vecdot(holds.axis, holds.axis @ fits.covariance[row]) + holds.std**2
         log_right = -0.5 * (holds.axis @ span) ** 2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
         # odds hold the width: right against a density of one over it
-        each = np.logaddexp(0.0, holds.log_odds + log_right) - np.logaddexp(0.0, LEVELS.log_upright)
+        each = np.logaddexp(0.0, holds.log_odds + log_right) - np.logaddexp(0.0, CONSTANTS.log_upright)
         gain[row] = (each[:1] if trials.is_pair[row] and turn[0, 0] < 0.0 else each).sum()
     return gain
 
@@ -364,4 +369,4 @@ def wanted(verdict: TrackDecision, length: float) -> bool:
     holds = verdict.holds
     information = np.linalg.inv(verdict.covariance) + (holds.axis.T / holds.std**2) @ holds.axis
     worst = np.sqrt(1.0 / np.linalg.eigvalsh(information)[0])
-    return bool(verdict.probability > LEVELS.born and verdict.misfit < LEVELS.fit and worst < 0.1 * length)
+    return bool(verdict.probability > CONSTANTS.born and verdict.misfit < CONSTANTS.fit and worst < 0.1 * length)

@@ -8,7 +8,7 @@ import scipy
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.associate import Candidates, pair_costs
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import GATE
 from rislam_rt.slam.window.panel import Identity, unknown
 
@@ -134,12 +134,12 @@ def alive(tracks: Tracks, cycle: int) -> Booleans:
     """
     share = (tracks.hits + 1.0) / (tracks.last - tracks.born + 3.0)
     patience = np.where(tracks.hits >= 4, np.log(0.01) / np.log(np.clip(1.0 - share, 1e-6, 0.999)), 3.0)
-    patience = np.where((tracks.log_ris > 0.0).any(axis=1) & (tracks.hits >= 2), LEVELS.window, patience)
-    return np.asarray(cycle - tracks.last <= np.clip(patience, 3.0, LEVELS.window))
+    patience = np.where((tracks.log_ris > 0.0).any(axis=1) & (tracks.hits >= 2), CONSTANTS.window, patience)
+    return np.asarray(cycle - tracks.last <= np.clip(patience, 3.0, CONSTANTS.window))
 
 
 def due(tracks: Tracks, cycle: int) -> Integers:
     """Tracks to examine: after 6 measurements, and whenever their number has grown by a half since."""
-    grown = tracks.hits >= np.maximum(6, np.minimum(3 * tracks.looked // 2, tracks.looked + LEVELS.window // 2))
+    grown = tracks.hits >= np.maximum(6, np.minimum(3 * tracks.looked // 2, tracks.looked + CONSTANTS.window // 2))
     rows = (grown & (cycle - tracks.last <= 1)).nonzero()[0]
     return rows[np.argsort(tracks.mean[rows, 0, 0])]

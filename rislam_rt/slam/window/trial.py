@@ -14,7 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window.digest import Digest
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import HOPELESS, RIDGE, STEPS
 
 
@@ -91,7 +91,7 @@ def try_all(trials: Trials, digest: Digest) -> Fits:
             lost[active] = False
             cost[lost] = np.inf
     evidence = -0.5 * cost - 0.5 * log_det + 1.5 * np.log(2.0 * np.pi)
-    share = np.where(trials.mixed, LEVELS.weaker * (1.0 + error[:, -1]), 0.0)
+    share = np.where(trials.mixed, CONSTANTS.weaker * (1.0 + error[:, -1]), 0.0)
     # a component lies between the two that it is made of
     evidence -= 20.0 * (np.maximum(-share, 0.0) + np.maximum(share - 1.0, 0.0))
     return Fits(place, covariance, held, cost, share, evidence)
@@ -168,7 +168,7 @@ def _equations(
     normal[:, common, common] += 1.0
     normal[:, own, own] += RIDGE
     slope[:, common] -= error
-    tail = LEVELS.tail
+    tail = CONSTANTS.tail
     cost = (tail + 3.0) * np.log1p(squared / tail).sum(axis=1) + np.vecdot(error, error)
     return _Equations(normal, slope, cost, (tail + 3.0) / (tail + squared))
 
@@ -189,9 +189,9 @@ def _mix(
     length = np.sqrt(np.vecdot(out, out))
     ray = out / length[..., None]
     gap = np.concatenate([length[..., None], ray[..., :2]], axis=-1) - value[both]
-    share = LEVELS.weaker * (1.0 + error[both, -1])[:, None, None]
+    share = CONSTANTS.weaker * (1.0 + error[both, -1])[:, None, None]
     value[both] += share * gap
-    split[both] = LEVELS.weaker * gap[..., None]
+    split[both] = CONSTANTS.weaker * gap[..., None]
     across = _by_image(ray, length)
     turned = across @ mirror[:, None, :, :3]
     by_new, by_agent = turned @ by_place[both], turned @ by_tx[both][:, None] - across
@@ -221,7 +221,7 @@ def smooth_paths(digest: Digest) -> tuple[Floats, Floats]:
     bend = speed**2 * np.stack([1.0 / reach, reach**-2.0, reach**-2.0], axis=1) + 0.1 * rate
     time = digest.time - digest.time.mean(axis=1, keepdims=True)
     rows = np.stack([np.ones(time.shape), time, 0.5 * time**2], axis=-1)[:, None]
-    tail = LEVELS.tail
+    tail = CONSTANTS.tail
     trust = np.ones(time.shape)
     value, weight = np.swapaxes(digest.seen, 1, 2), np.swapaxes(digest.weight, 1, 2)
     spread = np.stack([rate, bend], axis=-1)

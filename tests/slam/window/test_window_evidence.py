@@ -7,7 +7,7 @@ from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.returns import AXES, NONE, TX, Poses, linearise, reflect
 from rislam_rt.slam.window import trial
 from rislam_rt.slam.window.digest import Digest, scatter_of
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.path_forms import compile_forms
 from rislam_rt.slam.window.trial import COMMON, Trials, smooth_paths, try_all
 
@@ -168,4 +168,4 @@ def test_scatter_is_that_of_the_noise():
         seen = 3.0 + 0.2 * time[:, None] + 0.003 * time[:, None] ** 2 + factor * 0.01 * rng.standard_normal((200, 3))
         # of 200 measurements the deviation is known to 5 %; Student's weights take a little off
         np.testing.assert_allclose(scatter_of(seen, std, time), max(factor, 1.0), rtol=0.2)
-    assert LEVELS.crowd > 1.0
+    assert CONSTANTS.crowd > 1.0

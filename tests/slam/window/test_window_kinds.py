@@ -8,7 +8,7 @@ from rislam_rt.slam.returns import NONE, TX
 from rislam_rt.slam.window import births, track_classification
 from rislam_rt.slam.window.hypotheses import KNOWN_WALL, POINT, WALL, WALL_KNOWN
 from rislam_rt.slam.window.log import empty_log
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.path_forms import UNKNOWN
 from rislam_rt.slam.window.trial import Fits
 
@@ -22,7 +22,7 @@ def _table(kind, pair=None):
 
 def test_places_of_walls_and_points_have_densities_that_integrate_to_one():
     rng, middle = np.random.default_rng(5), np.array([3.0, -2.0, 1.0])
-    for kind, radius in ((WALL, 2.0 * LEVELS.size), (POINT, LEVELS.size)):
+    for kind, radius in ((WALL, 2.0 * CONSTANTS.size), (POINT, CONSTANTS.size)):
         # shells, sampled evenly in distance: the density times the area of each
         reach = rng.uniform(0.0, radius, 20_000)
         way = rng.standard_normal((len(reach), 3))
@@ -30,7 +30,7 @@ def test_places_of_walls_and_points_have_densities_that_integrate_to_one():
         density = np.exp(track_classification.log_place(_table([kind] * len(reach)), place, middle))
         share = radius * density * 4.0 * np.pi * reach**2
         # within the depth of a surface a wall is no likelier: two thirds of the share of that shell are missing
-        missing = 2.0 / 3.0 * 2.0 * LEVELS.depth / radius if kind == WALL else 0.0
+        missing = 2.0 / 3.0 * 2.0 * CONSTANTS.depth / radius if kind == WALL else 0.0
         assert abs(share.mean() - (1.0 - missing)) < 5.0 * np.std(share) / len(reach) ** 0.5
 
 

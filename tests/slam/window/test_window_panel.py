@@ -21,7 +21,7 @@ from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.returns import TX as MOVING
 from rislam_rt.slam.window.landmark_table import empty_table, enter
 from rislam_rt.slam.window.look import return_sides
-from rislam_rt.slam.window.model_constants import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.panel import Sight, gains, spread_places, unknown, weigh
 
 SENSOR = SensorModel(RadioConfig(noise_psd=3.52e-12))
@@ -44,13 +44,13 @@ def test_one_amplitude_tells_what_quadrature_tells():
     sight = _sight(3.0 * noise)
     gain = gains(sight, SPEC, code, radio)
     sight = sight._replace(amplitude=abs(gain[0]).mean(axis=1) + noise)
-    found = weigh(unknown(1), sight, gain, SENSOR).log_ris[0, 0] - np.log(LEVELS.panels)
+    found = weigh(unknown(1), sight, gain, SENSOR).log_ris[0, 0] - np.log(CONSTANTS.panels)
     loud = abs(gain[0, 0])
     spread = np.hypot(noise, MODEL_ERROR * loud)
     panel = np.mean(rice.pdf(sight.amplitude[0], loud / spread, scale=spread))
     # the root of the cross-section is log-normal; far beyond the filter's own grid
     log = np.linspace(np.log(1e-4), np.log(30.0), 4001)
-    prior = np.exp(-0.5 * ((log - np.log(LEVELS.strength)) / LEVELS.strength_std) ** 2)
+    prior = np.exp(-0.5 * ((log - np.log(CONSTANTS.strength)) / CONSTANTS.strength_std) ** 2)
     level = point_amplitude(np.exp(log), np.linalg.norm(PLACE - TX), np.linalg.norm(PLACE - RX), radio)
     width = np.hypot(noise, MODEL_ERROR * level)
     other = np.sum(prior * rice.pdf(sight.amplitude[0], level / width, scale=width)) / prior.sum()
@@ -77,12 +77,12 @@ def test_what_is_hidden_tells_nothing_by_silence_and_alternation_excludes():
     gain = 10.0 * gains(_sight(1.0), SPEC, code, SENSOR.radio)
     silent = _sight(1.0, seen=False)
     blocked = unknown(1)._replace(hidden=np.ones((1, 2)))
-    assert weigh(blocked, silent, gain, SENSOR).log_ris[0, 0] == pytest.approx(np.log(LEVELS.panels))
+    assert weigh(blocked, silent, gain, SENSOR).log_ris[0, 0] == pytest.approx(np.log(CONSTANTS.panels))
     # a panel this loud would have been heard
-    assert weigh(unknown(1), silent, gain, SENSOR).log_ris[0, 0] < np.log(LEVELS.panels)
+    assert weigh(unknown(1), silent, gain, SENSOR).log_ris[0, 0] < np.log(CONSTANTS.panels)
     level = float(abs(gain).mean())
     told = [weigh(unknown(1), _sight(level, side=side), gain, SENSOR).log_ris[0, 0] for side in (OTHER, UNTOLD, PANEL)]
-    assert told[0] < np.log(LEVELS.panels) < told[1] < told[2]
+    assert told[0] < np.log(CONSTANTS.panels) < told[1] < told[2]
 
 
 @pytest.mark.parametrize(("told", "cycles"), [(True, 4), (False, 20)])
