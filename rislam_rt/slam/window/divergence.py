@@ -11,10 +11,10 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window import egomotion, window_gaussian
+from rislam_rt.slam.window.cycle_association import Look
 from rislam_rt.slam.window.egomotion import Rates
 from rislam_rt.slam.window.factor import inverse
 from rislam_rt.slam.window.log import Log
-from rislam_rt.slam.window.look import Look
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import LADDER
 from rislam_rt.slam.window.steps import HEAD

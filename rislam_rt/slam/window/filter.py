@@ -15,11 +15,11 @@ from rislam_rt.slam.step_info import REMOVED, UNUSED, Outcome, StepInfo
 from rislam_rt.slam.window import divergence, motion, recovery, tracks, window_gaussian
 from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.context import Context
+from rislam_rt.slam.window.cycle_association import Look, echoes, look
 from rislam_rt.slam.window.excess import grow, take_in
 from rislam_rt.slam.window.landmark_table import WindowTable, empty_table, idents, image_ident
 from rislam_rt.slam.window.landmark_update import learn, no_observations
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
-from rislam_rt.slam.window.look import Look, echoes, look
 from rislam_rt.slam.window.measurement_prediction import (
     ExpectedComponents,
     KnownEnvironment,

@@ -19,8 +19,8 @@ from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.identity import MODEL_ERROR
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.returns import TX as MOVING
+from rislam_rt.slam.window.cycle_association import return_sides
 from rislam_rt.slam.window.landmark_table import empty_table, enter
-from rislam_rt.slam.window.look import return_sides
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.panel import Sight, gains, spread_places, unknown, weigh
 
