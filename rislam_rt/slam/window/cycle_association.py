@@ -26,7 +26,7 @@ from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.window_gaussian import Window
 
 
-class Look(NamedTuple):
+class CycleAssociation(NamedTuple):
     """A cycle as a belief sees it."""
 
     mean: Floats
@@ -69,10 +69,10 @@ FAR_STRONGER = 1.0
 """Log amplitude by which a component's echo is weaker: a turn of a fifth of a radian leaves a tenth."""
 
 
-def look(
+def associate_cycle(
     window: Window, book: WindowTable, sights: VisibilityObservations, heading: float, scene: KnownEnvironment, code: RisCode | None,
     glance: Observations, strangers: Floats,
-) -> Look:  # fmt: skip
+) -> CycleAssociation:  # fmt: skip
     """Expect, cluster, associate."""
     mean, covariance = window_gaussian.now(window)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
@@ -86,7 +86,9 @@ def look(
     due, seen = shows[alone], np.isin(np.arange(len(shows)), row)[alone]
     miss = float(np.log1p(-due[~seen]).sum())
     surprise = (due.sum() - seen.sum()) / np.sqrt((due * (1.0 - due)).sum() + 0.25)
-    return Look(mean, poses, expected, groups, shows, scatter, row, pick, gain + miss, float(surprise), strain)
+    return CycleAssociation(
+        mean, poses, expected, groups, shows, scatter, row, pick, gain + miss, float(surprise), strain
+    )
 
 
 def return_sides(forms: Integers, book: WindowTable) -> Integers:

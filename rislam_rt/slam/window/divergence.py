@@ -11,7 +11,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window import egomotion, window_gaussian
-from rislam_rt.slam.window.cycle_association import Look
+from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.egomotion import Rates
 from rislam_rt.slam.window.factor import inverse
 from rislam_rt.slam.window.log import Log
@@ -53,7 +53,7 @@ def advance(log_odds: float, score: float, followed: int, kept: int) -> float:
     return float(np.clip(np.log(lost / (1.0 - lost)) - score, SURE, -SURE))
 
 
-def jump(view: Look, glance: Observations) -> Floats:
+def jump(view: CycleAssociation, glance: Observations) -> Floats:
     """(3,) [m] by which an agent that hears this is elsewhere than thought: on which most returns agree."""
     lead = view.groups.leader
     expected, heard = view.expected.seen[lead], glance.seen

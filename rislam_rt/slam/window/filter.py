@@ -15,7 +15,7 @@ from rislam_rt.slam.step_info import REMOVED, UNUSED, Outcome, StepInfo
 from rislam_rt.slam.window import divergence, motion, recovery, tracks, window_gaussian
 from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.context import Context
-from rislam_rt.slam.window.cycle_association import Look, echoes, look
+from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes
 from rislam_rt.slam.window.excess import grow, take_in
 from rislam_rt.slam.window.landmark_table import WindowTable, empty_table, idents, image_ident
 from rislam_rt.slam.window.landmark_update import learn, no_observations
@@ -176,14 +176,14 @@ manoeuvre is looked for."""
 
 def _notice(
     state: WindowState, heading: float, code: RisCode | None, glance: Observations, strangers: Floats
-) -> tuple[WindowState, Look]:
+) -> tuple[WindowState, CycleAssociation]:
     """What is seen, and the belief that explains it best: as it was, with a manoeuvre in the last steps, or a jump.
 
     A jump has to explain the cycle better than being lost does, which explains nothing.
     """
 
-    def view_of(window: Window) -> Look:
-        return look(window, state.book, state.sights, heading, state.scene, code, glance, strangers)
+    def view_of(window: Window) -> CycleAssociation:
+        return associate_cycle(window, state.book, state.sights, heading, state.scene, code, glance, strangers)
 
     best, window = view_of(state.window), state.window
     learnt = state.config.motion == "learnt"
