@@ -12,7 +12,7 @@ from rislam_rt.slam.window.landmark_table import WindowTable, learn_ratio
 from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, KnownEnvironment, UnresolvedClusters
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import SCATTER_RATE
-from rislam_rt.slam.window.panel import Sight, gains, spread_places, weigh
+from rislam_rt.slam.window.ris_identification import Sight, gains, spread_places, weigh
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.window_gaussian import Window
 

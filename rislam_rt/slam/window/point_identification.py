@@ -12,7 +12,7 @@ from rislam_rt.slam.window.hypotheses import OVER_RX, OVER_SAME, OVER_TX, POINT,
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import CERTAIN
-from rislam_rt.slam.window.panel import Identity, Sight, gains, spread_places, unknown, weigh
+from rislam_rt.slam.window.ris_identification import Identity, Sight, gains, spread_places, unknown, weigh
 from rislam_rt.slam.window.trial import Fits
 from rislam_rt.slam.window.window_gaussian import poses
 

@@ -11,8 +11,8 @@ from rislam_rt.slam.window.log import Log, Residuals
 from rislam_rt.slam.window.measurement_prediction import ExpectedComponents
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import FEWEST, RECENT
-from rislam_rt.slam.window.panel import unknown
 from rislam_rt.slam.window.path_forms import UNKNOWN
+from rislam_rt.slam.window.ris_identification import unknown
 from rislam_rt.slam.window.tracks import Tracks
 
 

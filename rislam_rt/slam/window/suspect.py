@@ -12,7 +12,7 @@ from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import DRAWS
-from rislam_rt.slam.window.panel import Sight, gains, weigh
+from rislam_rt.slam.window.ris_identification import Sight, gains, weigh
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.tracks import Tracks
 

@@ -27,8 +27,8 @@ from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
-from rislam_rt.slam.window.panel import Identity, unknown
 from rislam_rt.slam.window.point_identification import identify
+from rislam_rt.slam.window.ris_identification import Identity, unknown
 from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
 from rislam_rt.slam.window.window_gaussian import DirectionPriors, no_holds
 

@@ -10,7 +10,7 @@ from rislam_rt.slam.associate import Candidates, pair_costs
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import GATE
-from rislam_rt.slam.window.panel import Identity, unknown
+from rislam_rt.slam.window.ris_identification import Identity, unknown
 
 WANDER = 1.0
 """Spread of an unexplained path's log amplitude from cycle to cycle: a panel's code may change."""

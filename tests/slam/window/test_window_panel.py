@@ -22,7 +22,7 @@ from rislam_rt.slam.returns import TX as MOVING
 from rislam_rt.slam.window.cycle_association import return_sides
 from rislam_rt.slam.window.landmark_table import empty_table, enter
 from rislam_rt.slam.window.model_constants import CONSTANTS
-from rislam_rt.slam.window.panel import Sight, gains, spread_places, unknown, weigh
+from rislam_rt.slam.window.ris_identification import Sight, gains, spread_places, unknown, weigh
 
 SENSOR = SensorModel(RadioConfig(noise_psd=3.52e-12))
 SPEC = RisSpec(6, 6, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
