@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.identity import STRENGTHS, panel_probabilities, strength_moments
 from rislam_rt.slam.window.model_constants import CONSTANTS
-from rislam_rt.slam.window.ris_identification import Identity
+from rislam_rt.slam.window.ris_identification import PanelIdentity
 
 
 class WindowTable(NamedTuple):
@@ -53,9 +53,9 @@ class WindowTable(NamedTuple):
         return probability
 
     @property
-    def identity(self) -> Identity:
+    def identity(self) -> PanelIdentity:
         """(F,) what points are held to be."""
-        return Identity(self.log_grid, self.log_ris, self.hidden)
+        return PanelIdentity(self.log_grid, self.log_ris, self.hidden)
 
     @property
     def panels(self) -> tuple[int, ...]:
@@ -87,7 +87,7 @@ def empty_table(panels: int = 1) -> WindowTable:
 
 
 def enter(
-    book: WindowTable, is_wall: bool, anchor: Floats, hits: int, log_odds: float, identity: Identity
+    book: WindowTable, is_wall: bool, anchor: Floats, hits: int, log_odds: float, identity: PanelIdentity
 ) -> WindowTable:
     """The book with one more feature, in the last row; `identity` (1,) of a point."""
     return book._replace(

@@ -12,7 +12,7 @@ from rislam_rt.slam.window.landmark_table import WindowTable, learn_ratio
 from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, KnownEnvironment, UnresolvedClusters
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import SCATTER_RATE
-from rislam_rt.slam.window.ris_identification import Sight, gains, spread_places, weigh
+from rislam_rt.slam.window.ris_identification import PanelObservation, gains, spread_places, weigh
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.window_gaussian import Window
 
@@ -155,7 +155,7 @@ def _identities(
     blocks = window.covariance[rows[:, :, None], rows[:, None, :]]
     count = len(points)
     amplitude, side = np.append(np.exp(glance.log_amplitude), 1.0), np.append(glance.sides, UNTOLD)
-    sight = Sight(
+    sight = PanelObservation(
         spread_places(window.features[points], blocks), np.tile(poses.tx, (count, 1)), np.tile(poses.rx, (count, 1)),
         np.ones(count), amplitude[heard], side[heard], heard >= 0,
     )  # fmt: skip

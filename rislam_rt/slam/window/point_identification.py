@@ -12,7 +12,14 @@ from rislam_rt.slam.window.hypotheses import OVER_RX, OVER_SAME, OVER_TX, POINT,
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import CERTAIN
-from rislam_rt.slam.window.ris_identification import Identity, Sight, gains, spread_places, unknown, weigh
+from rislam_rt.slam.window.ris_identification import (
+    PanelIdentity,
+    PanelObservation,
+    gains,
+    spread_places,
+    unknown,
+    weigh,
+)
 from rislam_rt.slam.window.trial import Fits
 from rislam_rt.slam.window.window_gaussian import poses
 
@@ -25,7 +32,7 @@ class Identified(NamedTuple):
 
     gain: Floats
     """(H,) in log evidence, of points that may be the panel instead of a scatterer."""
-    identity: Identity
+    identity: PanelIdentity
     """(H,) who each is then."""
     elsewhere: Floats
     """(T, Q) log odds that a track runs over each panel by a way that is none of these, against none over it."""
@@ -58,7 +65,7 @@ def identify(context: Context, ats: list[Integers], table: Hypotheses, fits: Fit
     return found._replace(identity=found.identity.settled())
 
 
-def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> Identity:
+def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> PanelIdentity:
     """Identities of the hypotheses `rows` (R,) of a track whose components are the log's rows `at`.
 
     The last row stands for a panel anywhere else: amplitudes scatter as they do.
@@ -77,7 +84,7 @@ def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows
         row = heard.get(slot, -1)
         amplitude, side = (np.exp(log.log_amplitude[row]), log.side[row]) if row >= 0 else (1.0, UNTOLD)
         tx, rx = (end[slot] @ turn[:, leg] + shift[:, leg] for leg, end in enumerate((ends.tx, ends.rx)))
-        sight = Sight(
+        sight = PanelObservation(
             spots, tx, rx, ratio, np.full(count, amplitude), np.full(count, side), np.full(count, row >= 0)
         )  # fmt: skip
         gain = gains(sight, scene.ris, context.codes[slot], scene.radio)

@@ -12,7 +12,7 @@ from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import DRAWS
-from rislam_rt.slam.window.ris_identification import Sight, gains, weigh
+from rislam_rt.slam.window.ris_identification import PanelObservation, gains, weigh
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.tracks import Tracks
 
@@ -26,7 +26,7 @@ def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: KnownEnvironme
     looks = tracks.mean[rows, None, :, 0] + even_draws(DRAWS, 3) * spread[:, None]
     place, _ = places(looks, poses)
     count = len(rows)
-    sight = Sight(
+    sight = PanelObservation(
         place, np.tile(poses.tx, (count, 1)), np.tile(poses.rx, (count, 1)), np.ones(count),
         np.exp(tracks.log_amplitude[rows]), tracks.side[rows], tracks.last[rows] == cycle,
     )  # fmt: skip

@@ -28,7 +28,7 @@ from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.point_identification import identify
-from rislam_rt.slam.window.ris_identification import Identity, unknown
+from rislam_rt.slam.window.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
 from rislam_rt.slam.window.window_gaussian import DirectionPriors, no_holds
 
@@ -56,7 +56,7 @@ class TrackDecision(NamedTuple):
     """Of the edge with the known wall in its place, where it comes out as one with that."""
     misfit: float
     """Standard deviations by which it costs more than noise makes it."""
-    identity: Identity
+    identity: PanelIdentity
     """(1,) who it is, if it is a point."""
 
     @property

@@ -10,7 +10,7 @@ from rislam_rt.slam.associate import Candidates, pair_costs
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import GATE
-from rislam_rt.slam.window.ris_identification import Identity, unknown
+from rislam_rt.slam.window.ris_identification import PanelIdentity, unknown
 
 WANDER = 1.0
 """Spread of an unexplained path's log amplitude from cycle to cycle: a panel's code may change."""
@@ -48,9 +48,9 @@ class Tracks(NamedTuple):
     next_ident: int
 
     @property
-    def identity(self) -> Identity:
+    def identity(self) -> PanelIdentity:
         """(T,) what the tracks would be, were they points."""
-        return Identity(self.log_grid, self.log_ris, self.hidden)
+        return PanelIdentity(self.log_grid, self.log_ris, self.hidden)
 
     def keep(self, rows: Booleans) -> "Tracks":
         """Only some of the tracks."""

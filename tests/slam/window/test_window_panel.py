@@ -22,7 +22,7 @@ from rislam_rt.slam.returns import TX as MOVING
 from rislam_rt.slam.window.cycle_association import return_sides
 from rislam_rt.slam.window.landmark_table import empty_table, enter
 from rislam_rt.slam.window.model_constants import CONSTANTS
-from rislam_rt.slam.window.ris_identification import Sight, gains, spread_places, unknown, weigh
+from rislam_rt.slam.window.ris_identification import PanelObservation, gains, spread_places, unknown, weigh
 
 SENSOR = SensorModel(RadioConfig(noise_psd=3.52e-12))
 SPEC = RisSpec(6, 6, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
@@ -32,7 +32,7 @@ PLACE, TX, RX = np.array([[3.0, 3.0, 3.0]]), np.array([[2.0, 2.5, 0.5]]), np.arr
 def _sight(amplitude, side=UNTOLD, seen=True, std=1e-4):
     places = spread_places(PLACE, std**2 * np.eye(3)[None])
     flag = np.array([seen])
-    return Sight(places, TX, RX, np.ones(1), np.array([amplitude]), np.array([side]), flag)
+    return PanelObservation(places, TX, RX, np.ones(1), np.array([amplitude]), np.array([side]), flag)
 
 
 def _code(rng):
@@ -94,7 +94,9 @@ def test_two_panels_of_one_data_sheet_are_told_apart(told, cycles):
     belief, places = unknown(3, 2), spread_places(spots, np.tile(1e-8 * np.eye(3), (3, 1, 1)))
     for _ in range(cycles):
         code = RisCode(rng.integers(4, size=(1, 72)), 4)
-        look = Sight(places, np.tile(TX, (3, 1)), np.tile(RX, (3, 1)), np.ones(3), *np.zeros((2, 3)), np.ones(3))
+        look = PanelObservation(
+            places, np.tile(TX, (3, 1)), np.tile(RX, (3, 1)), np.ones(3), *np.zeros((2, 3)), np.ones(3)
+        )
         gain = gains(look, sheets, code, SENSOR.radio)
         level = np.array([abs(gain[0, 0, 0]), abs(gain[1, 1, 0]), 3.0 * least])
         heard = np.hypot(level + noise * rng.standard_normal(3), noise * rng.standard_normal(3))
