@@ -8,6 +8,7 @@ from rislam_rt.slam.returns import TX, linearise
 from rislam_rt.slam.window import tracks, window_gaussian
 from rislam_rt.slam.window.context import Context, resolve
 from rislam_rt.slam.window.digest import Digest, digest
+from rislam_rt.slam.window.feature_removal import behind, release
 from rislam_rt.slam.window.hypotheses import BESIDE, known_features
 from rislam_rt.slam.window.landmark_table import enter, idents
 from rislam_rt.slam.window.landmark_update import seed
@@ -15,7 +16,6 @@ from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, Unr
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER, STRIDE
 from rislam_rt.slam.window.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.retract import behind, release
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.track_classification import NEW, TrackDecision, judge, wanted
 

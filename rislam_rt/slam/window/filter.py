@@ -17,6 +17,7 @@ from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes
 from rislam_rt.slam.window.excess import grow, take_in
+from rislam_rt.slam.window.feature_removal import condemned, release
 from rislam_rt.slam.window.landmark_table import WindowTable, empty_table, idents, image_ident
 from rislam_rt.slam.window.landmark_update import learn, no_observations
 from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
@@ -28,7 +29,6 @@ from rislam_rt.slam.window.measurement_prediction import (
 )
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import DAMPING, REFRESH
-from rislam_rt.slam.window.retract import condemned, release
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import TURN
 from rislam_rt.slam.window.suspect import weigh_tracks
