@@ -29,9 +29,9 @@ from rislam_rt.slam.window.measurement_prediction import (
 )
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import DAMPING, REFRESH
+from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import TURN
-from rislam_rt.slam.window.suspect import weigh_tracks
 from rislam_rt.slam.window.tracks import Tracks
 from rislam_rt.slam.window.window_gaussian import Window
 

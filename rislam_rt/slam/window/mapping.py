@@ -13,9 +13,9 @@ from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window import window_gaussian
 from rislam_rt.slam.window.filter import init
 from rislam_rt.slam.window.landmark_table import WindowTable, image_ident
+from rislam_rt.slam.window.ris_candidate import find_suspect
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import HEAD
-from rislam_rt.slam.window.suspect import find_suspect
 
 
 def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
