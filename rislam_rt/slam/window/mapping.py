@@ -13,7 +13,7 @@ from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window import window_gaussian
 from rislam_rt.slam.window.filter import init
 from rislam_rt.slam.window.landmark_table import WindowTable, image_ident
-from rislam_rt.slam.window.ris_candidate import find_suspect
+from rislam_rt.slam.window.ris_candidate import find_candidate
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import HEAD
 
@@ -26,7 +26,7 @@ def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
         return ahead
     mean, _ = window_gaussian.now(state.window)
     poses = poses_of(mean[:3], np.asarray(state.heading[-1] + mean[6]), state.scene.body)
-    found = [find_suspect(state.tracks, state.book, mean, state.cycle - 1, poses, panel) for panel in unknown]
+    found = [find_candidate(state.tracks, state.book, mean, state.cycle - 1, poses, panel) for panel in unknown]
     return replace(ahead, suspects=tuple(suspect for suspect in found if suspect is not None))
 
 

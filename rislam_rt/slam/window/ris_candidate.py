@@ -35,7 +35,7 @@ def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: KnownEnvironme
     return tracks._replace(**tracks.identity.put(rows, fresh)._asdict())
 
 
-def find_suspect(
+def find_candidate(
     tracks: Tracks, book: WindowTable, mean: Floats, cycle: int, poses: Poses, panel: int = 0
 ) -> PanelCandidate | None:
     """The point or track that is the likeliest to be a panel; None if nothing is likelier the panel than not.
