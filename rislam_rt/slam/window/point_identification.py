@@ -9,6 +9,7 @@ from rislam_rt.slam.moments import even_draws, poses_of
 from rislam_rt.slam.observations import OTHER, UNTOLD
 from rislam_rt.slam.window.context import Context
 from rislam_rt.slam.window.hypotheses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
+from rislam_rt.slam.window.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import CERTAIN
@@ -20,7 +21,6 @@ from rislam_rt.slam.window.ris_identification import (
     unknown,
     weigh,
 )
-from rislam_rt.slam.window.trial import Fits
 from rislam_rt.slam.window.window_gaussian import poses
 
 ASIDE = 12.0

@@ -23,13 +23,13 @@ from rislam_rt.slam.window.hypotheses import (
     KnownFeatures,
     hypotheses,
 )
+from rislam_rt.slam.window.hypothesis_fits import Fits, smooth_paths, try_all
 from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.point_identification import identify
 from rislam_rt.slam.window.ris_identification import PanelIdentity, unknown
-from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
 from rislam_rt.slam.window.window_gaussian import DirectionPriors, no_holds
 
 LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 0.2]))

@@ -5,11 +5,11 @@ import numpy as np
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.returns import AXES, NONE, TX, Poses, linearise, reflect
-from rislam_rt.slam.window import trial
+from rislam_rt.slam.window import hypothesis_fits
 from rislam_rt.slam.window.digest import Digest, scatter_of
+from rislam_rt.slam.window.hypothesis_fits import COMMON, Trials, smooth_paths, try_all
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.path_forms import compile_forms
-from rislam_rt.slam.window.trial import COMMON, Trials, smooth_paths, try_all
 
 
 def _digest(count, *, std=0.01, rng):
@@ -74,7 +74,7 @@ def _left(trials, digest, place, error):
     """Residuals of one hypothesis, through its cost's own slope: computed at `place` and `error`."""
     rows = np.zeros(1, dtype=np.int64)
     count = digest.seen.shape[1]
-    return trial._equations(trials, digest, rows, place[None], error[None], np.ones((1, count)))
+    return hypothesis_fits._equations(trials, digest, rows, place[None], error[None], np.ones((1, count)))
 
 
 def test_slopes_are_those_of_the_cost():
@@ -140,7 +140,7 @@ def test_evidence_is_the_integral_of_the_likelihood():
         places, *(np.repeat(field, len(places), axis=0) for field in trials[4:]),
     )  # fmt: skip
     rows = np.arange(len(places))
-    cost = trial._equations(
+    cost = hypothesis_fits._equations(
         every, digest, rows, places, np.zeros((len(places), COMMON)), np.ones((len(places), 8))
     ).cost  # fmt: skip
     cell = np.prod(np.sqrt(value)) * (nodes[1] - nodes[0]) ** 3
