@@ -7,7 +7,6 @@ from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.returns import TX, linearise
 from rislam_rt.slam.window import tracks, window_gaussian
 from rislam_rt.slam.window.context import Context, resolve
-from rislam_rt.slam.window.digest import Digest, digest
 from rislam_rt.slam.window.feature_removal import behind, release
 from rislam_rt.slam.window.hypotheses import BESIDE, known_features
 from rislam_rt.slam.window.landmark_table import enter, idents
@@ -18,6 +17,7 @@ from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER
 from rislam_rt.slam.window.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.track_classification import NEW, TrackDecision, judge, wanted
+from rislam_rt.slam.window.track_summary import Digest, digest
 
 
 def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClusters) -> Context:

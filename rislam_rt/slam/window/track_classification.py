@@ -8,7 +8,6 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.context import Context
-from rislam_rt.slam.window.digest import Digest
 from rislam_rt.slam.window.hypotheses import (
     BESIDE,
     IMAGE,
@@ -30,6 +29,7 @@ from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.point_identification import identify
 from rislam_rt.slam.window.ris_identification import PanelIdentity, unknown
+from rislam_rt.slam.window.track_summary import Digest
 from rislam_rt.slam.window.window_gaussian import DirectionPriors, no_holds
 
 LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 0.2]))
