@@ -17,7 +17,7 @@ from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER
 from rislam_rt.slam.window.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.track_classification import NEW, TrackDecision, judge, wanted
-from rislam_rt.slam.window.track_summary import Digest, digest
+from rislam_rt.slam.window.track_summary import TrackSummary, summarise_tracks
 
 
 def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClusters) -> Context:
@@ -33,7 +33,7 @@ def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClu
     rows, ats = rows[full], [ats[place] for place in full]
     mean, covariance = window_gaussian.now(context.window)
     known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.book, mean[:3])
-    histories = digest(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
+    histories = summarise_tracks(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
     told = explanations(context, rows, histories, expected, groups, mean, covariance)
     panels = context.book.panels
     lonely = _missing_legs(context, histories, mean)
@@ -73,7 +73,7 @@ def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClu
     return context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
 
 
-def _missing_legs(context: Context, histories: Digest, mean: Floats) -> Floats:
+def _missing_legs(context: Context, histories: TrackSummary, mean: Floats) -> Floats:
     """(T,) log probability that of two walls that throw a track together so many single returns are not heard.
 
     Two walls shift the Tx by the sum of what each does: a single return of theirs comes along the same line (opposite
@@ -110,7 +110,7 @@ def _bearings(context: Context, rows: Booleans, mean: Floats) -> tuple[Floats, F
     return away, np.maximum(context.tracks.mean[rows, 0, 0], 0.1)
 
 
-def _company(context: Context, ats: list[Integers], histories: Digest, mean: Floats) -> Floats:
+def _company(context: Context, ats: list[Integers], histories: TrackSummary, mean: Floats) -> Floats:
     """(T,) log odds by which a direction speaks for a path over unknown walls, and against all else: a shorter one
     comes from there.
 
@@ -136,7 +136,7 @@ LEG = 0.04
 
 
 def explanations(
-    context: Context, rows: Integers, histories: Digest, expected: ExpectedComponents, groups: UnresolvedClusters, mean: Floats,
+    context: Context, rows: Integers, histories: TrackSummary, expected: ExpectedComponents, groups: UnresolvedClusters, mean: Floats,
     covariance: Floats,
 ) -> list[tuple[int, float, Integers, int]]:  # fmt: skip
     """(track, log evidence, forms (2, 5) of feature rows, cluster) of returns of the map: nothing is free in them."""
@@ -165,7 +165,7 @@ def explanations(
 
 
 def _explain(
-    context: Context, histories: Digest, row: int, forms: Integers, groups: UnresolvedClusters, column: int, gap: Floats,
+    context: Context, histories: TrackSummary, row: int, forms: Integers, groups: UnresolvedClusters, column: int, gap: Floats,
     features: Floats, root: Floats,
 ) -> float:  # fmt: skip
     """Log evidence of one explanation."""
@@ -219,7 +219,9 @@ def _assign(context: Context, at: Integers, forms: Integers, scatter: Floats, pa
     return context._replace(log=log._replace(form=form, share=share, extra=extra))
 
 
-def _enter(context: Context, at: Integers, verdict: TrackDecision, histories: Digest, row: int) -> tuple[Context, bool]:
+def _enter(
+    context: Context, at: Integers, verdict: TrackDecision, histories: TrackSummary, row: int
+) -> tuple[Context, bool]:
     """The map with a new feature and its history, solved anew; as it was, if they do not agree."""
     new = len(context.book.ident)
     holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))

@@ -9,7 +9,7 @@ from rislam_rt.slam.moments import square_root
 from rislam_rt.slam.returns import AXES, NONE, reflect
 from rislam_rt.slam.window.hypothesis_fits import Trials
 from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.track_summary import Digest
+from rislam_rt.slam.window.track_summary import TrackSummary
 
 KINDS = (
     "wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same",
@@ -75,7 +75,7 @@ def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
     return np.asarray(-2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]))
 
 
-def hypotheses(digest: Digest, known: KnownFeatures, book: WindowTable, use_vt: bool) -> Hypotheses:
+def hypotheses(digest: TrackSummary, known: KnownFeatures, book: WindowTable, use_vt: bool) -> Hypotheses:
     """Every kind for every track, with its first guess; images of known points where wall returns tell no walls."""
     count, walls = len(digest.seen), book.walls
     seen, tx, rx = digest.mean
@@ -139,7 +139,7 @@ def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -
     return turns, shifts, doubt
 
 
-def _image(digest: Digest, spot: Floats, root: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def _image(digest: TrackSummary, spot: Floats, root: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """First guess of the wall (T, 3) that mirrors a point (3,), known to `root` (3, 3), and the `Trials` of that."""
     (seen, tx, rx), count = digest.mean, len(digest.seen)
     reach = np.maximum(seen[:, 0] - np.linalg.norm(spot - tx, axis=1), 0.1)

@@ -15,7 +15,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import HOPELESS, RIDGE, STEPS
-from rislam_rt.slam.window.track_summary import Digest
+from rislam_rt.slam.window.track_summary import TrackSummary
 
 
 class Trials(NamedTuple):
@@ -60,7 +60,7 @@ class Fits(NamedTuple):
     """(H,) of a density 1 over the place, without the constants that hypotheses of a track share."""
 
 
-def try_all(trials: Trials, digest: Digest) -> Fits:
+def try_all(trials: Trials, digest: TrackSummary) -> Fits:
     """Fit everything; hypotheses that fall hopelessly behind after one step keep what they had then."""
     count = len(trials.track)
     active = np.arange(count)
@@ -109,7 +109,7 @@ class _Equations(NamedTuple):
 
 
 def _equations(
-    trials: Trials, digest: Digest, rows: Integers, place: Floats, error: Floats, trust: Floats
+    trials: Trials, digest: TrackSummary, rows: Integers, place: Floats, error: Floats, trust: Floats
 ) -> _Equations:
     """Normal equations (H, 15, 15) of the rows, and their cost."""
     track, wall, pair = trials.track[rows], trials.is_wall[rows], trials.is_pair[rows]
@@ -208,7 +208,7 @@ def _by_image(arrival: Floats, reach: Floats) -> Floats:
     return found
 
 
-def smooth_paths(digest: Digest) -> tuple[Floats, Floats]:
+def smooth_paths(digest: TrackSummary) -> tuple[Floats, Floats]:
     """Log evidence (T,) and cost (T,) of paths of no kind: length and cosines that change smoothly.
 
     Their first two derivatives are beforehand what the agent's own speed makes of things at rest or mirrored; the place

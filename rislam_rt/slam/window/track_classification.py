@@ -29,7 +29,7 @@ from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.point_identification import identify
 from rislam_rt.slam.window.ris_identification import PanelIdentity, unknown
-from rislam_rt.slam.window.track_summary import Digest
+from rislam_rt.slam.window.track_summary import TrackSummary
 from rislam_rt.slam.window.window_gaussian import DirectionPriors, no_holds
 
 LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 0.2]))
@@ -90,7 +90,7 @@ _TEMPLATES = (
 
 
 def judge(
-    context: Context, ats: list[Integers], digest: Digest, known: KnownFeatures, told: list[tuple[int, float, int]],
+    context: Context, ats: list[Integers], digest: TrackSummary, known: KnownFeatures, told: list[tuple[int, float, int]],
     lonely: Floats, beside: Floats,
 ) -> tuple[list[TrackDecision], Floats]:  # fmt: skip
     """Verdicts of T tracks, and the posterior (E,) of each of the explanations by the map.
@@ -177,7 +177,7 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
 
 
 def _beside(
-    table: Hypotheses, digest: Digest, known: KnownFeatures, book: WindowTable, scene: KnownEnvironment
+    table: Hypotheses, digest: TrackSummary, known: KnownFeatures, book: WindowTable, scene: KnownEnvironment
 ) -> Floats:
     """(H,) log probability that a wall's return comes out by itself, or as one with its edge at a level wall.
 
@@ -242,7 +242,9 @@ COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(4 + 3) log(1 + chi^2 / 4)` for chi^2 with 3 degrees of freedom."""
 
 
-def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: WindowTable, scene: KnownEnvironment) -> Floats:
+def _amplitudes(
+    table: Hypotheses, fits: Fits, digest: TrackSummary, book: WindowTable, scene: KnownEnvironment
+) -> Floats:
     """(H,) log density of the tracks' mean amplitudes, given what walls leave and how points scatter."""
     radio, track = scene.radio, table.trials.track
     level, seen, rx = digest.log_amplitude[track], digest.mean[0][track], digest.mean[2][track]
@@ -271,7 +273,7 @@ def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: WindowTable
 
 
 def _image_amplitudes(
-    table: Hypotheses, rows: Integers, digest: Digest, book: WindowTable, scene: KnownEnvironment
+    table: Hypotheses, rows: Integers, digest: TrackSummary, book: WindowTable, scene: KnownEnvironment
 ) -> Floats:
     """The same of images of known points in new walls, hypotheses `rows` (R,); the panel's hangs on codes."""
     track, point = table.trials.track[rows], table.known[rows]
@@ -286,7 +288,7 @@ def _image_amplitudes(
     return np.asarray(-0.5 * off**2 / variance - 0.5 * np.log(variance))
 
 
-def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: KnownFeatures, book: WindowTable) -> Floats:
+def _opacity(table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, book: WindowTable) -> Floats:
     """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known."""
     middle, walls, wall = digest.middle, book.walls, table.trials.is_wall
     pair, tx = table.trials.is_pair[:, None], digest.mean[1][table.trials.track]
@@ -311,7 +313,7 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: KnownFeatures
     return total
 
 
-def beliefs(place: Floats, digest: Digest, known: KnownFeatures, book: WindowTable) -> DirectionPriors:
+def beliefs(place: Floats, digest: TrackSummary, known: KnownFeatures, book: WindowTable) -> DirectionPriors:
     """What may be held beforehand of a wall at `place` (3,): upright, at right angles to another; or level."""
     span = place - digest.middle
     reach = max(float(np.linalg.norm(span)), 0.1)
@@ -341,7 +343,7 @@ def beliefs(place: Floats, digest: Digest, known: KnownFeatures, book: WindowTab
     )  # fmt: skip
 
 
-def _upright(table: Hypotheses, fits: Fits, digest: Digest, known: KnownFeatures, book: WindowTable) -> Floats:
+def _upright(table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, book: WindowTable) -> Floats:
     """Gain (H,) in log evidence by what walls are beforehand: each direction held, or anywhere in its width."""
     gain = np.zeros(len(fits.cost))
     trials, tx = table.trials, digest.mean[1]

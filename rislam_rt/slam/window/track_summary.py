@@ -22,7 +22,7 @@ TOGETHER = 10.0
 """Measurements over which the pull of neighbours keeps its sign."""
 
 
-class Digest(NamedTuple):
+class TrackSummary(NamedTuple):
     """T tracks, B normal points each; where `weight` is 0 there is none."""
 
     seen: Floats
@@ -65,7 +65,9 @@ class Digest(NamedTuple):
         return np.concatenate([flat, up[:, None]], axis=1)
 
 
-def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: Floats, cycle: int) -> Digest:
+def summarise_tracks(
+    log: Log, rows: list[Integers], window: Window, body: Body, heading: Floats, cycle: int
+) -> TrackSummary:
     """The histories `rows` of T tracks (rows of the log each, in time)."""
     mean, covariance = now(window)
     place, time = poses(window), np.concatenate([[0.0], np.cumsum(window.step)])
@@ -83,7 +85,7 @@ def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: 
     around = np.where(pure, 1.0, crowd)
     scatter = np.sqrt((4.0 * around + number * scatter**2) / (4.0 + number))
     count = len(rows)
-    found = Digest(
+    found = TrackSummary(
         np.zeros((count, POINTS, 3)), np.zeros((count, POINTS, 3)), np.zeros((count, POINTS)),
         np.zeros((count, POINTS, 3)) + ends.tx[-1], np.zeros((count, POINTS, 3)) + ends.rx[-1],
         np.zeros((count, POINTS, 3, 6)), np.array([log.log_amplitude[at].mean() for at in rows]), scatter,

@@ -9,7 +9,7 @@ from rislam_rt.slam.window import hypothesis_fits
 from rislam_rt.slam.window.hypothesis_fits import COMMON, Trials, smooth_paths, try_all
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.path_forms import compile_forms
-from rislam_rt.slam.window.track_summary import Digest, scatter_of
+from rislam_rt.slam.window.track_summary import TrackSummary, scatter_of
 
 
 def _digest(count, *, std=0.01, rng):
@@ -20,7 +20,7 @@ def _digest(count, *, std=0.01, rng):
     doubt = 1e-3 * rng.standard_normal((3, 6))
     wide = doubt + time[:, None, None] * 1e-3 * rng.standard_normal((3, 6))
     weight = np.full((1, count, 3), 1.0 / std)
-    return Digest(
+    return TrackSummary(
         np.zeros((1, count, 3)), weight, time[None], ends.tx[None], ends.rx[None], wide[None],
         np.zeros(1), np.ones((1, 3)), place[-1], 0.4, np.zeros((1, count, 3, 0)),
     )  # fmt: skip
