@@ -11,7 +11,7 @@ from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.landmark_update import VisibilityObservations
 from rislam_rt.slam.window.log import Log, Residuals, renew
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window.tracks import WindowTracks
 from rislam_rt.slam.window.window_gaussian import Window
 
 
@@ -21,7 +21,7 @@ class Context(NamedTuple):
     window: Window
     book: WindowTable
     log: Log
-    tracks: Tracks
+    tracks: WindowTracks
     heading: Floats
     scene: KnownEnvironment
     cycle: int

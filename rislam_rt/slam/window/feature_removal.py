@@ -13,7 +13,7 @@ from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import FEWEST, RECENT
 from rislam_rt.slam.window.path_forms import UNKNOWN
 from rislam_rt.slam.window.ris_identification import unknown
-from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window.tracks import WindowTracks
 
 
 def release(context: Context, keep: Booleans) -> Context:
@@ -31,7 +31,7 @@ def release(context: Context, keep: Booleans) -> Context:
     return context._replace(window=resolve(context, 2)[0])
 
 
-def _resume(tracks: Tracks, log: Log, lost: Booleans, cycle: int, step: Floats) -> tuple[Tracks, Log]:
+def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Floats) -> tuple[WindowTracks, Log]:
     """One track for each form among the lost rows that was seen lately."""
     forms, which = np.unique(log.form[:, 0], axis=0, return_inverse=True)
     track = log.track.copy()
@@ -58,7 +58,7 @@ def _resume(tracks: Tracks, log: Log, lost: Booleans, cycle: int, step: Floats) 
         return tracks, log._replace(track=track)
     columns = [np.array([entry[place] for entry in fresh]) for place in range(len(fresh[0]))]
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], columns, strict=True))
-    return Tracks._make([*joined, ident]), log._replace(track=track)
+    return WindowTracks._make([*joined, ident]), log._replace(track=track)
 
 
 def condemned(

@@ -32,7 +32,7 @@ from rislam_rt.slam.window.numerics import DAMPING, REFRESH
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import TURN
-from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window.tracks import WindowTracks
 from rislam_rt.slam.window.window_gaussian import Window
 
 
@@ -311,7 +311,7 @@ def _unexplained(state: WindowState, glance: Observations) -> float:
 
 
 class _Followed(NamedTuple):
-    tracks: Tracks
+    tracks: WindowTracks
     log: Log
     followed: int
     """Tracks of the last cycle..."""

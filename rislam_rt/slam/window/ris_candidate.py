@@ -14,10 +14,12 @@ from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import DRAWS
 from rislam_rt.slam.window.ris_identification import PanelObservation, gains, weigh
 from rislam_rt.slam.window.steps import HEAD
-from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window.tracks import WindowTracks
 
 
-def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: KnownEnvironment, code: RisCode | None) -> Tracks:
+def weigh_tracks(
+    tracks: WindowTracks, cycle: int, poses: Poses, scene: KnownEnvironment, code: RisCode | None
+) -> WindowTracks:
     """The tracks after what this cycle tells of each, were it a point: is it a panel?"""
     rows = (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
@@ -36,7 +38,7 @@ def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: KnownEnvironme
 
 
 def find_candidate(
-    tracks: Tracks, book: WindowTable, mean: Floats, cycle: int, poses: Poses, panel: int = 0
+    tracks: WindowTracks, book: WindowTable, mean: Floats, cycle: int, poses: Poses, panel: int = 0
 ) -> PanelCandidate | None:
     """The point or track that is the likeliest to be a panel; None if nothing is likelier the panel than not.
 

@@ -9,7 +9,7 @@ from rislam_rt.slam.window.landmark_table import WindowTable
 from rislam_rt.slam.window.landmark_update import VisibilityObservations
 from rislam_rt.slam.window.log import Log
 from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window.tracks import WindowTracks
 from rislam_rt.slam.window.window_gaussian import Window
 
 
@@ -21,7 +21,7 @@ class WindowState(NamedTuple):
     window: Window
     book: WindowTable
     log: Log
-    tracks: Tracks
+    tracks: WindowTracks
     sights: VisibilityObservations
     gait: Floats
     """(2, L) probabilities of the liveliness of the step before the window's first, across and upwards; (3, L) with

@@ -18,7 +18,7 @@ CYCLE = 0.1
 """Time [s] that may pass from cycle to cycle where the clock says that none does."""
 
 
-class Tracks(NamedTuple):
+class WindowTracks(NamedTuple):
     """T tracks, each a Kalman filter of constant rate in length and either cosine of the room's axes."""
 
     ident: Integers
@@ -52,21 +52,21 @@ class Tracks(NamedTuple):
         """(T,) what the tracks would be, were they points."""
         return PanelIdentity(self.log_grid, self.log_ris, self.hidden)
 
-    def keep(self, rows: Booleans) -> "Tracks":
+    def keep(self, rows: Booleans) -> "WindowTracks":
         """Only some of the tracks."""
-        return Tracks._make([*(field[rows] for field in self[:-1]), self.next_ident])
+        return WindowTracks._make([*(field[rows] for field in self[:-1]), self.next_ident])
 
 
-def no_tracks(panels: int = 1) -> Tracks:
+def no_tracks(panels: int = 1) -> WindowTracks:
     """Nothing seen yet, in a room of so many panels."""
     none = np.zeros(0, dtype=np.int64)
-    return Tracks(
+    return WindowTracks(
         none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none,
         *unknown(0, panels), 0,
     )  # fmt: skip
 
 
-def advance(tracks: Tracks, dt: float, turn: float, bend: Floats) -> Tracks:
+def advance(tracks: WindowTracks, dt: float, turn: float, bend: Floats) -> WindowTracks:
     """Predict over `dt` [s] while the body turns by `turn` [rad]; `bend` (3,) is the drift of the rates a second."""
     move = np.array([[1.0, dt], [0.0, 1.0]])
     noise = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]]) * (bend**2)[:, None, None]
@@ -80,7 +80,7 @@ def advance(tracks: Tracks, dt: float, turn: float, bend: Floats) -> Tracks:
 
 
 def match(
-    tracks: Tracks, glance: Observations, free: Integers, cycle: int, strangers: float
+    tracks: WindowTracks, glance: Observations, free: Integers, cycle: int, strangers: float
 ) -> tuple[Integers, Integers]:
     """Rows of tracks and the free components that continue them; `strangers` is the density of new ones."""
     count = len(tracks.ident)
@@ -99,7 +99,7 @@ def match(
     return rows[good], free[columns[good]]
 
 
-def extend(tracks: Tracks, rows: Integers, glance: Observations, picks: Integers, cycle: int) -> Tracks:
+def extend(tracks: WindowTracks, rows: Integers, glance: Observations, picks: Integers, cycle: int) -> WindowTracks:
     """Tracks `rows` (A,) updated by components `picks` (A,)."""
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
     prior, spread = mean[rows], covariance[rows]
@@ -112,7 +112,9 @@ def extend(tracks: Tracks, rows: Integers, glance: Observations, picks: Integers
     return tracks._replace(mean=mean, covariance=covariance, log_amplitude=level, last=last, hits=hits)
 
 
-def start(tracks: Tracks, glance: Observations, picks: Integers, rate: Floats, cycle: int) -> tuple[Tracks, Integers]:
+def start(
+    tracks: WindowTracks, glance: Observations, picks: Integers, rate: Floats, cycle: int
+) -> tuple[WindowTracks, Integers]:
     """One new track for each of the components `picks` (A,), and their idents; `rate` (A, 3) is the rates' spread."""
     count = len(picks)
     ident = tracks.next_ident + np.arange(count)
@@ -124,10 +126,10 @@ def start(tracks: Tracks, glance: Observations, picks: Integers, rate: Floats, c
         np.zeros(count, dtype=np.int64), *unknown(count, tracks.log_ris.shape[1]),
     )  # fmt: skip
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))
-    return Tracks._make([*joined, tracks.next_ident + count]), ident
+    return WindowTracks._make([*joined, tracks.next_ident + count]), ident
 
 
-def alive(tracks: Tracks, cycle: int) -> Booleans:
+def alive(tracks: WindowTracks, cycle: int) -> Booleans:
     """(T,) not silent for longer than their past lets expect: 4 cycles, more for what comes and goes.
 
     What is likelier the panel than not may be silent for long: its codes make it so.
@@ -138,7 +140,7 @@ def alive(tracks: Tracks, cycle: int) -> Booleans:
     return np.asarray(cycle - tracks.last <= np.clip(patience, 3.0, CONSTANTS.window))
 
 
-def due(tracks: Tracks, cycle: int) -> Integers:
+def due(tracks: WindowTracks, cycle: int) -> Integers:
     """Tracks to examine: after 6 measurements, and whenever their number has grown by a half since."""
     grown = tracks.hits >= np.maximum(6, np.minimum(3 * tracks.looked // 2, tracks.looked + CONSTANTS.window // 2))
     rows = (grown & (cycle - tracks.last <= 1)).nonzero()[0]
