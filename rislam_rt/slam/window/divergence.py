@@ -14,7 +14,7 @@ from rislam_rt.slam.window import egomotion, window_gaussian
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.egomotion import Rates
 from rislam_rt.slam.window.factor import inverse
-from rislam_rt.slam.window.log import Log
+from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import LADDER
 from rislam_rt.slam.window.steps import HEAD

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.window.log import Log, unique_forms
+from rislam_rt.slam.window.measurement_log import Log, unique_forms
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.path_forms import UNKNOWN
 

@@ -7,7 +7,7 @@ from rislam_rt.slam.returns import NONE, TX
 from rislam_rt.slam.window import window_gaussian
 from rislam_rt.slam.window.context import Context, resolve
 from rislam_rt.slam.window.landmark_table import WindowTable, remove_features
-from rislam_rt.slam.window.log import Log, Residuals
+from rislam_rt.slam.window.measurement_log import Log, Residuals
 from rislam_rt.slam.window.measurement_prediction import ExpectedComponents
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import FEWEST, RECENT

@@ -20,7 +20,7 @@ from rislam_rt.slam.window.excess import grow, take_in
 from rislam_rt.slam.window.feature_removal import condemned, release
 from rislam_rt.slam.window.landmark_table import WindowTable, empty_table, idents, image_ident
 from rislam_rt.slam.window.landmark_update import learn, no_observations
-from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
+from rislam_rt.slam.window.measurement_log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.measurement_prediction import (
     ExpectedComponents,
     KnownEnvironment,

@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.slam.window import divergence, motion, tracks, window_gaussian
 from rislam_rt.slam.window.landmark_table import empty_table
 from rislam_rt.slam.window.landmark_update import no_observations
-from rislam_rt.slam.window.log import empty_log
+from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import HEAD
 

@@ -12,7 +12,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import PANEL
-from rislam_rt.slam.window.log import Log
+from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import POINTS
 from rislam_rt.slam.window.steps import TURN

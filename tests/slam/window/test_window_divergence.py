@@ -5,7 +5,7 @@ import pytest
 
 from rislam_rt.slam.window import divergence, egomotion, window_gaussian
 from rislam_rt.slam.window.egomotion import Rates
-from rislam_rt.slam.window.log import Log
+from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.path_forms import UNKNOWN
 from rislam_rt.slam.window.steps import HEAD
 

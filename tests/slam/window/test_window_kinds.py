@@ -8,7 +8,7 @@ from rislam_rt.slam.returns import NONE, TX
 from rislam_rt.slam.window import births, track_classification
 from rislam_rt.slam.window.hypotheses import KNOWN_WALL, POINT, WALL, WALL_KNOWN
 from rislam_rt.slam.window.hypothesis_fits import Fits
-from rislam_rt.slam.window.log import empty_log
+from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.path_forms import UNKNOWN
 
