@@ -183,7 +183,7 @@ def test_labels_are_idents_of_the_map(clear: tuple[Heard, Course]) -> None:
 
 def motion_prior(level: float) -> float:
     """Variance of the first step's acceleration, of a liveliness told to be `level`."""
-    gait = model.first_gait(level) @ model.transition(CONSTANTS.stay)
+    gait = model.first_motion_mode(level) @ model.transition(CONSTANTS.stay)
     return float(1.0 / model.prior_precision(gait, False))
 
 

@@ -49,7 +49,7 @@ def init(
     scene = KnownEnvironment(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
     lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if turns else ()))
-    gait = np.stack([motion.first_gait(level) for level in lively])
+    gait = np.stack([motion.first_motion_mode(level) for level in lively])
     return WindowState(
         0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_observations(),
         gait, gait,

@@ -30,7 +30,7 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
         return state._replace(window=divergence.with_velocity(state.window, told.velocity, told.std)), True
     # a compass that was wrong is not trusted: its offset is estimated from now on
     window = divergence.with_free_compass(state.window, told.std / float(np.linalg.norm(told.velocity)))
-    still = motion.first_gait(0.0)[None]
+    still = motion.first_motion_mode(0.0)[None]
     return state._replace(
         window=window, heading=state.heading + told.turn, turned=state.turned + told.turn,
         gait=np.concatenate([state.gait, still]), level=np.concatenate([state.level, still]),
