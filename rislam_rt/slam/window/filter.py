@@ -285,10 +285,10 @@ def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
     slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else last
     window, left = renew(window, log, book, body, state.heading, slots)
     window = window_gaussian.weigh_holds(window_gaussian.solve(window))
-    return liven(state._replace(window=window)), left, nis
+    return widen_motion(state._replace(window=window)), left, nis
 
 
-def liven(state: WindowState) -> WindowState:
+def widen_motion(state: WindowState) -> WindowState:
     """The prior of every step's acceleration, by what the measurements say of its liveliness."""
     window = state.window
     if not len(window.accel) or state.config.motion == "told":
