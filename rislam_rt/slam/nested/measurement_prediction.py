@@ -12,7 +12,7 @@ from rislam_rt.model import Body, DataSheet, RadioConfig, RisCode, RisSpec, Sens
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.nested.landmark_table import LandmarkTable
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, Sight, bounced, compact, observe, reflect
+from rislam_rt.slam.returns import NONE, TX, Poses, PredictedReturn, Returns, bounced, compact, observe, reflect
 
 FAINT = 0.35
 """Amplitude, in units of the detection threshold, down to which a return is still looked for."""
@@ -78,7 +78,7 @@ def expected_returns(belief: Belief, code: RisCode | None, max_bounces: int, use
     sight = observe(returns, belief.features, table.anchor, belief.poses)
     heard = (sight.up > np.where(returns.point == TX, -LEVEL, HORIZON)).nonzero()[0]
     returns = Returns(returns.legs, returns.tx[heard], returns.rx[heard])
-    sight = Sight._make(field[heard] for field in sight)
+    sight = PredictedReturn._make(field[heard] for field in sight)
     amplitude, spread = predicted_amplitudes(belief, returns, sight, code)
     visible = ((amplitude >= FAINT * belief.threshold) | (bounces(returns) == 0)).nonzero()[0]
     kept, amplitude = compact(returns, visible), amplitude[visible]
@@ -144,7 +144,9 @@ def detection_share(table: LandmarkTable, expected: Expected) -> Floats:
     return table.detection_rate[expected.owner, over_tx.astype(np.int64)]
 
 
-def predicted_amplitudes(belief: Belief, returns: Returns, sight: Sight, code: RisCode | None) -> tuple[Floats, Floats]:
+def predicted_amplitudes(
+    belief: Belief, returns: Returns, sight: PredictedReturn, code: RisCode | None
+) -> tuple[Floats, Floats]:
     """Amplitude (R,) and standard deviation of its logarithm (R,)."""
     table, radio = belief.table, belief.radio
     if not len(returns.tx):
