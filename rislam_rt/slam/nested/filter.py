@@ -25,7 +25,7 @@ from rislam_rt.slam.nested.track_classification import classify_tracks
 from rislam_rt.slam.nested.tracks import Tracks, advance, begin, extend, has_ended, no_tracks
 from rislam_rt.slam.observations import PANEL, Observations, free_space, is_los, observations_of, stranger_density
 from rislam_rt.slam.returns import Poses, compact
-from rislam_rt.slam.step_info import REMOVED, UNUSED, Outcome, StepInfo
+from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
 
 STRANGERS = np.array([1.3, 2.0, 3.0])
 """Factor on the standard deviations of returns over 0, 1 and 2 walls, for paths in their cell that the map lacks."""
@@ -269,9 +269,9 @@ def _bend(moments: Moments) -> Floats:
     return np.array([0.02 + speed**2, 0.02 + speed**2, 0.02 + speed**2])
 
 
-def _outcome(num_measurements: int, num_features: int, monitor: DivergenceMonitor) -> Outcome:
+def _outcome(num_measurements: int, num_features: int, monitor: DivergenceMonitor) -> StepOutcome:
     if num_measurements == 0:
-        return Outcome.NO_MEASUREMENTS
+        return StepOutcome.NO_MEASUREMENTS
     if num_features == 0:
-        return Outcome.NO_LANDMARKS
-    return Outcome.DIVERGED if monitor.diverged else Outcome.OK
+        return StepOutcome.NO_LANDMARKS
+    return StepOutcome.DIVERGED if monitor.diverged else StepOutcome.OK

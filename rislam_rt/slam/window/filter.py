@@ -11,7 +11,7 @@ from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.observations import Observations, is_los, observations_of, stranger_density
 from rislam_rt.slam.returns import TX
-from rislam_rt.slam.step_info import REMOVED, UNUSED, Outcome, StepInfo
+from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
 from rislam_rt.slam.window import divergence, motion, recovery, tracks, window_gaussian
 from rislam_rt.slam.window.births import births
 from rislam_rt.slam.window.context import Context
@@ -354,9 +354,9 @@ def _names(book: WindowTable, expected: ExpectedComponents, groups: UnresolvedCl
     return np.where(image, image_ident(own, book.ident[wall]), own)
 
 
-def _outcome(heard: int, features: int, lost: bool) -> Outcome:
+def _outcome(heard: int, features: int, lost: bool) -> StepOutcome:
     if not heard:
-        return Outcome.NO_MEASUREMENTS
+        return StepOutcome.NO_MEASUREMENTS
     if lost:
-        return Outcome.DIVERGED
-    return Outcome.OK if features else Outcome.NO_LANDMARKS
+        return StepOutcome.DIVERGED
+    return StepOutcome.OK if features else StepOutcome.NO_LANDMARKS

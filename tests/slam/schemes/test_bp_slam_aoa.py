@@ -11,7 +11,7 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Measurement, SensorModel
-from rislam_rt.slam import Outcome, StartPrior
+from rislam_rt.slam import StartPrior, StepOutcome
 from rislam_rt.slam.observations import free_space
 from rislam_rt.slam.schemes import bp_slam_aoa
 from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, born, hypothesise
@@ -201,7 +201,7 @@ def test_it_knows_what_it_knows_in_rooms_made_by_hand() -> None:
         squares.append(error @ np.linalg.solve(spread, error) / 2.0)
         moved = belief.position - walk.position[-1] - (walk.start.position - walk.position[0])
         errors.append(moved[:2])
-    assert info.outcome == Outcome.OK
+    assert info.outcome == StepOutcome.OK
     assert np.mean(squares) < 2.5
     reckoned = 0.03 * CYCLE * 39
     assert np.sqrt(np.mean(np.square(errors))) < 0.1 * reckoned
