@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.moments import Moments, poses_of
-from rislam_rt.slam.nested.birth import Birth, Verdict
+from rislam_rt.slam.nested.birth import Birth, BirthDecision
 from rislam_rt.slam.nested.hypotheses import IMAGE, POINT, History, fit_feature, initial_value
 from rislam_rt.slam.nested.particles import operations
 from rislam_rt.slam.returns import NONE, Returns, observe
@@ -127,7 +127,7 @@ def born(
         first = initial_value(kind, point, anchor, past)
         assert first is not None
         fit = fit_feature(kind, first, point, anchor, past, 10)
-        birth = Birth(Verdict(kind, parent, fit), anchor, slots, past.seen, past.std)
+        birth = Birth(BirthDecision(kind, parent, fit), anchor, slots, past.seen, past.std)
         particles = operations.initialise_landmark(particles, birth, BODY, rng=rng)
     assert known.shape == (3,)
     return particles
