@@ -14,7 +14,7 @@ from rislam_rt.slam.nested.candidates import (
     hidden_tracks,
     merge_returns,
 )
-from rislam_rt.slam.nested.measurement_prediction import Expected
+from rislam_rt.slam.nested.measurement_prediction import ExpectedReturns
 from rislam_rt.slam.nested.tracks import Tracks, begin, no_tracks
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import NONE, Returns
@@ -124,7 +124,7 @@ def outlook(seen: Floats, log_amplitude: Floats) -> PredictedMeasurements:
     legs = np.stack([np.arange(count), np.full(count, NONE), np.full(count, NONE)], axis=1)
     rows, ones = np.arange(count), np.ones(count, dtype=np.bool_)
     alone = UnresolvedGroups(np.full(count, -1), ~ones, np.zeros((count, 3)), ~ones)
-    expected = Expected(
+    expected = ExpectedReturns(
         Returns(legs, rows, rows), log_amplitude, np.full(count, 0.2), 0 * rows, rows, ones, np.full(count, -1), ones
     )
     spread = np.tile(1e-4 * np.eye(3), (count, 1, 1))
@@ -162,7 +162,7 @@ def test_tracks_behind_an_expected_return_give_way() -> None:
     assert chosen[1] == -1
 
 
-def _expected(strength: Floats) -> Expected:
+def _expected(strength: Floats) -> ExpectedReturns:
     return outlook(np.zeros((len(strength), 3)), np.log(strength)).expected
 
 

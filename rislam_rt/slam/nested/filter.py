@@ -16,7 +16,7 @@ from rislam_rt.slam.nested.candidates import PredictedMeasurements, candidates, 
 from rislam_rt.slam.nested.divergence_monitor import DivergenceMonitor, check
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, empty_table, remove
 from rislam_rt.slam.nested.landmark_update import Hits, learn
-from rislam_rt.slam.nested.measurement_prediction import Belief, detection_share, expected_returns
+from rislam_rt.slam.nested.measurement_prediction import MapBelief, detection_share, expected_returns
 from rislam_rt.slam.nested.particles import operations
 from rislam_rt.slam.nested.particles.operations import Particles, Update
 from rislam_rt.slam.nested.prune import keepers
@@ -120,7 +120,7 @@ def step(
     free = order[landmark[order] == UNUSED]
     observations = observations.take(free)
     moments = believed(state)
-    belief = Belief(moments.features, state.table, _poses(state, moments), state.body, state.sensor, state.ris)
+    belief = MapBelief(moments.features, state.table, _poses(state, moments), state.body, state.sensor, state.ris)
     expected = expected_returns(belief, code, config.max_bounces, config.use_vt)
     tracks = advance(state.tracks, dt, state.cycle, _bend(moments))
     predicted = look_ahead(belief, expected, moments, tracks, observations.side is not None)
@@ -188,7 +188,7 @@ def _correct(
 def _tidy(
     state: NestedState,
     predicted: PredictedMeasurements,
-    belief: Belief,
+    belief: MapBelief,
     config: SlamConfig,
     *,
     rng: np.random.Generator,

@@ -12,7 +12,7 @@ from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.identity import TOLD, add_evidence, log_panel, log_panel_missed, log_scatterer, log_scatterer_missed
 from rislam_rt.slam.moments import Moments, even_draws, poses_of
 from rislam_rt.slam.nested.landmark_table import LandmarkTable
-from rislam_rt.slam.nested.measurement_prediction import Belief
+from rislam_rt.slam.nested.measurement_prediction import MapBelief
 from rislam_rt.slam.nested.mirrors import is_behind_mirror, mirror_images
 from rislam_rt.slam.nested.tracks import Tracks
 from rislam_rt.slam.observations import PANEL, UNTOLD
@@ -22,7 +22,7 @@ DRAWS = 12
 """Places of a track over which the panel's predicted gain is averaged."""
 
 
-def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None) -> Tracks:
+def weigh_tracks(tracks: Tracks, belief: MapBelief, code: RisCode | None) -> Tracks:
     """The tracks after what this cycle tells of each: is it one of the panels?"""
     rows = np.flatnonzero(~tracks.specular)
     if belief.ris is None or code is None or not len(rows):

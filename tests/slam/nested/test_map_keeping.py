@@ -13,7 +13,7 @@ from rislam_rt.slam.nested.candidates import PredictedMeasurements, look_ahead
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, empty_table, enter, image_idents, learn_ratio, remove
 from rislam_rt.slam.nested.landmark_update import Hits, learn
 from rislam_rt.slam.nested.mapping import WALL_HITS, build_map
-from rislam_rt.slam.nested.measurement_prediction import Belief, detection_share, expected_returns
+from rislam_rt.slam.nested.measurement_prediction import MapBelief, detection_share, expected_returns
 from rislam_rt.slam.nested.prune import keepers
 from rislam_rt.slam.nested.tracks import no_tracks
 from rislam_rt.slam.observations import Observations
@@ -55,9 +55,9 @@ def room(*features: Floats) -> tuple[Moments, LandmarkTable]:
     return Moments(mean, 1e-4 * np.eye(len(mean))), strong(book)
 
 
-def outlook_of(moments: Moments, book: LandmarkTable) -> tuple[PredictedMeasurements, Belief]:
+def outlook_of(moments: Moments, book: LandmarkTable) -> tuple[PredictedMeasurements, MapBelief]:
     """What is expected of it, without a panel."""
-    belief = Belief(
+    belief = MapBelief(
         moments.features,
         book,
         poses_of(moments.position, np.asarray(moments.heading), BODY),
@@ -89,7 +89,7 @@ def live(
     return book
 
 
-def _amplitudes(belief: Belief, outlook: PredictedMeasurements, rows: np.ndarray) -> Floats:
+def _amplitudes(belief: MapBelief, outlook: PredictedMeasurements, rows: np.ndarray) -> Floats:
     """The amplitude law with the sphere's strength, and walls that reflect 0.85."""
     returns = outlook.expected.returns
     sight = observe(returns, belief.features, belief.table.anchor, belief.poses)

@@ -14,7 +14,7 @@ from rislam_rt.slam.inputs import check_sides
 from rislam_rt.slam.moments import POSE, Moments, poses_of
 from rislam_rt.slam.nested.candidates import return_sides
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, empty_table, enter
-from rislam_rt.slam.nested.measurement_prediction import Belief
+from rislam_rt.slam.nested.measurement_prediction import MapBelief
 from rislam_rt.slam.nested.ris_candidate import find_panel_candidate, weigh_tracks
 from rislam_rt.slam.nested.tracks import Tracks, advance, begin, extend, no_tracks
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations, side_of
@@ -61,7 +61,7 @@ def follow(cycles: int, sides: bool, rng: np.random.Generator) -> Tracks:
     rows = np.arange(3)
     fixed = Returns(np.stack([rows, np.full(3, -1), np.full(3, -1)], axis=1), rows, rows)
     seen = observe(fixed, SPOTS, SPOTS, POSES).seen
-    belief = Belief(np.zeros((0, 3)), empty_table(2), POSES, BODY, SensorModel(RADIO, threshold=THRESHOLD), SHEETS)
+    belief = MapBelief(np.zeros((0, 3)), empty_table(2), POSES, BODY, SensorModel(RADIO, threshold=THRESHOLD), SHEETS)
     tracks, dull = no_tracks(40, 2), np.zeros(3, dtype=np.bool_)
     for cycle in range(cycles):
         code = RisCode(rng.integers(4, size=(1, 72)), 4)

@@ -7,7 +7,7 @@ from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec, SensorModel
 from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.moments import POSE, Moments, poses_of
 from rislam_rt.slam.nested.landmark_table import empty_table
-from rislam_rt.slam.nested.measurement_prediction import Belief
+from rislam_rt.slam.nested.measurement_prediction import MapBelief
 from rislam_rt.slam.nested.ris_candidate import find_panel_candidate, weigh_tracks
 from rislam_rt.slam.nested.tracks import Tracks, advance, begin, extend, no_tracks
 from rislam_rt.slam.observations import Observations
@@ -35,8 +35,8 @@ def looks() -> np.ndarray:
     return observe(fixed, SPOTS, SPOTS, POSES).seen
 
 
-def belief() -> Belief:
-    return Belief(np.zeros((0, 3)), empty_table(), POSES, BODY, SensorModel(RADIO, threshold=THRESHOLD), PANEL)
+def belief() -> MapBelief:
+    return MapBelief(np.zeros((0, 3)), empty_table(), POSES, BODY, SensorModel(RADIO, threshold=THRESHOLD), PANEL)
 
 
 def glance(picks: list[int], amplitude: np.ndarray) -> Observations:
