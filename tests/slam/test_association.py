@@ -15,7 +15,7 @@ from rislam_rt.slam.nested.candidates import (
     merge_returns,
 )
 from rislam_rt.slam.nested.measurement_prediction import ExpectedReturns
-from rislam_rt.slam.nested.tracks import Tracks, begin, no_tracks
+from rislam_rt.slam.nested.tracks import LandmarkTracks, begin, no_tracks
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import NONE, Returns
 
@@ -134,13 +134,13 @@ def outlook(seen: Floats, log_amplitude: Floats) -> PredictedMeasurements:
     )
 
 
-def follow(seen: Floats, log_amplitude: Floats, shine: Floats, side: int = UNTOLD) -> Tracks:
+def follow(seen: Floats, log_amplitude: Floats, shine: Floats, side: int = UNTOLD) -> LandmarkTracks:
     """Tracks at some places."""
     count = len(seen)
     fields = {name: np.zeros((count, *field.shape[1:]), field.dtype) for name, field in no_tracks(4)._asdict().items()}
     mean = np.stack([seen, np.zeros((count, 3))], axis=-1)
     spread = np.tile(1e-4 * np.eye(2), (count, 3, 1, 1))
-    return Tracks(
+    return LandmarkTracks(
         **{**fields, "mean": mean, "covariance": spread, "log_amplitude": log_amplitude, "shine": shine,
            "side": np.full(count, side)}
     )  # fmt: skip

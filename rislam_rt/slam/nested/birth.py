@@ -31,7 +31,7 @@ from rislam_rt.slam.nested.hypotheses import (
 )
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, enter
 from rislam_rt.slam.nested.mirrors import is_behind_mirror, mirror_images
-from rislam_rt.slam.nested.tracks import Tracks, overstatement
+from rislam_rt.slam.nested.tracks import LandmarkTracks, overstatement
 from rislam_rt.slam.observations import PANEL, UNTOLD, same_side
 from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe
 
@@ -132,7 +132,7 @@ class Birth(NamedTuple):
 
 
 def examine(
-    tracks: Tracks,
+    tracks: LandmarkTracks,
     moments: Moments,
     table: LandmarkTable,
     predicted: PredictedMeasurements,
@@ -140,7 +140,7 @@ def examine(
     free_space: float,
     threshold: float,
     config: SlamConfig,
-) -> tuple[int, Tracks, Birth | None]:
+) -> tuple[int, LandmarkTracks, Birth | None]:
     """Look at the tracks whose turn it is; at most one becomes a feature, as it may explain the others.
 
     Returns its row (-1 without one), the tracks (some now known for moving images), and the birth. `threshold`: SNR.
@@ -175,7 +175,7 @@ def examine(
 
 
 def track_history(
-    tracks: Tracks, row: int, past: Past, doubt: Floats, free_space: float, threshold: float
+    tracks: LandmarkTracks, row: int, past: Past, doubt: Floats, free_space: float, threshold: float
 ) -> tuple[History, Integers]:
     """A track's measurements with the mean believed poses, and the rows of the past that they belong to.
 
@@ -190,7 +190,7 @@ def track_history(
     return History(seen, std, poses, lag, ratio, doubt, side=int(tracks.side[row])), rows
 
 
-def is_explained(tracks: Tracks, row: int, history: History, scene: BirthContext) -> bool:
+def is_explained(tracks: LandmarkTracks, row: int, history: History, scene: BirthContext) -> bool:
     """Whether a return of the map runs along the track's whole history."""
     covariance = np.diag(tracks.covariance[row, :, 0, 0] + np.mean(history.std**2, axis=0))
     near = explained(scene.predicted, tracks.mean[row, :, 0], covariance, scene.config.nested.gate, history.side)

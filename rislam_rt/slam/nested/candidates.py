@@ -10,7 +10,7 @@ from rislam_rt.slam.associate import DIAGONAL, Candidates, near_pairs, squared_d
 from rislam_rt.slam.moments import POSE, Moments
 from rislam_rt.slam.nested.landmark_table import LandmarkTable
 from rislam_rt.slam.nested.measurement_prediction import ExpectedReturns, MapBelief
-from rislam_rt.slam.nested.tracks import AMPLITUDE_WANDER, Tracks
+from rislam_rt.slam.nested.tracks import AMPLITUDE_WANDER, LandmarkTracks
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, same_side
 from rislam_rt.slam.returns import TX, Returns, linearise
 
@@ -61,7 +61,7 @@ class PredictedMeasurements(NamedTuple):
 
 
 def look_ahead(
-    belief: MapBelief, expected: ExpectedReturns, moments: Moments, tracks: Tracks, apart: bool = False
+    belief: MapBelief, expected: ExpectedReturns, moments: Moments, tracks: LandmarkTracks, apart: bool = False
 ) -> PredictedMeasurements:
     """Predicted returns with their uncertainty; `apart`: the receiver sets the panel's returns apart."""
     returns, table = expected.returns, belief.table
@@ -104,7 +104,7 @@ def return_sides(returns: Returns, table: LandmarkTable, odds: float) -> Integer
 
 
 def merge_returns(
-    seen: Floats, expected: ExpectedReturns, tracks: Tracks, cell: Floats, side: Integers
+    seen: Floats, expected: ExpectedReturns, tracks: LandmarkTracks, cell: Floats, side: Integers
 ) -> UnresolvedGroups:
     """Foresee what the receiver cannot resolve: from the strongest down, each takes in all that is in its cell.
 
@@ -145,7 +145,7 @@ def merge_returns(
     return UnresolvedGroups(partner, taken[:count], np.sqrt(variance[:count]), outshone[:count])
 
 
-def candidates(predicted: PredictedMeasurements, tracks: Tracks, hidden: Booleans) -> Candidates:
+def candidates(predicted: PredictedMeasurements, tracks: LandmarkTracks, hidden: Booleans) -> Candidates:
     """Expected returns, then the tracks that are not `hidden` (T,) behind one."""
     spread = predicted.covariance.copy()
     spread[:, DIAGONAL, DIAGONAL] += predicted.groups.disturbance**2
@@ -162,14 +162,14 @@ def candidates(predicted: PredictedMeasurements, tracks: Tracks, hidden: Boolean
     )
 
 
-def track_covariance(tracks: Tracks) -> Floats:
+def track_covariance(tracks: LandmarkTracks) -> Floats:
     """(T, 3, 3) of the predicted measurement of each track."""
     follow = np.zeros((len(tracks.misses), 3, 3))
     follow[:, DIAGONAL, DIAGONAL] = tracks.covariance[..., 0, 0]
     return follow
 
 
-def hidden_tracks(predicted: PredictedMeasurements, tracks: Tracks, gate: float) -> Booleans:
+def hidden_tracks(predicted: PredictedMeasurements, tracks: LandmarkTracks, gate: float) -> Booleans:
     """(T,) whether a track runs where the map expects a return of its strength (wall returns: where one is expected).
 
     Such a track would keep the measurements that prove the map right; it gives way to a return that fits at all.

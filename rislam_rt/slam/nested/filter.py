@@ -22,7 +22,7 @@ from rislam_rt.slam.nested.particles.operations import Particles, Update
 from rislam_rt.slam.nested.prune import keepers
 from rislam_rt.slam.nested.ris_candidate import weigh_tracks
 from rislam_rt.slam.nested.track_classification import classify_tracks
-from rislam_rt.slam.nested.tracks import Tracks, advance, begin, extend, has_ended, no_tracks
+from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, has_ended, no_tracks
 from rislam_rt.slam.observations import PANEL, Observations, free_space, is_los, observations_of, stranger_density
 from rislam_rt.slam.returns import Poses, compact
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
@@ -41,7 +41,7 @@ class NestedState(NamedTuple):
     particles: Particles
     """The belief over pose, recent poses and features."""
     table: LandmarkTable
-    tracks: Tracks
+    tracks: LandmarkTracks
     time: Floats
     """(W,) times [s] of the last W cycles."""
     monitor: DivergenceMonitor
@@ -214,12 +214,12 @@ def _tidy(
 def _follow(
     state: NestedState,
     rates: Floats,
-    tracks: Tracks,
+    tracks: LandmarkTracks,
     observations: Observations,
     picks: Integers,
     num_returns: int,
     config: SlamConfig,
-) -> tuple[Tracks, Integers]:
+) -> tuple[LandmarkTracks, Integers]:
     """Tracks extended, begun and ended; and which measurements were taken for wall returns."""
     bright = (observations.ratio > config.nested.specular_ratio) & (observations.sides < PANEL)
     kept = (picks[num_returns:] >= 0).nonzero()[0]

@@ -16,7 +16,7 @@ from rislam_rt.slam.nested.candidates import return_sides
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, empty_table, enter
 from rislam_rt.slam.nested.measurement_prediction import MapBelief
 from rislam_rt.slam.nested.ris_candidate import find_panel_candidate, weigh_tracks
-from rislam_rt.slam.nested.tracks import Tracks, advance, begin, extend, no_tracks
+from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, no_tracks
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations, side_of
 from rislam_rt.slam.returns import TX, Returns, observe
 
@@ -54,7 +54,7 @@ def test_certain_panels_and_impossible_ones_stay_so() -> None:
     assert panel_probabilities(np.full((1, 2), 20.0)).sum() == pytest.approx(1.0, abs=1e-8)
 
 
-def follow(cycles: int, sides: bool, rng: np.random.Generator) -> Tracks:
+def follow(cycles: int, sides: bool, rng: np.random.Generator) -> LandmarkTracks:
     """The spots under a new random code a cycle; `sides`: the receiver tells whose signs a component has."""
     noise = np.sqrt(RADIO.noise_psd / (2.0 * RADIO.array.num_antennas * RADIO.energy))
     least = noise * np.sqrt(2.0 * THRESHOLD)

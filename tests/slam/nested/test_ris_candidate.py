@@ -9,7 +9,7 @@ from rislam_rt.slam.moments import POSE, Moments, poses_of
 from rislam_rt.slam.nested.landmark_table import empty_table
 from rislam_rt.slam.nested.measurement_prediction import MapBelief
 from rislam_rt.slam.nested.ris_candidate import find_panel_candidate, weigh_tracks
-from rislam_rt.slam.nested.tracks import Tracks, advance, begin, extend, no_tracks
+from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, no_tracks
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.returns import Returns, observe
 from rislam_rt.slam.ris_candidate import DEEP, places
@@ -45,7 +45,7 @@ def glance(picks: list[int], amplitude: np.ndarray) -> Observations:
     return Observations(seen, std, log, np.full(len(picks), 0.1), 0.1 * amplitude[picks], 0.0 * log)
 
 
-def follow(cycles: int, rng: np.random.Generator) -> Tracks:
+def follow(cycles: int, rng: np.random.Generator) -> LandmarkTracks:
     """Both spots under a new random code a cycle; the panel is silent below the threshold, as the receiver has it."""
     noise = np.sqrt(RADIO.noise_psd / (2.0 * RADIO.array.num_antennas * RADIO.energy))
     least = noise * np.sqrt(2.0 * THRESHOLD)

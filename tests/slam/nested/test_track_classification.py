@@ -7,14 +7,14 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import Body, RadioConfig
 from rislam_rt.slam import NestedConfig
 from rislam_rt.slam.nested.track_classification import LOOK_EVERY, classify_tracks
-from rislam_rt.slam.nested.tracks import Tracks, advance, begin, extend, no_tracks
+from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, no_tracks
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 
 RADIO, BODY, WINDOW = RadioConfig(), Body(), 40
 POINT, WALL = np.array([3.1, 2.6, 1.9]), 5.0
 
 
-def _walked() -> tuple[Tracks, np.ndarray]:
+def _walked() -> tuple[LandmarkTracks, np.ndarray]:
     """Two tracks over 40 cycles: a sphere of 5 cm, and the wall x = 5 m of reflection 0.85; noise-free."""
     position = np.array([1.0, 1.2, 0.5]) + np.arange(WINDOW)[:, None] * np.array([0.012, -0.008, 0.0])
     tracks = no_tracks(WINDOW)

@@ -5,7 +5,7 @@ import pytest
 
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested.birth_scheduling import due_tracks
-from rislam_rt.slam.nested.tracks import Tracks, advance, begin, extend, has_ended, no_tracks, overstatement
+from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, has_ended, no_tracks, overstatement
 from rislam_rt.slam.observations import OTHER, PANEL, Observations
 from tests.slam.test_association import outlook
 
@@ -15,7 +15,7 @@ STEADY, FAINT = "#" * 12, "#..#..##...#.#.#..#.#..#"
 SNR = 10.0
 
 
-def follow(*courses: str, lengths: tuple[float, ...] = (3.0,), side: int = OTHER) -> tuple[Tracks, int]:
+def follow(*courses: str, lengths: tuple[float, ...] = (3.0,), side: int = OTHER) -> tuple[LandmarkTracks, int]:
     """Tracks that show as drawn, all of one direction and strength, and the cycle after which they are looked at."""
     tracks, dull = no_tracks(40), np.zeros(len(courses), dtype=np.bool_)
     seen = np.array([[length, 0.1, 0.2] for length in lengths])
