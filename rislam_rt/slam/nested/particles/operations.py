@@ -13,7 +13,7 @@ from rislam_rt.slam.nested.particles import belief
 from rislam_rt.slam.nested.particles import initialise_landmark as history
 from rislam_rt.slam.nested.particles.backend import pick_engine
 from rislam_rt.slam.nested.particles.belief import Nested
-from rislam_rt.slam.nested.particles.cloud import Engine
+from rislam_rt.slam.nested.particles.cloud import CloudEngine
 from rislam_rt.slam.nested.particles.prior_map import set_prior_map as place_known
 from rislam_rt.slam.nested.particles.update import FLOOR, Seen, look, trusted, whitened
 from rislam_rt.slam.nested.particles.update import update as absorb_all
@@ -32,7 +32,7 @@ class Particles(NamedTuple):
     config: NestedConfig
 
     @property
-    def engine(self) -> Engine:
+    def engine(self) -> CloudEngine:
         """Where the heavy passes run."""
         return pick_engine(self.config.engine)
 
