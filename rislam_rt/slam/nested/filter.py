@@ -18,7 +18,7 @@ from rislam_rt.slam.nested.landmark_table import LandmarkTable, empty_table, rem
 from rislam_rt.slam.nested.landmark_update import Hits, learn
 from rislam_rt.slam.nested.measurement_prediction import MapBelief, detection_share, expected_returns
 from rislam_rt.slam.nested.particles import operations
-from rislam_rt.slam.nested.particles.operations import Particles, Update
+from rislam_rt.slam.nested.particles.operations import ParticleUpdate, PointParticles
 from rislam_rt.slam.nested.prune import keepers
 from rislam_rt.slam.nested.ris_candidate import weigh_tracks
 from rislam_rt.slam.nested.track_classification import classify_tracks
@@ -38,7 +38,7 @@ class NestedState(NamedTuple):
 
     cycle: int
     config: SlamConfig
-    particles: Particles
+    particles: PointParticles
     """The belief over pose, recent poses and features."""
     table: LandmarkTable
     tracks: LandmarkTracks
@@ -173,7 +173,7 @@ def _correct(
     taken: Integers,
     *,
     rng: np.random.Generator,
-) -> Update:
+) -> ParticleUpdate:
     """The belief after the returns `hit` were seen as measurements `taken`."""
     partner = predicted.groups.partner[hit]
     returns = compact(predicted.expected.returns, hit)

@@ -47,7 +47,7 @@ class Run(NamedTuple):
     """After every cycle."""
     nees: Floats
     """(K,) of horizontal position and velocity, chi^2 with 4 degrees of freedom."""
-    particles: operations.Particles
+    particles: operations.PointParticles
     resampled: int
 
 
@@ -111,8 +111,8 @@ def pose_nees(moments: Moments, truth: Truth, cycle: int) -> float:
 
 
 def born(
-    particles: operations.Particles, truth: Truth, history: Floats, std: Floats, *, rng: np.random.Generator
-) -> operations.Particles:
+    particles: operations.PointParticles, truth: Truth, history: Floats, std: Floats, *, rng: np.random.Generator
+) -> operations.PointParticles:
     """Landmarks from the first cycles, as the front end would hand them over."""
     slots = np.arange(1, FIRST + 1)
     position, heading = operations.trail(particles, slots)

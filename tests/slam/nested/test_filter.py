@@ -141,13 +141,13 @@ def test_the_same_seed_gives_the_same_bits(machine: str) -> None:
 AGENTS = 100
 
 
-def started(heading: str = "known") -> tuple[operations.Particles, SlamConfig]:
+def started(heading: str = "known") -> tuple[operations.PointParticles, SlamConfig]:
     config = fixed(AGENTS, 32, "numpy", heading)
     start = StartPrior(np.array([0.5, 0.7, 0.5]), np.array([0.07, 0.07, 0.0]), HEADING)
     return operations.begin(start, config, rng=np.random.default_rng(1)), config
 
 
-def finite(particles: operations.Particles) -> bool:
+def finite(particles: operations.PointParticles) -> bool:
     """Whether all that the filter knows is a number, and weights sum to one."""
     state = particles.belief
     found = belief.gaussian(state)
