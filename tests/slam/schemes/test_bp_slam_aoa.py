@@ -17,7 +17,7 @@ from rislam_rt.slam.schemes import bp_slam_aoa
 from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, born, hypothesise
 from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, Ends, GaussianFeatures, look, prune, returns_of
 from rislam_rt.slam.schemes.bp_slam_aoa.update import CandidatePairs, View, absorb, claims, likelihoods, spread_of
-from rislam_rt.slam.schemes.shared.course import Course
+from rislam_rt.slam.schemes.shared.agent_trajectory import Course
 from rislam_rt.slam.step_info import REMOVED
 
 CONFIG = bp_slam_aoa.BpSlamAoaConfig(sigma_a=0.01)

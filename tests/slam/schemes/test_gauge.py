@@ -6,7 +6,7 @@ from rooms import BODY, CYCLE, HEADING, RADIO, build_room, measurement_of
 
 from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes import bp_slam
-from rislam_rt.slam.schemes.shared.course import Course, advance, begin
+from rislam_rt.slam.schemes.shared.agent_trajectory import Course, advance, begin
 from rislam_rt.slam.schemes.shared.gauge import over_all_turns
 
 PLACE, WALK = np.array([0.5, 0.7]), np.array([0.08, 0.06])

@@ -16,9 +16,9 @@ from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
+from rislam_rt.slam.schemes.shared.agent_trajectory import Course, advance, begin
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import absorb, claims, is_strong, newborn
-from rislam_rt.slam.schemes.shared.course import Course, advance, begin
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, outcome_of, reported
 from rislam_rt.slam.schemes.shared.scan import Odds, Scan, birth_ratio

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, WANDERER, Ends, GaussianFeatures
-from rislam_rt.slam.schemes.shared.course import Course
+from rislam_rt.slam.schemes.shared.agent_trajectory import Course
 
 NUDGE = 1e-6
 """Step of differences [m, rad]."""

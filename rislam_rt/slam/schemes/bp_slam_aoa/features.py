@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.schemes.shared.course import Course, Step
+from rislam_rt.slam.schemes.shared.agent_trajectory import Course, Step
 from rislam_rt.slam.schemes.shared.ranges import length_of
 
 WALL, POINT, WANDERER = 0, 1, 2

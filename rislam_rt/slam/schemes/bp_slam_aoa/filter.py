@@ -16,9 +16,9 @@ from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.features import Ends, GaussianFeatures, carry, join, look, no_features, prune
 from rislam_rt.slam.schemes.bp_slam_aoa.report import known_map, pose_moments
 from rislam_rt.slam.schemes.bp_slam_aoa.update import View, absorb, claims, expect_scan, likelihoods, spread_of
+from rislam_rt.slam.schemes.shared.agent_trajectory import Course, Step, advance
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import is_strong
-from rislam_rt.slam.schemes.shared.course import Course, Step, advance
 from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 

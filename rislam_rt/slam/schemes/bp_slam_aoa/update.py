@@ -16,8 +16,8 @@ from rislam_rt.model.sensor import merged_pull
 from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, log_normal
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.features import GaussianFeatures, PredictedReturns, spread_over, through
+from rislam_rt.slam.schemes.shared.agent_trajectory import Course
 from rislam_rt.slam.schemes.shared.association import Association, associate
-from rislam_rt.slam.schemes.shared.course import Course
 
 GATE = 40.0
 """Squared Mahalanobis distance beyond which nothing associates (chi^2, 3 dof: 1e-8)."""

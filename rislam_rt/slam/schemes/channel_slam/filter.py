@@ -21,9 +21,9 @@ from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.channel_slam import tracker
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
 from rislam_rt.slam.schemes.channel_slam.tracker import Tracks, assign, follow, no_tracks
+from rislam_rt.slam.schemes.shared.agent_trajectory import Course, advance, begin
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import absorb, is_strong
-from rislam_rt.slam.schemes.shared.course import Course, advance, begin
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, outcome_of, reported
 from rislam_rt.slam.schemes.shared.scan import Scan

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.schemes.shared.agent_trajectory import Course
 from rislam_rt.slam.schemes.shared.association import Association, associate
-from rislam_rt.slam.schemes.shared.course import Course
 from rislam_rt.slam.schemes.shared.scan import Odds, Scan
 from rislam_rt.slam.schemes.shared.sums import Sight, Sums, spread_of
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.schemes.shared.course import Course
+from rislam_rt.slam.schemes.shared.agent_trajectory import Course
 
 LEAST_WAY = 1e-6
 """Displacement [m] or speed [m/s] below which there is no direction to speak of."""

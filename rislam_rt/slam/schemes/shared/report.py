@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body, MapEstimate, SlamEstimate
-from rislam_rt.slam.schemes.shared.course import Course
+from rislam_rt.slam.schemes.shared.agent_trajectory import Course
 from rislam_rt.slam.schemes.shared.gauge import over_all_turns
 from rislam_rt.slam.schemes.shared.sums import POINT, Sums, unit_of
 from rislam_rt.slam.step_info import StepOutcome
