@@ -17,7 +17,7 @@ from rislam_rt.slam.schemes import bp_slam_aoa
 from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, born, hypothesise
 from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, Ends, GaussianFeatures, look, prune, returns_of
 from rislam_rt.slam.schemes.bp_slam_aoa.update import CandidatePairs, View, absorb, claims, likelihoods, spread_of
-from rislam_rt.slam.schemes.shared.agent_trajectory import Course
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.step_info import REMOVED
 
 CONFIG = bp_slam_aoa.BpSlamAoaConfig(sigma_a=0.01)
@@ -89,9 +89,9 @@ def follow(walk: Walk, config: bp_slam_aoa.BpSlamAoaConfig = CONFIG):
     return state, info, bp_slam_aoa.estimate(state, config)
 
 
-def course_at(place: Floats) -> Course:
+def course_at(place: Floats) -> AgentTrajectory:
     root = 0.05 * np.random.default_rng(2).standard_normal((6, 6))
-    return Course(np.concatenate([place, np.zeros(3)]), root @ root.T, np.zeros(6), 3, np.eye(6), 0.0)
+    return AgentTrajectory(np.concatenate([place, np.zeros(3)]), root @ root.T, np.zeros(6), 3, np.eye(6), 0.0)
 
 
 def one(kind: int, mean: Floats) -> GaussianFeatures:

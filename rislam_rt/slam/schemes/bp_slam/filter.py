@@ -16,7 +16,7 @@ from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
-from rislam_rt.slam.schemes.shared.agent_trajectory import Course, advance, begin
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance, begin
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import absorb, claims, is_strong, newborn
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
@@ -36,7 +36,7 @@ STRAIN_RATE = 0.05
 class BpSlamState(NamedTuple):
     """All that the filter knows."""
 
-    course: Course
+    course: AgentTrajectory
     sums: Sums
     undetected: float
     """Features that exist and were never seen, expected."""

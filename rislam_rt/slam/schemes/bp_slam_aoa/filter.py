@@ -16,7 +16,7 @@ from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.features import Ends, GaussianFeatures, carry, join, look, no_features, prune
 from rislam_rt.slam.schemes.bp_slam_aoa.report import known_map, pose_moments
 from rislam_rt.slam.schemes.bp_slam_aoa.update import View, absorb, claims, expect_scan, likelihoods, spread_of
-from rislam_rt.slam.schemes.shared.agent_trajectory import Course, Step, advance
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step, advance
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import is_strong
 from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of
@@ -45,7 +45,7 @@ STRAIN_RATE = 0.05
 class BpSlamAoaState(NamedTuple):
     """All that the filter knows."""
 
-    course: Course
+    course: AgentTrajectory
     """Relative to the start [m]."""
     features: GaussianFeatures
     fresh: float
@@ -71,7 +71,7 @@ def init(
     """The start prior, and no features. `ris` is taken for the interface and not used; nothing is drawn."""
     std = np.concatenate([np.zeros(3), start.velocity_std * np.array([1.0, 1.0, 0.0])])
     mean = np.concatenate([np.zeros(3), start.velocity])
-    course = Course(mean, np.diag(std**2), mean, 3, np.diag(std**2), 0.0)
+    course = AgentTrajectory(mean, np.diag(std**2), mean, 3, np.diag(std**2), 0.0)
     gait = np.array([1.0, 0.0, 0.0, 0.0])
     return BpSlamAoaState(
         course, no_features(6), 1.0, 0, 0, gait, float(start.heading), 1.0, start, body, sensor

@@ -21,7 +21,7 @@ from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.channel_slam import tracker
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
 from rislam_rt.slam.schemes.channel_slam.tracker import Tracks, assign, follow, no_tracks
-from rislam_rt.slam.schemes.shared.agent_trajectory import Course, advance, begin
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance, begin
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import absorb, is_strong
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
@@ -37,7 +37,7 @@ STRAIN_RATE = 0.1
 class ChannelSlamState(NamedTuple):
     """All that the filter knows."""
 
-    course: Course
+    course: AgentTrajectory
     sums: Sums
     """Virtual transmitters; `ident` is the label of the path."""
     tracks: Tracks
@@ -173,7 +173,7 @@ def _correct(
 
 
 def _squares(
-    sums: Sums, sight: Sight, course: Course, scan: Scan, hit: Integers, shown: Integers
+    sums: Sums, sight: Sight, course: AgentTrajectory, scan: Scan, hit: Integers, shown: Integers
 ) -> Floats:  # fmt: skip
     """Squared innovations over their variances, both of the whole sum of each virtual transmitter that was seen."""
     count, spread = len(sums.ident), spread_of(sight, course)

@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body, MapEstimate, SlamEstimate
-from rislam_rt.slam.schemes.shared.agent_trajectory import Course
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.gauge import over_all_turns
 from rislam_rt.slam.schemes.shared.sums import POINT, Sums, unit_of
 from rislam_rt.slam.step_info import StepOutcome
@@ -51,7 +51,7 @@ def lift(known: Floats, height: Floats) -> Floats:
 
 
 def reported(
-    course: Course, height: Floats, heading: float, body: Body, points: Points, num_samples: int
+    course: AgentTrajectory, height: Floats, heading: float, body: Body, points: Points, num_samples: int
 ) -> SlamEstimate:
     """Mean and covariance of the pose, samples of it, and the map."""
     belief, axes = over_all_turns(course), course.axes

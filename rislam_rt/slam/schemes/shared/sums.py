@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.schemes.shared.agent_trajectory import Course, Step
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step
 from rislam_rt.slam.schemes.shared.ranges import Bistatic, length_of
 
 POINT, PLANE, DRIFT = 0, 1, 2
@@ -147,7 +147,7 @@ def _leg(distance: Floats, unit: Floats, end: Floats) -> Floats:
     return np.asarray(np.sqrt(np.maximum(square, 1e-4)))
 
 
-def look(sums: Sums, course: Course, place: Floats, model: Bistatic) -> Sight:
+def look(sums: Sums, course: AgentTrajectory, place: Floats, model: Bistatic) -> Sight:
     """Ranges of all Gaussians from the present position `place` (3,), by central differences."""
     owner, kind, mean = sums.owner, sums.kind, sums.mean
     spread = np.sum((sums.slope @ course.covariance) * sums.slope, axis=2)
@@ -171,13 +171,13 @@ def look(sums: Sums, course: Course, place: Floats, model: Bistatic) -> Sight:
     return Sight(seen[0] + 0.5 * bend.sum(axis=1), by_mean, by_course, own)
 
 
-def spread_of(sight: Sight, course: Course) -> Floats:
+def spread_of(sight: Sight, course: AgentTrajectory) -> Floats:
     """Variance (C,) of predicted ranges [m^2]."""
     return np.asarray(sight.own + np.sum((sight.by_course @ course.covariance) * sight.by_course, axis=1))
 
 
 def born(
-    length: Floats, std: Floats, kinds: Floats, existence: Floats, course: Course, place: Floats, turns: int,
+    length: Floats, std: Floats, kinds: Floats, existence: Floats, course: AgentTrajectory, place: Floats, turns: int,
     first: int,
 ) -> Sums:  # fmt: skip
     """One new feature a range, over all directions of the upper half space; `kinds` (M, 3) are shares of the kinds."""
