@@ -22,7 +22,18 @@ from rislam_rt.slam.schemes.shared.correct import absorb, claims, is_strong, new
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, outcome_of, reported
 from rislam_rt.slam.schemes.shared.scan import Odds, Scan, birth_ratio
-from rislam_rt.slam.schemes.shared.sums import Sight, Sums, born, carry, join, kinds_of, look, no_sums, prune, spread_of
+from rislam_rt.slam.schemes.shared.sums import (
+    PredictedRanges,
+    Sums,
+    born,
+    carry,
+    join,
+    kinds_of,
+    look,
+    no_sums,
+    prune,
+    spread_of,
+)
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 FEWEST_FALSE = 1e-3
@@ -159,7 +170,7 @@ def estimate(state: BpSlamState, config: BpSlamConfig) -> SlamEstimate:
 
 
 def _claimed(
-    state: BpSlamState, sight: Sight, scan: Scan, found: Association, config: BpSlamConfig
+    state: BpSlamState, sight: PredictedRanges, scan: Scan, found: Association, config: BpSlamConfig
 ) -> tuple[Integers, float]:
     """Feature number of each range (`UNUSED` for none), and the NIS over those claimed, of the features' mixtures."""
     sums, numbers = state.sums, np.full(len(scan.length), UNUSED)

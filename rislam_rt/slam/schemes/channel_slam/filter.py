@@ -27,7 +27,18 @@ from rislam_rt.slam.schemes.shared.correct import absorb, is_strong
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, outcome_of, reported
 from rislam_rt.slam.schemes.shared.scan import Scan
-from rislam_rt.slam.schemes.shared.sums import Sight, Sums, born, carry, join, kinds_of, look, no_sums, prune, spread_of
+from rislam_rt.slam.schemes.shared.sums import (
+    PredictedRanges,
+    Sums,
+    born,
+    carry,
+    join,
+    kinds_of,
+    look,
+    no_sums,
+    prune,
+    spread_of,
+)
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 STRAIN_RATE = 0.1
@@ -173,7 +184,7 @@ def _correct(
 
 
 def _squares(
-    sums: Sums, sight: Sight, course: AgentTrajectory, scan: Scan, hit: Integers, shown: Integers
+    sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, hit: Integers, shown: Integers
 ) -> Floats:  # fmt: skip
     """Squared innovations over their variances, both of the whole sum of each virtual transmitter that was seen."""
     count, spread = len(sums.ident), spread_of(sight, course)

@@ -13,7 +13,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.association import Association, associate
 from rislam_rt.slam.schemes.shared.scan import Odds, Scan
-from rislam_rt.slam.schemes.shared.sums import Sight, Sums, spread_of
+from rislam_rt.slam.schemes.shared.sums import PredictedRanges, Sums, spread_of
 
 NO_VARIANCE = 1e12
 """Variance [m^2] of a range that tells nothing."""
@@ -34,7 +34,9 @@ class Pull(NamedTuple):
     """(C,) logarithm of the factor on the Gaussian's share."""
 
 
-def claims(sums: Sums, sight: Sight, course: AgentTrajectory, scan: Scan, fresh: Floats, odds: Odds) -> Association:
+def claims(
+    sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, fresh: Floats, odds: Odds
+) -> Association:
     """Marginals of the association of K features and M ranges."""
     pair = np.zeros((len(sums.ident), len(scan.length)))
     np.add.at(pair, sums.owner, sums.share[:, None] * _ratios(sight.length, spread_of(sight, course), scan, odds))
@@ -51,7 +53,7 @@ def _ratios(length: Floats, spread: Floats, scan: Scan, odds: Odds) -> Floats:
 
 
 def absorb(
-    sums: Sums, sight: Sight, course: AgentTrajectory, scan: Scan, found: Association, odds: Odds
+    sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, found: Association, odds: Odds
 ) -> tuple[Sums, AgentTrajectory]:
     """Features and course after the ranges, feature by feature, the surest first."""
     ref, edges = course.mean.copy(), np.searchsorted(sums.owner, np.arange(len(sums.ident) + 1))

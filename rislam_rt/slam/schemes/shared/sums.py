@@ -73,7 +73,7 @@ class Sums(NamedTuple):
     """(C,) shares of one feature sum to one."""
 
 
-class Sight(NamedTuple):
+class PredictedRanges(NamedTuple):
     """Ranges that C Gaussians predict, to first order in all and to second in the angles."""
 
     length: Floats
@@ -147,7 +147,7 @@ def _leg(distance: Floats, unit: Floats, end: Floats) -> Floats:
     return np.asarray(np.sqrt(np.maximum(square, 1e-4)))
 
 
-def look(sums: Sums, course: AgentTrajectory, place: Floats, model: Bistatic) -> Sight:
+def look(sums: Sums, course: AgentTrajectory, place: Floats, model: Bistatic) -> PredictedRanges:
     """Ranges of all Gaussians from the present position `place` (3,), by central differences."""
     owner, kind, mean = sums.owner, sums.kind, sums.mean
     spread = np.sum((sums.slope @ course.covariance) * sums.slope, axis=2)
@@ -168,10 +168,10 @@ def look(sums: Sums, course: AgentTrajectory, place: Floats, model: Bistatic) ->
     blind = course.turn()
     by_course -= np.outer(by_course @ blind, blind)
     own = np.einsum("ci,cij,cj->c", by_mean, sums.covariance, by_mean) + 0.5 * np.sum(bend**2, axis=1)
-    return Sight(seen[0] + 0.5 * bend.sum(axis=1), by_mean, by_course, own)
+    return PredictedRanges(seen[0] + 0.5 * bend.sum(axis=1), by_mean, by_course, own)
 
 
-def spread_of(sight: Sight, course: AgentTrajectory) -> Floats:
+def spread_of(sight: PredictedRanges, course: AgentTrajectory) -> Floats:
     """Variance (C,) of predicted ranges [m^2]."""
     return np.asarray(sight.own + np.sum((sight.by_course @ course.covariance) * sight.by_course, axis=1))
 
