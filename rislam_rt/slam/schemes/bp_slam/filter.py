@@ -81,7 +81,7 @@ def init(
     return BpSlamState(course, sums, config.initial_features, 0, 0, height, float(start.heading), 1.0, body, sensor)
 
 
-def told(config: BpSlamConfig, sensor: SensorModel) -> Odds:
+def assumed_odds(config: BpSlamConfig, sensor: SensorModel) -> Odds:
     """What a range is weighed against, with the false ranges that the agent is told of its receiver."""
     rate = max(sensor.false_alarms, FEWEST_FALSE)
     return Odds(config.detection_probability, rate, SPEED_OF_LIGHT * sensor.window[1])
@@ -120,7 +120,7 @@ def step(
         Time step or heading is no number.
     """
     check_step(dt, heading)
-    odds = told(config, state.sensor)
+    odds = assumed_odds(config, state.sensor)
     state = _move(state, dt, np.full(state.course.axes, config.sigma_a), config)._replace(heading=float(heading))
     glance = observations_of(measurement, state.sensor.radio)
     free = ~is_los(glance, state.body)
