@@ -20,7 +20,7 @@ from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.channel_slam import tracker
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
-from rislam_rt.slam.schemes.channel_slam.tracker import Tracks, assign, follow, no_tracks
+from rislam_rt.slam.schemes.channel_slam.tracker import RangeTracks, assign, follow, no_tracks
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance, begin
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import absorb, is_strong
@@ -51,7 +51,7 @@ class ChannelSlamState(NamedTuple):
     course: AgentTrajectory
     sums: Sums
     """Virtual transmitters; `ident` is the label of the path."""
-    tracks: Tracks
+    tracks: RangeTracks
     strains: dict[int, float]
     """Running mean of the squared innovation of every virtual transmitter, by label."""
     next_label: int
