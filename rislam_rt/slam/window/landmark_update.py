@@ -160,5 +160,5 @@ def _identities(
         np.ones(count), amplitude[heard], side[heard], heard >= 0,
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)
-    fresh = weigh(book.identity.take(points), sight, gain, scene.sensor).settled()
+    fresh = weigh(book.identity.take(points), sight, gain, scene.sensor).converged()
     return book._replace(**book.identity.put(points, fresh)._asdict())

@@ -62,7 +62,7 @@ def identify(context: Context, ats: list[Integers], table: Hypotheses, fits: Fit
         found = found._replace(identity=found.identity.put(near, fresh.take(np.arange(len(near)))))
     # what is heard over walls alone may well be hidden straight ahead: silence there tells nothing
     found.identity.hidden[table.kind != POINT] = 1.0
-    return found._replace(identity=found.identity.settled())
+    return found._replace(identity=found.identity.converged())
 
 
 def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> PanelIdentity:

@@ -52,7 +52,7 @@ class PanelIdentity(NamedTuple):
             field[rows] = value
         return PanelIdentity(*fields)
 
-    def settled(self) -> "PanelIdentity":
+    def converged(self) -> "PanelIdentity":
         """With odds that new evidence can still turn."""
         return self._replace(log_ris=np.clip(self.log_ris, -CERTAIN, CERTAIN))
 
