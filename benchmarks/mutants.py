@@ -64,7 +64,7 @@ MUTANTS = (
     ),
     Mutant(
         "never diverged", "slam/window/filter.py",
-        "        return Outcome.DIVERGED\n", "        return Outcome.OK\n",
+        "        return StepOutcome.DIVERGED\n", "        return StepOutcome.OK\n",
     ),
     Mutant(
         "every second birth of a wrong kind", "slam/window/births.py",

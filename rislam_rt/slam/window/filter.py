@@ -153,7 +153,7 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         window, headings = window_gaussian.slide(window), headings[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)
     if state.config.motion == "told":
-        window, excess = window_gaussian.extend(window, dt, _told_precision(state.config, dt)), state.excess
+        window, excess = window_gaussian.extend(window, dt, _assumed_precision(state.config, dt)), state.excess
     else:
         window = window_gaussian.extend(window, dt, precision := _precisions(level))
         excess = grow(state.excess, dt, motion.expected_variance(level)[COLUMNS[:3]] - 1.0 / precision[:3])
@@ -234,7 +234,7 @@ STILL = 1e-5
 """[m/s^2] Acceleration of an axis that is known to be still."""
 
 
-def _told_precision(config: SlamConfig, dt: float) -> Floats:
+def _assumed_precision(config: SlamConfig, dt: float) -> Floats:
     """(A,) of a step's white acceleration and, where the heading is not known, rate of turn, as the agent is told."""
     upwards = config.sigma_a if config.height == "estimated" else STILL
     turns = () if config.heading == "known" else (config.turn_std / np.sqrt(dt),)
