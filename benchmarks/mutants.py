@@ -70,7 +70,7 @@ MUTANTS = (
         "every second birth of a wrong kind", "slam/window/births.py",
         "    forms[0] = [new if part == NEW else part for part in verdict.form]\n",
         "    forms[0] = [new if part == NEW else part for part in verdict.form]\n"
-        "    if len(book.ident) % 2:\n"
+        "    if len(landmarks.ident) % 2:\n"
         "        forms[0] = [-1, -1, -1, new, -1] if not verdict.is_wall else [new, -1, -1, -1, -1]\n",
     ),
     Mutant(

@@ -32,10 +32,10 @@ def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClu
         return context
     rows, ats = rows[full], [ats[place] for place in full]
     mean, covariance = window_gaussian.now(context.window)
-    known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.book, mean[:3])
+    known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.landmarks, mean[:3])
     histories = summarise_tracks(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
     told = explanations(context, rows, histories, expected, groups, mean, covariance)
-    panels = context.book.panels
+    panels = context.landmarks.panels
     lonely = _missing_legs(context, histories, mean)
     beside = np.zeros(len(rows)) if context.scene.use_vt else _company(context, ats, histories, mean)
     over = [(row, value, panels.index(base) if (base := int(forms[0, 0])) >= 0 and base in panels else -1)
@@ -48,7 +48,7 @@ def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClu
             if not returns and forms[0, 0] == TX:  # what it is is known, and that is all it is asked for
                 gone[rows[row]] = True
                 continue
-            named = idents(context.book, forms)
+            named = idents(context.landmarks, forms)
             if not _taken(context, ats[row], named[0]):
                 part = float(groups.share[column])
                 context = _assign(context, ats[row], named, histories.scatter[row], part)
@@ -84,9 +84,9 @@ def _missing_legs(context: Context, histories: TrackSummary, mean: Floats) -> Fl
     old = every.hits >= 3
     away, reach = _bearings(context, old, mean)
     bright = (every.log_amplitude[old] + np.log(reach))[None] > shine[:, None] - 0.3
-    walls = context.book.walls
+    walls = context.landmarks.walls
     if len(walls):
-        place, anchor = mean[HEAD:].reshape(-1, 3)[walls], context.book.anchor[walls]
+        place, anchor = mean[HEAD:].reshape(-1, 3)[walls], context.landmarks.anchor[walls]
         span = place - anchor
         normal = span / np.linalg.norm(span, axis=1)[:, None]
         depth = np.vecdot(0.5 * (place + anchor) - mean[:3], normal)
@@ -117,7 +117,7 @@ def _company(context: Context, ats: list[Integers], histories: TrackSummary, mea
     A wall on the Tx leg alone changes the length and not the direction: the point itself is heard there as well.
     """
     away, reach = _bearings(context, context.tracks.hits >= 3, mean)
-    span = mean[HEAD:].reshape(-1, 3)[context.book.points] - mean[:3]
+    span = mean[HEAD:].reshape(-1, 3)[context.landmarks.points] - mean[:3]
     far = np.linalg.norm(span, axis=1)
     away, reach = np.concatenate([away, span / np.maximum(far, 0.05)[:, None]]), np.append(reach, 2.0 * far)
     ray, length = histories.direction, histories.mean[0][:, 0]
@@ -136,7 +136,8 @@ LEG = 0.04
 
 
 def explanations(
-    context: Context, rows: Integers, histories: TrackSummary, expected: ExpectedComponents, groups: UnresolvedClusters, mean: Floats,
+    context: Context, rows: Integers, histories: TrackSummary, expected: ExpectedComponents,
+    groups: UnresolvedClusters, mean: Floats,
     covariance: Floats,
 ) -> list[tuple[int, float, Integers, int]]:  # fmt: skip
     """(track, log evidence, forms (2, 5) of feature rows, cluster) of returns of the map: nothing is free in them."""
@@ -165,7 +166,8 @@ def explanations(
 
 
 def _explain(
-    context: Context, histories: TrackSummary, row: int, forms: Integers, groups: UnresolvedClusters, column: int, gap: Floats,
+    context: Context, histories: TrackSummary, row: int, forms: Integers, groups: UnresolvedClusters, column: int,
+    gap: Floats,
     features: Floats, root: Floats,
 ) -> float:  # fmt: skip
     """Log evidence of one explanation."""
@@ -174,7 +176,7 @@ def _explain(
     used = histories.weight[row, :, 0] > 0.0
     poses = Poses(histories.tx[row, used], histories.rx[row, used], np.zeros(int(used.sum())))
     parts = forms[forms[:, 0] != UNKNOWN]
-    linear = linearise(compile_forms(parts), features, context.book.anchor, poses)
+    linear = linearise(compile_forms(parts), features, context.landmarks.anchor, poses)
     weight = np.array([1.0 - groups.share[column], groups.share[column]])[: len(parts)]
     weight = weight / weight.sum()
     value = np.einsum("r,krj->kj", weight, linear.seen)
@@ -223,17 +225,17 @@ def _enter(
     context: Context, at: Integers, verdict: TrackDecision, histories: TrackSummary, row: int
 ) -> tuple[Context, bool]:
     """The map with a new feature and its history, solved anew; as it was, if they do not agree."""
-    new = len(context.book.ident)
+    new = len(context.landmarks.ident)
     holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))
     window = window_gaussian.add_feature(context.window, verdict.place, holds)
-    book = enter(context.book, verdict.is_wall, histories.middle, len(at), 5.0, verdict.identity)
+    landmarks = enter(context.landmarks, verdict.is_wall, histories.middle, len(at), 5.0, verdict.identity)
     forms = np.full((2, 5), UNKNOWN)
     forms[0] = [new if part == NEW else part for part in verdict.form]
     if verdict.kind == BESIDE:
         forms[1] = [*forms[0][:4], verdict.known]
-    grown = context._replace(window=window, book=book)
+    grown = context._replace(window=window, landmarks=landmarks)
     share = min(max(verdict.share, 0.0), 1.0)
-    grown = _assign(grown, at, idents(book, forms), histories.scatter[row], share)
+    grown = _assign(grown, at, idents(landmarks, forms), histories.scatter[row], share)
     window, left = resolve(grown, 3)
     if not np.isfinite(window.head).all():
         return context, False
@@ -241,7 +243,7 @@ def _enter(
     if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > 3.0 * CONSTANTS.fit:
         return context, False
     square = float(np.mean(histories.scatter[row] ** 2))
-    grown = grown._replace(window=window, sights=seed(context.sights, forms[:1], book, square))
+    grown = grown._replace(window=window, visibility=seed(context.visibility, forms[:1], landmarks, square))
     if verdict.is_wall:
         grown = release(grown, ~behind(grown, new))
     return grown, True

@@ -19,13 +19,13 @@ class Context(NamedTuple):
     """The belief, the window's components, and the tracks among them."""
 
     window: Window
-    book: WindowTable
+    landmarks: WindowTable
     log: Log
     tracks: WindowTracks
     heading: Floats
     scene: KnownEnvironment
     cycle: int
-    sights: VisibilityObservations
+    visibility: VisibilityObservations
     codes: tuple[RisCode | None, ...]
 
 
@@ -33,6 +33,6 @@ def resolve(context: Context, steps: int) -> tuple[Window, Residuals]:
     """Gauss-Newton over the whole window."""
     window, every = context.window, np.arange(context.window.num_poses)
     for _ in range(steps):
-        window, left = renew(window, context.log, context.book, context.scene.body, context.heading, every)
+        window, left = renew(window, context.log, context.landmarks, context.scene.body, context.heading, every)
         window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return window, left

@@ -53,12 +53,12 @@ def advance(log_odds: float, score: float, followed: int, kept: int) -> float:
     return float(np.clip(np.log(lost / (1.0 - lost)) - score, SURE, -SURE))
 
 
-def jump(view: CycleAssociation, glance: Observations) -> Floats:
+def jump(view: CycleAssociation, observed: Observations) -> Floats:
     """(3,) [m] by which an agent that hears this is elsewhere than thought: on which most returns agree."""
     lead = view.groups.leader
-    expected, heard = view.expected.seen[lead], glance.seen
+    expected, heard = view.expected.seen[lead], observed.seen
     off = np.abs(heard[:, 1:] - expected[:, None, 1:]).max(axis=-1)
-    level = np.abs(glance.log_amplitude - view.groups.log_amplitude[:, None])
+    level = np.abs(observed.log_amplitude - view.groups.log_amplitude[:, None])
     off = off + np.where(level < 10.0 * ALIKE, 0.0, ALIKE)
     near = np.argsort(off, axis=None, kind="stable")[:PAIRS]
     row, column = np.unravel_index(near[off.ravel()[near] < ALIKE], off.shape)

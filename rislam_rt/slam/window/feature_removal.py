@@ -20,14 +20,14 @@ def release(context: Context, keep: Booleans) -> Context:
     """The map without some features; what they explained is unexplained, and goes on as tracks."""
     if keep.all():
         return context
-    book, log = context.book, context.log
-    lost: Booleans = np.asarray(np.isin(log.form, book.ident[~keep]).any(axis=(1, 2)))
+    landmarks, log = context.landmarks, context.log
+    lost: Booleans = np.asarray(np.isin(log.form, landmarks.ident[~keep]).any(axis=(1, 2)))
     tracks, log = _resume(context.tracks, log, lost, context.cycle, context.window.step)
     form = log.form.copy()
     form[lost] = UNKNOWN
     log = log._replace(form=form)
-    window, book = window_gaussian.drop_features(context.window, keep), remove_features(book, keep)
-    context = context._replace(window=window, book=book, log=log, tracks=tracks)
+    window, landmarks = window_gaussian.drop_features(context.window, keep), remove_features(landmarks, keep)
+    context = context._replace(window=window, landmarks=landmarks, log=log, tracks=tracks)
     return context._replace(window=resolve(context, 2)[0])
 
 
@@ -62,26 +62,26 @@ def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Fl
 
 
 def condemned(
-    book: WindowTable, left: Residuals, log: Log, expected: ExpectedComponents, covariance: Floats
+    landmarks: WindowTable, left: Residuals, log: Log, expected: ExpectedComponents, covariance: Floats
 ) -> Booleans:
     """(F,) features to take back: that do not exist, that their measurements contradict, or that follow from others."""
-    gone = book.log_odds < np.log(CONSTANTS.dead / (1.0 - CONSTANTS.dead))
+    gone = landmarks.log_odds < np.log(CONSTANTS.dead / (1.0 - CONSTANTS.dead))
     square = np.vecdot(left.left, left.left)
     form = log.form[left.row, 0]
-    for row, ident in enumerate(book.ident):
-        own = form[:, 0] == ident if not book.is_wall[row] else (form[:, 1:] == ident).any(axis=1)
-        alone = own & ((form[:, 1:] != NONE).sum(axis=1) <= int(book.is_wall[row]))
+    for row, ident in enumerate(landmarks.ident):
+        own = form[:, 0] == ident if not landmarks.is_wall[row] else (form[:, 1:] == ident).any(axis=1)
+        alone = own & ((form[:, 1:] != NONE).sum(axis=1) <= int(landmarks.is_wall[row]))
         if alone.sum() >= FEWEST and np.median(square[alone]) > CONSTANTS.against:
             gone[row] = True
-    return np.asarray(gone | derived(book, expected, covariance))
+    return np.asarray(gone | derived(landmarks, expected, covariance))
 
 
-def derived(book: WindowTable, expected: ExpectedComponents, covariance: Floats) -> Booleans:
+def derived(landmarks: WindowTable, expected: ExpectedComponents, covariance: Floats) -> Booleans:
     """(F,) young features whose own return is one that others throw as well, without anything free in it."""
-    found = np.zeros(len(book.ident), dtype=np.bool_)
+    found = np.zeros(len(landmarks.ident), dtype=np.bool_)
     forms = expected.forms
-    for row in (book.hits < 3 * CONSTANTS.window).nonzero()[0]:
-        own = [row, NONE, NONE, NONE, NONE] if not book.is_wall[row] else [TX, NONE, NONE, row, NONE]
+    for row in (landmarks.hits < 3 * CONSTANTS.window).nonzero()[0]:
+        own = [row, NONE, NONE, NONE, NONE] if not landmarks.is_wall[row] else [TX, NONE, NONE, row, NONE]
         place = (forms == own).all(axis=1).nonzero()[0]
         if not len(place):
             continue
@@ -102,22 +102,22 @@ def derived(book: WindowTable, expected: ExpectedComponents, covariance: Floats)
 
 def behind(context: Context, wall: int) -> Booleans:
     """(F,) features that the newest wall stands before: what was held for them may be its doing."""
-    book, features = context.book, context.window.features
+    landmarks, features = context.landmarks, context.window.features
     middle = window_gaussian.now(context.window)[0][:3]
-    anchor = book.anchor[wall]
+    anchor = landmarks.anchor[wall]
     span = features[wall] - anchor
     normal = span / np.linalg.norm(span)
     depth = (0.5 * (features[wall] + anchor) - middle) @ normal
     sign = 1.0 if depth > 0 else -1.0
-    found = np.zeros(len(book.ident), dtype=np.bool_)
-    for row in range(len(book.ident)):
-        if row == wall or book.hits[row] > 2 * CONSTANTS.window:
+    found = np.zeros(len(landmarks.ident), dtype=np.bool_)
+    for row in range(len(landmarks.ident)):
+        if row == wall or landmarks.hits[row] > 2 * CONSTANTS.window:
             continue  # what has stood for long stands: rooms that are not convex have walls before walls
         foot = features[row]
-        if book.is_wall[row]:
-            out = features[row] - book.anchor[row]
+        if landmarks.is_wall[row]:
+            out = features[row] - landmarks.anchor[row]
             out = out / np.linalg.norm(out)
-            foot = middle + ((0.5 * (features[row] + book.anchor[row]) - middle) @ out) * out
+            foot = middle + ((0.5 * (features[row] + landmarks.anchor[row]) - middle) @ out) * out
         at = slice(7 + 3 * row, 10 + 3 * row)
         slack = CONSTANTS.depth + 2.0 * float(np.sqrt(np.trace(context.window.covariance[at, at])))
         found[row] = sign * ((foot - middle) @ normal) > abs(depth) + slack

@@ -51,7 +51,8 @@ def init(
     lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if turns else ()))
     gait = np.stack([motion.first_motion_mode(level) for level in lively])
     return WindowState(
-        0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_observations(),
+        0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels),
+        no_observations(),
         gait, gait,
         np.array([start.heading]), start.position_std * free, scene, divergence.SURE, False, 0.0,
         (None,), np.zeros((6, 6)), np.zeros((0, 3)),
@@ -72,53 +73,53 @@ def step(
     turn = heading - float(state.heading[-1])
     state = _move(state, dt, heading)
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
-    scene, book = state.scene, state.book
-    glance = observations_of(measurement, scene.radio)
-    landmark = np.where(is_los(glance, scene.body), REMOVED, UNUSED)
-    order = np.lexsort(glance.seen.T[::-1])
+    scene, landmarks = state.scene, state.landmarks
+    observed = observations_of(measurement, scene.radio)
+    landmark = np.where(is_los(observed, scene.body), REMOVED, UNUSED)
+    order = np.lexsort(observed.seen.T[::-1])
     free = order[landmark[order] == UNUSED]
-    free = free[~echoes(glance.take(free), scene.sensor.cell_length)]
-    glance = glance.take(free)
+    free = free[~echoes(observed.take(free), scene.sensor.cell_length)]
+    observed = observed.take(free)
 
-    strangers = stranger_density(glance, scene.sensor, max(config.new_density, _unexplained(state, glance)))
-    state, view = _notice(state, heading, code, glance, strangers)
+    strangers = stranger_density(observed, scene.sensor, max(config.new_density, _unexplained(state, observed)))
+    state, view = _notice(state, heading, code, observed, strangers)
     mean, poses, expected, groups = view.mean, view.poses, view.expected, view.groups
     shows, scatter, row, pick = view.shows, view.scatter, view.row, view.pick
     before = window_gaussian.now(state.window)[1]
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
 
-    log = append(state.log, glance, state.cycle, state.cycle - state.window.num_poses + 1)
+    log = append(state.log, observed, state.cycle, state.cycle - state.window.num_poses + 1)
     # wall returns that are thrown away are known for what they are, and move nothing
     used = np.ones(len(row), dtype=np.bool_) if config.use_vt else expected.forms[groups.leader[row], 0] != TX
-    log = _explain(log, expected, groups, book, scatter, row[used], pick[used], len(glance.seen))
+    log = _explain(log, expected, groups, landmarks, scatter, row[used], pick[used], len(observed.seen))
     state = state._replace(log=log)
     state, left, nis = _solve(state)
     raw = scatter[groups.leader[row]]
-    raw[used] = _squares(left, log, len(log.cycle) - len(glance.seen) + pick[used])
+    raw[used] = _squares(left, log, len(log.cycle) - len(observed.seen) + pick[used])
 
-    taken = np.zeros(len(glance.seen), dtype=np.bool_)
+    taken = np.zeros(len(observed.seen), dtype=np.bool_)
     taken[pick] = True
     turn += float(np.diff(window_gaussian.poses(state.window)[-2:, 3]).sum())
-    followed = _follow(state, mean, glance, (~taken).nonzero()[0], dt, turn, bend)
+    followed = _follow(state, mean, observed, (~taken).nonzero()[0], dt, turn, bend)
     state = state._replace(tracks=followed.tracks, log=followed.log)
     jumped = state.doubt == 0.0
-    if len(expected.seen) and len(glance.seen):
+    if len(expected.seen) and len(observed.seen):
         state = state._replace(doubt=divergence.advance(state.doubt, view.score, followed.followed, followed.kept))
-    if min(book.panels) < 0:  # once all are known, no track needs to be one
+    if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, poses, scene, code))
-    sights, book = learn(
-        state.sights, book, state.window, expected, groups, shows, row, pick, raw, glance, poses, scene, code
+    visibility, landmarks = learn(
+        state.visibility, landmarks, state.window, expected, groups, shows, row, pick, raw, observed, poses, scene, code
     )
-    state = state._replace(sights=sights, book=book)
-    landmark[free[pick]] = np.where(used, _names(state.book, expected, groups, row), REMOVED)
+    state = state._replace(visibility=visibility, landmarks=landmarks)
+    landmark[free[pick]] = np.where(used, _names(state.landmarks, expected, groups, row), REMOVED)
 
     state, wrong = recovery.ask(state)
     state = _grown(state, left, expected, groups)
     state = state._replace(excess=take_in(state.excess, before[:6, :6], window_gaussian.now(state.window)[1][:6, :6]))
-    outcome = _outcome(len(measurement), len(state.book.ident), wrong or jumped or state.doubt >= 0.0)
-    if divergence.is_lost(state.doubt) and len(state.book.ident):
+    outcome = _outcome(len(measurement), len(state.landmarks.ident), wrong or jumped or state.doubt >= 0.0)
+    if divergence.is_lost(state.doubt) and len(state.landmarks.ident):
         state = recovery.restart(state)
-    info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome)
+    info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.landmarks.points), outcome)
     return state._replace(cycle=state.cycle + 1), info
 
 
@@ -127,18 +128,20 @@ def _grown(
 ) -> WindowState:
     """With what the evidence has turned against taken back, or else with what is born."""
     context = Context(
-        state.window, state.book, state.log, state.tracks, state.heading, state.scene, state.cycle, state.sights,
+        state.window, state.landmarks, state.log, state.tracks, state.heading, state.scene, state.cycle,
+        state.visibility,
         state.codes,
     )  # fmt: skip
-    if state.cycle % REFRESH == 0 and len(state.book.ident):
-        gone = condemned(context.book, left, context.log, expected, window_gaussian.now(context.window)[1])
+    if state.cycle % REFRESH == 0 and len(state.landmarks.ident):
+        gone = condemned(context.landmarks, left, context.log, expected, window_gaussian.now(context.window)[1])
         context, fresh = release(context, ~gone), not gone.any()
     else:
         fresh = True
     if fresh:
         context = births(context, expected, groups)
     return state._replace(
-        window=context.window, book=context.book, log=context.log, tracks=context.tracks, sights=context.sights
+        window=context.window, landmarks=context.landmarks, log=context.log, tracks=context.tracks,
+        visibility=context.visibility
     )  # fmt: skip
 
 
@@ -175,7 +178,7 @@ manoeuvre is looked for."""
 
 
 def _notice(
-    state: WindowState, heading: float, code: RisCode | None, glance: Observations, strangers: Floats
+    state: WindowState, heading: float, code: RisCode | None, observed: Observations, strangers: Floats
 ) -> tuple[WindowState, CycleAssociation]:
     """What is seen, and the belief that explains it best: as it was, with a manoeuvre in the last steps, or a jump.
 
@@ -183,7 +186,9 @@ def _notice(
     """
 
     def view_of(window: Window) -> CycleAssociation:
-        return associate_cycle(window, state.book, state.sights, heading, state.scene, code, glance, strangers)
+        return associate_cycle(
+            window, state.landmarks, state.visibility, heading, state.scene, code, observed, strangers
+        )
 
     best, window = view_of(state.window), state.window
     learnt = state.config.motion == "learnt"
@@ -197,7 +202,7 @@ def _notice(
             if view.score + CONSTANTS.log_rare > best.score:
                 best, window = view, trial
     if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
-        by = divergence.jump(best, glance)
+        by = divergence.jump(best, observed)
         view = view_of(divergence.shifted(state.window, by)) if by.any() else best
         if view.score + divergence.LOG_JUMP > max(best.score, divergence.SURE):
             return recovery.landed(state, by), view
@@ -245,7 +250,7 @@ def _explain(
     log: Log,
     expected: ExpectedComponents,
     groups: UnresolvedClusters,
-    book: WindowTable,
+    landmarks: WindowTable,
     scatter: Floats,
     row: Integers,
     pick: Integers,
@@ -258,9 +263,9 @@ def _explain(
     lead, mate = groups.leader[row], groups.partner[row]
     share, variance = conditioned_share(groups, expected, row, log.log_amplitude[at], log.log_amplitude_std[at])
     form, shares, extra = log.form.copy(), log.share.copy(), log.extra.copy()
-    form[at, 0] = idents(book, expected.forms[lead])
+    form[at, 0] = idents(landmarks, expected.forms[lead])
     both = mate >= 0
-    form[at[both], 1] = idents(book, expected.forms[mate[both]])
+    form[at[both], 1] = idents(landmarks, expected.forms[mate[both]])
     gap = np.where(both[:, None], expected.seen[mate] - expected.seen[lead], 0.0)
     shares[at], extra[at] = np.where(both, share, 0.0), groups.disturbance[row] + variance[:, None] * gap**2
     extra[at] += CONSTANTS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
@@ -277,13 +282,13 @@ def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:
 
 def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
     """The window after this cycle's components: two Gauss-Newton steps; the whole of it again now and then."""
-    window, log, book, body = state.window, state.log, state.book, state.scene.body
+    window, log, landmarks, body = state.window, state.log, state.landmarks, state.scene.body
     last = np.array([window.num_poses - 1])
-    window, found = renew(window, log, book, body, state.heading, last, even=True)
+    window, found = renew(window, log, landmarks, body, state.heading, last, even=True)
     nis = float(np.sum(found.left**2))
     window = window_gaussian.solve(window, spread=False)
     slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else last
-    window, left = renew(window, log, book, body, state.heading, slots)
+    window, left = renew(window, log, landmarks, body, state.heading, slots)
     window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return widen_motion(state._replace(window=window)), left, nis
 
@@ -300,12 +305,12 @@ def widen_motion(state: WindowState) -> WindowState:
     return state._replace(window=window._replace(precision=precision), level=level)
 
 
-def _unexplained(state: WindowState, glance: Observations) -> float:
+def _unexplained(state: WindowState, observed: Observations) -> float:
     """Components per metre, unit of each cosine and e-fold that nothing explained in the cycle before."""
-    if not len(glance.seen):
+    if not len(observed.seen):
         return 0.0
     window, sensor = np.diff(state.scene.sensor.window)[0] * SPEED_OF_LIGHT, state.scene.sensor
-    loudness = 0.5 * np.log(sensor.radio.integrated_snr(np.exp(glance.log_amplitude.max())) / sensor.threshold)
+    loudness = 0.5 * np.log(sensor.radio.integrated_snr(np.exp(observed.log_amplitude.max())) / sensor.threshold)
     count = float((state.tracks.last == state.cycle - 1).sum())
     return count / (window * np.pi * max(float(loudness), 1.0))
 
@@ -320,7 +325,7 @@ class _Followed(NamedTuple):
 
 
 def _follow(
-    state: WindowState, mean: Floats, glance: Observations, free: Integers, dt: float, turn: float, bend: float
+    state: WindowState, mean: Floats, observed: Observations, free: Integers, dt: float, turn: float, bend: float
 ) -> _Followed:
     """Tracks extended, begun and ended by the components that nothing explains."""
     speed = float(np.linalg.norm(mean[3:6]))
@@ -328,30 +333,30 @@ def _follow(
     drift = np.array([2.0 * bend + speed**2, 0.1, 0.1]) if len(length) else np.zeros(3)
     found = tracks.advance(state.tracks, dt, turn, drift)
     late = found.last == state.cycle - 1
-    rows, picks = tracks.match(found, glance, free, state.cycle, state.config.new_density)
-    found = tracks.extend(found, rows, glance, picks, state.cycle)
+    rows, picks = tracks.match(found, observed, free, state.cycle, state.config.new_density)
+    found = tracks.extend(found, rows, observed, picks, state.cycle)
     spare = np.setdiff1d(free, picks)
-    reach = np.maximum(glance.seen[spare, 0], 0.5)
+    reach = np.maximum(observed.seen[spare, 0], 0.5)
     rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * (speed + 0.05)
     if len(state.level) > 2:  # what turns without a compass turns all that it sees
         rate[:, 1:] += np.sqrt(motion.expected_variance(state.level[2]))
-    found, fresh = tracks.start(found, glance, spare, rate, state.cycle)
-    base = len(state.log.cycle) - len(glance.seen)
+    found, fresh = tracks.start(found, observed, spare, rate, state.cycle)
+    base = len(state.log.cycle) - len(observed.seen)
     track = state.log.track.copy()
     track[base + picks], track[base + spare] = found.ident[rows], fresh
     found = found.keep(tracks.alive(found, state.cycle))
     return _Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()))
 
 
-def _names(book: WindowTable, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers) -> Integers:
+def _names(landmarks: WindowTable, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers) -> Integers:
     """Ident of what each of the clusters `row` (A,) came over first: a point, its image in a wall, a wall."""
     if not len(row):
         return np.zeros(0, dtype=np.int64)
     forms = expected.forms[groups.leader[row]]
     wall = np.where(forms[:, 3] >= 0, forms[:, 3], forms[:, 1])
-    own = book.ident[np.where(forms[:, 0] >= 0, forms[:, 0], wall)]
+    own = landmarks.ident[np.where(forms[:, 0] >= 0, forms[:, 0], wall)]
     image = (forms[:, 0] >= 0) & (wall >= 0)
-    return np.where(image, image_ident(own, book.ident[wall]), own)
+    return np.where(image, image_ident(own, landmarks.ident[wall]), own)
 
 
 def _outcome(heard: int, features: int, lost: bool) -> StepOutcome:

@@ -45,14 +45,14 @@ class Hypotheses(NamedTuple):
     trials: Trials
 
 
-def known_features(mean: Floats, covariance: Floats, book: WindowTable, middle: Floats) -> KnownFeatures:
+def known_features(mean: Floats, covariance: Floats, landmarks: WindowTable, middle: Floats) -> KnownFeatures:
     """The map's features (F, 3), walls as images of `middle`, with their covariances (3F, 3F) block by block."""
     place, count = mean.copy(), len(mean)
     blocks = covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
     turn, shift = np.tile(AXES, (count, 1, 1)), np.zeros((count, 3))
-    walls = book.walls
+    walls = landmarks.walls
     if len(walls):
-        wall, anchor = place[walls], book.anchor[walls]
+        wall, anchor = place[walls], landmarks.anchor[walls]
         blocks[walls] = (slope := by_wall(middle, wall, anchor)) @ blocks[walls] @ np.swapaxes(slope, 1, 2)
         place[walls] = reflect(np.broadcast_to(middle, wall.shape), wall, anchor)
         span = place[walls] - middle
@@ -75,9 +75,9 @@ def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
     return np.asarray(-2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]))
 
 
-def hypotheses(digest: TrackSummary, known: KnownFeatures, book: WindowTable, use_vt: bool) -> Hypotheses:
+def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool) -> Hypotheses:
     """Every kind for every track, with its first guess; images of known points where wall returns tell no walls."""
-    count, walls = len(digest.seen), book.walls
+    count, walls = len(digest.seen), landmarks.walls
     seen, tx, rx = digest.mean
     ray, length = digest.direction, seen[:, 0]
     middle, image = digest.middle, rx + length[:, None] * digest.direction
@@ -108,7 +108,7 @@ def hypotheses(digest: TrackSummary, known: KnownFeatures, book: WindowTable, us
             upright = reflect(anchor, image, tx)
             upright[:, 2] = middle[2]  # what lies higher comes of the edge
             add(BESIDE, wall, upright, NONE, NONE, (tx, tx))
-    pairs, points = _pairs(ray), book.points.tolist() if not use_vt else []
+    pairs, points = _pairs(ray), landmarks.points.tolist() if not use_vt else []
     for pair in pairs:
         add(TWO_WALLS, NONE, image - (pair @ tx[..., None])[..., 0], NONE, NONE, (tx, tx))
     images = [_image(digest, known.place[point], known.root[point]) for point in points]

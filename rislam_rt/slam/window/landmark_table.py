@@ -87,27 +87,27 @@ def empty_table(panels: int = 1) -> WindowTable:
 
 
 def enter(
-    book: WindowTable, is_wall: bool, anchor: Floats, hits: int, log_odds: float, identity: PanelIdentity
+    landmarks: WindowTable, is_wall: bool, anchor: Floats, hits: int, log_odds: float, identity: PanelIdentity
 ) -> WindowTable:
-    """The book with one more feature, in the last row; `identity` (1,) of a point."""
-    return book._replace(
-        ident=np.append(book.ident, book.next_ident),
-        is_wall=np.append(book.is_wall, is_wall),
-        anchor=np.concatenate([book.anchor, anchor[None]]),
-        hits=np.append(book.hits, hits),
-        log_odds=np.append(book.log_odds, log_odds),
-        ratio=np.append(book.ratio, CONSTANTS.wall_ratio if is_wall else 0.0),
-        ratio_variance=np.append(book.ratio_variance, CONSTANTS.wall_ratio_std**2 if is_wall else 0.0),
-        **book.identity.join(identity)._asdict(),
-        next_ident=book.next_ident + 1,
+    """The table with one more feature, in the last row; `identity` (1,) of a point."""
+    return landmarks._replace(
+        ident=np.append(landmarks.ident, landmarks.next_ident),
+        is_wall=np.append(landmarks.is_wall, is_wall),
+        anchor=np.concatenate([landmarks.anchor, anchor[None]]),
+        hits=np.append(landmarks.hits, hits),
+        log_odds=np.append(landmarks.log_odds, log_odds),
+        ratio=np.append(landmarks.ratio, CONSTANTS.wall_ratio if is_wall else 0.0),
+        ratio_variance=np.append(landmarks.ratio_variance, CONSTANTS.wall_ratio_std**2 if is_wall else 0.0),
+        **landmarks.identity.join(identity)._asdict(),
+        next_ident=landmarks.next_ident + 1,
     )
 
 
-def idents(book: WindowTable, forms: Integers) -> Integers:
+def idents(landmarks: WindowTable, forms: Integers) -> Integers:
     """Forms (..., 5) of feature rows as forms of idents."""
-    if not len(book.ident):
+    if not len(landmarks.ident):
         return forms
-    return np.where(forms >= 0, book.ident[np.maximum(forms, 0)], forms)
+    return np.where(forms >= 0, landmarks.ident[np.maximum(forms, 0)], forms)
 
 
 def image_ident(point: Integers, wall: Integers) -> Integers:
@@ -115,16 +115,18 @@ def image_ident(point: Integers, wall: Integers) -> Integers:
     return np.asarray(10_000 + 1000 * point + wall)
 
 
-def remove_features(book: WindowTable, keep: Booleans) -> WindowTable:
-    """The book without some of its features."""
-    fields: dict[str, Any] = {name: getattr(book, name)[keep] for name in book._fields if name != "next_ident"}
-    return book._replace(**fields)
+def remove_features(landmarks: WindowTable, keep: Booleans) -> WindowTable:
+    """The table without some of its features."""
+    fields: dict[str, Any] = {
+        name: getattr(landmarks, name)[keep] for name in landmarks._fields if name != "next_ident"
+    }
+    return landmarks._replace(**fields)
 
 
-def learn_ratio(book: WindowTable, wall: int, log_ratio: float) -> WindowTable:
+def learn_ratio(landmarks: WindowTable, wall: int, log_ratio: float) -> WindowTable:
     """A wall's log amplitude ratio after one more return over it."""
-    gain = book.ratio_variance[wall] / (book.ratio_variance[wall] + CONSTANTS.fading**2)
-    ratio, variance = book.ratio.copy(), book.ratio_variance.copy()
+    gain = landmarks.ratio_variance[wall] / (landmarks.ratio_variance[wall] + CONSTANTS.fading**2)
+    ratio, variance = landmarks.ratio.copy(), landmarks.ratio_variance.copy()
     ratio[wall] += gain * (log_ratio - ratio[wall])
     variance[wall] = max((1.0 - gain) * variance[wall], CONSTANTS.fading**2 / 10.0)
-    return book._replace(ratio=ratio, ratio_variance=variance)
+    return landmarks._replace(ratio=ratio, ratio_variance=variance)

@@ -33,33 +33,40 @@ def no_observations() -> VisibilityObservations:
     return VisibilityObservations(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
 
 
-def pack(forms: Integers, book: WindowTable) -> Integers:
+def pack(forms: Integers, landmarks: WindowTable) -> Integers:
     """Forms (R, 5) of rows as one number each, by ident."""
-    known = np.where(forms >= 0, book.ident[np.maximum(forms, 0)], forms) if len(book.ident) else forms
+    known = np.where(forms >= 0, landmarks.ident[np.maximum(forms, 0)], forms) if len(landmarks.ident) else forms
     code = np.zeros(len(forms), dtype=np.int64)
     for column in known.T:
         code = code * 4096 + column + 1
     return code
 
 
-def recall(sights: VisibilityObservations, expected: ExpectedComponents, book: WindowTable) -> tuple[Floats, Floats]:
+def recall(
+    visibility: VisibilityObservations, expected: ExpectedComponents, landmarks: WindowTable
+) -> tuple[Floats, Floats]:
     """Probability (R,) that nothing stands in the way of each return now, and its scatter (R,)."""
     first, scatter = CONSTANTS.steady ** (1.0 + expected.bounces), np.full(len(expected.seen), CONSTANTS.crowd)
-    if len(sights.code):
-        code = pack(expected.forms, book)
-        place = np.minimum(np.searchsorted(sights.code, code), len(sights.code) - 1)
-        known = sights.code[place] == code
-        first, scatter = np.where(known, sights.clear[place], first), np.where(known, sights.scatter[place], scatter)
+    if len(visibility.code):
+        code = pack(expected.forms, landmarks)
+        place = np.minimum(np.searchsorted(visibility.code, code), len(visibility.code) - 1)
+        known = visibility.code[place] == code
+        first, scatter = (
+            np.where(known, visibility.clear[place], first),
+            np.where(known, visibility.scatter[place], scatter),
+        )
     return np.asarray(first * (1.0 - CONSTANTS.blocked) + (1.0 - first) * CONSTANTS.cleared), scatter
 
 
-def seed(sights: VisibilityObservations, forms: Integers, book: WindowTable, scatter: float) -> VisibilityObservations:
+def seed(
+    visibility: VisibilityObservations, forms: Integers, landmarks: WindowTable, scatter: float
+) -> VisibilityObservations:
     """A form that a new feature was found by: nothing hides it, and it scatters so much."""
-    code = np.append(sights.code, pack(forms, book))
+    code = np.append(visibility.code, pack(forms, landmarks))
     order = np.argsort(code, kind="stable")
     return VisibilityObservations(
-        code[order], np.append(sights.clear, np.full(len(forms), 0.99))[order],
-        np.append(sights.scatter, np.full(len(forms), scatter))[order],
+        code[order], np.append(visibility.clear, np.full(len(forms), 0.99))[order],
+        np.append(visibility.scatter, np.full(len(forms), scatter))[order],
     )  # fmt: skip
 
 
@@ -71,15 +78,16 @@ def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Flo
 
 
 def learn(
-    sights: VisibilityObservations, book: WindowTable, window: Window, expected: ExpectedComponents, groups: UnresolvedClusters, shows: Floats, row: Integers,
-    pick: Integers, raw: Floats, glance: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
+    visibility: VisibilityObservations, landmarks: WindowTable, window: Window, expected: ExpectedComponents,
+    groups: UnresolvedClusters, shows: Floats, row: Integers,
+    pick: Integers, raw: Floats, observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
 ) -> tuple[VisibilityObservations, WindowTable]:  # fmt: skip
     """After clusters `row` (A,) were seen as components `pick` (A,) with residuals of mean square `raw` (A,)."""
     if not len(expected.seen):
-        return sights, book
+        return visibility, landmarks
     hit = np.zeros(len(groups.leader), dtype=np.bool_)
     hit[row] = True
-    before, scatter = recall(sights, expected, book)
+    before, scatter = recall(visibility, expected, landmarks)
     detection = CONSTANTS.shown * expected.detection
     missed = before * (1.0 - detection) / (1.0 - before * detection)
     after = before.copy()
@@ -88,18 +96,21 @@ def learn(
     lead = groups.leader[row]
     scatter[lead] += SCATTER_RATE * (np.minimum(raw, 30.0 * scatter[lead]) - scatter[lead])
     alone = (groups.partner < 0) & (groups.by_itself == 1.0)
-    book = _existence(book, expected, groups, hit & alone, ~hit & alone, shows)
-    book = _strengths(book, window, expected, groups, row, pick, glance, poses, scene, code)
-    fresh = pack(expected.forms, book)
-    keep = ~np.isin(sights.code, fresh)
-    packed = np.concatenate([sights.code[keep], fresh])
+    landmarks = _existence(landmarks, expected, groups, hit & alone, ~hit & alone, shows)
+    landmarks = _strengths(landmarks, window, expected, groups, row, pick, observed, poses, scene, code)
+    fresh = pack(expected.forms, landmarks)
+    keep = ~np.isin(visibility.code, fresh)
+    packed = np.concatenate([visibility.code[keep], fresh])
     order = np.argsort(packed, kind="stable")
-    cleared, scattered = np.concatenate([sights.clear[keep], after]), np.concatenate([sights.scatter[keep], scatter])
-    return VisibilityObservations(packed[order], cleared[order], scattered[order]), book
+    cleared, scattered = (
+        np.concatenate([visibility.clear[keep], after]),
+        np.concatenate([visibility.scatter[keep], scatter]),
+    )
+    return VisibilityObservations(packed[order], cleared[order], scattered[order]), landmarks
 
 
 def _existence(
-    book: WindowTable,
+    landmarks: WindowTable,
     expected: ExpectedComponents,
     groups: UnresolvedClusters,
     hit: Floats,
@@ -107,7 +118,7 @@ def _existence(
     shows: Floats,
 ) -> WindowTable:
     """Every feature by the returns that only it explains: those over the fewest other features."""
-    odds, hits = book.log_odds.copy(), book.hits.copy()
+    odds, hits = landmarks.log_odds.copy(), landmarks.hits.copy()
     for where, tell in ((hit, 1.0), (missed, 0.0)):
         rows = where.nonzero()[0]
         forms, bounces = expected.forms[groups.leader[rows]], expected.bounces[groups.leader[rows]]
@@ -120,12 +131,13 @@ def _existence(
                     hits[name] += 1
             elif direct:
                 odds[names[0]] += np.log1p(-show)
-    return book._replace(log_odds=odds, hits=hits)
+    return landmarks._replace(log_odds=odds, hits=hits)
 
 
 def _strengths(
-    book: WindowTable, window: Window, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers, pick: Integers,
-    glance: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
+    landmarks: WindowTable, window: Window, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers,
+    pick: Integers,
+    observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
 ) -> WindowTable:  # fmt: skip
     """Walls' losses, and who the points are, from components that came out alone."""
     lead, alone = groups.leader[row], groups.partner[row] < 0
@@ -134,14 +146,17 @@ def _strengths(
         form = expected.forms[lead[place]]
         walls = [part for part in form[1:] if part != NONE]
         if len(walls) == 1 and (form[0] == TX or expected.log_amplitude_std[lead[place]] < 0.5):
-            surplus = glance.log_amplitude[pick[place]] - expected.log_amplitude[lead[place]]
-            book = learn_ratio(book, int(walls[0]), float(np.clip(book.ratio[walls[0]] + surplus, -3.0, 0.1)))
-    return _identities(book, window, expected, groups, row, pick, glance, poses, scene, code)
+            surplus = observed.log_amplitude[pick[place]] - expected.log_amplitude[lead[place]]
+            landmarks = learn_ratio(
+                landmarks, int(walls[0]), float(np.clip(landmarks.ratio[walls[0]] + surplus, -3.0, 0.1))
+            )
+    return _identities(landmarks, window, expected, groups, row, pick, observed, poses, scene, code)
 
 
 def _identities(
-    book: WindowTable, window: Window, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers, pick: Integers,
-    glance: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
+    landmarks: WindowTable, window: Window, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers,
+    pick: Integers,
+    observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
 ) -> WindowTable:  # fmt: skip
     """What amplitude or silence of points that come straight, and alone, tells of who they are."""
     component = np.full(len(groups.leader), -1)
@@ -150,15 +165,15 @@ def _identities(
     alone = (groups.partner < 0) & (groups.by_itself == 1.0) & (expected.bounces[lead] == 0)
     points, heard = expected.forms[lead[alone], 0], component[alone]
     if not len(points):
-        return book
+        return landmarks
     rows = HEAD + 3 * points[:, None] + np.arange(3)
     blocks = window.covariance[rows[:, :, None], rows[:, None, :]]
     count = len(points)
-    amplitude, side = np.append(np.exp(glance.log_amplitude), 1.0), np.append(glance.sides, UNTOLD)
+    amplitude, side = np.append(np.exp(observed.log_amplitude), 1.0), np.append(observed.sides, UNTOLD)
     sight = PanelObservation(
         spread_places(window.features[points], blocks), np.tile(poses.tx, (count, 1)), np.tile(poses.rx, (count, 1)),
         np.ones(count), amplitude[heard], side[heard], heard >= 0,
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)
-    fresh = weigh(book.identity.take(points), sight, gain, scene.sensor).converged()
-    return book._replace(**book.identity.put(points, fresh)._asdict())
+    fresh = weigh(landmarks.identity.take(points), sight, gain, scene.sensor).converged()
+    return landmarks._replace(**landmarks.identity.put(points, fresh)._asdict())

@@ -56,21 +56,26 @@ class ExpectedComponents(NamedTuple):
 
 
 def predict_returns(
-    features: Floats, book: WindowTable, poses: Poses, position: Floats, scene: KnownEnvironment, code: RisCode | None
+    features: Floats,
+    landmarks: WindowTable,
+    poses: Poses,
+    position: Floats,
+    scene: KnownEnvironment,
+    code: RisCode | None,
 ) -> ExpectedComponents:
     """All forms that are possible at the mean belief, arrive from above, and may be detected."""
-    legs = enumerate_forms(tuple(book.points.tolist()), tuple(book.walls.tolist()), scene.max_bounces, True)
+    legs = enumerate_forms(tuple(landmarks.points.tolist()), tuple(landmarks.walls.tolist()), scene.max_bounces, True)
     returns, bounces = legs.returns, legs.bounces
-    fine = possible_legs(returns.legs, features, book.anchor, poses)
+    fine = possible_legs(returns.legs, features, landmarks.anchor, poses)
     rows = (fine[returns.tx] & fine[returns.rx]).nonzero()[0]
     returns, bounces = compact(returns, rows), bounces[rows]
-    sight = observe(returns, features, book.anchor, poses)
-    level, spread = amplitudes(returns, features, book, sight.tx_length, sight.rx_length, poses, scene, code)
+    sight = observe(returns, features, landmarks.anchor, poses)
+    level, spread = amplitudes(returns, features, landmarks, sight.tx_length, sight.rx_length, poses, scene, code)
     detection = detection_probability(level, spread, scene.sensor)
     strong = scene.radio.integrated_snr(np.exp(level + spread)) > FAINT
     audible = ((sight.up > -LEVEL) & strong).nonzero()[0]
     returns = compact(returns, audible)
-    linear = linearise(returns, features, book.anchor, poses)
+    linear = linearise(returns, features, landmarks.anchor, poses)
     count = len(audible)
     jacobian = np.zeros((count, 3, HEAD + 3 * len(features)))
     jacobian[..., :3], jacobian[..., 6] = linear.by_pose, linear.by_heading(poses, position)
@@ -81,7 +86,8 @@ def predict_returns(
 
 
 def amplitudes(
-    returns: Returns, features: Floats, book: WindowTable, tx_length: Floats, rx_length: Floats, poses: Poses, scene: KnownEnvironment,
+    returns: Returns, features: Floats, landmarks: WindowTable, tx_length: Floats, rx_length: Floats, poses: Poses,
+    scene: KnownEnvironment,
     code: RisCode | None,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Log amplitude (R,) and its standard deviation (R,)."""
@@ -89,22 +95,22 @@ def amplitudes(
     if not len(returns.tx):
         return np.zeros(0), np.zeros(0)
     none = legs[:, 1:] == NONE
-    left = np.where(none, 0.0, book.ratio[legs[:, 1:]]).sum(axis=1)
-    doubt = np.where(none, 0.0, book.ratio_variance[legs[:, 1:]]).sum(axis=1)
+    left = np.where(none, 0.0, landmarks.ratio[legs[:, 1:]]).sum(axis=1)
+    doubt = np.where(none, 0.0, landmarks.ratio_variance[legs[:, 1:]]).sum(axis=1)
     ratio, variance = left[returns.tx] + left[returns.rx], doubt[returns.tx] + doubt[returns.rx]
     point = returns.point
     moving = point == TX
-    strength, strength_std = book.log_strength
+    strength, strength_std = landmarks.log_strength
     free = np.log(image_amplitude(rx_length, radio)) + ratio
     unit = point_amplitude(np.ones(()), np.maximum(tx_length, 1e-3), rx_length, radio)
     level = np.where(moving, free, np.log(unit) + ratio + strength[point])
     spread = np.sqrt(np.where(moving, 0.0, strength_std[point] ** 2) + variance + (0.3 * CONSTANTS.fading) ** 2)
     if scene.ris is None or code is None:
         return level, spread
-    for panel, spec, part in zip(book.panels, scene.ris.panels, scene.ris.parts(code), strict=True):
+    for panel, spec, part in zip(landmarks.panels, scene.ris.panels, scene.ris.parts(code), strict=True):
         if panel >= 0:
             rows = (point == panel).nonzero()[0]
-            gain = panel_gains(compact(returns, rows), features, book, poses, radio, spec, part)
+            gain = panel_gains(compact(returns, rows), features, landmarks, poses, radio, spec, part)
             level[rows] = np.log(np.maximum(gain, 1e-30)) + ratio[rows]
             spread[rows] = np.sqrt(PANEL_STD**2 + variance[rows])
     return level, spread
@@ -113,7 +119,7 @@ def amplitudes(
 def panel_gains(
     returns: Returns,
     features: Floats,
-    book: WindowTable,
+    landmarks: WindowTable,
     poses: Poses,
     radio: RadioConfig,
     spec: RisSpec,
@@ -127,7 +133,7 @@ def panel_gains(
         for column in (2, 1):
             rows = (legs[:, column] != NONE).nonzero()[0]
             walls = legs[rows, column]
-            end[rows] = reflect(end[rows], features[walls], book.anchor[walls])
+            end[rows] = reflect(end[rows], features[walls], landmarks.anchor[walls])
         ends.append(leg_response(spec, center, end, np.sqrt(gain), radio.wavelength))
     return np.abs(panel_gain(ends[0][returns.tx], ends[1][returns.rx], code))
 

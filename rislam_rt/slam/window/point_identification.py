@@ -40,14 +40,16 @@ class Identified(NamedTuple):
 
 def identify(context: Context, ats: list[Integers], table: Hypotheses, fits: Fits, evidence: Floats) -> Identified:
     """The tracks whose components are the log's rows `ats`: what comes of its being a panel that throws them."""
-    scene, book, panels = context.scene, context.book, context.scene.num_panels
+    scene, landmarks, panels = context.scene, context.landmarks, context.scene.num_panels
     elsewhere = np.full((len(ats), panels), -CERTAIN)
     found = Identified(np.zeros(len(evidence)), unknown(len(evidence), panels), elsewhere)
     if scene.ris is None:
         found.identity.log_ris[:] = -np.inf
         return found
     point = np.isin(table.kind, (POINT, OVER_RX, OVER_TX, OVER_SAME))
-    taken = -np.logaddexp.reduce(np.append(book.log_ris[book.points], np.zeros((1, panels)), axis=0), axis=0)  # but one
+    taken = -np.logaddexp.reduce(
+        np.append(landmarks.log_ris[landmarks.points], np.zeros((1, panels)), axis=0), axis=0
+    )  # but one
     for track, at in enumerate(ats):
         rows = (point & (table.trials.track == track)).nonzero()[0]
         if (context.log.side[at] == OTHER).all():
@@ -74,7 +76,7 @@ def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows
     place = poses(window)
     ends = poses_of(place[:, :3], context.heading + place[:, 3], scene.body)
     turn, shift = np.swapaxes(table.trials.turn[rows], 2, 3), table.trials.shift[rows]
-    spots, ratio = spread_places(fits.place[rows], fits.held[rows]), _ratio(table, context.book, rows)
+    spots, ratio = spread_places(fits.place[rows], fits.held[rows]), _ratio(table, context.landmarks, rows)
     level = log.log_amplitude[at]
     anywhere = np.exp(level.mean() + max(float(level.std()), CONSTANTS.fading) * even_draws(spots.shape[1], 1)[:, 0])
     first = context.cycle - window.num_poses + 1
@@ -94,9 +96,9 @@ def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows
     return found
 
 
-def _ratio(table: Hypotheses, book: WindowTable, rows: Integers) -> Floats:
+def _ratio(table: Hypotheses, landmarks: WindowTable, rows: Integers) -> Floats:
     """(R,) amplitude that the known walls of hypotheses leave."""
-    if not len(book.ident):
+    if not len(landmarks.ident):
         return np.ones(len(rows))
     known, bounces = table.known[rows], np.where(table.kind[rows] == OVER_SAME, 2.0, 1.0)
-    return np.asarray(np.exp(np.where(known >= 0, book.ratio[known] * bounces, 0.0)))
+    return np.asarray(np.exp(np.where(known >= 0, landmarks.ratio[known] * bounces, 0.0)))

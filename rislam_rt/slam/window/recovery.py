@@ -16,7 +16,7 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
     if len(state.level) > 2 or len(state.heading) != state.window.num_poses:
         return state, False
     baseline = float(np.linalg.norm(state.scene.body.tx_offset - state.scene.body.rx_offset))
-    if len(state.book.ident):
+    if len(state.landmarks.ident):
         if state.cycle % divergence.PAST == 0:
             lively = float(np.sqrt(motion.expected_variance(state.level[0])))
             odds = divergence.ask_picture(state.window, state.log, state.heading, baseline, lively)
@@ -47,8 +47,9 @@ def restart(state: WindowState) -> WindowState:
     fresh = window_gaussian.begin(mean[:3], mean[3:6], std, turns=window.turns)
     fresh = fresh._replace(head=mean[:HEAD], prior=fresh.prior._replace(middle=mean[:HEAD]))
     return state._replace(
-        window=fresh, book=empty_table(state.scene.num_panels)._replace(next_ident=state.book.next_ident),
-        log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), sights=no_observations(), gait=state.level,
+        window=fresh, landmarks=empty_table(state.scene.num_panels)._replace(next_ident=state.landmarks.next_ident),
+        log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), visibility=no_observations(),
+        gait=state.level,
         heading=state.heading[-1:], shift=np.hypot(state.shift, away), doubt=0.0, asked=False,
         codes=state.codes[-1:], passed=np.concatenate([state.passed, window_gaussian.poses(window)[:-1, :3]]),
     )  # fmt: skip

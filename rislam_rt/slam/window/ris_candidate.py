@@ -38,14 +38,14 @@ def weigh_tracks(
 
 
 def find_candidate(
-    tracks: WindowTracks, book: WindowTable, mean: Floats, cycle: int, poses: Poses, panel: int = 0
+    tracks: WindowTracks, landmarks: WindowTable, mean: Floats, cycle: int, poses: Poses, panel: int = 0
 ) -> PanelCandidate | None:
     """The point or track that is the likeliest to be a panel; None if nothing is likelier the panel than not.
 
     A track that seems to come from behind a wall may be the panel over that wall: aiming there would miss it.
     """
-    features, walls = mean[HEAD:].reshape(-1, 3), book.walls
-    points = book.points[~np.isin(book.points, book.panels)]  # what is another panel is not this one
+    features, walls = mean[HEAD:].reshape(-1, 3), landmarks.walls
+    points = landmarks.points[~np.isin(landmarks.points, landmarks.panels)]  # what is another panel is not this one
     patience = np.where(tracks.hits > 3, np.inf, np.minimum(tracks.hits - 1, PATIENCE))
     least = np.where(tracks.hits > 1, DISMISSAL, 0.0)
     few = np.log(CONSTANTS.panels)  # the design asks what was measured, not how many panels there are
@@ -54,14 +54,14 @@ def find_candidate(
     spots, _ = places(tracks.mean[rows, :, 0], poses)
     if len(walls) and len(rows):
         out = features[walls] - mean[:3]
-        image = reflect(np.broadcast_to(mean[:3], out.shape), features[walls], book.anchor[walls])
+        image = reflect(np.broadcast_to(mean[:3], out.shape), features[walls], landmarks.anchor[walls])
         gap = np.linalg.norm(spots[:, None] - image, axis=-1) - np.linalg.norm(spots - mean[:3], axis=1)[:, None]
         shown = (gap > -DEEP).all(axis=1)
         rows, spots = rows[shown], spots[shown]
-    odds = np.concatenate([book.log_ris[points, panel] - few, told[rows]])
+    odds = np.concatenate([landmarks.log_ris[points, panel] - few, told[rows]])
     if not len(odds) or odds.max() <= DISMISSAL:
         return None
     best = int(np.argmax(odds))
     if best < len(points):
-        return PanelCandidate(features[points[best]], int(book.hits[points[best]]), panel)
+        return PanelCandidate(features[points[best]], int(landmarks.hits[points[best]]), panel)
     return PanelCandidate(spots[best - len(points)], int(tracks.hits[rows[best - len(points)]]), panel)

@@ -19,10 +19,10 @@ class WindowState(NamedTuple):
     cycle: int
     config: SlamConfig
     window: Window
-    book: WindowTable
+    landmarks: WindowTable
     log: Log
     tracks: WindowTracks
-    sights: VisibilityObservations
+    visibility: VisibilityObservations
     gait: Floats
     """(2, L) probabilities of the liveliness of the step before the window's first, across and upwards; (3, L) with
     the rate of turn, where the heading is not known."""

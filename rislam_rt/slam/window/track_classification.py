@@ -90,7 +90,8 @@ _TEMPLATES = (
 
 
 def judge(
-    context: Context, ats: list[Integers], digest: TrackSummary, known: KnownFeatures, told: list[tuple[int, float, int]],
+    context: Context, ats: list[Integers], digest: TrackSummary, known: KnownFeatures,
+    told: list[tuple[int, float, int]],
     lonely: Floats, beside: Floats,
 ) -> tuple[list[TrackDecision], Floats]:  # fmt: skip
     """Verdicts of T tracks, and the posterior (E,) of each of the explanations by the map.
@@ -100,21 +101,21 @@ def judge(
     `ats` are the tracks' rows of the log; `lonely` (T,) is the log probability that two walls throw so few single
     returns beside it, `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
     """
-    book, scene = context.book, context.scene
-    table = hypotheses(digest, known, book, scene.use_vt)
+    landmarks, scene = context.landmarks, context.scene
+    table = hypotheses(digest, known, landmarks, scene.use_vt)
     fits = try_all(table.trials, digest)
     track = table.trials.track
-    rivals = np.where(table.known >= 0, np.log(max(len(book.walls), 1)), 0.0)
-    rivals[table.kind == IMAGE] = np.log(max(len(book.points), 1))
+    rivals = np.where(table.known >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
+    rivals[table.kind == IMAGE] = np.log(max(len(landmarks.points), 1))
     evidence = fits.log_evidence + log_place(table, fits.place, digest.middle)
     evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair, lonely[track], 0.0)
-    evidence += _amplitudes(table, fits, digest, book, scene) + _opacity(table, fits, digest, known, book)
-    evidence += _beside(table, digest, known, book, scene)
-    gain = _upright(table, fits, digest, known, book)
+    evidence += _amplitudes(table, fits, digest, landmarks, scene) + _opacity(table, fits, digest, known, landmarks)
+    evidence += _beside(table, digest, known, landmarks, scene)
+    gain = _upright(table, fits, digest, known, landmarks)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
     over = identify(context, ats, table, fits, evidence)
     evidence += over.gain
-    for number, panel in enumerate(book.panels):
+    for number, panel in enumerate(landmarks.panels):
         if panel >= 0:
             evidence += np.where((table.kind == IMAGE) & (table.known == panel), over.elsewhere[track, number], 0.0)
     smooth, _ = smooth_paths(digest)
@@ -145,7 +146,7 @@ def judge(
         verdicts.append(
             TrackDecision(
                 int(table.kind[at]), probability, int(table.known[at]), fits.place[at], fits.held[at],
-                beliefs(fits.place[at], digest, known, book) if table.trials.is_wall[at] else no_holds(),
+                beliefs(fits.place[at], digest, known, landmarks) if table.trials.is_wall[at] else no_holds(),
                 float(fits.share[at]), float(misfit), over.identity.take(np.array([at])),
             )
         )  # fmt: skip
@@ -177,7 +178,7 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
 
 
 def _beside(
-    table: Hypotheses, digest: TrackSummary, known: KnownFeatures, book: WindowTable, scene: KnownEnvironment
+    table: Hypotheses, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, scene: KnownEnvironment
 ) -> Floats:
     """(H,) log probability that a wall's return comes out by itself, or as one with its edge at a level wall.
 
@@ -185,7 +186,7 @@ def _beside(
     """
     track, found = table.trials.track, np.zeros(len(table.kind))
     length, cell = digest.mean[0][track, 0], float(scene.sensor.cell_length[0])
-    for wall in book.walls[np.abs(known.turn[book.walls, 2, 2]) > LEVEL_TURN]:
+    for wall in landmarks.walls[np.abs(known.turn[landmarks.walls, 2, 2]) > LEVEL_TURN]:
         rise = float(np.linalg.norm(known.place[wall] - digest.middle))
         gap = np.hypot(length, rise) - length
         found += np.where((table.kind == WALL) & (gap < CLOSE * cell), LOG_ALONE, 0.0)
@@ -243,15 +244,17 @@ COST_MEAN, COST_STD = 3.56, 2.17
 
 
 def _amplitudes(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, book: WindowTable, scene: KnownEnvironment
+    table: Hypotheses, fits: Fits, digest: TrackSummary, landmarks: WindowTable, scene: KnownEnvironment
 ) -> Floats:
     """(H,) log density of the tracks' mean amplitudes, given what walls leave and how points scatter."""
     radio, track = scene.radio, table.trials.track
     level, seen, rx = digest.log_amplitude[track], digest.mean[0][track], digest.mean[2][track]
     free = np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * seen[:, 0]))
     has = (table.known >= 0) & (table.kind != BESIDE)
-    ratio = np.where(has, book.ratio[table.known], 0.0) if len(book.ident) else np.zeros(len(track))
-    variance = np.where(has, book.ratio_variance[table.known], 0.0) if len(book.ident) else np.zeros(len(track))
+    ratio = np.where(has, landmarks.ratio[table.known], 0.0) if len(landmarks.ident) else np.zeros(len(track))
+    variance = (
+        np.where(has, landmarks.ratio_variance[table.known], 0.0) if len(landmarks.ident) else np.zeros(len(track))
+    )
     mirror = free + ratio + CONSTANTS.wall_ratio
     spread = variance + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
     surplus = np.maximum(level - free - 0.2, 0.0)  # a mirror does not amplify
@@ -268,29 +271,31 @@ def _amplitudes(
     pair = -0.5 * (level - double) ** 2 / wide - 0.5 * np.log(wide) - 20.0 * surplus**2
     amplitude = np.where(table.trials.is_wall, wall, np.where(table.trials.is_pair, pair, point))
     image = (table.kind == IMAGE).nonzero()[0]
-    amplitude[image] = _image_amplitudes(table, image, digest, book, scene)
+    amplitude[image] = _image_amplitudes(table, image, digest, landmarks, scene)
     return amplitude
 
 
 def _image_amplitudes(
-    table: Hypotheses, rows: Integers, digest: TrackSummary, book: WindowTable, scene: KnownEnvironment
+    table: Hypotheses, rows: Integers, digest: TrackSummary, landmarks: WindowTable, scene: KnownEnvironment
 ) -> Floats:
     """The same of images of known points in new walls, hypotheses `rows` (R,); the panel's hangs on codes."""
     track, point = table.trials.track[rows], table.known[rows]
     first = np.maximum(np.linalg.norm(table.trials.shift[rows, 0] - digest.mean[1][track], axis=1), 0.05)
     unit = point_amplitude(np.ones(len(rows)), first, np.maximum(digest.mean[0][track, 0] - first, 0.05), scene.radio)
-    strength, doubt = (field[point] for field in book.log_strength)
+    strength, doubt = (field[point] for field in landmarks.log_strength)
     mean, variance = (
         np.log(unit) + strength + CONSTANTS.wall_ratio,
         doubt**2 + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2,
     )
-    off = np.where(np.isin(point, book.panels), 0.0, digest.log_amplitude[track] - mean)
+    off = np.where(np.isin(point, landmarks.panels), 0.0, digest.log_amplitude[track] - mean)
     return np.asarray(-0.5 * off**2 / variance - 0.5 * np.log(variance))
 
 
-def _opacity(table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, book: WindowTable) -> Floats:
+def _opacity(
+    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
+) -> Floats:
     """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known."""
-    middle, walls, wall = digest.middle, book.walls, table.trials.is_wall
+    middle, walls, wall = digest.middle, landmarks.walls, table.trials.is_wall
     pair, tx = table.trials.is_pair[:, None], digest.mean[1][table.trials.track]
     image = (table.trials.turn[:, 0] @ tx[..., None])[..., 0] + fits.place
     # the last of two walls is somewhere on the ray to the image of both: as far as a single wall would be
@@ -307,13 +312,13 @@ def _opacity(table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFe
         total += CONSTANTS.log_rare * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
         before = normal @ feet.T - np.vecdot(foot, normal)[:, None]
         total += np.where(wall, CONSTANTS.log_rare, 0.0) * (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
-    if len(book.points):
-        depth = normal @ known.place[book.points].T - np.vecdot(foot, normal)[:, None]
+    if len(landmarks.points):
+        depth = normal @ known.place[landmarks.points].T - np.vecdot(foot, normal)[:, None]
         total += np.where(wall, CONSTANTS.log_rare, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
     return total
 
 
-def beliefs(place: Floats, digest: TrackSummary, known: KnownFeatures, book: WindowTable) -> DirectionPriors:
+def beliefs(place: Floats, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> DirectionPriors:
     """What may be held beforehand of a wall at `place` (3,): upright, at right angles to another; or level."""
     span = place - digest.middle
     reach = max(float(np.linalg.norm(span)), 0.1)
@@ -326,7 +331,7 @@ def beliefs(place: Floats, digest: TrackSummary, known: KnownFeatures, book: Win
     elif rise < 0.35:
         axes.append(AXES[2])
         log_odds.append(CONSTANTS.log_upright + np.log(reach))
-        others = known.place[book.walls] - digest.middle
+        others = known.place[landmarks.walls] - digest.middle
         if len(others):
             flat = np.linalg.norm(others[:, :2], axis=1) > 0.95 * np.linalg.norm(others, axis=1)
             off = np.arctan2(others[flat, 1], others[flat, 0]) - np.arctan2(span[1], span[0])
@@ -343,7 +348,9 @@ def beliefs(place: Floats, digest: TrackSummary, known: KnownFeatures, book: Win
     )  # fmt: skip
 
 
-def _upright(table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, book: WindowTable) -> Floats:
+def _upright(
+    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
+) -> Floats:
     """Gain (H,) in log evidence by what walls are beforehand: each direction held, or anywhere in its width."""
     gain = np.zeros(len(fits.cost))
     trials, tx = table.trials, digest.mean[1]
@@ -354,7 +361,7 @@ def _upright(table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFe
                 continue  # an edge under the ceiling: any elevation
             at = tx[trials.track[row]]
             place = digest.middle + turn @ at + place - at
-        holds = beliefs(place, digest, known, book)
+        holds = beliefs(place, digest, known, landmarks)
         span = place - digest.middle
         variance = np.vecdot(holds.axis, holds.axis @ fits.covariance[row]) + holds.std**2
         log_right = -0.5 * (holds.axis @ span) ** 2 / variance - 0.5 * np.log(2.0 * np.pi * variance)

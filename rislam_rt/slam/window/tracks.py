@@ -80,7 +80,7 @@ def advance(tracks: WindowTracks, dt: float, turn: float, bend: Floats) -> Windo
 
 
 def match(
-    tracks: WindowTracks, glance: Observations, free: Integers, cycle: int, strangers: float
+    tracks: WindowTracks, observed: Observations, free: Integers, cycle: int, strangers: float
 ) -> tuple[Integers, Integers]:
     """Rows of tracks and the free components that continue them; `strangers` is the density of new ones."""
     count = len(tracks.ident)
@@ -93,36 +93,37 @@ def match(
     candidates = Candidates(
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
     )
-    cost = pair_costs(candidates, glance.take(free), GATE, strangers)
+    cost = pair_costs(candidates, observed.take(free), GATE, strangers)
     rows, columns = scipy.optimize.linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     return rows[good], free[columns[good]]
 
 
-def extend(tracks: WindowTracks, rows: Integers, glance: Observations, picks: Integers, cycle: int) -> WindowTracks:
+def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: Integers, cycle: int) -> WindowTracks:
     """Tracks `rows` (A,) updated by components `picks` (A,)."""
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
     prior, spread = mean[rows], covariance[rows]
-    gain = spread[..., 0] / (spread[..., 0, 0] + glance.std[picks] ** 2)[..., None]
-    mean[rows] = prior + gain * (glance.seen[picks] - prior[..., 0])[..., None]
+    gain = spread[..., 0] / (spread[..., 0, 0] + observed.std[picks] ** 2)[..., None]
+    mean[rows] = prior + gain * (observed.seen[picks] - prior[..., 0])[..., None]
     covariance[rows] = spread - gain[..., :, None] * spread[..., None, 0, :]
     level, last, hits = tracks.log_amplitude.copy(), tracks.last.copy(), tracks.hits.copy()
-    level[rows], last[rows] = glance.log_amplitude[picks], cycle
+    level[rows], last[rows] = observed.log_amplitude[picks], cycle
     hits[rows] += 1
     return tracks._replace(mean=mean, covariance=covariance, log_amplitude=level, last=last, hits=hits)
 
 
 def start(
-    tracks: WindowTracks, glance: Observations, picks: Integers, rate: Floats, cycle: int
+    tracks: WindowTracks, observed: Observations, picks: Integers, rate: Floats, cycle: int
 ) -> tuple[WindowTracks, Integers]:
     """One new track for each of the components `picks` (A,), and their idents; `rate` (A, 3) is the rates' spread."""
     count = len(picks)
     ident = tracks.next_ident + np.arange(count)
     covariance = np.zeros((count, 3, 2, 2))
-    covariance[..., 0, 0], covariance[..., 1, 1] = glance.std[picks] ** 2, rate**2
+    covariance[..., 0, 0], covariance[..., 1, 1] = observed.std[picks] ** 2, rate**2
     fresh = (
-        ident, np.stack([glance.seen[picks], np.zeros((count, 3))], axis=-1), covariance, glance.log_amplitude[picks],
-        glance.sides[picks], np.full(count, cycle), np.full(count, cycle), np.ones(count, dtype=np.int64),
+        ident, np.stack([observed.seen[picks], np.zeros((count, 3))], axis=-1), covariance,
+        observed.log_amplitude[picks],
+        observed.sides[picks], np.full(count, cycle), np.full(count, cycle), np.ones(count, dtype=np.int64),
         np.zeros(count, dtype=np.int64), *unknown(count, tracks.log_ris.shape[1]),
     )  # fmt: skip
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))

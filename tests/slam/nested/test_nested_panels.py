@@ -102,10 +102,10 @@ def test_panels_of_one_data_sheet_are_told_apart(sides: bool, cycles: int) -> No
 
 
 def book_of(odds: list[list[float]]) -> LandmarkTable:
-    book = empty_table(2)
+    landmarks = empty_table(2)
     for _ in odds:
-        book = enter(book, False, np.zeros(3), -1)
-    return book._replace(log_ris=np.array(odds))
+        landmarks = enter(landmarks, False, np.zeros(3), -1)
+    return landmarks._replace(log_ris=np.array(odds))
 
 
 def test_returns_take_the_side_of_the_panel_that_their_point_is_held_for() -> None:

@@ -39,7 +39,7 @@ def belief() -> MapBelief:
     return MapBelief(np.zeros((0, 3)), empty_table(), POSES, BODY, SensorModel(RADIO, threshold=THRESHOLD), PANEL)
 
 
-def glance(picks: list[int], amplitude: np.ndarray) -> Observations:
+def observed(picks: list[int], amplitude: np.ndarray) -> Observations:
     seen, std = looks()[picks], np.tile([0.02, 0.02, 0.02], (len(picks), 1))
     log = np.log(amplitude[picks])
     return Observations(seen, std, log, np.full(len(picks), 0.1), 0.1 * amplitude[picks], 0.0 * log)
@@ -55,7 +55,7 @@ def follow(cycles: int, rng: np.random.Generator) -> LandmarkTracks:
         code = RisCode(rng.integers(4, size=(6, 6)), 4)
         gain = panel_path_gain(PANEL, code, SPOTS[:1], POSES.tx, POSES.rx, np.ones(1), RADIO)
         amplitude = np.hypot(*(np.array([[abs(gain[0]), ball], [0.0, 0.0]]) + noise * rng.standard_normal((2, 2))))
-        seen = glance([0, 1], amplitude)
+        seen = observed([0, 1], amplitude)
         if not cycle:
             tracks = begin(tracks, seen, np.arange(2), dull, np.full(3, 0.01), cycle)
         else:
@@ -81,7 +81,7 @@ def test_changing_codes_tell_the_panel_from_a_scatterer(rng: np.random.Generator
 
 
 def test_silence_when_the_panel_would_shout_speaks_against_it(rng: np.random.Generator) -> None:
-    tracks = begin(no_tracks(40), glance([0], np.full(2, 1e-5)), np.arange(1), np.zeros(1, bool), np.full(3, 0.01), 0)
+    tracks = begin(no_tracks(40), observed([0], np.full(2, 1e-5)), np.arange(1), np.zeros(1, bool), np.full(3, 0.01), 0)
     tracks = advance(tracks, 0.1, 1, np.full(3, 1e-3))
     loudest = max(
         (RisCode(rng.integers(4, size=(6, 6)), 4) for _ in range(300)),

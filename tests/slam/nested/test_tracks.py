@@ -20,16 +20,16 @@ def follow(*courses: str, lengths: tuple[float, ...] = (3.0,), side: int = OTHER
     tracks, dull = no_tracks(40), np.zeros(len(courses), dtype=np.bool_)
     seen = np.array([[length, 0.1, 0.2] for length in lengths])
     zero = np.zeros(len(courses))
-    glance = Observations(
+    observed = Observations(
         seen, np.full(seen.shape, 0.02), zero, zero + 0.1, zero + 0.1, zero, np.full(len(courses), side)
     )
     for cycle in range(len(courses[0])):
         if cycle:
             shown = np.flatnonzero([course[cycle] == "#" for course in courses])
             tracks = advance(tracks, 0.1, cycle, np.full(3, 0.03))
-            tracks = extend(tracks, shown, glance, shown, dull, cycle)
+            tracks = extend(tracks, shown, observed, shown, dull, cycle)
         else:
-            tracks = begin(tracks, glance, np.arange(len(courses)), dull, np.full(3, 0.1), cycle)
+            tracks = begin(tracks, observed, np.arange(len(courses)), dull, np.full(3, 0.1), cycle)
     return tracks, len(courses[0]) - 1
 
 

@@ -113,10 +113,10 @@ def test_forms_take_the_side_of_the_panel_that_their_point_is_held_for():
     forms[:, 0] = [0, 1, 2, MOVING]
 
     def sides(odds):
-        book = empty_table(2)
+        landmarks = empty_table(2)
         for row in odds:
-            book = enter(book, False, np.zeros(3), 1, 0.0, unknown(1, 2)._replace(log_ris=np.array([row])))
-        return return_sides(forms, book), book.panels
+            landmarks = enter(landmarks, False, np.zeros(3), 1, 0.0, unknown(1, 2)._replace(log_ris=np.array([row])))
+        return return_sides(forms, landmarks), landmarks.panels
 
     found, held = sides([[-9.0, 9.0], [9.0, -9.0], [-9.0, -9.0]])
     assert held == (1, 0)

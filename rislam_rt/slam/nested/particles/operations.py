@@ -120,13 +120,13 @@ def update(
     """Update by A associated returns: lengths [m] and cosines `seen` (A, 3) with standard deviations `std`."""
     if not len(seen):
         return ParticleUpdate(particles, 0.0, np.zeros((0, 3)), 0.0)
-    sights = Seen(returns, twin, anchor, body, seen, std**2 + FLOOR**2)
+    visibility = Seen(returns, twin, anchor, body, seen, std**2 + FLOOR**2)
     mean = moments(particles)
-    predicted = look(mean, sights)
-    white, _ = whitened(mean, predicted, sights.noise)
-    sights = sights._replace(noise=trusted(sights.noise, white))
-    nis = whitened(mean, predicted, sights.noise)[1]
-    moved, evidence = absorb_all(particles.belief, sights, particles.config, particles.engine)
+    predicted = look(mean, visibility)
+    white, _ = whitened(mean, predicted, visibility.noise)
+    visibility = visibility._replace(noise=trusted(visibility.noise, white))
+    nis = whitened(mean, predicted, visibility.noise)[1]
+    moved, evidence = absorb_all(particles.belief, visibility, particles.config, particles.engine)
     return ParticleUpdate(particles._replace(belief=moved), evidence, white, nis)
 
 

@@ -122,12 +122,12 @@ def step(
     check_step(dt, heading)
     odds = assumed_odds(config, state.sensor)
     state = _move(state, dt, np.full(state.course.axes, config.sigma_a), config)._replace(heading=float(heading))
-    glance = observations_of(measurement, state.sensor.radio)
-    free = ~is_los(glance, state.body)
+    observed = observations_of(measurement, state.sensor.radio)
+    free = ~is_los(observed, state.body)
     if not config.planes:
-        free &= ~is_strong(glance.ratio, config.specular_ratio)
+        free &= ~is_strong(observed.ratio, config.specular_ratio)
     rows = np.flatnonzero(free)
-    scan = Scan(glance.seen[rows, 0], np.maximum(glance.std[rows, 0], config.smallest_std))
+    scan = Scan(observed.seen[rows, 0], np.maximum(observed.std[rows, 0], config.smallest_std))
     turn = rotation_z(np.asarray(heading))
     model = Bistatic(
         turn @ state.body.tx_offset, turn @ state.body.rx_offset, state.sensor.radio.array.pattern == "upper"
@@ -140,7 +140,7 @@ def step(
     dof = int((landmark >= 0).sum())
     sums, course = absorb(state.sums, sight, state.course, scan, found, odds)
     state = state._replace(sums=sums, course=course)
-    state = _give_birth(state, scan, is_strong(glance.ratio[rows], config.specular_ratio), found, fresh, config)
+    state = _give_birth(state, scan, is_strong(observed.ratio[rows], config.specular_ratio), found, fresh, config)
     strain = state.strain + (STRAIN_RATE * (nis / dof - state.strain) if dof else 0.0)
     count = int((state.sums.existence > config.detection_threshold).sum())
     report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, count, outcome_of(len(measurement), count, strain))

@@ -133,14 +133,14 @@ def estimate(state: BpSlamAoaState, config: BpSlamAoaConfig) -> SlamEstimate:
 def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConfig) -> tuple[ComponentScan, Integers]:
     """The components without the direct path (and wall returns that are set aside), and their rows."""
     sensor = state.sensor
-    glance = observations_of(measurement, sensor.radio)
-    aside = is_los(glance, state.body) | is_strong(glance.ratio, None if config.use_vt else config.specular_ratio)
+    observed = observations_of(measurement, sensor.radio)
+    aside = is_los(observed, state.body) | is_strong(observed.ratio, None if config.use_vt else config.specular_ratio)
     rows = np.flatnonzero(~aside)
-    glance = glance.take(rows)
-    snr = sensor.radio.integrated_snr(np.exp(glance.log_amplitude))
-    false = sensor.false_alarm_density(glance.seen[:, 0] / SPEED_OF_LIGHT, glance.seen[:, 1:]) / SPEED_OF_LIGHT
+    observed = observed.take(rows)
+    snr = sensor.radio.integrated_snr(np.exp(observed.log_amplitude))
+    false = sensor.false_alarm_density(observed.seen[:, 0] / SPEED_OF_LIGHT, observed.seen[:, 1:]) / SPEED_OF_LIGHT
     false = np.maximum(false * 2.0 * snr * sensor.false_alarm_snr_density(snr), LEAST_FALSE)
-    return ComponentScan(glance.seen, glance.std, glance.log_amplitude, glance.log_amplitude_std, false), rows
+    return ComponentScan(observed.seen, observed.std, observed.log_amplitude, observed.log_amplitude_std, false), rows
 
 
 def _levels(config: BpSlamAoaConfig) -> Floats:

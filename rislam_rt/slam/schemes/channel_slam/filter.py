@@ -104,10 +104,10 @@ def step(
     """
     check_step(dt, heading)
     state = _move(state, dt, config)._replace(heading=float(heading))
-    glance = observations_of(measurement, state.sensor.radio)
-    strong, free = is_strong(glance.ratio, config.specular_ratio), ~is_los(glance, state.body)
+    observed = observations_of(measurement, state.sensor.radio)
+    strong, free = is_strong(observed.ratio, config.specular_ratio), ~is_los(observed, state.body)
     rows = np.flatnonzero(free if config.planes else free & ~strong)
-    scan = Scan(glance.seen[rows, 0], np.maximum(glance.std[rows, 0], config.smallest_std))
+    scan = Scan(observed.seen[rows, 0], np.maximum(observed.std[rows, 0], config.smallest_std))
     turn = rotation_z(np.asarray(heading))
     upper = state.sensor.radio.array.pattern == "upper"
     model = Bistatic(turn @ state.body.tx_offset, turn @ state.body.rx_offset, upper)
