@@ -20,7 +20,7 @@ import numpy as np
 import rislam_rt.slam.window  # noqa: F401  every module that reads the table
 from rislam_rt import read_recording, replay
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.window.levels import LEVELS, Levels
+from rislam_rt.slam.window.model_constants import CONSTANTS, ModelConstants
 
 PROBABILITIES = ("rare", "cleared", "shown", "square", "upright", "born")
 """Constants whose odds are halved and doubled."""
@@ -28,19 +28,19 @@ NUDGE = 1e-9
 """Reported deviations by which chance moves a measurement: next to nothing, but it decides what was undecided."""
 
 
-def changed(name: str, factor: float) -> Levels:
+def changed(name: str, factor: float) -> ModelConstants:
     """The table with one constant at another value."""
-    value = getattr(LEVELS, name)
+    value = getattr(CONSTANTS, name)
     if name in PROBABILITIES:
         odds = factor * value / (1.0 - value)
-        return LEVELS._replace(**{name: odds / (1.0 + odds)})
-    return LEVELS._replace(**{name: type(value)(round(factor * value, 12))})
+        return CONSTANTS._replace(**{name: odds / (1.0 + odds)})
+    return CONSTANTS._replace(**{name: type(value)(round(factor * value, 12))})
 
 
-def use(levels: Levels) -> None:
+def use(levels: ModelConstants) -> None:
     """Every module of the filter reads these from now on."""
     for name, module in sys.modules.items():
-        if name.startswith("rislam_rt.slam.window") and hasattr(module, "LEVELS"):
+        if name.startswith("rislam_rt.slam.window") and hasattr(module, "CONSTANTS"):
             module.LEVELS = levels  # type: ignore[attr-defined]
 
 
@@ -91,7 +91,7 @@ def study(paths: list[Path], names: list[str], cycles: int) -> Iterator[str]:
         for factor, word in ((0.5, "half"), (2.0, "twice")):
             use(changed(name, factor))
             yield compare(f"`{name}`, {word}", base, np.array([error(path, cycles) for path in paths]))
-    use(LEVELS)
+    use(CONSTANTS)
 
 
 def main() -> None:
@@ -101,7 +101,7 @@ def main() -> None:
     parser.add_argument("--rooms", type=int, default=12)
     parser.add_argument("--cycles", type=int, default=200, help="of each room, from the first on")
     parser.add_argument("--pattern", default="*_13dB_*.nc", help="of the files in a room's folder")
-    parser.add_argument("--only", nargs="*", default=list(Levels._fields), help="constants")
+    parser.add_argument("--only", nargs="*", default=list(ModelConstants._fields), help="constants")
     chosen = parser.parse_args()
     paths = sorted(chosen.recordings.glob(f"room_*/{chosen.pattern}"))[: chosen.rooms]
     if not paths:

@@ -31,7 +31,7 @@ from rislam_rt.slam import NestedConfig, SlamConfig, StartPrior
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.particles import belief, operations
 from rislam_rt.slam.nested.particles.backend import pick_engine
-from rislam_rt.slam.nested.particles.cloud import Engine, Kernel, kernel_width
+from rislam_rt.slam.nested.particles.cloud import CloudEngine, Kernel, kernel_width
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, pack, trace_sightline
 from rislam_rt.slam.returns import NONE, Returns, observe
 
@@ -116,7 +116,7 @@ def compare_engines(agents: int, points: int) -> None:
 
 
 def _passes(
-    engine: Engine, agents: int, points: int, *, rng: np.random.Generator
+    engine: CloudEngine, agents: int, points: int, *, rng: np.random.Generator
 ) -> tuple[Callable[[], object], Callable[[], object]]:
     """An update, and a resampling, of clouds that are every agent particle's own."""
     position = START + 0.02 * rng.standard_normal((agents, 3))

@@ -41,9 +41,9 @@ from rislam_rt.model import (
 )
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
-from rislam_rt.slam import NestedConfig, Outcome, SlamConfig, StartPrior, StepInfo, estimate, init, predict, step
+from rislam_rt.slam import NestedConfig, SlamConfig, StartPrior, StepInfo, StepOutcome, estimate, init, predict, step
 from rislam_rt.slam.nested.filter import believed
-from rislam_rt.slam.window import WindowState, gauss
+from rislam_rt.slam.window import WindowState, window_gaussian
 
 ROOM = Path(__file__).parents[1] / "scenes" / "paper_room"
 ROUNDING = 1e-10
@@ -70,7 +70,7 @@ class Verdict(NamedTuple):
     @property
     def said(self) -> bool:
         """Whether divergence was reported in any cycle."""
-        return Outcome.DIVERGED in self.outcomes
+        return StepOutcome.DIVERGED in self.outcomes
 
 
 ROOMS = ("coincident landmarks", "one antenna element", "a row of antennas", "blinding radio", "deaf radio")
@@ -218,7 +218,7 @@ def run_case(case: Case) -> Verdict:
 
 def _believed(state: Any) -> Floats:
     """Covariance of all that the filter holds of the present."""
-    return gauss.now(state.window)[1] if isinstance(state, WindowState) else believed(state).covariance
+    return window_gaussian.now(state.window)[1] if isinstance(state, WindowState) else believed(state).covariance
 
 
 def faults_of(belief: SlamEstimate, info: StepInfo, count: int, covariance: Floats | None = None) -> list[str]:
@@ -236,7 +236,7 @@ def faults_of(belief: SlamEstimate, info: StepInfo, count: int, covariance: Floa
         spreads["belief"] = covariance[None]
     for name, matrix in spreads.items():
         faults += [f"{name} covariance {fault}" for fault in _not_covariance(matrix)]
-    if info.outcome not in set(Outcome):
+    if info.outcome not in set(StepOutcome):
         faults.append(f"outcome {info.outcome}")
     if info.landmark.shape != (count,):
         faults.append("labels of another shape")
@@ -310,7 +310,7 @@ def tabulate(verdicts: Sequence[Verdict]) -> dict[str, dict[str, Any]]:
 
 def show(table: dict[str, dict[str, Any]]) -> None:
     """The table, one line a kind."""
-    names = [str(outcome) for outcome in Outcome]
+    names = [str(outcome) for outcome in StepOutcome]
     print(f"{'':30s}{'cases':>6s}{'faulty':>7s}" + "".join(f"{n:>16s}" for n in names) + "  lost said back  drift [m]")
     for kind, row in table.items():
         counts = "".join(f"{row['cycles'].get(name, 0):16d}" for name in names)

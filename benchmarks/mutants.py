@@ -50,7 +50,7 @@ class Mutant(NamedTuple):
 MUTANTS = (
     Mutant("nothing", "constants.py", "", ""),
     Mutant(
-        "no update of the pose", "slam/window/gauss.py",
+        "no update of the pose", "slam/window/window_gaussian.py",
         "        accel=window.accel + change[size:].reshape(window.accel.shape),",
         "        accel=window.accel,",
     ),
@@ -64,13 +64,13 @@ MUTANTS = (
     ),
     Mutant(
         "never diverged", "slam/window/filter.py",
-        "        return Outcome.DIVERGED\n", "        return Outcome.OK\n",
+        "        return StepOutcome.DIVERGED\n", "        return StepOutcome.OK\n",
     ),
     Mutant(
         "every second birth of a wrong kind", "slam/window/births.py",
         "    forms[0] = [new if part == NEW else part for part in verdict.form]\n",
         "    forms[0] = [new if part == NEW else part for part in verdict.form]\n"
-        "    if len(book.ident) % 2:\n"
+        "    if len(landmarks.ident) % 2:\n"
         "        forms[0] = [-1, -1, -1, new, -1] if not verdict.is_wall else [new, -1, -1, -1, -1]\n",
     ),
     Mutant(

@@ -3,14 +3,14 @@
 from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.estimator import estimate, init, predict, revisit, smoothed, step
 from rislam_rt.slam.nested_config import NestedConfig
-from rislam_rt.slam.step_info import Outcome, StepInfo
+from rislam_rt.slam.step_info import StepInfo, StepOutcome
 
 __all__ = [
     "NestedConfig",
-    "Outcome",
     "SlamConfig",
     "StartPrior",
     "StepInfo",
+    "StepOutcome",
     "estimate",
     "init",
     "predict",

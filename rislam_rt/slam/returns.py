@@ -36,7 +36,7 @@ class Returns(NamedTuple):
         return self.legs[self.rx, 0]
 
 
-class Sight(NamedTuple):
+class PredictedReturn(NamedTuple):
     """Returns as seen from a pose."""
 
     seen: Floats
@@ -86,7 +86,7 @@ def leg_images(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -
     return base
 
 
-def observe(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Sight:
+def observe(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> PredictedReturn:
     """Predict every return from features (..., F, 3)."""
     image = leg_images(returns, features, anchor, poses.tx)
     # leg by leg, as many returns share one
@@ -101,7 +101,7 @@ def observe(returns: Returns, features: Floats, anchor: Floats, poses: Poses) ->
     by_leg[..., 2] = arrival[..., 1] * cos - arrival[..., 0] * sin
     seen = by_leg[..., returns.rx, :]
     seen[..., 0] += tx_length
-    return Sight(seen, tx_length, rx_length[..., returns.rx], arrival[..., returns.rx, 2])
+    return PredictedReturn(seen, tx_length, rx_length[..., returns.rx], arrival[..., returns.rx, 2])
 
 
 class Linear(NamedTuple):

@@ -9,7 +9,7 @@ UNUSED, REMOVED = -1, -2
 """In `StepInfo.landmark`: clutter or not yet explained; taken for LOS or a wall return."""
 
 
-class Outcome(StrEnum):
+class StepOutcome(StrEnum):
     """How a cycle went. Values, not exceptions: a filter must survive every one of them."""
 
     OK = "ok"
@@ -31,4 +31,4 @@ class StepInfo(NamedTuple):
     nis_dof: int
     log_evidence: float
     num_landmarks: int
-    outcome: Outcome
+    outcome: StepOutcome

@@ -14,7 +14,7 @@ from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.specification.spec import Settings, build_settings
 from rislam_rt.slam import StartPrior
 from rislam_rt.slam.observations import observations_of, stranger_density
-from rislam_rt.slam.schemes.bp_slam.filter import told
+from rislam_rt.slam.schemes.bp_slam.filter import assumed_odds
 from rislam_rt.slam.window import WindowState
 
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
@@ -114,4 +114,6 @@ def test_filter_and_rival_expect_the_false_components_that_the_receiver_makes(ra
     span = 0.5 * np.log1p(1.0 / sensor.threshold)
     # importance sampling over the first unit of SNR above the threshold: some 130 draws, each within a factor e
     assert np.sum(inverse[near]) / len(inverse) * rate == pytest.approx(volume * span, rel=0.25)
-    assert told(settings_of([]).bp_slam, sensor).clutter_density == pytest.approx(rate / (80e-9 * SPEED_OF_LIGHT))
+    assert assumed_odds(settings_of([]).bp_slam, sensor).clutter_density == pytest.approx(
+        rate / (80e-9 * SPEED_OF_LIGHT)
+    )

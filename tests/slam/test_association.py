@@ -14,8 +14,8 @@ from rislam_rt.slam.nested.candidates import (
     hidden_tracks,
     merge_returns,
 )
-from rislam_rt.slam.nested.measurement_prediction import Expected
-from rislam_rt.slam.nested.tracks import Tracks, begin, no_tracks
+from rislam_rt.slam.nested.measurement_prediction import ExpectedReturns
+from rislam_rt.slam.nested.tracks import LandmarkTracks, begin, no_tracks
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import NONE, Returns
 
@@ -40,7 +40,7 @@ def draw_candidates(count: int, *, rng: np.random.Generator) -> Candidates:
     )
 
 
-def glance(seen: Floats, log_amplitude: Floats, std: float = 0.02) -> Observations:
+def observed(seen: Floats, log_amplitude: Floats, std: float = 0.02) -> Observations:
     """Measurements as the filter looks at them."""
     count = len(seen)
     return Observations(
@@ -55,7 +55,9 @@ def test_assignment_is_the_best_of_all() -> None:
     for _ in range(60):
         here, there = rng.integers(1, 5, size=2)
         found = draw_candidates(int(here), rng=rng)
-        seen = glance(found.seen[rng.integers(here, size=there)] + 0.05 * rng.normal(size=(there, 3)), np.zeros(there))
+        seen = observed(
+            found.seen[rng.integers(here, size=there)] + 0.05 * rng.normal(size=(there, 3)), np.zeros(there)
+        )
         cost = pair_costs(found, seen, GATE, CLUTTER)
         chosen = associate(found, seen, GATE, CLUTTER)
         best = min(
@@ -78,7 +80,7 @@ def test_cost_is_the_likelihood_ratio_against_clutter(rng: np.random.Generator) 
     from scipy.stats import multivariate_normal, norm
 
     found = draw_candidates(1, rng=rng)
-    seen = glance(found.seen + 0.01, np.array([0.1]))
+    seen = observed(found.seen + 0.01, np.array([0.1]))
     density = multivariate_normal.logpdf(seen.seen[0], found.seen[0], found.covariance[0] + 0.02**2 * np.eye(3))
     fade = norm.logpdf(0.1, found.log_amplitude[0], np.hypot(0.3, 0.1))
     want = -2.0 * (density + fade + found.log_odds[0] - np.log(CLUTTER))
@@ -98,15 +100,15 @@ def test_beyond_the_gate_nothing_is_paired(axis: int) -> None:
         else:
             fade[0] = factor * np.sqrt(GATE * (0.05**2 + 0.1**2))
         # clutter is made so rare that only the gate stands between the two
-        assert (associate(found, glance(seen, fade), GATE, 1e-9)[0] == 0) == paired
+        assert (associate(found, observed(seen, fade), GATE, 1e-9)[0] == 0) == paired
 
 
 def test_nothing_to_assign() -> None:
     rng = np.random.default_rng(1)
-    none = glance(np.zeros((0, 3)), np.zeros(0))
+    none = observed(np.zeros((0, 3)), np.zeros(0))
     np.testing.assert_array_equal(associate(draw_candidates(3, rng=rng), none, GATE, CLUTTER), [-1, -1, -1])
     empty = Candidates._make(field[:0] for field in draw_candidates(1, rng=rng))
-    assert len(associate(empty, glance(np.zeros((2, 3)), np.zeros(2)), GATE, CLUTTER)) == 0
+    assert len(associate(empty, observed(np.zeros((2, 3)), np.zeros(2)), GATE, CLUTTER)) == 0
 
 
 def test_small_inverses(rng: np.random.Generator) -> None:
@@ -124,7 +126,7 @@ def outlook(seen: Floats, log_amplitude: Floats) -> PredictedMeasurements:
     legs = np.stack([np.arange(count), np.full(count, NONE), np.full(count, NONE)], axis=1)
     rows, ones = np.arange(count), np.ones(count, dtype=np.bool_)
     alone = UnresolvedGroups(np.full(count, -1), ~ones, np.zeros((count, 3)), ~ones)
-    expected = Expected(
+    expected = ExpectedReturns(
         Returns(legs, rows, rows), log_amplitude, np.full(count, 0.2), 0 * rows, rows, ones, np.full(count, -1), ones
     )
     spread = np.tile(1e-4 * np.eye(3), (count, 1, 1))
@@ -134,13 +136,13 @@ def outlook(seen: Floats, log_amplitude: Floats) -> PredictedMeasurements:
     )
 
 
-def follow(seen: Floats, log_amplitude: Floats, shine: Floats, side: int = UNTOLD) -> Tracks:
+def follow(seen: Floats, log_amplitude: Floats, shine: Floats, side: int = UNTOLD) -> LandmarkTracks:
     """Tracks at some places."""
     count = len(seen)
     fields = {name: np.zeros((count, *field.shape[1:]), field.dtype) for name, field in no_tracks(4)._asdict().items()}
     mean = np.stack([seen, np.zeros((count, 3))], axis=-1)
     spread = np.tile(1e-4 * np.eye(2), (count, 3, 1, 1))
-    return Tracks(
+    return LandmarkTracks(
         **{**fields, "mean": mean, "covariance": spread, "log_amplitude": log_amplitude, "shine": shine,
            "side": np.full(count, side)}
     )  # fmt: skip
@@ -157,12 +159,12 @@ def test_tracks_behind_an_expected_return_give_way() -> None:
     np.testing.assert_array_equal(hidden, [True, False, False, False])
     # and a hidden one gets nothing, even where it fits better than the return
     found = candidates(ahead, tracks, hidden)
-    chosen = associate(found, glance(place[None], np.zeros(1)), GATE, CLUTTER)
+    chosen = associate(found, observed(place[None], np.zeros(1)), GATE, CLUTTER)
     assert chosen[0] == 0
     assert chosen[1] == -1
 
 
-def _expected(strength: Floats) -> Expected:
+def _expected(strength: Floats) -> ExpectedReturns:
     return outlook(np.zeros((len(strength), 3)), np.log(strength)).expected
 
 
@@ -201,7 +203,7 @@ def test_what_runs_over_the_panel_is_not_paired_with_what_does_not(mine: int, ot
     found = Candidates(
         np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, 0.05), np.zeros(1), np.full(1, mine)
     )
-    seen = glance(np.zeros((1, 3)), np.zeros(1))._replace(side=np.full(1, other))
+    seen = observed(np.zeros((1, 3)), np.zeros(1))._replace(side=np.full(1, other))
     assert (associate(found, seen, GATE, 1e-9)[0] == 0) == paired
 
 
@@ -219,7 +221,7 @@ def test_under_alternated_codes_the_panel_merges_with_nothing_else() -> None:
 
 def test_a_track_keeps_the_side_of_its_measurements() -> None:
     place = np.array([[3.0, 0.2, 0.1], [4.0, 0.0, 0.0]])
-    seen = glance(place, np.zeros(2))._replace(side=np.array([PANEL, OTHER]))
+    seen = observed(place, np.zeros(2))._replace(side=np.array([PANEL, OTHER]))
     dull = np.zeros(2, dtype=np.bool_)
     tracks = begin(no_tracks(4), seen, np.arange(2), dull, np.full(3, 0.1), 0)
     np.testing.assert_array_equal(tracks.side, [PANEL, OTHER])

@@ -12,9 +12,9 @@ from rislam_rt.measurement import ReceiverConfig, build_sensor, measure
 from rislam_rt.model import Measurement, Paths, RadioConfig, RisCode, RisLegs, Scene, SensorModel, SlamEstimate
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
-from rislam_rt.slam import Outcome, SlamConfig, StartPrior, StepInfo, estimate, init, step
+from rislam_rt.slam import SlamConfig, StartPrior, StepInfo, StepOutcome, estimate, init, step
 from rislam_rt.slam.window import motion as model
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 
 ROOM = Path(__file__).parents[2] / "scenes" / "paper_room"
 CYCLES = slice(180, 300)
@@ -121,7 +121,7 @@ def test_errs_no_more_than_a_few_deviations(receiver: str, request: pytest.Fixtu
     error = np.array([e.position for e in course.estimates])[:, :2] - truth[:, :2]
     own = np.array([np.trace(e.covariance[:2, :2]) for e in course.estimates])
     assert np.sqrt(np.mean(np.sum(error**2, axis=1))) < 3.0 * np.sqrt(own.mean())
-    assert Outcome.DIVERGED not in {info.outcome for info in course.infos}
+    assert StepOutcome.DIVERGED not in {info.outcome for info in course.infos}
 
 
 def test_walls_are_walls_of_the_room(clear: tuple[Heard, Course]) -> None:
@@ -183,7 +183,7 @@ def test_labels_are_idents_of_the_map(clear: tuple[Heard, Course]) -> None:
 
 def motion_prior(level: float) -> float:
     """Variance of the first step's acceleration, of a liveliness told to be `level`: of the mixture of all gaits."""
-    gait = model.first_gait(level) @ model.transition(LEVELS.stay)
+    gait = model.first_motion_mode(level) @ model.transition(CONSTANTS.stay)
     return float(model.expected_variance(gait))
 
 
@@ -201,5 +201,5 @@ def test_prediction_is_the_belief_without_a_measurement(clear: tuple[Heard, Cour
     want = 0.01**2 + 0.5**2 * 0.01**2 + (0.5 * 0.5**2) ** 2 * push[0]
     height = (0.5 * 0.5**2) ** 2 * push[1]
     np.testing.assert_allclose(np.diag(belief.covariance)[:3], [want, want, height], rtol=1e-6, atol=1e-9)
-    assert info.outcome == Outcome.NO_MEASUREMENTS
+    assert info.outcome == StepOutcome.NO_MEASUREMENTS
     assert info.nis_dof == 0

@@ -31,7 +31,7 @@ from rislam_rt.slam.nested.hypotheses import (
 )
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, enter
 from rislam_rt.slam.nested.mirrors import is_behind_mirror, mirror_images
-from rislam_rt.slam.nested.tracks import Tracks, overstatement
+from rislam_rt.slam.nested.tracks import LandmarkTracks, overstatement
 from rislam_rt.slam.observations import PANEL, UNTOLD, same_side
 from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe
 
@@ -53,7 +53,7 @@ MIRROR_MARGIN = 0.1
 """Distance [m], beside twice the point's own error, by which it must lie nearer to an image of the agent."""
 
 
-class Verdict(NamedTuple):
+class BirthDecision(NamedTuple):
     """What a track is taken for."""
 
     kind: Returns
@@ -64,7 +64,7 @@ class Verdict(NamedTuple):
     """Whether a wall is taken to be upright, as its returns do not tell."""
 
 
-class Scene(NamedTuple):
+class BirthContext(NamedTuple):
     """What a judgement is based on, at the mean of the belief."""
 
     features: Floats
@@ -95,7 +95,7 @@ class Past(NamedTuple):
 class Birth(NamedTuple):
     """A track that becomes a feature."""
 
-    verdict: Verdict
+    verdict: BirthDecision
     anchor: Floats
     """(3,) of the feature, if it is a wall."""
     slots: Integers
@@ -132,7 +132,7 @@ class Birth(NamedTuple):
 
 
 def examine(
-    tracks: Tracks,
+    tracks: LandmarkTracks,
     moments: Moments,
     table: LandmarkTable,
     predicted: PredictedMeasurements,
@@ -140,7 +140,7 @@ def examine(
     free_space: float,
     threshold: float,
     config: SlamConfig,
-) -> tuple[int, Tracks, Birth | None]:
+) -> tuple[int, LandmarkTracks, Birth | None]:
     """Look at the tracks whose turn it is; at most one becomes a feature, as it may explain the others.
 
     Returns its row (-1 without one), the tracks (some now known for moving images), and the birth. `threshold`: SNR.
@@ -148,7 +148,7 @@ def examine(
     due = due_tracks(tracks, predicted, past.cycle, config)
     if not len(due):
         return -1, tracks, None
-    scene = Scene(
+    scene = BirthContext(
         moments.features, table, moments.position, predicted, mirror_images(tracks, moments, table, past.body), config
     )
     moving = tracks.moving.copy()
@@ -175,7 +175,7 @@ def examine(
 
 
 def track_history(
-    tracks: Tracks, row: int, past: Past, doubt: Floats, free_space: float, threshold: float
+    tracks: LandmarkTracks, row: int, past: Past, doubt: Floats, free_space: float, threshold: float
 ) -> tuple[History, Integers]:
     """A track's measurements with the mean believed poses, and the rows of the past that they belong to.
 
@@ -190,7 +190,7 @@ def track_history(
     return History(seen, std, poses, lag, ratio, doubt, side=int(tracks.side[row])), rows
 
 
-def is_explained(tracks: Tracks, row: int, history: History, scene: Scene) -> bool:
+def is_explained(tracks: LandmarkTracks, row: int, history: History, scene: BirthContext) -> bool:
     """Whether a return of the map runs along the track's whole history."""
     covariance = np.diag(tracks.covariance[row, :, 0, 0] + np.mean(history.std**2, axis=0))
     near = explained(scene.predicted, tracks.mean[row, :, 0], covariance, scene.config.nested.gate, history.side)
@@ -203,7 +203,7 @@ def is_explained(tracks: Tracks, row: int, history: History, scene: Scene) -> bo
     return bool(squared_distance(gap, spread)[0].mean(axis=0).min() < 6.0)
 
 
-def judge(history: History, scene: Scene) -> Verdict | None:
+def judge(history: History, scene: BirthContext) -> BirthDecision | None:
     """The hypothesis that explains the history, if one does and no other comes near."""
     margin, verdicts = scene.config.nested.birth_margin, _points(history, scene)
     if len(history.seen) < WALL_CYCLES and not (verdicts and _promising(verdicts, history, scene)):
@@ -227,26 +227,26 @@ def judge(history: History, scene: Scene) -> Verdict | None:
     return best if _sharp(best) and ready else None
 
 
-def _best(verdicts: list[Verdict], history: History, margin: float) -> tuple[Verdict, bool]:
+def _best(verdicts: list[BirthDecision], history: History, margin: float) -> tuple[BirthDecision, bool]:
     """The cheapest, and whether it explains the history and no other comes near."""
     best, *others = sorted(verdicts, key=lambda v: float(v.fit.cost))
     clear = min((float(v.fit.cost - best.fit.cost) for v in others), default=np.inf) > margin
     return best, clear and plausible(best.fit, len(history.seen), 3)
 
 
-def _promising(verdicts: list[Verdict], history: History, scene: Scene) -> bool:
+def _promising(verdicts: list[BirthDecision], history: History, scene: BirthContext) -> bool:
     """Whether a history too short for walls may come to anything: images would only be rivals to the other kinds."""
     best, clear = _best(verdicts, history, scene.config.nested.birth_margin)
     return clear and (best.kind is MOVING or _is_fit_point(best, scene))
 
 
-def _is_fit_point(verdict: Verdict, scene: Scene) -> bool:
+def _is_fit_point(verdict: BirthDecision, scene: BirthContext) -> bool:
     """Whether a point may enter the map: well known, and in the room as far as its walls are known."""
     margin = MIRROR_MARGIN + 2.0 * _worst_std(verdict)
     return _sharp(verdict) and not is_behind_mirror(verdict.fit.feature, scene.anchor, scene.mirrored, margin)
 
 
-def judge_wall(history: History, scene: Scene) -> Verdict | None:
+def judge_wall(history: History, scene: BirthContext) -> BirthDecision | None:
     """The wall that throws a wall return; upright, if that explains it as well as any lean would.
 
     It has to win over the images that two walls make together: until the agent has moved enough, they look alike.
@@ -259,12 +259,12 @@ def judge_wall(history: History, scene: Scene) -> Verdict | None:
     if np.linalg.norm(level - scene.anchor) > 0.1:
         held = fit_feature(MOVING, level, None, scene.anchor, history, 6, slack_of_height(level, scene.anchor))
         if held.cost < free.cost + scene.config.nested.birth_margin and plausible(held, len(history.seen), 2):
-            return Verdict(MOVING, -1, held, upright=True) if _is_single(held, history, scene) else None
+            return BirthDecision(MOVING, -1, held, upright=True) if _is_single(held, history, scene) else None
     single = plausible(free, len(history.seen), 3) and _is_single(free, history, scene)
-    return Verdict(MOVING, -1, free) if single else None
+    return BirthDecision(MOVING, -1, free) if single else None
 
 
-def _is_single(wall: Fit, history: History, scene: Scene) -> bool:
+def _is_single(wall: Fit, history: History, scene: BirthContext) -> bool:
     """Whether the image is one wall's: behind no other mirror, as all images in two walls are, or no two explain it."""
     reach = np.linalg.norm(wall.feature - scene.anchor)
     nearer = np.linalg.norm(scene.mirrored - scene.anchor, axis=1) < reach - 2.0 * MIRROR_MARGIN
@@ -274,31 +274,31 @@ def _is_single(wall: Fit, history: History, scene: Scene) -> bool:
     return min(float(rival.cost) for rival in rivals) > float(wall.cost) + scene.config.nested.birth_margin
 
 
-def _sharp(verdict: Verdict) -> bool:
+def _sharp(verdict: BirthDecision) -> bool:
     """Whether the feature's worst axis is known well enough."""
     limit = MAX_POINT_STD if verdict.kind is POINT else MAX_WALL_STD
     return _worst_std(verdict) < limit
 
 
-def _worst_std(verdict: Verdict) -> float:
+def _worst_std(verdict: BirthDecision) -> float:
     """Standard deviation [m] of the feature along its worst axis."""
     return float(np.sqrt(np.linalg.eigvalsh(verdict.fit.covariance)[-1]))
 
 
-def _points(history: History, scene: Scene) -> list[Verdict]:
+def _points(history: History, scene: BirthContext) -> list[BirthDecision]:
     """A static point, and a moving image; over the panel there are no moving images, and it is one point alone."""
     verdicts = []
     if history.side < PANEL or scene.table.holders[history.side - PANEL] < 0:
         start = initial_value(POINT, None, scene.anchor, history)
         if start is not None:
             fit = fit_feature(POINT, start, None, scene.anchor, history, 6)
-            verdicts.append(Verdict(POINT, -1, fit._replace(cost=fit.cost - history.panel)))
+            verdicts.append(BirthDecision(POINT, -1, fit._replace(cost=fit.cost - history.panel)))
     start = initial_value(MOVING, None, scene.anchor, history) if history.side < PANEL else None
     if start is not None:
         single = fit_feature(MOVING, start, None, scene.anchor, history, 6)
         fits = [single._replace(cost=single.cost + _dimness(history, 1))]
         fits += [f._replace(cost=f.cost + _dimness(history, 2)) for f in fit_doubles(start, scene.anchor, history)]
-        verdicts.append(Verdict(MOVING, -1, min(fits, key=lambda fit: float(fit.cost))))
+        verdicts.append(BirthDecision(MOVING, -1, min(fits, key=lambda fit: float(fit.cost))))
     return verdicts
 
 
@@ -307,7 +307,7 @@ def _dimness(history: History, walls: int) -> float:
     return (history.ratio - walls * MOVING_RATIO) ** 2 / (walls * MOVING_SPREAD**2)
 
 
-def _images(history: History, scene: Scene) -> list[Verdict]:
+def _images(history: History, scene: BirthContext) -> list[BirthDecision]:
     """The image of each known point in a new wall on the Rx leg."""
     verdicts = []
     for kind in (IMAGE, TWIN):
@@ -322,7 +322,7 @@ def _images(history: History, scene: Scene) -> list[Verdict]:
         fits = fit_feature(kind, start, scene.features[parents], scene.anchor, history, 6)
         for parent, fit in zip(parents, map(Fit._make, zip(*fits, strict=True)), strict=True):
             if kind is IMAGE or _one_cell(fit.feature, scene.features[parent], scene, history, 1.1):
-                verdicts.append(Verdict(kind, int(parent), fit))
+                verdicts.append(BirthDecision(kind, int(parent), fit))
     return verdicts
 
 
@@ -334,7 +334,7 @@ def _sources(table: LandmarkTable, side: int) -> Integers:
     return points[points == held[side - PANEL]] if side >= PANEL else points[~np.isin(points, held)]
 
 
-def _one_cell(wall: Floats, parent: Floats, scene: Scene, history: History, cells: float) -> bool:
+def _one_cell(wall: Floats, parent: Floats, scene: BirthContext, history: History, cells: float) -> bool:
     """Whether a wall would throw both its returns within so many resolution cells, halfway through the history."""
     middle = len(history.seen) // 2
     poses = Poses(history.poses.tx[middle], history.poses.rx[middle], history.poses.heading[middle])
@@ -348,7 +348,7 @@ def _established(table: LandmarkTable, side: int) -> Integers:
     return points[table.hits[points] >= PARENT_HITS]
 
 
-def _reciprocal_cost(history: History, scene: Scene) -> float:
+def _reciprocal_cost(history: History, scene: BirthContext) -> float:
     """How well an unknown Tx leg to a known image fits, if the track comes from that image's direction.
 
     What arrives from where something is already known to be, only later, is most likely the same thing over a wall.
@@ -371,21 +371,21 @@ def _reciprocal_cost(history: History, scene: Scene) -> float:
     return min((float(fit.cost) for fit in fits if fit is not None), default=np.inf)
 
 
-def _floor_wanted(history: History, scene: Scene) -> bool:
+def _floor_wanted(history: History, scene: BirthContext) -> bool:
     """Whether the map has no floor yet and the history is long enough to give one."""
     level = np.abs(unit(scene.features - scene.table.anchor)[:, 2]) > 0.9
     below = level & (scene.features[:, 2] < scene.anchor[2]) & scene.table.is_wall
     return len(history.seen) >= WALL_CYCLES and not below.any()
 
 
-def _floor(history: History, scene: Scene, rival: float) -> Verdict | None:
+def _floor(history: History, scene: BirthContext, rival: float) -> BirthDecision | None:
     """The floor under a known point, if it fits as well as any wall that one could choose freely."""
     if not _floor_wanted(history, scene):
         return None
     fits = [
         (int(p), fit_floor(scene.features[p], scene.anchor, history)) for p in _established(scene.table, history.side)
     ]
-    verdicts = [Verdict(RECIPROCAL, parent, fit) for parent, fit in fits if fit is not None]
+    verdicts = [BirthDecision(RECIPROCAL, parent, fit) for parent, fit in fits if fit is not None]
     if not verdicts:
         return None
     best = min(verdicts, key=lambda v: float(v.fit.cost))

@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Integers
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested.candidates import PredictedMeasurements, hidden_tracks
-from rislam_rt.slam.nested.tracks import Tracks, log_silence
+from rislam_rt.slam.nested.tracks import LandmarkTracks, log_silence
 from rislam_rt.slam.observations import OTHER, same_side
 
 STRIDE = 4
@@ -20,7 +20,7 @@ PARALLEL = 4.0
 """Standard deviations (and 0.02) within which a track's direction is that of a known leg."""
 
 
-def due_tracks(tracks: Tracks, predicted: PredictedMeasurements, cycle: int, config: SlamConfig) -> Integers:
+def due_tracks(tracks: LandmarkTracks, predicted: PredictedMeasurements, cycle: int, config: SlamConfig) -> Integers:
     """Tracks to examine now, the shortest first: an image lies behind its point, and is weaker.
 
     So a track has to wait while another that is shorter and stronger is still unexplained.
@@ -45,7 +45,7 @@ def due_tracks(tracks: Tracks, predicted: PredictedMeasurements, cycle: int, con
     return rows[np.argsort(tracks.mean[rows, 0, 0])]
 
 
-def _aligned(tracks: Tracks) -> Booleans:
+def _aligned(tracks: LandmarkTracks) -> Booleans:
     """(T, T) whether two tracks come from one direction: the longer is likely the shorter over a wall on the Tx leg."""
     gap = np.abs(tracks.mean[None, :, 1:, 0] - tracks.mean[:, None, 1:, 0])
     variance = tracks.covariance[..., 1:, 0, 0]

@@ -9,8 +9,8 @@ from rislam_rt.model import merged_pull
 from rislam_rt.slam.associate import DIAGONAL, Candidates, near_pairs, squared_distance
 from rislam_rt.slam.moments import POSE, Moments
 from rislam_rt.slam.nested.landmark_table import LandmarkTable
-from rislam_rt.slam.nested.measurement_prediction import Belief, Expected
-from rislam_rt.slam.nested.tracks import AMPLITUDE_WANDER, Tracks
+from rislam_rt.slam.nested.measurement_prediction import ExpectedReturns, MapBelief
+from rislam_rt.slam.nested.tracks import AMPLITUDE_WANDER, LandmarkTracks
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, same_side
 from rislam_rt.slam.returns import TX, Returns, linearise
 
@@ -42,7 +42,7 @@ class UnresolvedGroups(NamedTuple):
 class PredictedMeasurements(NamedTuple):
     """R expected returns, linearised about the mean belief."""
 
-    expected: Expected
+    expected: ExpectedReturns
     seen: Floats
     """(R, 3)."""
     covariance: Floats
@@ -61,7 +61,7 @@ class PredictedMeasurements(NamedTuple):
 
 
 def look_ahead(
-    belief: Belief, expected: Expected, moments: Moments, tracks: Tracks, apart: bool = False
+    belief: MapBelief, expected: ExpectedReturns, moments: Moments, tracks: LandmarkTracks, apart: bool = False
 ) -> PredictedMeasurements:
     """Predicted returns with their uncertainty; `apart`: the receiver sets the panel's returns apart."""
     returns, table = expected.returns, belief.table
@@ -103,7 +103,9 @@ def return_sides(returns: Returns, table: LandmarkTable, odds: float) -> Integer
     return sides
 
 
-def merge_returns(seen: Floats, expected: Expected, tracks: Tracks, cell: Floats, side: Integers) -> UnresolvedGroups:
+def merge_returns(
+    seen: Floats, expected: ExpectedReturns, tracks: LandmarkTracks, cell: Floats, side: Integers
+) -> UnresolvedGroups:
     """Foresee what the receiver cannot resolve: from the strongest down, each takes in all that is in its cell.
 
     Phases change by a turn every half wavelength of motion: a weaker path shifts the stronger by the root mean square
@@ -143,7 +145,7 @@ def merge_returns(seen: Floats, expected: Expected, tracks: Tracks, cell: Floats
     return UnresolvedGroups(partner, taken[:count], np.sqrt(variance[:count]), outshone[:count])
 
 
-def candidates(predicted: PredictedMeasurements, tracks: Tracks, hidden: Booleans) -> Candidates:
+def candidates(predicted: PredictedMeasurements, tracks: LandmarkTracks, hidden: Booleans) -> Candidates:
     """Expected returns, then the tracks that are not `hidden` (T,) behind one."""
     spread = predicted.covariance.copy()
     spread[:, DIAGONAL, DIAGONAL] += predicted.groups.disturbance**2
@@ -160,14 +162,14 @@ def candidates(predicted: PredictedMeasurements, tracks: Tracks, hidden: Boolean
     )
 
 
-def track_covariance(tracks: Tracks) -> Floats:
+def track_covariance(tracks: LandmarkTracks) -> Floats:
     """(T, 3, 3) of the predicted measurement of each track."""
     follow = np.zeros((len(tracks.misses), 3, 3))
     follow[:, DIAGONAL, DIAGONAL] = tracks.covariance[..., 0, 0]
     return follow
 
 
-def hidden_tracks(predicted: PredictedMeasurements, tracks: Tracks, gate: float) -> Booleans:
+def hidden_tracks(predicted: PredictedMeasurements, tracks: LandmarkTracks, gate: float) -> Booleans:
     """(T,) whether a track runs where the map expects a return of its strength (wall returns: where one is expected).
 
     Such a track would keep the measurements that prove the map right; it gives way to a return that fits at all.

@@ -16,16 +16,16 @@ from rislam_rt.slam.nested.candidates import PredictedMeasurements, candidates, 
 from rislam_rt.slam.nested.divergence_monitor import DivergenceMonitor, check
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, empty_table, remove
 from rislam_rt.slam.nested.landmark_update import Hits, learn
-from rislam_rt.slam.nested.measurement_prediction import Belief, detection_share, expected_returns
+from rislam_rt.slam.nested.measurement_prediction import MapBelief, detection_share, expected_returns
 from rislam_rt.slam.nested.particles import operations
-from rislam_rt.slam.nested.particles.operations import Particles, Update
+from rislam_rt.slam.nested.particles.operations import ParticleUpdate, PointParticles
 from rislam_rt.slam.nested.prune import keepers
 from rislam_rt.slam.nested.ris_candidate import weigh_tracks
 from rislam_rt.slam.nested.track_classification import classify_tracks
-from rislam_rt.slam.nested.tracks import Tracks, advance, begin, extend, has_ended, no_tracks
+from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, has_ended, no_tracks
 from rislam_rt.slam.observations import PANEL, Observations, free_space, is_los, observations_of, stranger_density
 from rislam_rt.slam.returns import Poses, compact
-from rislam_rt.slam.step_info import REMOVED, UNUSED, Outcome, StepInfo
+from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
 
 STRANGERS = np.array([1.3, 2.0, 3.0])
 """Factor on the standard deviations of returns over 0, 1 and 2 walls, for paths in their cell that the map lacks."""
@@ -38,10 +38,10 @@ class NestedState(NamedTuple):
 
     cycle: int
     config: SlamConfig
-    particles: Particles
+    particles: PointParticles
     """The belief over pose, recent poses and features."""
     table: LandmarkTable
-    tracks: Tracks
+    tracks: LandmarkTracks
     time: Floats
     """(W,) times [s] of the last W cycles."""
     monitor: DivergenceMonitor
@@ -120,7 +120,7 @@ def step(
     free = order[landmark[order] == UNUSED]
     observations = observations.take(free)
     moments = believed(state)
-    belief = Belief(moments.features, state.table, _poses(state, moments), state.body, state.sensor, state.ris)
+    belief = MapBelief(moments.features, state.table, _poses(state, moments), state.body, state.sensor, state.ris)
     expected = expected_returns(belief, code, config.max_bounces, config.use_vt)
     tracks = advance(state.tracks, dt, state.cycle, _bend(moments))
     predicted = look_ahead(belief, expected, moments, tracks, observations.side is not None)
@@ -173,7 +173,7 @@ def _correct(
     taken: Integers,
     *,
     rng: np.random.Generator,
-) -> Update:
+) -> ParticleUpdate:
     """The belief after the returns `hit` were seen as measurements `taken`."""
     partner = predicted.groups.partner[hit]
     returns = compact(predicted.expected.returns, hit)
@@ -188,7 +188,7 @@ def _correct(
 def _tidy(
     state: NestedState,
     predicted: PredictedMeasurements,
-    belief: Belief,
+    belief: MapBelief,
     config: SlamConfig,
     *,
     rng: np.random.Generator,
@@ -214,12 +214,12 @@ def _tidy(
 def _follow(
     state: NestedState,
     rates: Floats,
-    tracks: Tracks,
+    tracks: LandmarkTracks,
     observations: Observations,
     picks: Integers,
     num_returns: int,
     config: SlamConfig,
-) -> tuple[Tracks, Integers]:
+) -> tuple[LandmarkTracks, Integers]:
     """Tracks extended, begun and ended; and which measurements were taken for wall returns."""
     bright = (observations.ratio > config.nested.specular_ratio) & (observations.sides < PANEL)
     kept = (picks[num_returns:] >= 0).nonzero()[0]
@@ -269,9 +269,9 @@ def _bend(moments: Moments) -> Floats:
     return np.array([0.02 + speed**2, 0.02 + speed**2, 0.02 + speed**2])
 
 
-def _outcome(num_measurements: int, num_features: int, monitor: DivergenceMonitor) -> Outcome:
+def _outcome(num_measurements: int, num_features: int, monitor: DivergenceMonitor) -> StepOutcome:
     if num_measurements == 0:
-        return Outcome.NO_MEASUREMENTS
+        return StepOutcome.NO_MEASUREMENTS
     if num_features == 0:
-        return Outcome.NO_LANDMARKS
-    return Outcome.DIVERGED if monitor.diverged else Outcome.OK
+        return StepOutcome.NO_LANDMARKS
+    return StepOutcome.DIVERGED if monitor.diverged else StepOutcome.OK

@@ -21,7 +21,7 @@ from rislam_rt.slam.identity import (
 from rislam_rt.slam.moments import Moments, poses_of, square_root
 from rislam_rt.slam.nested.candidates import PredictedMeasurements
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, image_idents, learn_ratio
-from rislam_rt.slam.nested.measurement_prediction import Belief, Expected
+from rislam_rt.slam.nested.measurement_prediction import ExpectedReturns, MapBelief
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.returns import NONE, TX, Returns, compact, observe
 
@@ -48,7 +48,7 @@ class Hits(NamedTuple):
 
 
 def learn(
-    belief: Belief,
+    belief: MapBelief,
     moments: Moments,
     predicted: PredictedMeasurements,
     hits: Hits,
@@ -91,7 +91,7 @@ def learn(
     return table, names
 
 
-def _name(table: LandmarkTable, expected: Expected, rows: Integers) -> tuple[LandmarkTable, Integers]:
+def _name(table: LandmarkTable, expected: ExpectedReturns, rows: Integers) -> tuple[LandmarkTable, Integers]:
     """The ident of the landmark (point, image, or wall of a moving image) that each of the returns belongs to."""
     returns, owner = expected.returns, expected.owner[rows]
     names, point = table.ident[owner], returns.point[rows]
@@ -119,7 +119,7 @@ def _detection_rate(table: LandmarkTable, predicted: PredictedMeasurements, hit:
 
 def _weigh(
     table: LandmarkTable,
-    belief: Belief,
+    belief: MapBelief,
     moments: Moments,
     direct: Returns,
     amplitude: Floats,
@@ -148,7 +148,7 @@ def _weigh(
 
 def _weigh_silent(
     table: LandmarkTable,
-    belief: Belief,
+    belief: MapBelief,
     moments: Moments,
     direct: Returns,
     code: RisCode,
@@ -172,7 +172,7 @@ def _weigh_silent(
 
 
 def _sampled_gains(
-    belief: Belief, moments: Moments, points: Sequence[int] | Integers, code: RisCode, *, rng: np.random.Generator
+    belief: MapBelief, moments: Moments, points: Sequence[int] | Integers, code: RisCode, *, rng: np.random.Generator
 ) -> list[Complexes]:
     """The gain (P, S) of each panel if it were at each of the points, over samples of pose and map together."""
     assert belief.ris is not None

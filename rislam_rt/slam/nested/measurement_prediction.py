@@ -12,7 +12,7 @@ from rislam_rt.model import Body, DataSheet, RadioConfig, RisCode, RisSpec, Sens
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.nested.landmark_table import LandmarkTable
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, Sight, bounced, compact, observe, reflect
+from rislam_rt.slam.returns import NONE, TX, Poses, PredictedReturn, Returns, bounced, compact, observe, reflect
 
 FAINT = 0.35
 """Amplitude, in units of the detection threshold, down to which a return is still looked for."""
@@ -26,7 +26,7 @@ PANEL_AMPLITUDE_STD = 0.7
 """Spread of the panel's predicted log amplitude: its gain depends on phases, hence on millimetres."""
 
 
-class Expected(NamedTuple):
+class ExpectedReturns(NamedTuple):
     """R returns worth looking for."""
 
     returns: Returns
@@ -46,7 +46,7 @@ class Expected(NamedTuple):
     """(R,) strong enough to be seen for certain, unless something shades it."""
 
 
-class Belief(NamedTuple):
+class MapBelief(NamedTuple):
     """The mean of the belief, in which returns are enumerated and linearised."""
 
     features: Floats
@@ -68,7 +68,7 @@ class Belief(NamedTuple):
         return float(amplitude_std(self.radio) * np.sqrt(2.0 * self.sensor.threshold))
 
 
-def expected_returns(belief: Belief, code: RisCode | None, max_bounces: int, use_vt: bool) -> Expected:
+def expected_returns(belief: MapBelief, code: RisCode | None, max_bounces: int, use_vt: bool) -> ExpectedReturns:
     """All returns of up to `max_bounces` bounces that arrive from above and are not hopelessly faint."""
     table = belief.table
     returns = enumerate_returns(tuple(table.points.tolist()), tuple(table.walls.tolist()), max_bounces, use_vt)
@@ -78,14 +78,14 @@ def expected_returns(belief: Belief, code: RisCode | None, max_bounces: int, use
     sight = observe(returns, belief.features, table.anchor, belief.poses)
     heard = (sight.up > np.where(returns.point == TX, -LEVEL, HORIZON)).nonzero()[0]
     returns = Returns(returns.legs, returns.tx[heard], returns.rx[heard])
-    sight = Sight._make(field[heard] for field in sight)
+    sight = PredictedReturn._make(field[heard] for field in sight)
     amplitude, spread = predicted_amplitudes(belief, returns, sight, code)
     visible = ((amplitude >= FAINT * belief.threshold) | (bounces(returns) == 0)).nonzero()[0]
     kept, amplitude = compact(returns, visible), amplitude[visible]
     log_amplitude = np.log(np.maximum(amplitude, 1e-30))
     number, owner, by_parent = _roles(table, kept)
     likely = amplitude > 2.0 * belief.threshold
-    return Expected(kept, log_amplitude, spread[visible], number, owner, by_parent, partners(kept), likely)
+    return ExpectedReturns(kept, log_amplitude, spread[visible], number, owner, by_parent, partners(kept), likely)
 
 
 @lru_cache(maxsize=64)
@@ -138,13 +138,15 @@ def partners(returns: Returns) -> Integers:
     return np.array([row_of.get((rx, tx), -1) if rx != tx else -1 for rx, tx in pairs], dtype=np.int64)
 
 
-def detection_share(table: LandmarkTable, expected: Expected) -> Floats:
+def detection_share(table: LandmarkTable, expected: ExpectedReturns) -> Floats:
     """(R,) share of the cycles in which what each return speaks about showed lately, of those in which it should."""
     over_tx = expected.returns.legs[expected.returns.tx, 1] != NONE
     return table.detection_rate[expected.owner, over_tx.astype(np.int64)]
 
 
-def predicted_amplitudes(belief: Belief, returns: Returns, sight: Sight, code: RisCode | None) -> tuple[Floats, Floats]:
+def predicted_amplitudes(
+    belief: MapBelief, returns: Returns, sight: PredictedReturn, code: RisCode | None
+) -> tuple[Floats, Floats]:
     """Amplitude (R,) and standard deviation of its logarithm (R,)."""
     table, radio = belief.table, belief.radio
     if not len(returns.tx):
@@ -173,7 +175,7 @@ def predicted_amplitudes(belief: Belief, returns: Returns, sight: Sight, code: R
     return amplitude, spread
 
 
-def _panel_amplitudes(belief: Belief, returns: Returns, sheet: RisSpec, code: RisCode) -> Floats:
+def _panel_amplitudes(belief: MapBelief, returns: Returns, sheet: RisSpec, code: RisCode) -> Floats:
     """|gain| (R,) of a panel's returns with perfect walls."""
     radio, returns = belief.radio, compact(returns, np.arange(len(returns.tx)))
     center, legs = belief.features[returns.legs[:, 0]], returns.legs
@@ -184,7 +186,7 @@ def _panel_amplitudes(belief: Belief, returns: Returns, sheet: RisSpec, code: Ri
     return np.abs(panel_gain(tx[returns.tx], rx[returns.rx], code))
 
 
-def _unfolded(belief: Belief, legs: Integers, device: Floats) -> Floats:
+def _unfolded(belief: MapBelief, legs: Integers, device: Floats) -> Floats:
     """Device (G, 3) mirrored in the walls of each leg, so that it lies where the panel's ray seems to come from."""
     end = np.tile(device, (len(legs), 1))
     for column in (2, 1):
@@ -201,7 +203,7 @@ def _leg_ratio(table: LandmarkTable, returns: Returns) -> tuple[Floats, Floats]:
     return total.sum(axis=1), variance.sum(axis=1)
 
 
-def possible_legs(belief: Belief, returns: Returns) -> Booleans:
+def possible_legs(belief: MapBelief, returns: Returns) -> Booleans:
     """(G,) whether each bounce of a leg has both its ends on one side of the wall.
 
     Mirroring takes a source away from the device then, by twice the smaller of both depths at least; an image that

@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import Moments, poses_of
 from rislam_rt.slam.nested.landmark_table import LandmarkTable
-from rislam_rt.slam.nested.tracks import Tracks
+from rislam_rt.slam.nested.tracks import LandmarkTracks
 from rislam_rt.slam.returns import reflect
 from rislam_rt.slam.ris_candidate import rays
 
@@ -14,7 +14,7 @@ MIRROR_CYCLES = 3
 """Measurements of a wall return before it is held against points."""
 
 
-def mirror_images(tracks: Tracks, moments: Moments, table: LandmarkTable, body: Body) -> Floats:
+def mirror_images(tracks: LandmarkTracks, moments: Moments, table: LandmarkTable, body: Body) -> Floats:
     """Images (V, 3) [m] of the agent, from the wall returns that are followed now and from the walls of the map."""
     rows = np.flatnonzero(tracks.specular & (tracks.misses == 0) & (tracks.length >= MIRROR_CYCLES))
     seen = tracks.mean[rows, :, 0]

@@ -7,7 +7,7 @@ from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.moments import Moments
 from rislam_rt.slam.nested.candidates import PredictedMeasurements
 from rislam_rt.slam.nested.landmark_table import LandmarkTable
-from rislam_rt.slam.nested.measurement_prediction import Belief
+from rislam_rt.slam.nested.measurement_prediction import MapBelief
 from rislam_rt.slam.returns import NONE, TX, reflect
 
 MAX_DRIFT = 0.8
@@ -27,7 +27,7 @@ SLACK = 0.03
 
 
 def keepers(
-    moments: Moments, table: LandmarkTable, predicted: PredictedMeasurements, belief: Belief, config: SlamConfig
+    moments: Moments, table: LandmarkTable, predicted: PredictedMeasurements, belief: MapBelief, config: SlamConfig
 ) -> Booleans:
     """(F,) the features that should stay."""
     if not len(table.ident):
@@ -57,7 +57,7 @@ def _doubles(moments: Moments, table: LandmarkTable, distance: float) -> Boolean
     return double
 
 
-def _derived(moments: Moments, predicted: PredictedMeasurements, belief: Belief, distance: float) -> Booleans:
+def _derived(moments: Moments, predicted: PredictedMeasurements, belief: MapBelief, distance: float) -> Booleans:
     """(F,) points that are images of other points, and walls whose images other walls make together.
 
     A corner throws an image that a single slanted wall would throw as well, and walls on both legs make a static
@@ -85,7 +85,7 @@ def _derived(moments: Moments, predicted: PredictedMeasurements, belief: Belief,
     return derived
 
 
-def _images(moments: Moments, belief: Belief, legs: Integers) -> tuple[Floats, Floats]:
+def _images(moments: Moments, belief: MapBelief, legs: Integers) -> tuple[Floats, Floats]:
     """Images (G, 3) of the legs at the mean belief, with a covariance (G, 3, 3) from their features one by one."""
     image = belief.features[legs[:, 0]]
     spread = np.array([moments.block(int(row)) for row in legs[:, 0]])

@@ -12,9 +12,9 @@ from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.identity import TOLD, add_evidence, log_panel, log_panel_missed, log_scatterer, log_scatterer_missed
 from rislam_rt.slam.moments import Moments, even_draws, poses_of
 from rislam_rt.slam.nested.landmark_table import LandmarkTable
-from rislam_rt.slam.nested.measurement_prediction import Belief
+from rislam_rt.slam.nested.measurement_prediction import MapBelief
 from rislam_rt.slam.nested.mirrors import is_behind_mirror, mirror_images
-from rislam_rt.slam.nested.tracks import Tracks
+from rislam_rt.slam.nested.tracks import LandmarkTracks
 from rislam_rt.slam.observations import PANEL, UNTOLD
 from rislam_rt.slam.ris_candidate import DEEP, DISMISSAL, PATIENCE, places
 
@@ -22,7 +22,7 @@ DRAWS = 12
 """Places of a track over which the panel's predicted gain is averaged."""
 
 
-def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None) -> Tracks:
+def weigh_tracks(tracks: LandmarkTracks, belief: MapBelief, code: RisCode | None) -> LandmarkTracks:
     """The tracks after what this cycle tells of each: is it one of the panels?"""
     rows = np.flatnonzero(~tracks.specular)
     if belief.ris is None or code is None or not len(rows):
@@ -54,7 +54,7 @@ def weigh_tracks(tracks: Tracks, belief: Belief, code: RisCode | None) -> Tracks
 
 
 def find_panel_candidate(
-    tracks: Tracks, table: LandmarkTable, moments: Moments, body: Body, panel: int = 0
+    tracks: LandmarkTracks, table: LandmarkTable, moments: Moments, body: Body, panel: int = 0
 ) -> PanelCandidate | None:
     """The landmark or track that is the likeliest to be a panel; None if nothing is likelier the panel than not.
 

@@ -12,15 +12,21 @@ from rislam_rt.slam.classify import (
     sightings_of,
     track_features,
 )
-from rislam_rt.slam.nested.tracks import Tracks
+from rislam_rt.slam.nested.tracks import LandmarkTracks
 
 LOOK_EVERY = 4
 """Cycles between looks; until its first one a track is judged by its amplitude."""
 
 
 def classify_tracks(
-    tracks: Tracks, position: Floats, heading: Floats, cycle: int, body: Body, radio: RadioConfig, classifier: str
-) -> Tracks:
+    tracks: LandmarkTracks,
+    position: Floats,
+    heading: Floats,
+    cycle: int,
+    body: Body,
+    radio: RadioConfig,
+    classifier: str,
+) -> LandmarkTracks:
     """Tracks with the classifier's odds; unchanged between its looks and by the rule `amplitude`.
 
     `position` (W, 3) [m] and `heading` (W,) [rad] of the agent as it believes, cycle k at row k % W.

@@ -19,7 +19,7 @@ FAINTEST = 0.1
 """Least share of cycles from which the strength of a path is reckoned."""
 
 
-class Tracks(NamedTuple):
+class LandmarkTracks(NamedTuple):
     """T tracks, each a Kalman filter of constant rate in length and either cosine, and its last W measurements."""
 
     mean: Floats
@@ -73,12 +73,12 @@ class Tracks(NamedTuple):
         """(T,) cycles without a measurement between the oldest and the latest that are held."""
         return np.asarray(np.maximum(self.age(cycle) + 1 - self.length - self.misses, 0))
 
-    def keep(self, rows: Booleans) -> "Tracks":
+    def keep(self, rows: Booleans) -> "LandmarkTracks":
         """Only some of the tracks."""
-        return Tracks._make(field[rows] for field in self)
+        return LandmarkTracks._make(field[rows] for field in self)
 
 
-def log_silence(tracks: Tracks, cycle: int) -> Floats:
+def log_silence(tracks: LandmarkTracks, cycle: int) -> Floats:
     """(T,) log probability of gaps as long as the present ones, by the tracks' own past.
 
     What shows in every cycle has ended after a few without it; what lies near the detection threshold comes and goes.
@@ -95,13 +95,13 @@ def log_silence(tracks: Tracks, cycle: int) -> Floats:
     )
 
 
-def has_ended(tracks: Tracks, cycle: int, max_misses: int) -> Booleans:
+def has_ended(tracks: LandmarkTracks, cycle: int, max_misses: int) -> Booleans:
     """(T,) tracks that were not seen for longer than `max_misses`, and than their past lets expect."""
     patient = (tracks.length >= PATIENT_CYCLES) & (log_silence(tracks, cycle) > LOST)
     return np.asarray((tracks.misses > max_misses) & ~patient)
 
 
-def overstatement(tracks: Tracks, cycle: int, threshold: float) -> Floats:
+def overstatement(tracks: LandmarkTracks, cycle: int, threshold: float) -> Floats:
     """(T,) factor by which the amplitudes of a track exceed its path's, and its reported deviations fall short.
 
     Of a path near the threshold only those amplitudes are measured that noise lifts above it. The share p of cycles in
@@ -115,9 +115,9 @@ def overstatement(tracks: Tracks, cycle: int, threshold: float) -> Floats:
     return np.asarray(1.0 + np.exp(-0.5 * quantile**2) / np.sqrt(2.0 * np.pi) / share / mean)
 
 
-def no_tracks(window: int, panels: int = 1) -> Tracks:
+def no_tracks(window: int, panels: int = 1) -> LandmarkTracks:
     """Nothing seen yet, in a room of so many panels."""
-    return Tracks(
+    return LandmarkTracks(
         np.zeros((0, 3, 2)),
         np.zeros((0, 3, 2, 2)),
         np.zeros(0),
@@ -136,7 +136,7 @@ def no_tracks(window: int, panels: int = 1) -> Tracks:
     )
 
 
-def advance(tracks: Tracks, dt: float, cycle: int, bend: Floats) -> Tracks:
+def advance(tracks: LandmarkTracks, dt: float, cycle: int, bend: Floats) -> LandmarkTracks:
     """Predict every track over `dt` and forget what lies more than a window back; `bend` (3,) is the rate's drift."""
     transition = np.array([[1.0, dt], [0.0, 1.0]])
     noise = np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]]) * (bend**2)[:, None, None]
@@ -146,8 +146,8 @@ def advance(tracks: Tracks, dt: float, cycle: int, bend: Floats) -> Tracks:
 
 
 def extend(
-    tracks: Tracks, rows: Integers, observations: Observations, picks: Integers, bright: Booleans, cycle: int
-) -> Tracks:
+    tracks: LandmarkTracks, rows: Integers, observations: Observations, picks: Integers, bright: Booleans, cycle: int
+) -> LandmarkTracks:
     """Tracks `rows` (A,) updated by measurements `picks` (A,); `bright` (M,) tells those as strong as wall returns."""
     if not len(rows):
         return tracks
@@ -180,8 +180,8 @@ def extend(
 
 
 def begin(
-    tracks: Tracks, observations: Observations, picks: Integers, bright: Booleans, rate: Floats, cycle: int
-) -> Tracks:
+    tracks: LandmarkTracks, observations: Observations, picks: Integers, bright: Booleans, rate: Floats, cycle: int
+) -> LandmarkTracks:
     """One new track for each of the measurements `picks` (A,); `rate` (3,) is the spread of rates to expect."""
     if not len(picks):
         return tracks
@@ -196,7 +196,7 @@ def begin(
     slot = cycle % window
     seen[:, slot], std[:, slot], cycles[:, slot] = observations.seen[picks], observations.std[picks], cycle
     level[:, slot] = observations.log_amplitude[picks]
-    fresh = Tracks(
+    fresh = LandmarkTracks(
         mean,
         covariance,
         observations.log_amplitude[picks],
@@ -213,4 +213,4 @@ def begin(
         np.zeros((count, tracks.log_ris.shape[1])),
         observations.sides[picks],
     )
-    return Tracks._make(np.concatenate([old, new]) for old, new in zip(tracks, fresh, strict=True))
+    return LandmarkTracks._make(np.concatenate([old, new]) for old, new in zip(tracks, fresh, strict=True))

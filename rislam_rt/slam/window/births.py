@@ -5,22 +5,22 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.returns import TX, linearise
-from rislam_rt.slam.window import gauss, tracks
-from rislam_rt.slam.window.book import enter, idents
+from rislam_rt.slam.window import tracks, window_gaussian
 from rislam_rt.slam.window.context import Context, resolve
-from rislam_rt.slam.window.digest import Digest, digest
-from rislam_rt.slam.window.expect import Clusters, Expected
-from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.guesses import BESIDE, known_features
-from rislam_rt.slam.window.kinds import NEW, Verdict, judge, wanted
-from rislam_rt.slam.window.learn import seed
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.feature_removal import behind, release
+from rislam_rt.slam.window.hypotheses import BESIDE, known_features
+from rislam_rt.slam.window.landmark_table import enter, idents
+from rislam_rt.slam.window.landmark_update import seed
+from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, UnresolvedClusters
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER, STRIDE
-from rislam_rt.slam.window.retract import behind, release
+from rislam_rt.slam.window.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.steps import HEAD
+from rislam_rt.slam.window.track_classification import NEW, TrackDecision, judge, wanted
+from rislam_rt.slam.window.track_summary import TrackSummary, summarise_tracks
 
 
-def births(context: Context, expected: Expected, groups: Clusters) -> Context:
+def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClusters) -> Context:
     """Every track whose time has come is weighed; the shortest of those that are clear enters."""
     rows = tracks.due(context.tracks, context.cycle)
     if not len(rows) or (context.cycle % STRIDE and context.cycle > 12):
@@ -31,11 +31,11 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     if not full:
         return context
     rows, ats = rows[full], [ats[place] for place in full]
-    mean, covariance = gauss.now(context.window)
-    known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.book, mean[:3])
-    histories = digest(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
+    mean, covariance = window_gaussian.now(context.window)
+    known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.landmarks, mean[:3])
+    histories = summarise_tracks(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
     told = explanations(context, rows, histories, expected, groups, mean, covariance)
-    panels = context.book.panels
+    panels = context.landmarks.panels
     lonely = _missing_legs(context, histories, mean)
     beside = np.zeros(len(rows)) if context.scene.use_vt else _company(context, ats, histories, mean)
     over = [(row, value, panels.index(base) if (base := int(forms[0, 0])) >= 0 and base in panels else -1)
@@ -44,11 +44,11 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked, returns = context.tracks.looked.copy(), context.scene.use_vt
     for (row, _, forms, column), share in zip(told, shares, strict=True):
-        if share > LEVELS.born:
+        if share > CONSTANTS.born:
             if not returns and forms[0, 0] == TX:  # what it is is known, and that is all it is asked for
                 gone[rows[row]] = True
                 continue
-            named = idents(context.book, forms)
+            named = idents(context.landmarks, forms)
             if not _taken(context, ats[row], named[0]):
                 part = float(groups.share[column])
                 context = _assign(context, ats[row], named, histories.scatter[row], part)
@@ -73,7 +73,7 @@ def births(context: Context, expected: Expected, groups: Clusters) -> Context:
     return context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
 
 
-def _missing_legs(context: Context, histories: Digest, mean: Floats) -> Floats:
+def _missing_legs(context: Context, histories: TrackSummary, mean: Floats) -> Floats:
     """(T,) log probability that of two walls that throw a track together so many single returns are not heard.
 
     Two walls shift the Tx by the sum of what each does: a single return of theirs comes along the same line (opposite
@@ -84,9 +84,9 @@ def _missing_legs(context: Context, histories: Digest, mean: Floats) -> Floats:
     old = every.hits >= 3
     away, reach = _bearings(context, old, mean)
     bright = (every.log_amplitude[old] + np.log(reach))[None] > shine[:, None] - 0.3
-    walls = context.book.walls
+    walls = context.landmarks.walls
     if len(walls):
-        place, anchor = mean[HEAD:].reshape(-1, 3)[walls], context.book.anchor[walls]
+        place, anchor = mean[HEAD:].reshape(-1, 3)[walls], context.landmarks.anchor[walls]
         span = place - anchor
         normal = span / np.linalg.norm(span, axis=1)[:, None]
         depth = np.vecdot(0.5 * (place + anchor) - mean[:3], normal)
@@ -96,7 +96,7 @@ def _missing_legs(context: Context, histories: Digest, mean: Floats) -> Floats:
     along, share = ray @ away.T, reach / length[:, None]
     leg = (np.abs(along - share) < LEG) | (np.abs(along) > 1.0 - LEG)
     found = (leg & (share < 0.995) & bright).sum(axis=1)
-    missing = np.array([LEVELS.log_rare, np.log1p(-LEVELS.steady), 0.0])  # both, one of them, none
+    missing = np.array([CONSTANTS.log_rare, np.log1p(-CONSTANTS.steady), 0.0])  # both, one of them, none
     return missing[np.minimum(found, 2)]
 
 
@@ -110,14 +110,14 @@ def _bearings(context: Context, rows: Booleans, mean: Floats) -> tuple[Floats, F
     return away, np.maximum(context.tracks.mean[rows, 0, 0], 0.1)
 
 
-def _company(context: Context, ats: list[Integers], histories: Digest, mean: Floats) -> Floats:
+def _company(context: Context, ats: list[Integers], histories: TrackSummary, mean: Floats) -> Floats:
     """(T,) log odds by which a direction speaks for a path over unknown walls, and against all else: a shorter one
     comes from there.
 
     A wall on the Tx leg alone changes the length and not the direction: the point itself is heard there as well.
     """
     away, reach = _bearings(context, context.tracks.hits >= 3, mean)
-    span = mean[HEAD:].reshape(-1, 3)[context.book.points] - mean[:3]
+    span = mean[HEAD:].reshape(-1, 3)[context.landmarks.points] - mean[:3]
     far = np.linalg.norm(span, axis=1)
     away, reach = np.concatenate([away, span / np.maximum(far, 0.05)[:, None]]), np.append(reach, 2.0 * far)
     ray, length = histories.direction, histories.mean[0][:, 0]
@@ -136,7 +136,8 @@ LEG = 0.04
 
 
 def explanations(
-    context: Context, rows: Integers, histories: Digest, expected: Expected, groups: Clusters, mean: Floats,
+    context: Context, rows: Integers, histories: TrackSummary, expected: ExpectedComponents,
+    groups: UnresolvedClusters, mean: Floats,
     covariance: Floats,
 ) -> list[tuple[int, float, Integers, int]]:  # fmt: skip
     """(track, log evidence, forms (2, 5) of feature rows, cluster) of returns of the map: nothing is free in them."""
@@ -165,7 +166,8 @@ def explanations(
 
 
 def _explain(
-    context: Context, histories: Digest, row: int, forms: Integers, groups: Clusters, column: int, gap: Floats,
+    context: Context, histories: TrackSummary, row: int, forms: Integers, groups: UnresolvedClusters, column: int,
+    gap: Floats,
     features: Floats, root: Floats,
 ) -> float:  # fmt: skip
     """Log evidence of one explanation."""
@@ -174,7 +176,7 @@ def _explain(
     used = histories.weight[row, :, 0] > 0.0
     poses = Poses(histories.tx[row, used], histories.rx[row, used], np.zeros(int(used.sum())))
     parts = forms[forms[:, 0] != UNKNOWN]
-    linear = linearise(compile_forms(parts), features, context.book.anchor, poses)
+    linear = linearise(compile_forms(parts), features, context.landmarks.anchor, poses)
     weight = np.array([1.0 - groups.share[column], groups.share[column]])[: len(parts)]
     weight = weight / weight.sum()
     value = np.einsum("r,krj->kj", weight, linear.seen)
@@ -193,11 +195,11 @@ def _explain(
         normal = heavy.T @ flat + np.eye(flat.shape[1])
         error = np.linalg.solve(normal, heavy.T @ left.ravel())
         squared = np.sum((left - (flat @ error).reshape(-1, 3)) ** 2, axis=1)
-        trust = (LEVELS.tail + 3.0) / (LEVELS.tail + squared)
-    cost = (LEVELS.tail + 3.0) * np.log1p(squared / LEVELS.tail).sum() + error @ error
+        trust = (CONSTANTS.tail + 3.0) / (CONSTANTS.tail + squared)
+    cost = (CONSTANTS.tail + 3.0) * np.log1p(squared / CONSTANTS.tail).sum() + error @ error
     cost += 2.0 * np.log(std / reported).sum()
     level = histories.log_amplitude[row] - groups.log_amplitude[column]
-    variance = groups.log_amplitude_std[column] ** 2 + LEVELS.fading**2
+    variance = groups.log_amplitude_std[column] ** 2 + CONSTANTS.fading**2
     evidence = -0.5 * cost - 0.5 * np.linalg.slogdet(normal)[1] - 0.5 * level**2 / variance - 0.5 * np.log(variance)
     return float(evidence)
 
@@ -215,31 +217,33 @@ def _assign(context: Context, at: Integers, forms: Integers, scatter: Floats, pa
     form, share, extra = log.form.copy(), log.share.copy(), log.extra.copy()
     form[at] = forms
     share[at] = part if forms[1, 0] != UNKNOWN else 0.0
-    extra[at] = LEVELS.memory * log.std[at] ** 2 * (scatter**2 - 1.0)
+    extra[at] = CONSTANTS.memory * log.std[at] ** 2 * (scatter**2 - 1.0)
     return context._replace(log=log._replace(form=form, share=share, extra=extra))
 
 
-def _enter(context: Context, at: Integers, verdict: Verdict, histories: Digest, row: int) -> tuple[Context, bool]:
+def _enter(
+    context: Context, at: Integers, verdict: TrackDecision, histories: TrackSummary, row: int
+) -> tuple[Context, bool]:
     """The map with a new feature and its history, solved anew; as it was, if they do not agree."""
-    new = len(context.book.ident)
+    new = len(context.landmarks.ident)
     holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))
-    window = gauss.add_feature(context.window, verdict.place, holds)
-    book = enter(context.book, verdict.is_wall, histories.middle, len(at), 5.0, verdict.identity)
+    window = window_gaussian.add_feature(context.window, verdict.place, holds)
+    landmarks = enter(context.landmarks, verdict.is_wall, histories.middle, len(at), 5.0, verdict.identity)
     forms = np.full((2, 5), UNKNOWN)
     forms[0] = [new if part == NEW else part for part in verdict.form]
     if verdict.kind == BESIDE:
         forms[1] = [*forms[0][:4], verdict.known]
-    grown = context._replace(window=window, book=book)
+    grown = context._replace(window=window, landmarks=landmarks)
     share = min(max(verdict.share, 0.0), 1.0)
-    grown = _assign(grown, at, idents(book, forms), histories.scatter[row], share)
+    grown = _assign(grown, at, idents(landmarks, forms), histories.scatter[row], share)
     window, left = resolve(grown, 3)
     if not np.isfinite(window.head).all():
         return context, False
     fresh = np.isin(left.row, at)
-    if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > 3.0 * LEVELS.fit:
+    if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > 3.0 * CONSTANTS.fit:
         return context, False
     square = float(np.mean(histories.scatter[row] ** 2))
-    grown = grown._replace(window=window, sights=seed(context.sights, forms[:1], book, square))
+    grown = grown._replace(window=window, visibility=seed(context.visibility, forms[:1], landmarks, square))
     if verdict.is_wall:
         grown = release(grown, ~behind(grown, new))
     return grown, True

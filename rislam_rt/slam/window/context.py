@@ -6,26 +6,26 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import RisCode
-from rislam_rt.slam.window import gauss
-from rislam_rt.slam.window.book import Book
-from rislam_rt.slam.window.expect import Scene
-from rislam_rt.slam.window.gauss import Window
-from rislam_rt.slam.window.learn import Sights
-from rislam_rt.slam.window.log import Log, Residuals, renew
-from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window import window_gaussian
+from rislam_rt.slam.window.landmark_table import WindowTable
+from rislam_rt.slam.window.landmark_update import VisibilityObservations
+from rislam_rt.slam.window.measurement_log import Log, Residuals, renew
+from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
+from rislam_rt.slam.window.tracks import WindowTracks
+from rislam_rt.slam.window.window_gaussian import Window
 
 
 class Context(NamedTuple):
     """The belief, the window's components, and the tracks among them."""
 
     window: Window
-    book: Book
+    landmarks: WindowTable
     log: Log
-    tracks: Tracks
+    tracks: WindowTracks
     heading: Floats
-    scene: Scene
+    scene: KnownEnvironment
     cycle: int
-    sights: Sights
+    visibility: VisibilityObservations
     codes: tuple[RisCode | None, ...]
 
 
@@ -33,6 +33,6 @@ def resolve(context: Context, steps: int) -> tuple[Window, Residuals]:
     """Gauss-Newton over the whole window."""
     window, every = context.window, np.arange(context.window.num_poses)
     for _ in range(steps):
-        window, left = renew(window, context.log, context.book, context.scene.body, context.heading, every)
-        window = gauss.weigh_holds(gauss.solve(window))
+        window, left = renew(window, context.log, context.landmarks, context.scene.body, context.heading, every)
+        window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return window, left

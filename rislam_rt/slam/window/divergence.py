@@ -10,16 +10,16 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.window import egomotion, gauss
+from rislam_rt.slam.window import egomotion, window_gaussian
+from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.egomotion import Rates
 from rislam_rt.slam.window.factor import inverse
-from rislam_rt.slam.window.gauss import Quadratic, Window
-from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.log import Log
-from rislam_rt.slam.window.look import Look
+from rislam_rt.slam.window.measurement_log import Log
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import LADDER
 from rislam_rt.slam.window.steps import HEAD
 from rislam_rt.slam.window.tracks import CYCLE
+from rislam_rt.slam.window.window_gaussian import Quadratic, Window
 
 RATE = 1e-4
 """Probability that a cycle is the one in which the agent is lost: once in 1000 s."""
@@ -53,12 +53,12 @@ def advance(log_odds: float, score: float, followed: int, kept: int) -> float:
     return float(np.clip(np.log(lost / (1.0 - lost)) - score, SURE, -SURE))
 
 
-def jump(view: Look, glance: Observations) -> Floats:
+def jump(view: CycleAssociation, observed: Observations) -> Floats:
     """(3,) [m] by which an agent that hears this is elsewhere than thought: on which most returns agree."""
     lead = view.groups.leader
-    expected, heard = view.expected.seen[lead], glance.seen
+    expected, heard = view.expected.seen[lead], observed.seen
     off = np.abs(heard[:, 1:] - expected[:, None, 1:]).max(axis=-1)
-    level = np.abs(glance.log_amplitude - view.groups.log_amplitude[:, None])
+    level = np.abs(observed.log_amplitude - view.groups.log_amplitude[:, None])
     off = off + np.where(level < 10.0 * ALIKE, 0.0, ALIKE)
     near = np.argsort(off, axis=None, kind="stable")[:PAIRS]
     row, column = np.unravel_index(near[off.ravel()[near] < ALIKE], off.shape)
@@ -82,7 +82,7 @@ def shifted(window: Window, by: Floats) -> Window:
 def landed(window: Window, by: Floats) -> Window:
     """The window after a jump: its last pose alone, elsewhere within `JUMP`; velocity and map as they were."""
     while window.num_poses > 1:
-        window = gauss.slide(window)
+        window = window_gaussian.slide(window)
     head, size = window.head.copy(), len(window.head)
     head[:3] += by
     covariance = inverse(window.prior.hessian)
@@ -117,9 +117,9 @@ def ask_picture(window: Window, log: Log, heading: Floats, baseline: float, live
     found = egomotion.rates(log, heading[-PAST - 1 :], time / PAST, baseline)
     if len(found.rate) < egomotion.FEWEST:
         return 0.0
-    place = gauss.poses(window)[-PAST - 1 :, :3]
+    place = window_gaussian.poses(window)[-PAST - 1 :, :3]
     # what a clock that stands still does not allow for was not foreseen
-    std = passed / time * np.sqrt(np.diag(gauss.now(window)[1])[3:6] + (lively * time) ** 2) + 1e-6
+    std = passed / time * np.sqrt(np.diag(window_gaussian.now(window)[1])[3:6] + (lively * time) ** 2) + 1e-6
     return egomotion.weigh(found, (place[-1] - place[0]) / time, std).log_odds - egomotion.LOG_WRONG
 
 
@@ -144,9 +144,9 @@ def with_free_compass(window: Window, std: float) -> Window:
 
 
 def _begun(window: Window, head: Floats, hessian: Floats) -> Window:
-    return gauss.solve(window._replace(head=head, prior=Quadratic(hessian, np.zeros(len(head)), head)))
+    return window_gaussian.solve(window._replace(head=head, prior=Quadratic(hessian, np.zeros(len(head)), head)))
 
 
 def is_lost(log_odds: float) -> bool:
     """Whether the map is given up."""
-    return log_odds > np.log(LEVELS.born / (1.0 - LEVELS.born))
+    return log_odds > np.log(CONSTANTS.born / (1.0 - CONSTANTS.born))

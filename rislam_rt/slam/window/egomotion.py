@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.window.forms import UNKNOWN
-from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.log import Log, unique_forms
+from rislam_rt.slam.window.measurement_log import Log, unique_forms
+from rislam_rt.slam.window.model_constants import CONSTANTS
+from rislam_rt.slam.window.path_forms import UNKNOWN
 
 WALK = 1.0
 """Standard deviation [m/s] of a velocity of which nothing is known."""
@@ -88,7 +88,7 @@ def rates(log: Log, heading: Floats, step: float, baseline: float) -> Rates:
     toward /= np.bincount(which, minlength=count)[:, None]
     up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
     toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
-    rate, variance = (s * sxy - sx * sy) / spread, LEVELS.crowd * s / spread
+    rate, variance = (s * sxy - sx * sy) / spread, CONSTANTS.crowd * s / spread
     enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     blur = 2.0 * baseline * s / np.maximum(sy, 1e-9)

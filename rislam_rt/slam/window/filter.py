@@ -11,24 +11,29 @@ from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.observations import Observations, is_los, observations_of, stranger_density
 from rislam_rt.slam.returns import TX
-from rislam_rt.slam.step_info import REMOVED, UNUSED, Outcome, StepInfo
-from rislam_rt.slam.window import divergence, gauss, motion, recovery, tracks
+from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
+from rislam_rt.slam.window import divergence, motion, recovery, tracks, window_gaussian
 from rislam_rt.slam.window.births import births
-from rislam_rt.slam.window.book import Book, empty_book, idents, image_ident
 from rislam_rt.slam.window.context import Context
+from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes
 from rislam_rt.slam.window.excess import grow, take_in
-from rislam_rt.slam.window.expect import Clusters, Expected, Scene, conditioned_share
-from rislam_rt.slam.window.gauss import Window
-from rislam_rt.slam.window.learn import learn, no_sights
-from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.log import Log, Residuals, append, empty_log, renew
-from rislam_rt.slam.window.look import Look, echoes, look
+from rislam_rt.slam.window.feature_removal import condemned, release
+from rislam_rt.slam.window.landmark_table import WindowTable, empty_table, idents, image_ident
+from rislam_rt.slam.window.landmark_update import learn, no_observations
+from rislam_rt.slam.window.measurement_log import Log, Residuals, append, empty_log, renew
+from rislam_rt.slam.window.measurement_prediction import (
+    ExpectedComponents,
+    KnownEnvironment,
+    UnresolvedClusters,
+    conditioned_share,
+)
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import DAMPING, REFRESH
-from rislam_rt.slam.window.retract import condemned, release
+from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import TURN
-from rislam_rt.slam.window.suspect import weigh_tracks
-from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window.tracks import WindowTracks
+from rislam_rt.slam.window.window_gaussian import Window
 
 
 def init(
@@ -40,13 +45,14 @@ def init(
     offset = start.heading_std if config.heading == "estimated" else 0.0
     turns = config.heading != "known"
     std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [offset]])
-    window = gauss.begin(start.position, start.velocity, std, turns=turns)
-    scene = Scene(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
+    window = window_gaussian.begin(start.position, start.velocity, std, turns=turns)
+    scene = KnownEnvironment(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
     lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if turns else ()))
-    gait = np.stack([motion.first_gait(level) for level in lively])
+    gait = np.stack([motion.first_motion_mode(level) for level in lively])
     return WindowState(
-        0, config, window, empty_book(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels), no_sights(),
+        0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels),
+        no_observations(),
         gait, gait,
         np.array([start.heading]), start.position_std * free, scene, divergence.SURE, False, 0.0,
         (None,), np.zeros((6, 6)), np.zeros((0, 3)),
@@ -67,71 +73,75 @@ def step(
     turn = heading - float(state.heading[-1])
     state = _move(state, dt, heading)
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
-    scene, book = state.scene, state.book
-    glance = observations_of(measurement, scene.radio)
-    landmark = np.where(is_los(glance, scene.body), REMOVED, UNUSED)
-    order = np.lexsort(glance.seen.T[::-1])
+    scene, landmarks = state.scene, state.landmarks
+    observed = observations_of(measurement, scene.radio)
+    landmark = np.where(is_los(observed, scene.body), REMOVED, UNUSED)
+    order = np.lexsort(observed.seen.T[::-1])
     free = order[landmark[order] == UNUSED]
-    free = free[~echoes(glance.take(free), scene.sensor.cell_length)]
-    glance = glance.take(free)
+    free = free[~echoes(observed.take(free), scene.sensor.cell_length)]
+    observed = observed.take(free)
 
-    strangers = stranger_density(glance, scene.sensor, max(config.new_density, _unexplained(state, glance)))
-    state, view = _notice(state, heading, code, glance, strangers)
+    strangers = stranger_density(observed, scene.sensor, max(config.new_density, _unexplained(state, observed)))
+    state, view = _notice(state, heading, code, observed, strangers)
     mean, poses, expected, groups = view.mean, view.poses, view.expected, view.groups
     shows, scatter, row, pick = view.shows, view.scatter, view.row, view.pick
-    before = gauss.now(state.window)[1]
-    bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(LEVELS.stay))))
+    before = window_gaussian.now(state.window)[1]
+    bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
 
-    log = append(state.log, glance, state.cycle, state.cycle - state.window.num_poses + 1)
+    log = append(state.log, observed, state.cycle, state.cycle - state.window.num_poses + 1)
     # wall returns that are thrown away are known for what they are, and move nothing
     used = np.ones(len(row), dtype=np.bool_) if config.use_vt else expected.forms[groups.leader[row], 0] != TX
-    log = _explain(log, expected, groups, book, scatter, row[used], pick[used], len(glance.seen))
+    log = _explain(log, expected, groups, landmarks, scatter, row[used], pick[used], len(observed.seen))
     state = state._replace(log=log)
     state, left, nis = _solve(state)
     raw = scatter[groups.leader[row]]
-    raw[used] = _squares(left, log, len(log.cycle) - len(glance.seen) + pick[used])
+    raw[used] = _squares(left, log, len(log.cycle) - len(observed.seen) + pick[used])
 
-    taken = np.zeros(len(glance.seen), dtype=np.bool_)
+    taken = np.zeros(len(observed.seen), dtype=np.bool_)
     taken[pick] = True
-    turn += float(np.diff(gauss.poses(state.window)[-2:, 3]).sum())
-    followed = _follow(state, mean, glance, (~taken).nonzero()[0], dt, turn, bend)
+    turn += float(np.diff(window_gaussian.poses(state.window)[-2:, 3]).sum())
+    followed = _follow(state, mean, observed, (~taken).nonzero()[0], dt, turn, bend)
     state = state._replace(tracks=followed.tracks, log=followed.log)
     jumped = state.doubt == 0.0
-    if len(expected.seen) and len(glance.seen):
+    if len(expected.seen) and len(observed.seen):
         state = state._replace(doubt=divergence.advance(state.doubt, view.score, followed.followed, followed.kept))
-    if min(book.panels) < 0:  # once all are known, no track needs to be one
+    if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, poses, scene, code))
-    sights, book = learn(
-        state.sights, book, state.window, expected, groups, shows, row, pick, raw, glance, poses, scene, code
+    visibility, landmarks = learn(
+        state.visibility, landmarks, state.window, expected, groups, shows, row, pick, raw, observed, poses, scene, code
     )
-    state = state._replace(sights=sights, book=book)
-    landmark[free[pick]] = np.where(used, _names(state.book, expected, groups, row), REMOVED)
+    state = state._replace(visibility=visibility, landmarks=landmarks)
+    landmark[free[pick]] = np.where(used, _names(state.landmarks, expected, groups, row), REMOVED)
 
     state, wrong = recovery.ask(state)
     state = _grown(state, left, expected, groups)
-    state = state._replace(excess=take_in(state.excess, before[:6, :6], gauss.now(state.window)[1][:6, :6]))
-    outcome = _outcome(len(measurement), len(state.book.ident), wrong or jumped or state.doubt >= 0.0)
-    if divergence.is_lost(state.doubt) and len(state.book.ident):
+    state = state._replace(excess=take_in(state.excess, before[:6, :6], window_gaussian.now(state.window)[1][:6, :6]))
+    outcome = _outcome(len(measurement), len(state.landmarks.ident), wrong or jumped or state.doubt >= 0.0)
+    if divergence.is_lost(state.doubt) and len(state.landmarks.ident):
         state = recovery.restart(state)
-    info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.book.points), outcome)
+    info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.landmarks.points), outcome)
     return state._replace(cycle=state.cycle + 1), info
 
 
-def _grown(state: WindowState, left: Residuals, expected: Expected, groups: Clusters) -> WindowState:
+def _grown(
+    state: WindowState, left: Residuals, expected: ExpectedComponents, groups: UnresolvedClusters
+) -> WindowState:
     """With what the evidence has turned against taken back, or else with what is born."""
     context = Context(
-        state.window, state.book, state.log, state.tracks, state.heading, state.scene, state.cycle, state.sights,
+        state.window, state.landmarks, state.log, state.tracks, state.heading, state.scene, state.cycle,
+        state.visibility,
         state.codes,
     )  # fmt: skip
-    if state.cycle % REFRESH == 0 and len(state.book.ident):
-        gone = condemned(context.book, left, context.log, expected, gauss.now(context.window)[1])
+    if state.cycle % REFRESH == 0 and len(state.landmarks.ident):
+        gone = condemned(context.landmarks, left, context.log, expected, window_gaussian.now(context.window)[1])
         context, fresh = release(context, ~gone), not gone.any()
     else:
         fresh = True
     if fresh:
         context = births(context, expected, groups)
     return state._replace(
-        window=context.window, book=context.book, log=context.log, tracks=context.tracks, sights=context.sights
+        window=context.window, landmarks=context.landmarks, log=context.log, tracks=context.tracks,
+        visibility=context.visibility
     )  # fmt: skip
 
 
@@ -140,15 +150,15 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     if dt <= 0.0 and state.cycle == 0:
         return state._replace(heading=np.array([heading]))
     window, gait, headings, passed = state.window, state.gait, state.heading, state.passed
-    while window.num_poses >= LEVELS.window:
-        gait = motion.forward(gait, _likelihoods(window, 1)[:, 0], LEVELS.stay)
+    while window.num_poses >= CONSTANTS.window:
+        gait = motion.forward(gait, _likelihoods(window, 1)[:, 0], CONSTANTS.stay)
         passed = np.concatenate([passed, window.head[None, :3]])
-        window, headings = gauss.slide(window), headings[1:]
-    level = state.level @ motion.transition(LEVELS.stay)
+        window, headings = window_gaussian.slide(window), headings[1:]
+    level = state.level @ motion.transition(CONSTANTS.stay)
     if state.config.motion == "told":
-        window, excess = gauss.extend(window, dt, _told_precision(state.config, dt)), state.excess
+        window, excess = window_gaussian.extend(window, dt, _assumed_precision(state.config, dt)), state.excess
     else:
-        window = gauss.extend(window, dt, precision := _precisions(level))
+        window = window_gaussian.extend(window, dt, precision := _precisions(level))
         excess = grow(state.excess, dt, motion.expected_variance(level)[COLUMNS[:3]] - 1.0 / precision[:3])
     return state._replace(
         window=window, gait=gait, heading=np.append(headings, heading), excess=excess, passed=passed
@@ -157,7 +167,7 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
 
 def smoothed(state: WindowState) -> Floats:
     """(K, 3) [m] positions of all cycles with hindsight: of the window's length, less for the last ones."""
-    return np.concatenate([state.passed, gauss.poses(state.window)[:, :3]])
+    return np.concatenate([state.passed, window_gaussian.poses(state.window)[:, :3]])
 
 
 START = ((3, 0.5), (10, 1.0))
@@ -168,15 +178,17 @@ manoeuvre is looked for."""
 
 
 def _notice(
-    state: WindowState, heading: float, code: RisCode | None, glance: Observations, strangers: Floats
-) -> tuple[WindowState, Look]:
+    state: WindowState, heading: float, code: RisCode | None, observed: Observations, strangers: Floats
+) -> tuple[WindowState, CycleAssociation]:
     """What is seen, and the belief that explains it best: as it was, with a manoeuvre in the last steps, or a jump.
 
     A jump has to explain the cycle better than being lost does, which explains nothing.
     """
 
-    def view_of(window: Window) -> Look:
-        return look(window, state.book, state.sights, heading, state.scene, code, glance, strangers)
+    def view_of(window: Window) -> CycleAssociation:
+        return associate_cycle(
+            window, state.landmarks, state.visibility, heading, state.scene, code, observed, strangers
+        )
 
     best, window = view_of(state.window), state.window
     learnt = state.config.motion == "learnt"
@@ -185,12 +197,12 @@ def _notice(
             precision = state.window.precision.copy()
             lively = COLUMNS[: precision.shape[1]] != 1
             precision[-steps:, lively] = np.minimum(precision[-steps:, lively], liveliness**-2.0)
-            trial = gauss.solve(state.window._replace(precision=precision))
+            trial = window_gaussian.solve(state.window._replace(precision=precision))
             view = view_of(trial)
-            if view.score + LEVELS.log_rare > best.score:
+            if view.score + CONSTANTS.log_rare > best.score:
                 best, window = view, trial
     if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
-        by = divergence.jump(best, glance)
+        by = divergence.jump(best, observed)
         view = view_of(divergence.shifted(state.window, by)) if by.any() else best
         if view.score + divergence.LOG_JUMP > max(best.score, divergence.SURE):
             return recovery.landed(state, by), view
@@ -227,7 +239,7 @@ STILL = 1e-5
 """[m/s^2] Acceleration of an axis that is known to be still."""
 
 
-def _told_precision(config: SlamConfig, dt: float) -> Floats:
+def _assumed_precision(config: SlamConfig, dt: float) -> Floats:
     """(A,) of a step's white acceleration and, where the heading is not known, rate of turn, as the agent is told."""
     upwards = config.sigma_a if config.height == "estimated" else STILL
     turns = () if config.heading == "known" else (config.turn_std / np.sqrt(dt),)
@@ -236,9 +248,9 @@ def _told_precision(config: SlamConfig, dt: float) -> Floats:
 
 def _explain(
     log: Log,
-    expected: Expected,
-    groups: Clusters,
-    book: Book,
+    expected: ExpectedComponents,
+    groups: UnresolvedClusters,
+    landmarks: WindowTable,
     scatter: Floats,
     row: Integers,
     pick: Integers,
@@ -251,12 +263,12 @@ def _explain(
     lead, mate = groups.leader[row], groups.partner[row]
     share, variance = conditioned_share(groups, expected, row, log.log_amplitude[at], log.log_amplitude_std[at])
     form, shares, extra = log.form.copy(), log.share.copy(), log.extra.copy()
-    form[at, 0] = idents(book, expected.forms[lead])
+    form[at, 0] = idents(landmarks, expected.forms[lead])
     both = mate >= 0
-    form[at[both], 1] = idents(book, expected.forms[mate[both]])
+    form[at[both], 1] = idents(landmarks, expected.forms[mate[both]])
     gap = np.where(both[:, None], expected.seen[mate] - expected.seen[lead], 0.0)
     shares[at], extra[at] = np.where(both, share, 0.0), groups.disturbance[row] + variance[:, None] * gap**2
-    extra[at] += LEVELS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
+    extra[at] += CONSTANTS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
     return log._replace(form=form, share=shares, extra=extra)
 
 
@@ -270,41 +282,41 @@ def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:
 
 def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
     """The window after this cycle's components: two Gauss-Newton steps; the whole of it again now and then."""
-    window, log, book, body = state.window, state.log, state.book, state.scene.body
+    window, log, landmarks, body = state.window, state.log, state.landmarks, state.scene.body
     last = np.array([window.num_poses - 1])
-    window, found = renew(window, log, book, body, state.heading, last, even=True)
+    window, found = renew(window, log, landmarks, body, state.heading, last, even=True)
     nis = float(np.sum(found.left**2))
-    window = gauss.solve(window, spread=False)
+    window = window_gaussian.solve(window, spread=False)
     slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else last
-    window, left = renew(window, log, book, body, state.heading, slots)
-    window = gauss.weigh_holds(gauss.solve(window))
-    return liven(state._replace(window=window)), left, nis
+    window, left = renew(window, log, landmarks, body, state.heading, slots)
+    window = window_gaussian.weigh_holds(window_gaussian.solve(window))
+    return widen_motion(state._replace(window=window)), left, nis
 
 
-def liven(state: WindowState) -> WindowState:
+def widen_motion(state: WindowState) -> WindowState:
     """The prior of every step's acceleration, by what the measurements say of its liveliness."""
     window = state.window
     if not len(window.accel) or state.config.motion == "told":
         return state
-    posterior, level = motion.smooth(state.gait, _likelihoods(window, len(window.accel)), LEVELS.stay)
+    posterior, level = motion.smooth(state.gait, _likelihoods(window, len(window.accel)), CONSTANTS.stay)
     fresh = _precisions(posterior)
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
     return state._replace(window=window._replace(precision=precision), level=level)
 
 
-def _unexplained(state: WindowState, glance: Observations) -> float:
+def _unexplained(state: WindowState, observed: Observations) -> float:
     """Components per metre, unit of each cosine and e-fold that nothing explained in the cycle before."""
-    if not len(glance.seen):
+    if not len(observed.seen):
         return 0.0
     window, sensor = np.diff(state.scene.sensor.window)[0] * SPEED_OF_LIGHT, state.scene.sensor
-    loudness = 0.5 * np.log(sensor.radio.integrated_snr(np.exp(glance.log_amplitude.max())) / sensor.threshold)
+    loudness = 0.5 * np.log(sensor.radio.integrated_snr(np.exp(observed.log_amplitude.max())) / sensor.threshold)
     count = float((state.tracks.last == state.cycle - 1).sum())
     return count / (window * np.pi * max(float(loudness), 1.0))
 
 
 class _Followed(NamedTuple):
-    tracks: Tracks
+    tracks: WindowTracks
     log: Log
     followed: int
     """Tracks of the last cycle..."""
@@ -313,7 +325,7 @@ class _Followed(NamedTuple):
 
 
 def _follow(
-    state: WindowState, mean: Floats, glance: Observations, free: Integers, dt: float, turn: float, bend: float
+    state: WindowState, mean: Floats, observed: Observations, free: Integers, dt: float, turn: float, bend: float
 ) -> _Followed:
     """Tracks extended, begun and ended by the components that nothing explains."""
     speed = float(np.linalg.norm(mean[3:6]))
@@ -321,35 +333,35 @@ def _follow(
     drift = np.array([2.0 * bend + speed**2, 0.1, 0.1]) if len(length) else np.zeros(3)
     found = tracks.advance(state.tracks, dt, turn, drift)
     late = found.last == state.cycle - 1
-    rows, picks = tracks.match(found, glance, free, state.cycle, state.config.new_density)
-    found = tracks.extend(found, rows, glance, picks, state.cycle)
+    rows, picks = tracks.match(found, observed, free, state.cycle, state.config.new_density)
+    found = tracks.extend(found, rows, observed, picks, state.cycle)
     spare = np.setdiff1d(free, picks)
-    reach = np.maximum(glance.seen[spare, 0], 0.5)
+    reach = np.maximum(observed.seen[spare, 0], 0.5)
     rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * (speed + 0.05)
     if len(state.level) > 2:  # what turns without a compass turns all that it sees
         rate[:, 1:] += np.sqrt(motion.expected_variance(state.level[2]))
-    found, fresh = tracks.start(found, glance, spare, rate, state.cycle)
-    base = len(state.log.cycle) - len(glance.seen)
+    found, fresh = tracks.start(found, observed, spare, rate, state.cycle)
+    base = len(state.log.cycle) - len(observed.seen)
     track = state.log.track.copy()
     track[base + picks], track[base + spare] = found.ident[rows], fresh
     found = found.keep(tracks.alive(found, state.cycle))
     return _Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()))
 
 
-def _names(book: Book, expected: Expected, groups: Clusters, row: Integers) -> Integers:
+def _names(landmarks: WindowTable, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers) -> Integers:
     """Ident of what each of the clusters `row` (A,) came over first: a point, its image in a wall, a wall."""
     if not len(row):
         return np.zeros(0, dtype=np.int64)
     forms = expected.forms[groups.leader[row]]
     wall = np.where(forms[:, 3] >= 0, forms[:, 3], forms[:, 1])
-    own = book.ident[np.where(forms[:, 0] >= 0, forms[:, 0], wall)]
+    own = landmarks.ident[np.where(forms[:, 0] >= 0, forms[:, 0], wall)]
     image = (forms[:, 0] >= 0) & (wall >= 0)
-    return np.where(image, image_ident(own, book.ident[wall]), own)
+    return np.where(image, image_ident(own, landmarks.ident[wall]), own)
 
 
-def _outcome(heard: int, features: int, lost: bool) -> Outcome:
+def _outcome(heard: int, features: int, lost: bool) -> StepOutcome:
     if not heard:
-        return Outcome.NO_MEASUREMENTS
+        return StepOutcome.NO_MEASUREMENTS
     if lost:
-        return Outcome.DIVERGED
-    return Outcome.OK if features else Outcome.NO_LANDMARKS
+        return StepOutcome.DIVERGED
+    return StepOutcome.OK if features else StepOutcome.NO_LANDMARKS

@@ -10,29 +10,29 @@ from rislam_rt.slam.config import SlamConfig, StartPrior
 from rislam_rt.slam.map_geometry import MAX_LEAN, images_in, wall_planes
 from rislam_rt.slam.moments import even_draws, poses_of, square_root
 from rislam_rt.slam.returns import AXES
-from rislam_rt.slam.window import gauss
-from rislam_rt.slam.window.book import Book, image_ident
+from rislam_rt.slam.window import window_gaussian
 from rislam_rt.slam.window.filter import init
+from rislam_rt.slam.window.landmark_table import WindowTable, image_ident
+from rislam_rt.slam.window.ris_candidate import find_candidate
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import HEAD
-from rislam_rt.slam.window.suspect import find_suspect
 
 
 def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
     """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent; with the suspect."""
     ahead = estimate(state, config, dt)
-    unknown = [panel for panel, row in enumerate(state.book.panels) if row < 0]
+    unknown = [panel for panel, row in enumerate(state.landmarks.panels) if row < 0]
     if state.scene.ris is None or not unknown:
         return ahead
-    mean, _ = gauss.now(state.window)
+    mean, _ = window_gaussian.now(state.window)
     poses = poses_of(mean[:3], np.asarray(state.heading[-1] + mean[6]), state.scene.body)
-    found = [find_suspect(state.tracks, state.book, mean, state.cycle - 1, poses, panel) for panel in unknown]
+    found = [find_candidate(state.tracks, state.landmarks, mean, state.cycle - 1, poses, panel) for panel in unknown]
     return replace(ahead, suspects=tuple(suspect for suspect in found if suspect is not None))
 
 
 def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> SlamEstimate:
     """Mean and covariance of the pose, equally likely samples of it, and the map."""
-    mean, covariance = gauss.now(state.window)
+    mean, covariance = window_gaussian.now(state.window)
     spread = covariance.copy()
     spread[:6, :6] += state.excess
     spread[:3, :3] += np.diag(state.shift**2)
@@ -45,18 +45,18 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
         spread[:6, :6],
         position + even_draws(config.num_samples, root.shape[1]) @ root.T,
         state.scene.body,
-        build_map(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], state.book, state.shift),
+        build_map(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], state.landmarks, state.shift),
     )
 
 
-def shift_covariance(features: Floats, book: Book, shift: Floats) -> Floats:
+def shift_covariance(features: Floats, landmarks: WindowTable, shift: Floats) -> Floats:
     """(3F, 3F) of features (F, 3) that all move with the start's error, of standard deviation `shift` (3,).
 
     A wall's three numbers, the image of an anchor that stays, move by `2 n n^T` of what the wall itself does.
     """
-    span = features - book.anchor
+    span = features - landmarks.anchor
     normal = span / np.maximum(np.linalg.norm(span, axis=1), 1e-9)[:, None]
-    by_shift = np.where(book.is_wall[:, None, None], 2.0 * normal[:, :, None] * normal[:, None, :], AXES)
+    by_shift = np.where(landmarks.is_wall[:, None, None], 2.0 * normal[:, :, None] * normal[:, None, :], AXES)
     rows = by_shift.reshape(-1, 3) * shift
     return np.asarray(rows @ rows.T)
 
@@ -71,30 +71,34 @@ def revisit(
     """
     scene = state.scene
     fresh = init(start, scene.body, scene.ris, scene.sensor, config, rng=rng)
-    mean, covariance = gauss.now(state.window)
+    mean, covariance = window_gaussian.now(state.window)
     features = mean[HEAD:].reshape(-1, 3)
-    spread = covariance[HEAD:, HEAD:] + shift_covariance(features, state.book, state.shift)
+    spread = covariance[HEAD:, HEAD:] + shift_covariance(features, state.landmarks, state.shift)
     std = np.concatenate([np.maximum(fresh.shift, 1e-5), np.sqrt(np.diag(fresh.window.covariance))[3:HEAD]])
-    window = gauss.begin_with(start.position, start.velocity, std, mean[HEAD:], spread, turns=fresh.window.turns)
-    book = state.book._replace(hidden=np.zeros(state.book.hidden.shape))
-    return fresh._replace(window=window, book=book, shift=np.zeros(3))
+    window = window_gaussian.begin_with(
+        start.position, start.velocity, std, mean[HEAD:], spread, turns=fresh.window.turns
+    )
+    landmarks = state.landmarks._replace(hidden=np.zeros(state.landmarks.hidden.shape))
+    return fresh._replace(window=window, landmarks=landmarks, shift=np.zeros(3))
 
 
-def build_map(features: Floats, covariance: Floats, book: Book, shift: Floats) -> MapEstimate:
+def build_map(features: Floats, covariance: Floats, landmarks: WindowTable, shift: Floats) -> MapEstimate:
     """Points, their images in each wall, and the walls; the start's error moves all of it together."""
-    if not len(book.ident):
+    if not len(landmarks.ident):
         return empty_map()
-    covariance = covariance + shift_covariance(features, book, shift)
-    points, walls = book.points, book.walls
+    covariance = covariance + shift_covariance(features, landmarks, shift)
+    points, walls = landmarks.points, landmarks.walls
     parent, wall = np.repeat(points, len(walls)), np.tile(walls, len(points))
-    place, spread = images_in(features, covariance, book.anchor, parent, wall)
+    place, spread = images_in(features, covariance, landmarks.anchor, parent, wall)
     columns = 3 * points[:, None] + np.arange(3)
-    normal, offset, std = wall_planes(features, covariance, book.anchor, walls)
+    normal, offset, std = wall_planes(features, covariance, landmarks.anchor, walls)
     known = np.sqrt(2.0) * std[:, 0] < MAX_LEAN
-    strength, ratio = np.exp(book.log_strength[0][points]), np.exp(book.ratio[wall])
-    probability = np.concatenate([book.ris_probability[points], np.zeros((len(place), book.log_ris.shape[1]))])
+    strength, ratio = np.exp(landmarks.log_strength[0][points]), np.exp(landmarks.ratio[wall])
+    probability = np.concatenate(
+        [landmarks.ris_probability[points], np.zeros((len(place), landmarks.log_ris.shape[1]))]
+    )
     return MapEstimate(
-        np.concatenate([book.ident[points], image_ident(book.ident[parent], book.ident[wall])]),
+        np.concatenate([landmarks.ident[points], image_ident(landmarks.ident[parent], landmarks.ident[wall])]),
         np.concatenate([features[points], place]),
         np.concatenate([covariance[columns[:, :, None], columns[:, None, :]], spread]),
         np.concatenate([np.full(len(points), -1), np.searchsorted(points, parent)]),

@@ -14,7 +14,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.slam.window.numerics import LADDER
 
 
-def first_gait(sigma_a: float) -> Floats:
+def first_motion_mode(sigma_a: float) -> Floats:
     """The level nearest to the acceleration told is the likeliest, one three times as far off a third as likely."""
     nearest = int(np.argmin(np.abs(np.log(LADDER / max(sigma_a, LADDER[0])))))
     weight = 3.0 ** -np.abs(np.arange(len(LADDER)) - nearest).astype(np.float64)

@@ -3,10 +3,10 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.window import divergence, gauss, motion, tracks
-from rislam_rt.slam.window.book import empty_book
-from rislam_rt.slam.window.learn import no_sights
-from rislam_rt.slam.window.log import empty_log
+from rislam_rt.slam.window import divergence, motion, tracks, window_gaussian
+from rislam_rt.slam.window.landmark_table import empty_table
+from rislam_rt.slam.window.landmark_update import no_observations
+from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.steps import HEAD
 
@@ -16,7 +16,7 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
     if len(state.level) > 2 or len(state.heading) != state.window.num_poses:
         return state, False
     baseline = float(np.linalg.norm(state.scene.body.tx_offset - state.scene.body.rx_offset))
-    if len(state.book.ident):
+    if len(state.landmarks.ident):
         if state.cycle % divergence.PAST == 0:
             lively = float(np.sqrt(motion.expected_variance(state.level[0])))
             odds = divergence.ask_picture(state.window, state.log, state.heading, baseline, lively)
@@ -30,7 +30,7 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
         return state._replace(window=divergence.with_velocity(state.window, told.velocity, told.std)), True
     # a compass that was wrong is not trusted: its offset is estimated from now on
     window = divergence.with_free_compass(state.window, told.std / float(np.linalg.norm(told.velocity)))
-    still = motion.first_gait(0.0)[None]
+    still = motion.first_motion_mode(0.0)[None]
     return state._replace(
         window=window, heading=state.heading + told.turn, turned=state.turned + told.turn,
         gait=np.concatenate([state.gait, still]), level=np.concatenate([state.level, still]),
@@ -40,23 +40,24 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
 def restart(state: WindowState) -> WindowState:
     """The pose that is kept, with what it may be off by beside it, and nothing else."""
     window = state.window
-    mean, covariance = gauss.now(window)
+    mean, covariance = window_gaussian.now(window)
     lively = np.sqrt(motion.expected_variance(state.level))[[0, 0, 1]]
     std = np.sqrt(np.concatenate([np.full(3, 1e-10), np.diag(covariance)[3:6] + lively**2, [covariance[6, 6]]]))
     away = divergence.JUMP * np.array([1.0, 1.0, float(state.config.height == "estimated")])
-    fresh = gauss.begin(mean[:3], mean[3:6], std, turns=window.turns)
+    fresh = window_gaussian.begin(mean[:3], mean[3:6], std, turns=window.turns)
     fresh = fresh._replace(head=mean[:HEAD], prior=fresh.prior._replace(middle=mean[:HEAD]))
     return state._replace(
-        window=fresh, book=empty_book(state.scene.num_panels)._replace(next_ident=state.book.next_ident),
-        log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), sights=no_sights(), gait=state.level,
+        window=fresh, landmarks=empty_table(state.scene.num_panels)._replace(next_ident=state.landmarks.next_ident),
+        log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), visibility=no_observations(),
+        gait=state.level,
         heading=state.heading[-1:], shift=np.hypot(state.shift, away), doubt=0.0, asked=False,
-        codes=state.codes[-1:], passed=np.concatenate([state.passed, gauss.poses(window)[:-1, :3]]),
+        codes=state.codes[-1:], passed=np.concatenate([state.passed, window_gaussian.poses(window)[:-1, :3]]),
     )  # fmt: skip
 
 
 def landed(state: WindowState, by: Floats) -> WindowState:
     """After a jump: the last pose alone, with the map; held for lost until the next cycle agrees."""
-    passed = np.concatenate([state.passed, gauss.poses(state.window)[:-1, :3]])
+    passed = np.concatenate([state.passed, window_gaussian.poses(state.window)[:-1, :3]])
     return state._replace(
         window=divergence.landed(state.window, by), gait=state.level, heading=state.heading[-1:],
         codes=state.codes[-1:], passed=passed, doubt=0.0,

@@ -5,12 +5,12 @@ from typing import NamedTuple
 from rislam_rt.arrays import Floats
 from rislam_rt.model import RisCode
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.window.book import Book
-from rislam_rt.slam.window.expect import Scene
-from rislam_rt.slam.window.gauss import Window
-from rislam_rt.slam.window.learn import Sights
-from rislam_rt.slam.window.log import Log
-from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window.landmark_table import WindowTable
+from rislam_rt.slam.window.landmark_update import VisibilityObservations
+from rislam_rt.slam.window.measurement_log import Log
+from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
+from rislam_rt.slam.window.tracks import WindowTracks
+from rislam_rt.slam.window.window_gaussian import Window
 
 
 class WindowState(NamedTuple):
@@ -19,10 +19,10 @@ class WindowState(NamedTuple):
     cycle: int
     config: SlamConfig
     window: Window
-    book: Book
+    landmarks: WindowTable
     log: Log
-    tracks: Tracks
-    sights: Sights
+    tracks: WindowTracks
+    visibility: VisibilityObservations
     gait: Floats
     """(2, L) probabilities of the liveliness of the step before the window's first, across and upwards; (3, L) with
     the rate of turn, where the heading is not known."""
@@ -32,7 +32,7 @@ class WindowState(NamedTuple):
     """(K,) [rad] that the compass told; where it is not asked, what offsets are against."""
     shift: Floats
     """(3,) [m] standard deviation of the start's position: what no measurement tells."""
-    scene: Scene
+    scene: KnownEnvironment
     doubt: float
     """Log odds that the agent is lost: that the map explains nothing of what is heard (see `divergence`)."""
     asked: bool

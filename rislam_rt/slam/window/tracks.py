@@ -8,9 +8,9 @@ import scipy
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.associate import Candidates, pair_costs
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import GATE
-from rislam_rt.slam.window.panel import Identity, unknown
+from rislam_rt.slam.window.ris_identification import PanelIdentity, unknown
 
 WANDER = 1.0
 """Spread of an unexplained path's log amplitude from cycle to cycle: a panel's code may change."""
@@ -18,7 +18,7 @@ CYCLE = 0.1
 """Time [s] that may pass from cycle to cycle where the clock says that none does."""
 
 
-class Tracks(NamedTuple):
+class WindowTracks(NamedTuple):
     """T tracks, each a Kalman filter of constant rate in length and either cosine of the room's axes."""
 
     ident: Integers
@@ -48,25 +48,25 @@ class Tracks(NamedTuple):
     next_ident: int
 
     @property
-    def identity(self) -> Identity:
+    def identity(self) -> PanelIdentity:
         """(T,) what the tracks would be, were they points."""
-        return Identity(self.log_grid, self.log_ris, self.hidden)
+        return PanelIdentity(self.log_grid, self.log_ris, self.hidden)
 
-    def keep(self, rows: Booleans) -> "Tracks":
+    def keep(self, rows: Booleans) -> "WindowTracks":
         """Only some of the tracks."""
-        return Tracks._make([*(field[rows] for field in self[:-1]), self.next_ident])
+        return WindowTracks._make([*(field[rows] for field in self[:-1]), self.next_ident])
 
 
-def no_tracks(panels: int = 1) -> Tracks:
+def no_tracks(panels: int = 1) -> WindowTracks:
     """Nothing seen yet, in a room of so many panels."""
     none = np.zeros(0, dtype=np.int64)
-    return Tracks(
+    return WindowTracks(
         none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none,
         *unknown(0, panels), 0,
     )  # fmt: skip
 
 
-def advance(tracks: Tracks, dt: float, turn: float, bend: Floats) -> Tracks:
+def advance(tracks: WindowTracks, dt: float, turn: float, bend: Floats) -> WindowTracks:
     """Predict over `dt` [s] while the body turns by `turn` [rad]; `bend` (3,) is the drift of the rates a second."""
     move = np.array([[1.0, dt], [0.0, 1.0]])
     noise = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]]) * (bend**2)[:, None, None]
@@ -80,7 +80,7 @@ def advance(tracks: Tracks, dt: float, turn: float, bend: Floats) -> Tracks:
 
 
 def match(
-    tracks: Tracks, glance: Observations, free: Integers, cycle: int, strangers: float
+    tracks: WindowTracks, observed: Observations, free: Integers, cycle: int, strangers: float
 ) -> tuple[Integers, Integers]:
     """Rows of tracks and the free components that continue them; `strangers` is the density of new ones."""
     count = len(tracks.ident)
@@ -93,53 +93,56 @@ def match(
     candidates = Candidates(
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
     )
-    cost = pair_costs(candidates, glance.take(free), GATE, strangers)
+    cost = pair_costs(candidates, observed.take(free), GATE, strangers)
     rows, columns = scipy.optimize.linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     return rows[good], free[columns[good]]
 
 
-def extend(tracks: Tracks, rows: Integers, glance: Observations, picks: Integers, cycle: int) -> Tracks:
+def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: Integers, cycle: int) -> WindowTracks:
     """Tracks `rows` (A,) updated by components `picks` (A,)."""
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
     prior, spread = mean[rows], covariance[rows]
-    gain = spread[..., 0] / (spread[..., 0, 0] + glance.std[picks] ** 2)[..., None]
-    mean[rows] = prior + gain * (glance.seen[picks] - prior[..., 0])[..., None]
+    gain = spread[..., 0] / (spread[..., 0, 0] + observed.std[picks] ** 2)[..., None]
+    mean[rows] = prior + gain * (observed.seen[picks] - prior[..., 0])[..., None]
     covariance[rows] = spread - gain[..., :, None] * spread[..., None, 0, :]
     level, last, hits = tracks.log_amplitude.copy(), tracks.last.copy(), tracks.hits.copy()
-    level[rows], last[rows] = glance.log_amplitude[picks], cycle
+    level[rows], last[rows] = observed.log_amplitude[picks], cycle
     hits[rows] += 1
     return tracks._replace(mean=mean, covariance=covariance, log_amplitude=level, last=last, hits=hits)
 
 
-def start(tracks: Tracks, glance: Observations, picks: Integers, rate: Floats, cycle: int) -> tuple[Tracks, Integers]:
+def start(
+    tracks: WindowTracks, observed: Observations, picks: Integers, rate: Floats, cycle: int
+) -> tuple[WindowTracks, Integers]:
     """One new track for each of the components `picks` (A,), and their idents; `rate` (A, 3) is the rates' spread."""
     count = len(picks)
     ident = tracks.next_ident + np.arange(count)
     covariance = np.zeros((count, 3, 2, 2))
-    covariance[..., 0, 0], covariance[..., 1, 1] = glance.std[picks] ** 2, rate**2
+    covariance[..., 0, 0], covariance[..., 1, 1] = observed.std[picks] ** 2, rate**2
     fresh = (
-        ident, np.stack([glance.seen[picks], np.zeros((count, 3))], axis=-1), covariance, glance.log_amplitude[picks],
-        glance.sides[picks], np.full(count, cycle), np.full(count, cycle), np.ones(count, dtype=np.int64),
+        ident, np.stack([observed.seen[picks], np.zeros((count, 3))], axis=-1), covariance,
+        observed.log_amplitude[picks],
+        observed.sides[picks], np.full(count, cycle), np.full(count, cycle), np.ones(count, dtype=np.int64),
         np.zeros(count, dtype=np.int64), *unknown(count, tracks.log_ris.shape[1]),
     )  # fmt: skip
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))
-    return Tracks._make([*joined, tracks.next_ident + count]), ident
+    return WindowTracks._make([*joined, tracks.next_ident + count]), ident
 
 
-def alive(tracks: Tracks, cycle: int) -> Booleans:
+def alive(tracks: WindowTracks, cycle: int) -> Booleans:
     """(T,) not silent for longer than their past lets expect: 4 cycles, more for what comes and goes.
 
     What is likelier the panel than not may be silent for long: its codes make it so.
     """
     share = (tracks.hits + 1.0) / (tracks.last - tracks.born + 3.0)
     patience = np.where(tracks.hits >= 4, np.log(0.01) / np.log(np.clip(1.0 - share, 1e-6, 0.999)), 3.0)
-    patience = np.where((tracks.log_ris > 0.0).any(axis=1) & (tracks.hits >= 2), LEVELS.window, patience)
-    return np.asarray(cycle - tracks.last <= np.clip(patience, 3.0, LEVELS.window))
+    patience = np.where((tracks.log_ris > 0.0).any(axis=1) & (tracks.hits >= 2), CONSTANTS.window, patience)
+    return np.asarray(cycle - tracks.last <= np.clip(patience, 3.0, CONSTANTS.window))
 
 
-def due(tracks: Tracks, cycle: int) -> Integers:
+def due(tracks: WindowTracks, cycle: int) -> Integers:
     """Tracks to examine: after 6 measurements, and whenever their number has grown by a half since."""
-    grown = tracks.hits >= np.maximum(6, np.minimum(3 * tracks.looked // 2, tracks.looked + LEVELS.window // 2))
+    grown = tracks.hits >= np.maximum(6, np.minimum(3 * tracks.looked // 2, tracks.looked + CONSTANTS.window // 2))
     rows = (grown & (cycle - tracks.last <= 1)).nonzero()[0]
     return rows[np.argsort(tracks.mean[rows, 0, 0])]

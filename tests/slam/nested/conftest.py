@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam.nested.particles.backend import pick_engine
-from rislam_rt.slam.nested.particles.cloud import Engine
+from rislam_rt.slam.nested.particles.cloud import CloudEngine
 
 
 @pytest.fixture(params=["numpy", "drjit"])
-def engine(request: pytest.FixtureRequest) -> Engine:
+def engine(request: pytest.FixtureRequest) -> CloudEngine:
     """Both engines in turn."""
     return pick_engine(request.param)
 

@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.moments import Moments, poses_of
-from rislam_rt.slam.nested.birth import Birth, Verdict
+from rislam_rt.slam.nested.birth import Birth, BirthDecision
 from rislam_rt.slam.nested.hypotheses import IMAGE, POINT, History, fit_feature, initial_value
 from rislam_rt.slam.nested.particles import operations
 from rislam_rt.slam.returns import NONE, Returns, observe
@@ -47,7 +47,7 @@ class Run(NamedTuple):
     """After every cycle."""
     nees: Floats
     """(K,) of horizontal position and velocity, chi^2 with 4 degrees of freedom."""
-    particles: operations.Particles
+    particles: operations.PointParticles
     resampled: int
 
 
@@ -111,8 +111,8 @@ def pose_nees(moments: Moments, truth: Truth, cycle: int) -> float:
 
 
 def born(
-    particles: operations.Particles, truth: Truth, history: Floats, std: Floats, *, rng: np.random.Generator
-) -> operations.Particles:
+    particles: operations.PointParticles, truth: Truth, history: Floats, std: Floats, *, rng: np.random.Generator
+) -> operations.PointParticles:
     """Landmarks from the first cycles, as the front end would hand them over."""
     slots = np.arange(1, FIRST + 1)
     position, heading = operations.trail(particles, slots)
@@ -127,7 +127,7 @@ def born(
         first = initial_value(kind, point, anchor, past)
         assert first is not None
         fit = fit_feature(kind, first, point, anchor, past, 10)
-        birth = Birth(Verdict(kind, parent, fit), anchor, slots, past.seen, past.std)
+        birth = Birth(BirthDecision(kind, parent, fit), anchor, slots, past.seen, past.std)
         particles = operations.initialise_landmark(particles, birth, BODY, rng=rng)
     assert known.shape == (3,)
     return particles

@@ -6,7 +6,7 @@ import pytest
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.slam.nested.particles.backend import pick_engine
-from rislam_rt.slam.nested.particles.cloud import HOPELESS, Cloud, Engine, Kernel, kernel_width, restoring_map
+from rislam_rt.slam.nested.particles.cloud import HOPELESS, Cloud, CloudEngine, Kernel, kernel_width, restoring_map
 from rislam_rt.slam.nested.particles.numpy_engine import NumpyEngine
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, pack, trace_sightline
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, observe
@@ -35,7 +35,7 @@ def poses_near(position: Floats) -> Poses:
     return Poses(position - arm, position + arm, np.full(len(position), 0.3))
 
 
-def cloud_of(engine: Engine, rng: np.random.Generator, count: int = N, size: int = M) -> Cloud:
+def cloud_of(engine: CloudEngine, rng: np.random.Generator, count: int = N, size: int = M) -> Cloud:
     """A block of points that all agent particles share, with unequal weights."""
     points, log_weight = 0.1 * rng.standard_normal((1, size, 3)), rng.standard_normal((1, size))
     zero = np.zeros(count, dtype=np.int64)
@@ -106,7 +106,7 @@ def test_engines_agree_to_single_precision(pairs: list[tuple[int, int]], rng: np
     np.testing.assert_allclose(one.ess, other.ess, rtol=1e-2)
 
 
-def test_weights_of_shared_rows_become_each_agents_own(engine: Engine, rng: np.random.Generator) -> None:
+def test_weights_of_shared_rows_become_each_agents_own(engine: CloudEngine, rng: np.random.Generator) -> None:
     cloud = cloud_of(engine, rng)
     agents = 0.05 * rng.standard_normal((N, 3))
     sighting = Sighting((linear_sightline(np.zeros((N, 3)), agents),), np.zeros(3), 0.01 * np.eye(3))
@@ -120,7 +120,7 @@ def test_weights_of_shared_rows_become_each_agents_own(engine: Engine, rng: np.r
 
 
 @pytest.mark.parametrize("size", [M, 2 * M, M // 2])
-def test_resampling_keeps_mean_and_covariance(engine: Engine, size: int, rng: np.random.Generator) -> None:
+def test_resampling_keeps_mean_and_covariance(engine: CloudEngine, size: int, rng: np.random.Generator) -> None:
     """Exactly, that is to single precision of offsets of 0.1 m: 1e-8 m, times some hundred terms."""
     cloud, sums = engine.weigh(cloud_of(engine, rng), (), np.zeros((0, N)))
     fresh = engine.resample(cloud, sums.covariance, size, Kernel(rng.random(N), 7, 32, kernel_width(size, 3)))
@@ -131,7 +131,7 @@ def test_resampling_keeps_mean_and_covariance(engine: Engine, size: int, rng: np
     np.testing.assert_allclose(covariance, sums.covariance, atol=1e-6)
 
 
-def test_resampling_draws_in_proportion_to_the_weights(engine: Engine, rng: np.random.Generator) -> None:
+def test_resampling_draws_in_proportion_to_the_weights(engine: CloudEngine, rng: np.random.Generator) -> None:
     """Without a kernel children are their parents but for an affine map, so that parents can be counted.
 
     Systematic resampling draws a particle of weight w either floor(M w) or ceil(M w) times; over C agent particles with
@@ -170,7 +170,7 @@ def _parents(children: Floats, points: Floats, weight: Floats) -> Floats:
     return parents
 
 
-def test_impossible_measurements_leave_numbers(engine: Engine, rng: np.random.Generator) -> None:
+def test_impossible_measurements_leave_numbers(engine: CloudEngine, rng: np.random.Generator) -> None:
     cloud = cloud_of(engine, rng)
     far = Sighting((linear_sightline(np.zeros((N, 3)), np.full((N, 3), 1e25)),), np.zeros(3), 1e-6 * np.eye(3))
     for _ in range(3):
@@ -181,7 +181,7 @@ def test_impossible_measurements_leave_numbers(engine: Engine, rng: np.random.Ge
     assert np.isfinite(engine.read(fresh)[0]).all()
 
 
-def test_landmark_on_top_of_the_device_leaves_numbers(engine: Engine) -> None:
+def test_landmark_on_top_of_the_device_leaves_numbers(engine: CloudEngine) -> None:
     zero = np.zeros(2, dtype=np.int64)
     cloud = engine.build(np.zeros((1, 8, 3)), np.zeros((1, 8)), zero, zero)
     here = np.zeros((2, 3))

@@ -10,7 +10,7 @@ from rislam_rt.slam import NestedConfig, SlamConfig, StartPrior
 from rislam_rt.slam.nested.particles import agents, belief, operations
 from rislam_rt.slam.nested.particles.backend import pick_engine
 from rislam_rt.slam.nested.particles.belief import Nested
-from rislam_rt.slam.nested.particles.cloud import Engine
+from rislam_rt.slam.nested.particles.cloud import CloudEngine
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline
 from rislam_rt.slam.nested.particles.update import Seen, update
 from rislam_rt.slam.returns import Returns
@@ -141,13 +141,13 @@ def test_the_same_seed_gives_the_same_bits(machine: str) -> None:
 AGENTS = 100
 
 
-def started(heading: str = "known") -> tuple[operations.Particles, SlamConfig]:
+def started(heading: str = "known") -> tuple[operations.PointParticles, SlamConfig]:
     config = fixed(AGENTS, 32, "numpy", heading)
     start = StartPrior(np.array([0.5, 0.7, 0.5]), np.array([0.07, 0.07, 0.0]), HEADING)
     return operations.begin(start, config, rng=np.random.default_rng(1)), config
 
 
-def finite(particles: operations.Particles) -> bool:
+def finite(particles: operations.PointParticles) -> bool:
     """Whether all that the filter knows is a number, and weights sum to one."""
     state = particles.belief
     found = belief.gaussian(state)
@@ -171,7 +171,7 @@ def test_no_measurements_change_nothing() -> None:
 
 
 @pytest.mark.parametrize("offset", [1e3, 1e12, 1e30])
-def test_impossible_measurements_leave_a_belief(offset: float, engine: Engine) -> None:
+def test_impossible_measurements_leave_a_belief(offset: float, engine: CloudEngine) -> None:
     particles, _ = started()
     state, config, rng = particles.belief, particles.config, np.random.default_rng(2)
     state = belief.initialise_landmark(

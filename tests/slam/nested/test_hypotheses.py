@@ -10,7 +10,7 @@ from rislam_rt.evaluate import consistency, normalised_squares
 from rislam_rt.model import Body
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.moments import poses_of
-from rislam_rt.slam.nested.birth import Scene, judge_wall
+from rislam_rt.slam.nested.birth import BirthContext, judge_wall
 from rislam_rt.slam.nested.hypotheses import (
     IMAGE,
     MOVING,
@@ -231,10 +231,10 @@ def test_what_two_walls_throw_is_told_from_a_wall_and_a_point(name: str, place: 
         assert fit_feature(MOVING, wall, None, ANCHOR, history, 10).cost > fit.cost + 100.0
 
 
-def shown(*images: Floats) -> Scene:
+def shown(*images: Floats) -> BirthContext:
     """A judgement where the agent sees itself in so many mirrors."""
     mirrored = np.array(images).reshape(-1, 3)
-    return Scene(np.zeros((0, 3)), empty_table(), ANCHOR, None, mirrored, SlamConfig())  # type: ignore[arg-type]
+    return BirthContext(np.zeros((0, 3)), empty_table(), ANCHOR, None, mirrored, SlamConfig())  # type: ignore[arg-type]
 
 
 def test_a_wall_is_not_born_before_its_image_moves_as_one_walls_does() -> None:

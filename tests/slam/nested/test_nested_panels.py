@@ -14,9 +14,9 @@ from rislam_rt.slam.inputs import check_sides
 from rislam_rt.slam.moments import POSE, Moments, poses_of
 from rislam_rt.slam.nested.candidates import return_sides
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, empty_table, enter
-from rislam_rt.slam.nested.measurement_prediction import Belief
+from rislam_rt.slam.nested.measurement_prediction import MapBelief
 from rislam_rt.slam.nested.ris_candidate import find_panel_candidate, weigh_tracks
-from rislam_rt.slam.nested.tracks import Tracks, advance, begin, extend, no_tracks
+from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, no_tracks
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations, side_of
 from rislam_rt.slam.returns import TX, Returns, observe
 
@@ -54,14 +54,14 @@ def test_certain_panels_and_impossible_ones_stay_so() -> None:
     assert panel_probabilities(np.full((1, 2), 20.0)).sum() == pytest.approx(1.0, abs=1e-8)
 
 
-def follow(cycles: int, sides: bool, rng: np.random.Generator) -> Tracks:
+def follow(cycles: int, sides: bool, rng: np.random.Generator) -> LandmarkTracks:
     """The spots under a new random code a cycle; `sides`: the receiver tells whose signs a component has."""
     noise = np.sqrt(RADIO.noise_psd / (2.0 * RADIO.array.num_antennas * RADIO.energy))
     least = noise * np.sqrt(2.0 * THRESHOLD)
     rows = np.arange(3)
     fixed = Returns(np.stack([rows, np.full(3, -1), np.full(3, -1)], axis=1), rows, rows)
     seen = observe(fixed, SPOTS, SPOTS, POSES).seen
-    belief = Belief(np.zeros((0, 3)), empty_table(2), POSES, BODY, SensorModel(RADIO, threshold=THRESHOLD), SHEETS)
+    belief = MapBelief(np.zeros((0, 3)), empty_table(2), POSES, BODY, SensorModel(RADIO, threshold=THRESHOLD), SHEETS)
     tracks, dull = no_tracks(40, 2), np.zeros(3, dtype=np.bool_)
     for cycle in range(cycles):
         code = RisCode(rng.integers(4, size=(1, 72)), 4)
@@ -102,10 +102,10 @@ def test_panels_of_one_data_sheet_are_told_apart(sides: bool, cycles: int) -> No
 
 
 def book_of(odds: list[list[float]]) -> LandmarkTable:
-    book = empty_table(2)
+    landmarks = empty_table(2)
     for _ in odds:
-        book = enter(book, False, np.zeros(3), -1)
-    return book._replace(log_ris=np.array(odds))
+        landmarks = enter(landmarks, False, np.zeros(3), -1)
+    return landmarks._replace(log_ris=np.array(odds))
 
 
 def test_returns_take_the_side_of_the_panel_that_their_point_is_held_for() -> None:

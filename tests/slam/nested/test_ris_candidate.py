@@ -7,9 +7,9 @@ from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec, SensorModel
 from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.moments import POSE, Moments, poses_of
 from rislam_rt.slam.nested.landmark_table import empty_table
-from rislam_rt.slam.nested.measurement_prediction import Belief
+from rislam_rt.slam.nested.measurement_prediction import MapBelief
 from rislam_rt.slam.nested.ris_candidate import find_panel_candidate, weigh_tracks
-from rislam_rt.slam.nested.tracks import Tracks, advance, begin, extend, no_tracks
+from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, no_tracks
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.returns import Returns, observe
 from rislam_rt.slam.ris_candidate import DEEP, places
@@ -35,17 +35,17 @@ def looks() -> np.ndarray:
     return observe(fixed, SPOTS, SPOTS, POSES).seen
 
 
-def belief() -> Belief:
-    return Belief(np.zeros((0, 3)), empty_table(), POSES, BODY, SensorModel(RADIO, threshold=THRESHOLD), PANEL)
+def belief() -> MapBelief:
+    return MapBelief(np.zeros((0, 3)), empty_table(), POSES, BODY, SensorModel(RADIO, threshold=THRESHOLD), PANEL)
 
 
-def glance(picks: list[int], amplitude: np.ndarray) -> Observations:
+def observed(picks: list[int], amplitude: np.ndarray) -> Observations:
     seen, std = looks()[picks], np.tile([0.02, 0.02, 0.02], (len(picks), 1))
     log = np.log(amplitude[picks])
     return Observations(seen, std, log, np.full(len(picks), 0.1), 0.1 * amplitude[picks], 0.0 * log)
 
 
-def follow(cycles: int, rng: np.random.Generator) -> Tracks:
+def follow(cycles: int, rng: np.random.Generator) -> LandmarkTracks:
     """Both spots under a new random code a cycle; the panel is silent below the threshold, as the receiver has it."""
     noise = np.sqrt(RADIO.noise_psd / (2.0 * RADIO.array.num_antennas * RADIO.energy))
     least = noise * np.sqrt(2.0 * THRESHOLD)
@@ -55,7 +55,7 @@ def follow(cycles: int, rng: np.random.Generator) -> Tracks:
         code = RisCode(rng.integers(4, size=(6, 6)), 4)
         gain = panel_path_gain(PANEL, code, SPOTS[:1], POSES.tx, POSES.rx, np.ones(1), RADIO)
         amplitude = np.hypot(*(np.array([[abs(gain[0]), ball], [0.0, 0.0]]) + noise * rng.standard_normal((2, 2))))
-        seen = glance([0, 1], amplitude)
+        seen = observed([0, 1], amplitude)
         if not cycle:
             tracks = begin(tracks, seen, np.arange(2), dull, np.full(3, 0.01), cycle)
         else:
@@ -81,7 +81,7 @@ def test_changing_codes_tell_the_panel_from_a_scatterer(rng: np.random.Generator
 
 
 def test_silence_when_the_panel_would_shout_speaks_against_it(rng: np.random.Generator) -> None:
-    tracks = begin(no_tracks(40), glance([0], np.full(2, 1e-5)), np.arange(1), np.zeros(1, bool), np.full(3, 0.01), 0)
+    tracks = begin(no_tracks(40), observed([0], np.full(2, 1e-5)), np.arange(1), np.zeros(1, bool), np.full(3, 0.01), 0)
     tracks = advance(tracks, 0.1, 1, np.full(3, 1e-3))
     loudest = max(
         (RisCode(rng.integers(4, size=(6, 6)), 4) for _ in range(300)),

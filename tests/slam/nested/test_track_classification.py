@@ -7,14 +7,14 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import Body, RadioConfig
 from rislam_rt.slam import NestedConfig
 from rislam_rt.slam.nested.track_classification import LOOK_EVERY, classify_tracks
-from rislam_rt.slam.nested.tracks import Tracks, advance, begin, extend, no_tracks
+from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, no_tracks
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 
 RADIO, BODY, WINDOW = RadioConfig(), Body(), 40
 POINT, WALL = np.array([3.1, 2.6, 1.9]), 5.0
 
 
-def _walked() -> tuple[Tracks, np.ndarray]:
+def _walked() -> tuple[LandmarkTracks, np.ndarray]:
     """Two tracks over 40 cycles: a sphere of 5 cm, and the wall x = 5 m of reflection 0.85; noise-free."""
     position = np.array([1.0, 1.2, 0.5]) + np.arange(WINDOW)[:, None] * np.array([0.012, -0.008, 0.0])
     tracks = no_tracks(WINDOW)
@@ -27,15 +27,15 @@ def _walked() -> tuple[Tracks, np.ndarray]:
         free = RADIO.wavelength / (4.0 * np.pi * length)
         ratio = np.array([0.05 * length[0] / (np.linalg.norm(POINT - tx) * np.linalg.norm(POINT - rx)), 0.85])
         log_amplitude, small = np.log(ratio * free), np.full(2, 1e-3)
-        glance = Observations(
+        observed = Observations(
             np.column_stack([length, ray[:, :2]]), np.full((2, 3), 2e-3), log_amplitude, small, small, ratio
         )
         rows, dark = np.arange(2), np.zeros(2, dtype=np.bool_)
         tracks = advance(tracks, 0.1, cycle, np.full(3, 0.02))
         if cycle:
-            tracks = extend(tracks, rows, glance, rows, dark, cycle)
+            tracks = extend(tracks, rows, observed, rows, dark, cycle)
         else:
-            tracks = begin(tracks, glance, rows, dark, np.full(3, 0.1), cycle)
+            tracks = begin(tracks, observed, rows, dark, np.full(3, 0.1), cycle)
     return tracks, position
 
 
@@ -92,12 +92,12 @@ def test_odds_are_finite_whatever_was_measured(case: int) -> None:
         seen = np.column_stack([10.0 ** rng.uniform(-6.0, 5.0, count), cosines])
         seen = np.broadcast_to(seen[:1], seen.shape) if case % 3 == 0 else seen
         std, level = 10.0 ** rng.uniform(-5.0, 5.0, (count, 3)), rng.uniform(-69.0, 69.0, count)
-        glance = Observations(seen, std, level, ones, ones, ones)
+        observed = Observations(seen, std, level, ones, ones, ones)
         tracks = advance(tracks, 0.1, cycle, np.full(3, 0.02))
         if cycle:
-            tracks = extend(tracks, rows, glance, rows, dark, cycle)
+            tracks = extend(tracks, rows, observed, rows, dark, cycle)
         else:
-            tracks = begin(tracks, glance, rows, dark, np.full(3, 0.1), cycle)
+            tracks = begin(tracks, observed, rows, dark, np.full(3, 0.1), cycle)
     for classifier in ("network", "geometric"):
         found = classify_tracks(tracks, position, np.zeros(WINDOW), LOOK_EVERY, BODY, RADIO, classifier)
         assert np.isfinite(found.odds).all()

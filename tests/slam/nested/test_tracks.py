@@ -5,7 +5,7 @@ import pytest
 
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested.birth_scheduling import due_tracks
-from rislam_rt.slam.nested.tracks import Tracks, advance, begin, extend, has_ended, no_tracks, overstatement
+from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, has_ended, no_tracks, overstatement
 from rislam_rt.slam.observations import OTHER, PANEL, Observations
 from tests.slam.test_association import outlook
 
@@ -15,21 +15,21 @@ STEADY, FAINT = "#" * 12, "#..#..##...#.#.#..#.#..#"
 SNR = 10.0
 
 
-def follow(*courses: str, lengths: tuple[float, ...] = (3.0,), side: int = OTHER) -> tuple[Tracks, int]:
+def follow(*courses: str, lengths: tuple[float, ...] = (3.0,), side: int = OTHER) -> tuple[LandmarkTracks, int]:
     """Tracks that show as drawn, all of one direction and strength, and the cycle after which they are looked at."""
     tracks, dull = no_tracks(40), np.zeros(len(courses), dtype=np.bool_)
     seen = np.array([[length, 0.1, 0.2] for length in lengths])
     zero = np.zeros(len(courses))
-    glance = Observations(
+    observed = Observations(
         seen, np.full(seen.shape, 0.02), zero, zero + 0.1, zero + 0.1, zero, np.full(len(courses), side)
     )
     for cycle in range(len(courses[0])):
         if cycle:
             shown = np.flatnonzero([course[cycle] == "#" for course in courses])
             tracks = advance(tracks, 0.1, cycle, np.full(3, 0.03))
-            tracks = extend(tracks, shown, glance, shown, dull, cycle)
+            tracks = extend(tracks, shown, observed, shown, dull, cycle)
         else:
-            tracks = begin(tracks, glance, np.arange(len(courses)), dull, np.full(3, 0.1), cycle)
+            tracks = begin(tracks, observed, np.arange(len(courses)), dull, np.full(3, 0.1), cycle)
     return tracks, len(courses[0]) - 1
 
 

@@ -11,13 +11,13 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Measurement, SensorModel
-from rislam_rt.slam import Outcome, StartPrior
+from rislam_rt.slam import StartPrior, StepOutcome
 from rislam_rt.slam.observations import free_space
 from rislam_rt.slam.schemes import bp_slam_aoa
 from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, born, hypothesise
 from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, Ends, GaussianFeatures, look, prune, returns_of
 from rislam_rt.slam.schemes.bp_slam_aoa.update import CandidatePairs, View, absorb, claims, likelihoods, spread_of
-from rislam_rt.slam.schemes.shared.course import Course
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.step_info import REMOVED
 
 CONFIG = bp_slam_aoa.BpSlamAoaConfig(sigma_a=0.01)
@@ -89,9 +89,9 @@ def follow(walk: Walk, config: bp_slam_aoa.BpSlamAoaConfig = CONFIG):
     return state, info, bp_slam_aoa.estimate(state, config)
 
 
-def course_at(place: Floats) -> Course:
+def course_at(place: Floats) -> AgentTrajectory:
     root = 0.05 * np.random.default_rng(2).standard_normal((6, 6))
-    return Course(np.concatenate([place, np.zeros(3)]), root @ root.T, np.zeros(6), 3, np.eye(6), 0.0)
+    return AgentTrajectory(np.concatenate([place, np.zeros(3)]), root @ root.T, np.zeros(6), 3, np.eye(6), 0.0)
 
 
 def one(kind: int, mean: Floats) -> GaussianFeatures:
@@ -201,7 +201,7 @@ def test_it_knows_what_it_knows_in_rooms_made_by_hand() -> None:
         squares.append(error @ np.linalg.solve(spread, error) / 2.0)
         moved = belief.position - walk.position[-1] - (walk.start.position - walk.position[0])
         errors.append(moved[:2])
-    assert info.outcome == Outcome.OK
+    assert info.outcome == StepOutcome.OK
     assert np.mean(squares) < 2.5
     reckoned = 0.03 * CYCLE * 39
     assert np.sqrt(np.mean(np.square(errors))) < 0.1 * reckoned

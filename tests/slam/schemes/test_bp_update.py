@@ -6,7 +6,7 @@ import pytest
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.schemes.bp_slam_static import BpSlamStaticConfig
 from rislam_rt.slam.schemes.bp_slam_static.features import Features, make_features, no_features
-from rislam_rt.slam.schemes.bp_slam_static.update import Belief, predict_belief, update_belief
+from rislam_rt.slam.schemes.bp_slam_static.update import FactorGraphBelief, predict_belief, update_belief
 from rislam_rt.slam.schemes.shared.ranges import Bistatic, Direct, length_of, random_directions
 from rislam_rt.slam.schemes.shared.scan import Scan, birth_ratio
 
@@ -20,9 +20,9 @@ def feature_at(place: list[float], existence: float, count: int = COUNT) -> Feat
     return make_features(cloud, np.array([existence]), np.array([0]), np.array([5]))
 
 
-def belief_of(features: Features, undetected: float, count: int = COUNT) -> Belief:
+def belief_of(features: Features, undetected: float, count: int = COUNT) -> FactorGraphBelief:
     """An agent that is certain to stand at the origin."""
-    return Belief(np.zeros((count, 4)), features, np.array([undetected]), 6)
+    return FactorGraphBelief(np.zeros((count, 4)), features, np.array([undetected]), 6)
 
 
 def existence_after(length: Floats, existence: float, undetected: float) -> float:

@@ -6,21 +6,21 @@ from rooms import BODY, CYCLE, HEADING, RADIO, build_room, measurement_of
 
 from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes import bp_slam
-from rislam_rt.slam.schemes.shared.course import Course, advance, begin
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance, begin
 from rislam_rt.slam.schemes.shared.gauge import over_all_turns
 
 PLACE, WALK = np.array([0.5, 0.7]), np.array([0.08, 0.06])
 ALONG, ACROSS = np.array([0.8, 0.6]), np.array([-0.6, 0.8])
 
 
-def course_after(cycles: int) -> Course:
+def course_after(cycles: int) -> AgentTrajectory:
     course = begin(PLACE, WALK, 0.01, 0.01)
     for cycle in range(cycles):
         course, _ = advance(course, CYCLE, np.full(2, 0.01), cycle % 40 == 0)
     return course
 
 
-def turned(course: Course, angle: float) -> Course:
+def turned(course: AgentTrajectory, angle: float) -> AgentTrajectory:
     """The same shape at another direction, mean and covariance: the course that another gauge would hold."""
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     big = np.kron(np.eye(len(course.mean) // 2), turn)
@@ -28,7 +28,7 @@ def turned(course: Course, angle: float) -> Course:
     return course._replace(mean=start + big @ (course.mean - start), covariance=big @ course.covariance @ big.T)
 
 
-def certain(course: Course) -> Course:
+def certain(course: AgentTrajectory) -> AgentTrajectory:
     return course._replace(covariance=1e-12 * course.covariance)
 
 

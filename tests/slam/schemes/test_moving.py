@@ -10,7 +10,7 @@ from rooms import BODY, CYCLE, HEADING, RADIO, build_room, measurement_of
 from rislam_rt import slam
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import SensorModel
-from rislam_rt.slam import Outcome
+from rislam_rt.slam import StepOutcome
 from rislam_rt.slam.schemes import RIVALS, bp_slam, channel_slam
 from rislam_rt.slam.step_info import REMOVED
 
@@ -42,7 +42,7 @@ def test_a_short_walk_stays_within_bounds(scheme: Any, config: Any) -> None:
         # mirrored course and map give the same delays: the mean is on the line that was told, up to rounding
         assert abs(off) < 1e-12
     assert info.num_landmarks >= 1
-    assert info.outcome == Outcome.OK
+    assert info.outcome == StepOutcome.OK
     assert len(belief.samples) == config.num_samples
     ahead = scheme.predict(state, CYCLE, config)
     assert np.allclose(ahead.position, belief.position + CYCLE * belief.velocity, rtol=0.0, atol=1e-9)
@@ -56,9 +56,9 @@ def test_direct_path_and_wall_returns_are_set_aside(scheme: Any, config: Any) ->
     bright = measurement_of(np.array([0.1, 3.0, 7.0]), ratio=0.85)
     _, info = scheme.step(state, bright, None, CYCLE, HEADING, config, rng=rng)
     assert np.array_equal(info.landmark, [REMOVED, REMOVED, REMOVED])
-    assert info.outcome == Outcome.NO_LANDMARKS
+    assert info.outcome == StepOutcome.NO_LANDMARKS
     _, info = scheme.step(state, measurement_of(np.zeros(0)), None, CYCLE, HEADING, config, rng=rng)
-    assert info.outcome == Outcome.NO_MEASUREMENTS
+    assert info.outcome == StepOutcome.NO_MEASUREMENTS
 
 
 @pytest.mark.parametrize(("scheme", "config"), SCHEMES)

@@ -6,8 +6,8 @@ from rooms import BODY, CYCLE, HEADING, RADIO, build_room
 
 from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes import bp_slam
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance, begin
 from rislam_rt.slam.schemes.shared.correct import absorb, claims
-from rislam_rt.slam.schemes.shared.course import Course, advance, begin
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
 from rislam_rt.slam.schemes.shared.scan import Odds, Scan
 from rislam_rt.slam.schemes.shared.sums import Sums, born, carry, look, prune, unit_of
@@ -18,14 +18,14 @@ PUSH = np.array([0.01, 0.01])
 PLACE = np.array([0.5, 0.7, 0.5])
 
 
-def course_after(cycles: int, stride: int) -> Course:
+def course_after(cycles: int, stride: int) -> AgentTrajectory:
     course = begin(PLACE[:2], np.array([0.07, 0.07]), 0.01, 0.01)
     for cycle in range(cycles):
         course, _ = advance(course, CYCLE, PUSH, cycle % stride == 0)
     return course
 
 
-def one_feature(course: Course, kinds: tuple[float, float, float] = (1.0, 0.0, 0.0)) -> Sums:
+def one_feature(course: AgentTrajectory, kinds: tuple[float, float, float] = (1.0, 0.0, 0.0)) -> Sums:
     return born(np.array([4.0]), np.array([0.005]), np.array([kinds]), np.array([0.9]), course, PLACE, 6, 0)
 
 
@@ -47,7 +47,7 @@ def test_a_feature_keeps_its_moments_over_a_motion(stride: int) -> None:
     sums = one_feature(course)
     sums = sums._replace(slope=rng.normal(0.0, 0.3, sums.slope.shape))
 
-    def spread(sums: Sums, course: Course) -> np.ndarray:
+    def spread(sums: Sums, course: AgentTrajectory) -> np.ndarray:
         return sums.covariance + sums.slope @ course.covariance @ sums.slope.swapaxes(1, 2)
 
     wanted = spread(sums, course)

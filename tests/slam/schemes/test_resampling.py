@@ -8,9 +8,9 @@ from rislam_rt.slam.schemes.shared.resampling import (
     effective_fraction,
     kernel_width,
     normalised_rows,
+    resample_systematic,
     smooth,
     systematic_rows,
-    thin_out,
 )
 
 
@@ -77,7 +77,7 @@ def test_partial_resampling_keeps_expectations() -> None:
     before = normalised_rows(log_weight)[0] @ cloud[0]
     means = []
     for _ in range(400):
-        thinned, left = thin_out(cloud, log_weight, 0.7, rng=rng)
+        thinned, left = resample_systematic(cloud, log_weight, 0.7, rng=rng)
         means.append(normalised_rows(left)[0] @ thinned[0])
     error = np.std(means, axis=0) / np.sqrt(400)
     # The ratio of two sums is biased by about 1/N of the spread, besides.

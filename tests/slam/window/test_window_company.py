@@ -27,7 +27,7 @@ def _odds(points=NOWHERE, rows=ALL):
     tracks = SimpleNamespace(hits=np.full(4, 9)[rows], mean=np.stack([state, 0.0 * state], axis=-1)[rows])
     context = SimpleNamespace(
         tracks=tracks, heading=np.array([HEADING]), log=SimpleNamespace(side=SIDES),
-        book=SimpleNamespace(points=np.arange(len(points))),
+        landmarks=SimpleNamespace(points=np.arange(len(points))),
     )  # fmt: skip
     histories = SimpleNamespace(
         mean=(np.concatenate([LENGTHS[:, None], rays[:, :2]], axis=1), None, None), direction=rays,

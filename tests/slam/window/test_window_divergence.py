@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.window import divergence, egomotion, gauss
+from rislam_rt.slam.window import divergence, egomotion, window_gaussian
 from rislam_rt.slam.window.egomotion import Rates
-from rislam_rt.slam.window.forms import UNKNOWN
-from rislam_rt.slam.window.log import Log
+from rislam_rt.slam.window.measurement_log import Log
+from rislam_rt.slam.window.path_forms import UNKNOWN
 from rislam_rt.slam.window.steps import HEAD
 
 TOLD, STD = np.array([0.3, 0.1, 0.0]), np.full(3, 0.01)
@@ -99,21 +99,21 @@ def test_tracks_that_end_at_once_make_a_loss_likelier_and_a_map_that_explains_do
 
 def _window(rng):
     """Three poses and two features that measurements tie together."""
-    window = gauss.begin(np.zeros(3), np.array([0.1, 0.2, 0.0]), np.array([1e-5] * 3 + [0.01] * 3 + [0.0]))
+    window = window_gaussian.begin(np.zeros(3), np.array([0.1, 0.2, 0.0]), np.array([1e-5] * 3 + [0.01] * 3 + [0.0]))
     for place in ([1.0, 2.0, 1.0], [-2.0, 1.0, 2.0]):
-        window = gauss.add_feature(window, np.array(place), gauss.no_holds())
+        window = window_gaussian.add_feature(window, np.array(place), window_gaussian.no_holds())
     for _ in range(2):
-        window = gauss.extend(window, 0.1, np.full(3, 25.0))
+        window = window_gaussian.extend(window, 0.1, np.full(3, 25.0))
     root = rng.standard_normal(window.slots.hessian.shape) * 10.0
     root[-1] = 0.0  # nothing is measured from the last pose as yet
     slots = window.slots._replace(hessian=root @ np.swapaxes(root, 1, 2))
-    return gauss.solve(window._replace(slots=slots))
+    return window_gaussian.solve(window._replace(slots=slots))
 
 
 def test_after_a_jump_all_but_the_place_is_as_it_was():
     window, by = _window(np.random.default_rng(5)), np.array([0.7, -0.4, 0.0])
-    mean, covariance = gauss.now(window)
-    after, spread = gauss.now(divergence.landed(window, by))
+    mean, covariance = window_gaussian.now(window)
+    after, spread = window_gaussian.now(divergence.landed(window, by))
     np.testing.assert_allclose(after, mean + np.concatenate([by, np.zeros(len(mean) - 3)]), atol=1e-6)
     wide = covariance.copy()
     wide[[0, 1], [0, 1]] += divergence.JUMP**2
@@ -124,6 +124,8 @@ def test_after_a_jump_all_but_the_place_is_as_it_was():
 def test_a_look_elsewhere_moves_the_last_pose_alone():
     window, by = _window(np.random.default_rng(6)), np.array([0.7, -0.4, 0.1])
     there = divergence.shifted(window, by)
-    np.testing.assert_allclose(gauss.poses(there)[-1, :3] - gauss.poses(window)[-1, :3], by, atol=1e-12)
-    np.testing.assert_allclose(gauss.now(there)[0][3:6], gauss.now(window)[0][3:6], atol=1e-9)
-    np.testing.assert_allclose(gauss.now(there)[0][HEAD:], gauss.now(window)[0][HEAD:])
+    np.testing.assert_allclose(
+        window_gaussian.poses(there)[-1, :3] - window_gaussian.poses(window)[-1, :3], by, atol=1e-12
+    )
+    np.testing.assert_allclose(window_gaussian.now(there)[0][3:6], window_gaussian.now(window)[0][3:6], atol=1e-9)
+    np.testing.assert_allclose(window_gaussian.now(there)[0][HEAD:], window_gaussian.now(window)[0][HEAD:])

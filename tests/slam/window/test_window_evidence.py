@@ -5,11 +5,11 @@ import numpy as np
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.returns import AXES, NONE, TX, Poses, linearise, reflect
-from rislam_rt.slam.window import trial
-from rislam_rt.slam.window.digest import Digest, scatter_of
-from rislam_rt.slam.window.forms import compile_forms
-from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.trial import COMMON, Trials, smooth_paths, try_all
+from rislam_rt.slam.window import hypothesis_fits
+from rislam_rt.slam.window.hypothesis_fits import COMMON, Trials, smooth_paths, try_all
+from rislam_rt.slam.window.model_constants import CONSTANTS
+from rislam_rt.slam.window.path_forms import compile_forms
+from rislam_rt.slam.window.track_summary import TrackSummary, scatter_of
 
 
 def _digest(count, *, std=0.01, rng):
@@ -20,7 +20,7 @@ def _digest(count, *, std=0.01, rng):
     doubt = 1e-3 * rng.standard_normal((3, 6))
     wide = doubt + time[:, None, None] * 1e-3 * rng.standard_normal((3, 6))
     weight = np.full((1, count, 3), 1.0 / std)
-    return Digest(
+    return TrackSummary(
         np.zeros((1, count, 3)), weight, time[None], ends.tx[None], ends.rx[None], wide[None],
         np.zeros(1), np.ones((1, 3)), place[-1], 0.4, np.zeros((1, count, 3, 0)),
     )  # fmt: skip
@@ -74,7 +74,7 @@ def _left(trials, digest, place, error):
     """Residuals of one hypothesis, through its cost's own slope: computed at `place` and `error`."""
     rows = np.zeros(1, dtype=np.int64)
     count = digest.seen.shape[1]
-    return trial._equations(trials, digest, rows, place[None], error[None], np.ones((1, count)))
+    return hypothesis_fits._equations(trials, digest, rows, place[None], error[None], np.ones((1, count)))
 
 
 def test_slopes_are_those_of_the_cost():
@@ -140,7 +140,7 @@ def test_evidence_is_the_integral_of_the_likelihood():
         places, *(np.repeat(field, len(places), axis=0) for field in trials[4:]),
     )  # fmt: skip
     rows = np.arange(len(places))
-    cost = trial._equations(
+    cost = hypothesis_fits._equations(
         every, digest, rows, places, np.zeros((len(places), COMMON)), np.ones((len(places), 8))
     ).cost  # fmt: skip
     cell = np.prod(np.sqrt(value)) * (nodes[1] - nodes[0]) ** 3
@@ -168,4 +168,4 @@ def test_scatter_is_that_of_the_noise():
         seen = 3.0 + 0.2 * time[:, None] + 0.003 * time[:, None] ** 2 + factor * 0.01 * rng.standard_normal((200, 3))
         # of 200 measurements the deviation is known to 5 %; Student's weights take a little off
         np.testing.assert_allclose(scatter_of(seen, std, time), max(factor, 1.0), rtol=0.2)
-    assert LEVELS.crowd > 1.0
+    assert CONSTANTS.crowd > 1.0

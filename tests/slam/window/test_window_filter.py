@@ -141,7 +141,7 @@ def test_start_error_stays_in_the_covariance(run):
     # nothing that is measured tells where the start was
     for estimate, _ in (found[5], found[-1]):
         assert np.sqrt(np.diag(estimate.covariance)[:2]).min() >= 0.01
-    assert found[-1][1].outcome == slam.Outcome.OK
+    assert found[-1][1].outcome == slam.StepOutcome.OK
 
 
 def test_a_second_run_on_the_map_finds_out_where_it_began(run):

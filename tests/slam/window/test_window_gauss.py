@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.window import gauss, motion
-from rislam_rt.slam.window.gauss import Holds, Quadratic
+from rislam_rt.slam.window import motion, window_gaussian
 from rislam_rt.slam.window.steps import HEAD, POSE
+from rislam_rt.slam.window.window_gaussian import DirectionPriors, Quadratic
 
 DT, CYCLES, SIGMA_A = 0.1, 12, 0.5
 
@@ -19,20 +19,20 @@ def _sighting(rng):
 
 def _filtered(sightings, start, std, keep):
     """The window's answer, at most `keep` poses long."""
-    window = gauss.begin(start[:3], start[3:6], std)
-    nothing = Holds(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), *(np.zeros(0) for _ in range(4)))
-    window = gauss.add_feature(window, np.ones(3), nothing, ridge=1.0)
+    window = window_gaussian.begin(start[:3], start[3:6], std)
+    nothing = DirectionPriors(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), *(np.zeros(0) for _ in range(4)))
+    window = window_gaussian.add_feature(window, np.ones(3), nothing, ridge=1.0)
     for cycle, (rows, value, weight) in enumerate(sightings):
         if cycle:
             while window.num_poses >= keep:
-                window = gauss.slide(window)
-            window = gauss.extend(window, DT, np.full(3, SIGMA_A**-2.0))
+                window = window_gaussian.slide(window)
+            window = window_gaussian.extend(window, DT, np.full(3, SIGMA_A**-2.0))
         hessian, gradient, middle = (field.copy() for field in window.slots)
-        spot = np.concatenate([gauss.poses(window)[-1], window.features[0]])
+        spot = np.concatenate([window_gaussian.poses(window)[-1], window.features[0]])
         hessian[-1] = rows.T @ (weight[:, None] * rows)
         gradient[-1], middle[-1] = rows.T @ (weight * (rows @ spot - value)), spot
-        window = gauss.solve(window._replace(slots=Quadratic(hessian, gradient, middle)))
-    return gauss.now(window)
+        window = window_gaussian.solve(window._replace(slots=Quadratic(hessian, gradient, middle)))
+    return window_gaussian.now(window)
 
 
 def _batch(sightings, start, std):
@@ -83,19 +83,19 @@ def test_a_linear_window_is_the_batch_and_loses_nothing_when_it_slides(keep):
 
 def test_a_belief_about_a_wall_gives_way_to_what_contradicts_it():
     rng = np.random.default_rng(4)
-    window = gauss.begin(np.zeros(3), np.zeros(3), np.full(7, 1e-3))
-    hold = Holds(
+    window = window_gaussian.begin(np.zeros(3), np.zeros(3), np.full(7, 1e-3))
+    hold = DirectionPriors(
         np.zeros(1, dtype=np.int64), np.array([[0.0, 0.0, 1.0]]), np.zeros(1), np.full(1, 0.05),
         np.array([np.log(9.0) + np.log(5.0)]), np.full(1, 0.5),
     )  # fmt: skip
     for truth, right in ((0.02, True), (0.6, False)):
-        held = gauss.add_feature(window, np.array([5.0, 0.0, truth]) + 0.1 * rng.standard_normal(3), hold)
+        held = window_gaussian.add_feature(window, np.array([5.0, 0.0, truth]) + 0.1 * rng.standard_normal(3), hold)
         hessian, gradient, middle = (field.copy() for field in held.slots)
         hessian[0, POSE:, POSE:] = np.eye(3) / 0.03**2
         middle[0, POSE:] = [5.0, 0.0, truth]
         held = held._replace(slots=Quadratic(hessian, gradient, middle))
         for _ in range(4):
-            held = gauss.weigh_holds(gauss.solve(held))
+            held = window_gaussian.weigh_holds(window_gaussian.solve(held))
         assert (held.holds.probability[0] > 0.9) == right
         # where it does not hold, the measurement alone counts
         if not right:
@@ -143,24 +143,24 @@ def test_a_heading_that_turns_is_filtered_as_a_batch_does(keep):
     rng, rate = np.random.default_rng(11), 0.3
     seen, weight = 0.1 * rng.standard_normal(CYCLES), rng.uniform(10.0, 1e3, CYCLES)
     std = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.2])
-    window = gauss.begin(np.zeros(3), np.zeros(3), std, turns=True)
+    window = window_gaussian.begin(np.zeros(3), np.zeros(3), std, turns=True)
     for cycle in range(CYCLES):
         if cycle:
             while window.num_poses >= keep:
-                window = gauss.slide(window)
-            window = gauss.extend(window, DT, np.full(4, rate**-2.0))
+                window = window_gaussian.slide(window)
+            window = window_gaussian.extend(window, DT, np.full(4, rate**-2.0))
         hessian, gradient, middle = (field.copy() for field in window.slots)
         hessian[-1, 3, 3] = weight[cycle]
         gradient[-1, 3], middle[-1] = (
-            weight[cycle] * (gauss.poses(window)[-1, 3] - seen[cycle]),
-            gauss.poses(window)[-1],
+            weight[cycle] * (window_gaussian.poses(window)[-1, 3] - seen[cycle]),
+            window_gaussian.poses(window)[-1],
         )
-        window = gauss.solve(window._replace(slots=Quadratic(hessian, gradient, middle)))
+        window = window_gaussian.solve(window._replace(slots=Quadratic(hessian, gradient, middle)))
     # the batch: the first heading and every rate
     rows = np.concatenate([np.ones((CYCLES, 1)), DT * np.tri(CYCLES, CYCLES - 1, -1)], axis=1)
     prior = np.concatenate([[0.2**-2.0], np.full(CYCLES - 1, rate**-2.0)])
     covariance = np.linalg.inv(rows.T @ (weight[:, None] * rows) + np.diag(prior))
     wanted = rows @ covariance @ rows.T @ (weight * seen)
-    mean, spread = gauss.now(window)
+    mean, spread = window_gaussian.now(window)
     np.testing.assert_allclose(mean[6], wanted[-1], atol=1e-9)
     np.testing.assert_allclose(spread[6, 6], rows[-1] @ covariance @ rows[-1], rtol=1e-9)

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 
 from rislam_rt.slam.returns import NONE, TX
-from rislam_rt.slam.window import births, kinds
-from rislam_rt.slam.window.forms import UNKNOWN
-from rislam_rt.slam.window.guesses import KNOWN_WALL, POINT, WALL, WALL_KNOWN
-from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.log import empty_log
-from rislam_rt.slam.window.trial import Fits
+from rislam_rt.slam.window import births, track_classification
+from rislam_rt.slam.window.hypotheses import KNOWN_WALL, POINT, WALL, WALL_KNOWN
+from rislam_rt.slam.window.hypothesis_fits import Fits
+from rislam_rt.slam.window.measurement_log import empty_log
+from rislam_rt.slam.window.model_constants import CONSTANTS
+from rislam_rt.slam.window.path_forms import UNKNOWN
 
 
 def _table(kind, pair=None):
@@ -22,21 +22,21 @@ def _table(kind, pair=None):
 
 def test_places_of_walls_and_points_have_densities_that_integrate_to_one():
     rng, middle = np.random.default_rng(5), np.array([3.0, -2.0, 1.0])
-    for kind, radius in ((WALL, 2.0 * LEVELS.size), (POINT, LEVELS.size)):
+    for kind, radius in ((WALL, 2.0 * CONSTANTS.size), (POINT, CONSTANTS.size)):
         # shells, sampled evenly in distance: the density times the area of each
         reach = rng.uniform(0.0, radius, 20_000)
         way = rng.standard_normal((len(reach), 3))
         place = middle + reach[:, None] * way / np.linalg.norm(way, axis=1)[:, None]
-        density = np.exp(kinds.log_place(_table([kind] * len(reach)), place, middle))
+        density = np.exp(track_classification.log_place(_table([kind] * len(reach)), place, middle))
         share = radius * density * 4.0 * np.pi * reach**2
         # within the depth of a surface a wall is no likelier: two thirds of the share of that shell are missing
-        missing = 2.0 / 3.0 * 2.0 * LEVELS.depth / radius if kind == WALL else 0.0
+        missing = 2.0 / 3.0 * 2.0 * CONSTANTS.depth / radius if kind == WALL else 0.0
         assert abs(share.mean() - (1.0 - missing)) < 5.0 * np.std(share) / len(reach) ** 0.5
 
 
 def test_a_wall_twice_as_far_is_as_likely_in_the_same_step_of_distance():
     far = np.array([[4.0, 0.0, 0.0], [8.0, 0.0, 0.0]])
-    density = np.exp(kinds.log_place(_table([WALL, WALL]), far, np.zeros(3)))
+    density = np.exp(track_classification.log_place(_table([WALL, WALL]), far, np.zeros(3)))
     assert np.isclose(density[0] * 4.0**2, density[1] * 8.0**2)
 
 
@@ -46,11 +46,11 @@ def test_forms_that_put_the_wall_in_one_place_speak_for_it_together():
     cost = np.array([1.0, 1.0, 1.0, 1.0, np.inf])
     fits = Fits(place, spread, spread, cost, np.zeros(5), np.zeros(5))
     table = _table([KNOWN_WALL, WALL_KNOWN, WALL, POINT, WALL])
-    found = kinds._alike(table, fits, np.arange(5), 0)
+    found = track_classification._alike(table, fits, np.arange(5), 0)
     # not itself, not half a metre off, not a point, not what could not be fitted
     assert found.tolist() == [False, True, False, False, False]
     pair = _table([WALL, WALL, WALL, WALL, WALL], [True, True, False, False, False])
-    assert not kinds._alike(pair, fits, np.arange(5), 0).any()
+    assert not track_classification._alike(pair, fits, np.arange(5), 0).any()
 
 
 def test_two_components_at_a_time_are_not_the_same_return():

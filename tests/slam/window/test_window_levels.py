@@ -6,34 +6,34 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam import window
-from rislam_rt.slam.window.expect import PANEL_STD
 from rislam_rt.slam.window.factor import factorise, inverse
-from rislam_rt.slam.window.levels import LEVELS, Levels
+from rislam_rt.slam.window.measurement_prediction import PANEL_STD
+from rislam_rt.slam.window.model_constants import CONSTANTS, ModelConstants
 
 SOURCES = [path.read_text() for path in Path(window.__file__).parent.glob("*.py")]
 
 
 def test_there_are_at_most_25_constants_and_each_is_read():
-    assert len(Levels._fields) <= 25
-    for name in Levels._fields:
-        assert any(f"LEVELS.{name}" in text or f"self.{name}" in text for text in SOURCES), name
+    assert len(ModelConstants._fields) <= 25
+    for name in ModelConstants._fields:
+        assert any(f"CONSTANTS.{name}" in text or f"self.{name}" in text for text in SOURCES), name
 
 
 def test_nothing_is_worked_out_from_the_table_when_a_module_is_loaded():
     """Or a study that changes the table would change half of it."""
     for text in SOURCES:
-        loose = [line for line in text.splitlines() if "LEVELS." in line and not line.startswith((" ", ")"))]
+        loose = [line for line in text.splitlines() if "CONSTANTS." in line and not line.startswith((" ", ")"))]
         assert not loose
 
 
 def test_unseen_legs_are_clear_as_often_as_the_chain_is_in_the_long_run():
-    move = np.array([[1.0 - LEVELS.blocked, LEVELS.blocked], [LEVELS.cleared, 1.0 - LEVELS.cleared]])
-    assert LEVELS.steady == pytest.approx(np.linalg.matrix_power(move, 1000)[0, 0], rel=1e-9)
+    move = np.array([[1.0 - CONSTANTS.blocked, CONSTANTS.blocked], [CONSTANTS.cleared, 1.0 - CONSTANTS.cleared]])
+    assert CONSTANTS.steady == pytest.approx(np.linalg.matrix_power(move, 1000)[0, 0], rel=1e-9)
 
 
 def test_the_weaker_of_two_paths_lies_a_walls_loss_below():
-    first, second = 1.0, np.exp(LEVELS.wall_ratio)
-    assert LEVELS.weaker == pytest.approx(second / (first + second), rel=1e-12)
+    first, second = 1.0, np.exp(CONSTANTS.wall_ratio)
+    assert CONSTANTS.weaker == pytest.approx(second / (first + second), rel=1e-12)
 
 
 def test_the_panels_spread_is_that_of_a_rayleigh_amplitude():

@@ -19,10 +19,10 @@ from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.identity import MODEL_ERROR
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.returns import TX as MOVING
-from rislam_rt.slam.window.book import empty_book, enter
-from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.look import return_sides
-from rislam_rt.slam.window.panel import Sight, gains, spread_places, unknown, weigh
+from rislam_rt.slam.window.cycle_association import return_sides
+from rislam_rt.slam.window.landmark_table import empty_table, enter
+from rislam_rt.slam.window.model_constants import CONSTANTS
+from rislam_rt.slam.window.ris_identification import PanelObservation, gains, spread_places, unknown, weigh
 
 SENSOR = SensorModel(RadioConfig(noise_psd=3.52e-12))
 SPEC = RisSpec(6, 6, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
@@ -32,7 +32,7 @@ PLACE, TX, RX = np.array([[3.0, 3.0, 3.0]]), np.array([[2.0, 2.5, 0.5]]), np.arr
 def _sight(amplitude, side=UNTOLD, seen=True, std=1e-4):
     places = spread_places(PLACE, std**2 * np.eye(3)[None])
     flag = np.array([seen])
-    return Sight(places, TX, RX, np.ones(1), np.array([amplitude]), np.array([side]), flag)
+    return PanelObservation(places, TX, RX, np.ones(1), np.array([amplitude]), np.array([side]), flag)
 
 
 def _code(rng):
@@ -44,13 +44,13 @@ def test_one_amplitude_tells_what_quadrature_tells():
     sight = _sight(3.0 * noise)
     gain = gains(sight, SPEC, code, radio)
     sight = sight._replace(amplitude=abs(gain[0]).mean(axis=1) + noise)
-    found = weigh(unknown(1), sight, gain, SENSOR).log_ris[0, 0] - np.log(LEVELS.panels)
+    found = weigh(unknown(1), sight, gain, SENSOR).log_ris[0, 0] - np.log(CONSTANTS.panels)
     loud = abs(gain[0, 0])
     spread = np.hypot(noise, MODEL_ERROR * loud)
     panel = np.mean(rice.pdf(sight.amplitude[0], loud / spread, scale=spread))
     # the root of the cross-section is log-normal; far beyond the filter's own grid
     log = np.linspace(np.log(1e-4), np.log(30.0), 4001)
-    prior = np.exp(-0.5 * ((log - np.log(LEVELS.strength)) / LEVELS.strength_std) ** 2)
+    prior = np.exp(-0.5 * ((log - np.log(CONSTANTS.strength)) / CONSTANTS.strength_std) ** 2)
     level = point_amplitude(np.exp(log), np.linalg.norm(PLACE - TX), np.linalg.norm(PLACE - RX), radio)
     width = np.hypot(noise, MODEL_ERROR * level)
     other = np.sum(prior * rice.pdf(sight.amplitude[0], level / width, scale=width)) / prior.sum()
@@ -77,12 +77,12 @@ def test_what_is_hidden_tells_nothing_by_silence_and_alternation_excludes():
     gain = 10.0 * gains(_sight(1.0), SPEC, code, SENSOR.radio)
     silent = _sight(1.0, seen=False)
     blocked = unknown(1)._replace(hidden=np.ones((1, 2)))
-    assert weigh(blocked, silent, gain, SENSOR).log_ris[0, 0] == pytest.approx(np.log(LEVELS.panels))
+    assert weigh(blocked, silent, gain, SENSOR).log_ris[0, 0] == pytest.approx(np.log(CONSTANTS.panels))
     # a panel this loud would have been heard
-    assert weigh(unknown(1), silent, gain, SENSOR).log_ris[0, 0] < np.log(LEVELS.panels)
+    assert weigh(unknown(1), silent, gain, SENSOR).log_ris[0, 0] < np.log(CONSTANTS.panels)
     level = float(abs(gain).mean())
     told = [weigh(unknown(1), _sight(level, side=side), gain, SENSOR).log_ris[0, 0] for side in (OTHER, UNTOLD, PANEL)]
-    assert told[0] < np.log(LEVELS.panels) < told[1] < told[2]
+    assert told[0] < np.log(CONSTANTS.panels) < told[1] < told[2]
 
 
 @pytest.mark.parametrize(("told", "cycles"), [(True, 4), (False, 20)])
@@ -94,7 +94,9 @@ def test_two_panels_of_one_data_sheet_are_told_apart(told, cycles):
     belief, places = unknown(3, 2), spread_places(spots, np.tile(1e-8 * np.eye(3), (3, 1, 1)))
     for _ in range(cycles):
         code = RisCode(rng.integers(4, size=(1, 72)), 4)
-        look = Sight(places, np.tile(TX, (3, 1)), np.tile(RX, (3, 1)), np.ones(3), *np.zeros((2, 3)), np.ones(3))
+        look = PanelObservation(
+            places, np.tile(TX, (3, 1)), np.tile(RX, (3, 1)), np.ones(3), *np.zeros((2, 3)), np.ones(3)
+        )
         gain = gains(look, sheets, code, SENSOR.radio)
         level = np.array([abs(gain[0, 0, 0]), abs(gain[1, 1, 0]), 3.0 * least])
         heard = np.hypot(level + noise * rng.standard_normal(3), noise * rng.standard_normal(3))
@@ -111,10 +113,10 @@ def test_forms_take_the_side_of_the_panel_that_their_point_is_held_for():
     forms[:, 0] = [0, 1, 2, MOVING]
 
     def sides(odds):
-        book = empty_book(2)
+        landmarks = empty_table(2)
         for row in odds:
-            book = enter(book, False, np.zeros(3), 1, 0.0, unknown(1, 2)._replace(log_ris=np.array([row])))
-        return return_sides(forms, book), book.panels
+            landmarks = enter(landmarks, False, np.zeros(3), 1, 0.0, unknown(1, 2)._replace(log_ris=np.array([row])))
+        return return_sides(forms, landmarks), landmarks.panels
 
     found, held = sides([[-9.0, 9.0], [9.0, -9.0], [-9.0, -9.0]])
     assert held == (1, 0)

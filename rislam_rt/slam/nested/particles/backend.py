@@ -3,12 +3,12 @@
 from functools import cache
 
 from rislam_rt.errors import SetupError
-from rislam_rt.slam.nested.particles.cloud import Engine
+from rislam_rt.slam.nested.particles.cloud import CloudEngine
 from rislam_rt.slam.nested.particles.numpy_engine import NumpyEngine
 
 
 @cache
-def pick_engine(name: str) -> Engine:
+def pick_engine(name: str) -> CloudEngine:
     """The engine `auto`, `drjit` or `numpy`; Dr.Jit is imported here and not before.
 
     Raises

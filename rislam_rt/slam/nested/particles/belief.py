@@ -9,7 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
 from rislam_rt.slam.moments import POSE, Moments, normalised, where
 from rislam_rt.slam.nested.particles import agents
-from rislam_rt.slam.nested.particles.cloud import HOPELESS, Cloud, Engine, Kernel, kernel_width
+from rislam_rt.slam.nested.particles.cloud import HOPELESS, Cloud, CloudEngine, Kernel, kernel_width
 from rislam_rt.slam.nested.particles.kld_sampling import num_agents, num_points
 from rislam_rt.slam.nested.particles.sightline import Sighting, pack
 from rislam_rt.slam.nested_config import NestedConfig
@@ -105,7 +105,7 @@ def propagate(belief: Nested, dt: float, accelerate: Floats, turn: float, *, rng
     return belief._replace(position=position, velocity=velocity, heading=heading)
 
 
-def absorb(belief: Nested, owner: int, sightings: Sequence[Sighting], engine: Engine) -> tuple[Nested, float]:
+def absorb(belief: Nested, owner: int, sightings: Sequence[Sighting], engine: CloudEngine) -> tuple[Nested, float]:
     """Weights after returns that speak of landmark `owner`, and the log evidence of what was measured.
 
     The previous weight enters once, however many returns there are. If no particle can explain them, the belief stays
@@ -131,7 +131,7 @@ def absorb(belief: Nested, owner: int, sightings: Sequence[Sighting], engine: En
 
 
 def renew(
-    belief: Nested, spans: Floats, config: NestedConfig, engine: Engine, *, rng: np.random.Generator
+    belief: Nested, spans: Floats, config: NestedConfig, engine: CloudEngine, *, rng: np.random.Generator
 ) -> tuple[Nested, bool]:
     """Resample what has degenerated: clouds first, then agent particles (whether these were is told).
 
@@ -152,7 +152,7 @@ def initialise_landmark(
     mean: Floats,
     covariance: Floats,
     config: NestedConfig,
-    engine: Engine,
+    engine: CloudEngine,
     *,
     wall: Floats | None = None,
     rng: np.random.Generator,
@@ -237,7 +237,7 @@ def joint(belief: Nested) -> Floats:
 
 
 def _renew_cloud(
-    belief: Nested, owner: int, config: NestedConfig, engine: Engine, *, rng: np.random.Generator
+    belief: Nested, owner: int, config: NestedConfig, engine: CloudEngine, *, rng: np.random.Generator
 ) -> Nested:
     """Landmark particles of one landmark, resampled within every agent particle."""
     count, cloud = len(belief.log_weight), belief.clouds[owner]
@@ -253,7 +253,7 @@ def _renew_cloud(
 
 
 def _renew_agents(
-    belief: Nested, spans: Floats, config: NestedConfig, engine: Engine, *, rng: np.random.Generator
+    belief: Nested, spans: Floats, config: NestedConfig, engine: CloudEngine, *, rng: np.random.Generator
 ) -> Nested:
     """Agent particles resampled: clouds follow by index, moved as a whole with the kernel; so is the trail."""
     count = num_agents(agents.moments(belief.weight, belief.position)[1], config)
@@ -281,7 +281,7 @@ def _renew_agents(
     )
 
 
-def _inherit(cloud: Cloud, ancestors: Integers, engine: Engine) -> Cloud:
+def _inherit(cloud: Cloud, ancestors: Integers, engine: CloudEngine) -> Cloud:
     """A cloud as the children see it; written anew only if most of it is nobody's any more."""
     block, row = cloud.block[ancestors], cloud.row[ancestors]
     cloud = cloud._replace(block=block, row=row, log_total=cloud.log_total[ancestors])

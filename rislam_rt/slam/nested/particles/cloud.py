@@ -44,7 +44,7 @@ class Cloud(NamedTuple):
     """M."""
 
 
-class Sums(NamedTuple):
+class CloudSums(NamedTuple):
     """What a pass over all particles of a cloud found, for each of N agent particles."""
 
     log_total: Floats
@@ -70,7 +70,7 @@ class Kernel(NamedTuple):
     """Kernel width h in standard deviations of the cloud."""
 
 
-class Engine(Protocol):
+class CloudEngine(Protocol):
     """The heavy passes, on whatever machine."""
 
     name: str
@@ -81,7 +81,7 @@ class Engine(Protocol):
     def read(self, cloud: Cloud) -> tuple[Floats, Floats]:
         """Offsets (N, M, 3) and normalised log weights (N, M) of every agent particle, for tests and pictures."""
 
-    def weigh(self, cloud: Cloud, kinds: Kinds, constants: Floats) -> tuple[Cloud, Sums]:
+    def weigh(self, cloud: Cloud, kinds: Kinds, constants: Floats) -> tuple[Cloud, CloudSums]:
         """Multiply the weights by the likelihood of some returns, constants (K, N) float32."""
 
     def resample(self, cloud: Cloud, covariance: Floats, size: int, kernel: Kernel) -> Cloud:
@@ -91,7 +91,7 @@ class Engine(Protocol):
         """The same cloud without blocks and rows that nobody points at."""
 
 
-def combine(lanes: Floats) -> Sums:
+def combine(lanes: Floats) -> CloudSums:
     """Sums over the particles of an agent from sums over parts of them.
 
     Parameters
@@ -107,7 +107,7 @@ def combine(lanes: Floats) -> Sums:
     sums = np.einsum("knc,nc->kn", lanes[3:], scale) / total
     mean = sums[:3].T
     covariance = sums[3:][SECOND].transpose(2, 0, 1) - mean[:, :, None] * mean[:, None, :]
-    return Sums(top + np.log(total), total**2 / square, mean, covariance)
+    return CloudSums(top + np.log(total), total**2 / square, mean, covariance)
 
 
 def restoring_map(wanted: Floats, found: Floats) -> Floats:

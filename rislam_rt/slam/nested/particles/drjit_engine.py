@@ -13,7 +13,16 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.backend import prepare_backend
-from rislam_rt.slam.nested.particles.cloud import DEEPEST, HOPELESS, SECOND, Cloud, Kernel, Sums, combine, restoring_map
+from rislam_rt.slam.nested.particles.cloud import (
+    DEEPEST,
+    HOPELESS,
+    SECOND,
+    Cloud,
+    CloudSums,
+    Kernel,
+    combine,
+    restoring_map,
+)
 from rislam_rt.slam.nested.particles.quantisation import TOP, WORDS, Quantisation, decode, encode, join, split, steps
 from rislam_rt.slam.nested.particles.sightline import Kinds, log_likelihood
 
@@ -46,7 +55,7 @@ class DrJitEngine:
         log_weight = cloud.log_weight.numpy().reshape(-1, cloud.size)[cloud.row]
         return points, log_weight - cloud.log_total[:, None]
 
-    def weigh(self, cloud: Cloud, kinds: Kinds, constants: Floats) -> tuple[Cloud, Sums]:
+    def weigh(self, cloud: Cloud, kinds: Kinds, constants: Floats) -> tuple[Cloud, CloudSums]:
         """See `Engine`."""
         dr, count, size = self._dr, len(cloud.block), cloud.size
         agent, place, lanes = self._lanes(count, size)

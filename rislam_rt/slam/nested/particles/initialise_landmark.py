@@ -9,7 +9,7 @@ from rislam_rt.slam.nested.birth import Birth
 from rislam_rt.slam.nested.hypotheses import POINT
 from rislam_rt.slam.nested.particles.belief import Nested, absorb, mean_covariances, renew
 from rislam_rt.slam.nested.particles.belief import initialise_landmark as place
-from rislam_rt.slam.nested.particles.cloud import Engine
+from rislam_rt.slam.nested.particles.cloud import CloudEngine
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, trace_sightline
 from rislam_rt.slam.nested.particles.update import FLOOR, trusted
 from rislam_rt.slam.nested_config import NestedConfig
@@ -27,7 +27,7 @@ def initialise_landmark(
     body: Body,
     spans: Floats,
     config: NestedConfig,
-    engine: Engine,
+    engine: CloudEngine,
     *,
     rng: np.random.Generator,
 ) -> Nested:

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.nested.particles.cloud import DEEPEST, HOPELESS, Cloud, Kernel, Sums, combine, restoring_map
+from rislam_rt.slam.nested.particles.cloud import DEEPEST, HOPELESS, Cloud, CloudSums, Kernel, combine, restoring_map
 from rislam_rt.slam.nested.particles.sightline import Kinds, log_likelihood
 
 Singles = npt.NDArray[np.float32]
@@ -32,7 +32,7 @@ class NumpyEngine:
         points = np.swapaxes(cloud.points[cloud.block], 1, 2)
         return points.astype(np.float64), cloud.log_weight[cloud.row] - cloud.log_total[:, None]
 
-    def weigh(self, cloud: Cloud, kinds: Kinds, constants: Floats) -> tuple[Cloud, Sums]:
+    def weigh(self, cloud: Cloud, kinds: Kinds, constants: Floats) -> tuple[Cloud, CloudSums]:
         """See `Engine`."""
         count, size = len(cloud.block), cloud.size
         new = np.empty((count, size), dtype=np.float32)

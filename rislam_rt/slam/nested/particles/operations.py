@@ -13,7 +13,7 @@ from rislam_rt.slam.nested.particles import belief
 from rislam_rt.slam.nested.particles import initialise_landmark as history
 from rislam_rt.slam.nested.particles.backend import pick_engine
 from rislam_rt.slam.nested.particles.belief import Nested
-from rislam_rt.slam.nested.particles.cloud import Engine
+from rislam_rt.slam.nested.particles.cloud import CloudEngine
 from rislam_rt.slam.nested.particles.prior_map import set_prior_map as place_known
 from rislam_rt.slam.nested.particles.update import FLOOR, Seen, look, trusted, whitened
 from rislam_rt.slam.nested.particles.update import update as absorb_all
@@ -21,7 +21,7 @@ from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.returns import Returns
 
 
-class Particles(NamedTuple):
+class PointParticles(NamedTuple):
     """The belief, and what goes with it."""
 
     belief: Nested
@@ -32,7 +32,7 @@ class Particles(NamedTuple):
     config: NestedConfig
 
     @property
-    def engine(self) -> Engine:
+    def engine(self) -> CloudEngine:
         """Where the heavy passes run."""
         return pick_engine(self.config.engine)
 
@@ -42,10 +42,10 @@ class Particles(NamedTuple):
         return self.now - self.time
 
 
-class Update(NamedTuple):
+class ParticleUpdate(NamedTuple):
     """Particles after a cycle's measurements."""
 
-    particles: Particles
+    particles: PointParticles
     log_evidence: float
     """Log density of the measurements given all before."""
     white: Floats
@@ -54,7 +54,7 @@ class Update(NamedTuple):
     """Squared innovation of the mean belief, normalised; chi^2 with 3 A degrees of freedom."""
 
 
-def begin(start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> Particles:
+def begin(start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> PointParticles:
     """Agent particles from the start prior, with its mean and covariance exactly."""
     nested = config.nested
     std = np.concatenate([start.position_std * config.axes, start.velocity_std * config.axes, [start.heading_std]])
@@ -62,17 +62,17 @@ def begin(start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) ->
         std[6] = 0.0
     centre = np.concatenate([start.position, start.velocity, [start.heading]])
     state = belief.draw_start(centre, std, nested.num_agents, config.nested.window, rng=rng)
-    return Particles(state, np.zeros(config.nested.window), 0.0, nested)
+    return PointParticles(state, np.zeros(config.nested.window), 0.0, nested)
 
 
-def set_prior_map(particles: Particles, features: Floats, covariance: Floats) -> Particles:
+def set_prior_map(particles: PointParticles, features: Floats, covariance: Floats) -> PointParticles:
     """F landmarks (F, 3) known beforehand, with a covariance (3F, 3F)."""
     known = place_known(particles.belief, features, covariance, particles.config, particles.engine)
     return particles._replace(belief=known)
 
 
 def propagate(
-    particles: Particles,
+    particles: PointParticles,
     dt: float,
     accelerate: Floats,
     heading: float,
@@ -80,7 +80,7 @@ def propagate(
     config: SlamConfig,
     *,
     rng: np.random.Generator,
-) -> Particles:
+) -> PointParticles:
     """Discrete white-noise acceleration over `dt` [s]; the new pose is kept in row `slot` of the trail."""
     turn = config.turn_std * np.sqrt(dt) if config.heading == "estimated" else 0.0
     moved = belief.propagate(particles.belief, dt, accelerate, turn, rng=rng)
@@ -95,19 +95,19 @@ def propagate(
     return particles._replace(belief=moved._replace(trail=past), time=time, now=now)
 
 
-def moments(particles: Particles) -> Moments:
+def moments(particles: PointParticles) -> Moments:
     """Mean and covariance over pose and features."""
     return belief.gaussian(particles.belief)
 
 
-def trail(particles: Particles, slots: Integers) -> tuple[Floats, Floats]:
+def trail(particles: PointParticles, slots: Integers) -> tuple[Floats, Floats]:
     """Mean positions (K, 3) and headings (K,) of past poses."""
     past = np.einsum("n,knj->kj", particles.belief.weight, particles.belief.trail[slots])
     return past[:, :3], past[:, 3]
 
 
 def update(
-    particles: Particles,
+    particles: PointParticles,
     returns: Returns,
     twin: Returns,
     anchor: Floats,
@@ -116,21 +116,23 @@ def update(
     std: Floats,
     *,
     rng: np.random.Generator,
-) -> Update:
+) -> ParticleUpdate:
     """Update by A associated returns: lengths [m] and cosines `seen` (A, 3) with standard deviations `std`."""
     if not len(seen):
-        return Update(particles, 0.0, np.zeros((0, 3)), 0.0)
-    sights = Seen(returns, twin, anchor, body, seen, std**2 + FLOOR**2)
+        return ParticleUpdate(particles, 0.0, np.zeros((0, 3)), 0.0)
+    visibility = Seen(returns, twin, anchor, body, seen, std**2 + FLOOR**2)
     mean = moments(particles)
-    predicted = look(mean, sights)
-    white, _ = whitened(mean, predicted, sights.noise)
-    sights = sights._replace(noise=trusted(sights.noise, white))
-    nis = whitened(mean, predicted, sights.noise)[1]
-    moved, evidence = absorb_all(particles.belief, sights, particles.config, particles.engine)
-    return Update(particles._replace(belief=moved), evidence, white, nis)
+    predicted = look(mean, visibility)
+    white, _ = whitened(mean, predicted, visibility.noise)
+    visibility = visibility._replace(noise=trusted(visibility.noise, white))
+    nis = whitened(mean, predicted, visibility.noise)[1]
+    moved, evidence = absorb_all(particles.belief, visibility, particles.config, particles.engine)
+    return ParticleUpdate(particles._replace(belief=moved), evidence, white, nis)
 
 
-def initialise_landmark(particles: Particles, new: Birth, body: Body, *, rng: np.random.Generator) -> Particles:
+def initialise_landmark(
+    particles: PointParticles, new: Birth, body: Body, *, rng: np.random.Generator
+) -> PointParticles:
     """One more landmark, from the history of a track."""
     moved = history.initialise_landmark(
         particles.belief, new, body, particles.spans, particles.config, particles.engine, rng=rng
@@ -138,17 +140,17 @@ def initialise_landmark(particles: Particles, new: Birth, body: Body, *, rng: np
     return particles._replace(belief=moved)
 
 
-def drop(particles: Particles, keep: Booleans) -> Particles:
+def drop(particles: PointParticles, keep: Booleans) -> PointParticles:
     """Only the landmarks (F,) that are kept."""
     return particles._replace(belief=belief.drop(particles.belief, keep))
 
 
-def resample(particles: Particles, config: SlamConfig, *, rng: np.random.Generator) -> tuple[Particles, bool]:
+def resample(particles: PointParticles, config: SlamConfig, *, rng: np.random.Generator) -> tuple[PointParticles, bool]:
     """Clouds and agent particles resampled where that is due, and whether the latter were."""
     moved, done = belief.renew(particles.belief, particles.spans, particles.config, particles.engine, rng=rng)
     return particles._replace(belief=moved), done
 
 
-def effective_size(particles: Particles) -> float:
+def effective_size(particles: PointParticles) -> float:
     """Effective number of agent particles."""
     return belief.effective_size(particles.belief)

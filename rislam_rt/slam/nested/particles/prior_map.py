@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.nested.particles import agents
 from rislam_rt.slam.nested.particles.belief import Nested, absorb, initialise_landmark
-from rislam_rt.slam.nested.particles.cloud import LEAST_STD, Engine
+from rislam_rt.slam.nested.particles.cloud import LEAST_STD, CloudEngine
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline
 from rislam_rt.slam.nested_config import NestedConfig
 
@@ -13,7 +13,9 @@ SEED = 7
 """Of the draws that spread a given map over the agent particles: the map is data, and the same each time."""
 
 
-def set_prior_map(belief: Nested, features: Floats, covariance: Floats, config: NestedConfig, engine: Engine) -> Nested:
+def set_prior_map(
+    belief: Nested, features: Floats, covariance: Floats, config: NestedConfig, engine: CloudEngine
+) -> Nested:
     """F landmarks (F, 3) with a joint covariance (3F, 3F).
 
     What landmarks have in common is spread over the agent particles, the rest over their clouds. A known map fixes the

@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import POSE, Moments, poses_of
 from rislam_rt.slam.nested.particles.belief import Nested, absorb, gaussian, mean_covariances
-from rislam_rt.slam.nested.particles.cloud import Engine
+from rislam_rt.slam.nested.particles.cloud import CloudEngine
 from rislam_rt.slam.nested.particles.sightline import Sighting, trace_sightline
 from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.returns import NONE, Returns, linearise
@@ -80,7 +80,7 @@ def owners(returns: Returns) -> Integers:
     return np.where(first == NONE, returns.point, first)
 
 
-def update(belief: Nested, seen: Seen, config: NestedConfig, engine: Engine) -> tuple[Nested, float]:
+def update(belief: Nested, seen: Seen, config: NestedConfig, engine: CloudEngine) -> tuple[Nested, float]:
     """The belief after all returns, and the log evidence of those that it could explain."""
     owner = owners(seen.returns)
     direct = seen.returns.legs[:, 1]

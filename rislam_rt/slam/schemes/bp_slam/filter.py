@@ -16,13 +16,24 @@ from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance, begin
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import absorb, claims, is_strong, newborn
-from rislam_rt.slam.schemes.shared.course import Course, advance, begin
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, outcome_of, reported
 from rislam_rt.slam.schemes.shared.scan import Odds, Scan, birth_ratio
-from rislam_rt.slam.schemes.shared.sums import Sight, Sums, born, carry, join, kinds_of, look, no_sums, prune, spread_of
+from rislam_rt.slam.schemes.shared.sums import (
+    PredictedRanges,
+    Sums,
+    born,
+    carry,
+    join,
+    kinds_of,
+    look,
+    no_sums,
+    prune,
+    spread_of,
+)
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 FEWEST_FALSE = 1e-3
@@ -36,7 +47,7 @@ STRAIN_RATE = 0.05
 class BpSlamState(NamedTuple):
     """All that the filter knows."""
 
-    course: Course
+    course: AgentTrajectory
     sums: Sums
     undetected: float
     """Features that exist and were never seen, expected."""
@@ -70,7 +81,7 @@ def init(
     return BpSlamState(course, sums, config.initial_features, 0, 0, height, float(start.heading), 1.0, body, sensor)
 
 
-def told(config: BpSlamConfig, sensor: SensorModel) -> Odds:
+def assumed_odds(config: BpSlamConfig, sensor: SensorModel) -> Odds:
     """What a range is weighed against, with the false ranges that the agent is told of its receiver."""
     rate = max(sensor.false_alarms, FEWEST_FALSE)
     return Odds(config.detection_probability, rate, SPEED_OF_LIGHT * sensor.window[1])
@@ -109,14 +120,14 @@ def step(
         Time step or heading is no number.
     """
     check_step(dt, heading)
-    odds = told(config, state.sensor)
+    odds = assumed_odds(config, state.sensor)
     state = _move(state, dt, np.full(state.course.axes, config.sigma_a), config)._replace(heading=float(heading))
-    glance = observations_of(measurement, state.sensor.radio)
-    free = ~is_los(glance, state.body)
+    observed = observations_of(measurement, state.sensor.radio)
+    free = ~is_los(observed, state.body)
     if not config.planes:
-        free &= ~is_strong(glance.ratio, config.specular_ratio)
+        free &= ~is_strong(observed.ratio, config.specular_ratio)
     rows = np.flatnonzero(free)
-    scan = Scan(glance.seen[rows, 0], np.maximum(glance.std[rows, 0], config.smallest_std))
+    scan = Scan(observed.seen[rows, 0], np.maximum(observed.std[rows, 0], config.smallest_std))
     turn = rotation_z(np.asarray(heading))
     model = Bistatic(
         turn @ state.body.tx_offset, turn @ state.body.rx_offset, state.sensor.radio.array.pattern == "upper"
@@ -129,7 +140,7 @@ def step(
     dof = int((landmark >= 0).sum())
     sums, course = absorb(state.sums, sight, state.course, scan, found, odds)
     state = state._replace(sums=sums, course=course)
-    state = _give_birth(state, scan, is_strong(glance.ratio[rows], config.specular_ratio), found, fresh, config)
+    state = _give_birth(state, scan, is_strong(observed.ratio[rows], config.specular_ratio), found, fresh, config)
     strain = state.strain + (STRAIN_RATE * (nis / dof - state.strain) if dof else 0.0)
     count = int((state.sums.existence > config.detection_threshold).sum())
     report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, count, outcome_of(len(measurement), count, strain))
@@ -159,7 +170,7 @@ def estimate(state: BpSlamState, config: BpSlamConfig) -> SlamEstimate:
 
 
 def _claimed(
-    state: BpSlamState, sight: Sight, scan: Scan, found: Association, config: BpSlamConfig
+    state: BpSlamState, sight: PredictedRanges, scan: Scan, found: Association, config: BpSlamConfig
 ) -> tuple[Integers, float]:
     """Feature number of each range (`UNUSED` for none), and the NIS over those claimed, of the features' mixtures."""
     sums, numbers = state.sums, np.full(len(scan.length), UNUSED)

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, WANDERER, Ends, GaussianFeatures
-from rislam_rt.slam.schemes.shared.course import Course
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 
 NUDGE = 1e-6
 """Step of differences [m, rad]."""
@@ -113,7 +113,12 @@ def hypothesise(
 
 
 def born(
-    found: list[BirthHypotheses], existence: Floats, course: Course, ends: Ends, first: int, config: BpSlamAoaConfig
+    found: list[BirthHypotheses],
+    existence: Floats,
+    course: AgentTrajectory,
+    ends: Ends,
+    first: int,
+    config: BpSlamAoaConfig,
 ) -> GaussianFeatures:
     """One new feature for each set of hypotheses."""
     owner = np.repeat(np.arange(len(found)), [len(each.kind) for each in found])

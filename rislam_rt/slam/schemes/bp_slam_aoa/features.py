@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.schemes.shared.course import Course, Step
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step
 from rislam_rt.slam.schemes.shared.ranges import length_of
 
 WALL, POINT, WANDERER = 0, 1, 2
@@ -118,7 +118,7 @@ def returns_of(kind: Integers, place: Floats, agent: Floats, ends: Ends) -> Floa
     return np.stack([length, arrival[..., 0], arrival[..., 1], arrival[..., 2], law], axis=-1)
 
 
-def look(features: GaussianFeatures, course: Course, ends: Ends, free: float) -> PredictedReturns:
+def look(features: GaussianFeatures, course: AgentTrajectory, ends: Ends, free: float) -> PredictedReturns:
     """Returns of all Gaussians from the present mean position; `free` is the log amplitude of 1 m in free space."""
     kind, mean, agent = features.kind, features.mean, course.mean[:3]
     spread = features.covariance + spread_over(features.slope, course)
@@ -144,7 +144,7 @@ def through(rows: Floats, matrix: Floats) -> Floats:
     return np.asarray((rows.reshape(3 * len(rows), len(matrix)) @ matrix).reshape(len(rows), 3, matrix.shape[1]))
 
 
-def spread_over(rows: Floats, course: Course) -> Floats:
+def spread_over(rows: Floats, course: AgentTrajectory) -> Floats:
     """Covariance (C, 3, 3) that rows (C, 3, n) make of the course's."""
     return through(rows, course.covariance) @ rows.swapaxes(1, 2)
 

@@ -16,9 +16,9 @@ from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.features import Ends, GaussianFeatures, carry, join, look, no_features, prune
 from rislam_rt.slam.schemes.bp_slam_aoa.report import known_map, pose_moments
 from rislam_rt.slam.schemes.bp_slam_aoa.update import View, absorb, claims, expect_scan, likelihoods, spread_of
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step, advance
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import is_strong
-from rislam_rt.slam.schemes.shared.course import Course, Step, advance
 from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
@@ -45,7 +45,7 @@ STRAIN_RATE = 0.05
 class BpSlamAoaState(NamedTuple):
     """All that the filter knows."""
 
-    course: Course
+    course: AgentTrajectory
     """Relative to the start [m]."""
     features: GaussianFeatures
     fresh: float
@@ -71,7 +71,7 @@ def init(
     """The start prior, and no features. `ris` is taken for the interface and not used; nothing is drawn."""
     std = np.concatenate([np.zeros(3), start.velocity_std * np.array([1.0, 1.0, 0.0])])
     mean = np.concatenate([np.zeros(3), start.velocity])
-    course = Course(mean, np.diag(std**2), mean, 3, np.diag(std**2), 0.0)
+    course = AgentTrajectory(mean, np.diag(std**2), mean, 3, np.diag(std**2), 0.0)
     gait = np.array([1.0, 0.0, 0.0, 0.0])
     return BpSlamAoaState(
         course, no_features(6), 1.0, 0, 0, gait, float(start.heading), 1.0, start, body, sensor
@@ -133,14 +133,14 @@ def estimate(state: BpSlamAoaState, config: BpSlamAoaConfig) -> SlamEstimate:
 def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConfig) -> tuple[ComponentScan, Integers]:
     """The components without the direct path (and wall returns that are set aside), and their rows."""
     sensor = state.sensor
-    glance = observations_of(measurement, sensor.radio)
-    aside = is_los(glance, state.body) | is_strong(glance.ratio, None if config.use_vt else config.specular_ratio)
+    observed = observations_of(measurement, sensor.radio)
+    aside = is_los(observed, state.body) | is_strong(observed.ratio, None if config.use_vt else config.specular_ratio)
     rows = np.flatnonzero(~aside)
-    glance = glance.take(rows)
-    snr = sensor.radio.integrated_snr(np.exp(glance.log_amplitude))
-    false = sensor.false_alarm_density(glance.seen[:, 0] / SPEED_OF_LIGHT, glance.seen[:, 1:]) / SPEED_OF_LIGHT
+    observed = observed.take(rows)
+    snr = sensor.radio.integrated_snr(np.exp(observed.log_amplitude))
+    false = sensor.false_alarm_density(observed.seen[:, 0] / SPEED_OF_LIGHT, observed.seen[:, 1:]) / SPEED_OF_LIGHT
     false = np.maximum(false * 2.0 * snr * sensor.false_alarm_snr_density(snr), LEAST_FALSE)
-    return ComponentScan(glance.seen, glance.std, glance.log_amplitude, glance.log_amplitude_std, false), rows
+    return ComponentScan(observed.seen, observed.std, observed.log_amplitude, observed.log_amplitude_std, false), rows
 
 
 def _levels(config: BpSlamAoaConfig) -> Floats:

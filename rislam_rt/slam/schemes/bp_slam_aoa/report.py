@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.model import MapEstimate
 from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, GaussianFeatures, spread_over
-from rislam_rt.slam.schemes.shared.course import Course
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 
 
 def start_variance(start: StartPrior) -> Floats:
@@ -14,7 +14,7 @@ def start_variance(start: StartPrior) -> Floats:
     return start.position_std**2 * np.diag([1.0, 1.0, 0.0])
 
 
-def pose_moments(course: Course, start: StartPrior, count: int) -> tuple[Floats, Floats, Floats, Floats]:
+def pose_moments(course: AgentTrajectory, start: StartPrior, count: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Position (3,), velocity (3,), their covariance (6, 6), and `count` positions, equally likely."""
     covariance = course.covariance[:6, :6].copy()
     covariance[:3, :3] += start_variance(start)
@@ -26,7 +26,7 @@ def pose_moments(course: Course, start: StartPrior, count: int) -> tuple[Floats,
     return position, velocity, covariance, position + draws @ (vector * np.sqrt(np.maximum(value, 0.0))).T
 
 
-def known_map(features: GaussianFeatures, course: Course, start: StartPrior, threshold: float) -> MapEstimate:
+def known_map(features: GaussianFeatures, course: AgentTrajectory, start: StartPrior, threshold: float) -> MapEstimate:
     """GaussianFeatures that exist, each by its likeliest Gaussian; wanderers have no place."""
     total = features.covariance + spread_over(features.slope, course)
     best = np.zeros(len(features.ident))

@@ -16,8 +16,8 @@ from rislam_rt.model.sensor import merged_pull
 from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, log_normal
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.features import GaussianFeatures, PredictedReturns, spread_over, through
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.association import Association, associate
-from rislam_rt.slam.schemes.shared.course import Course
 
 GATE = 40.0
 """Squared Mahalanobis distance beyond which nothing associates (chi^2, 3 dof: 1e-8)."""
@@ -111,7 +111,7 @@ def _neighbours(
     return hidden, pull, np.einsum("co,coi,coj->cij", second, gap, gap)
 
 
-def spread_of(predicted: PredictedReturns, course: Course) -> Floats:
+def spread_of(predicted: PredictedReturns, course: AgentTrajectory) -> Floats:
     """Covariance (C, 3, 3) of predicted returns."""
     return predicted.own + spread_over(predicted.by_course, course)
 
@@ -156,8 +156,13 @@ def claims(features: GaussianFeatures, view: View, density: Floats, fresh: Float
 
 
 def absorb(
-    features: GaussianFeatures, view: View, course: Course, scan: ComponentScan, found: Association, fresh: Floats
-) -> tuple[GaussianFeatures, Course]:
+    features: GaussianFeatures,
+    view: View,
+    course: AgentTrajectory,
+    scan: ComponentScan,
+    found: Association,
+    fresh: Floats,
+) -> tuple[GaussianFeatures, AgentTrajectory]:
     """GaussianFeatures and course after the components, feature by feature, the surest first."""
     ref, predicted = course.mean.copy(), view.predicted
     edges = np.searchsorted(features.owner, np.arange(len(features.ident) + 1))
@@ -286,7 +291,7 @@ def _as_one(mean: Floats, after: Floats, before: Floats) -> tuple[Floats, Floats
     return (axes @ along[..., None])[..., 0], (axes * noise[:, None]) @ axes.swapaxes(1, 2)
 
 
-def _mix(course: Course, gain: Floats, spread: Floats, learnt: Learnt, weight: Floats) -> Course:
+def _mix(course: AgentTrajectory, gain: Floats, spread: Floats, learnt: Learnt, weight: Floats) -> AgentTrajectory:
     """Course after one feature's message: moments over its Gaussians; the rest of the weight changes nothing."""
     rows = np.flatnonzero(weight > LEAST_WEIGHT)
     if not len(rows):

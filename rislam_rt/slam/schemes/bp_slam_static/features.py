@@ -12,7 +12,7 @@ from rislam_rt.slam.schemes.shared.resampling import (
     cell_order,
     effective_fraction,
     normalised_rows,
-    thin_out,
+    resample_systematic,
 )
 from rislam_rt.slam.schemes.shared.scan import Scan
 
@@ -120,7 +120,7 @@ def refresh(features: Features, *, rng: np.random.Generator) -> Features:
     if not len(rows):
         return features
     cloud, log_weight = features.cloud.copy(), features.log_weight.copy()
-    cloud[rows], log_weight[rows] = thin_out(cloud[rows], log_weight[rows], SHARE, rng=rng)
+    cloud[rows], log_weight[rows] = resample_systematic(cloud[rows], log_weight[rows], SHARE, rng=rng)
     return features._replace(cloud=cloud, log_weight=log_weight)
 
 

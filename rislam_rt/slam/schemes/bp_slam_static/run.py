@@ -10,7 +10,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.errors import ConfigError
 from rislam_rt.slam.schemes.bp_slam_static.config import BpSlamStaticConfig
 from rislam_rt.slam.schemes.bp_slam_static.features import Features, known_anchors, select
-from rislam_rt.slam.schemes.bp_slam_static.update import Belief, predict_belief, update_belief
+from rislam_rt.slam.schemes.bp_slam_static.update import FactorGraphBelief, predict_belief, update_belief
 from rislam_rt.slam.schemes.shared.ranges import Direct
 from rislam_rt.slam.schemes.shared.scan import Scan
 
@@ -78,7 +78,7 @@ def run_static(
     points, mean, std, scans = _checked(anchors, ranges, start, start_std, config)
     dims, count = points.shape[1], config.num_particles
     cloud = mean + std * rng.standard_normal((count, 2 * dims))
-    belief = Belief(
+    belief = FactorGraphBelief(
         cloud,
         known_anchors(points, anchor_std, count, rng=rng),
         np.full(len(points), config.initial_features),

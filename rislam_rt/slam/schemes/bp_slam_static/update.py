@@ -42,7 +42,7 @@ AGENT_MEMORY = 100.0
 """Steps over which the agent's error stays much the same."""
 
 
-class Belief(NamedTuple):
+class FactorGraphBelief(NamedTuple):
     """Agent of N equally likely particles, and potential features."""
 
     state: Floats
@@ -85,8 +85,8 @@ class _Evaluation(NamedTuple):
 
 
 def predict_belief(
-    belief: Belief, dt: float, accelerate: Floats, config: BpSlamStaticConfig, *, rng: np.random.Generator
-) -> Belief:
+    belief: FactorGraphBelief, dt: float, accelerate: Floats, config: BpSlamStaticConfig, *, rng: np.random.Generator
+) -> FactorGraphBelief:
     """Discrete white-noise acceleration of standard deviations `accelerate` (D,) [m/s^2]; features survive or not."""
     before = rng.permutation(belief.state)
     position, velocity = np.split(before, 2, axis=1)
@@ -102,8 +102,13 @@ def predict_belief(
 
 
 def update_belief(
-    belief: Belief, scans: tuple[Scan, ...], model: RangeModel, config: BpSlamStaticConfig, *, rng: np.random.Generator
-) -> tuple[Belief, UpdateInfo]:
+    belief: FactorGraphBelief,
+    scans: tuple[Scan, ...],
+    model: RangeModel,
+    config: BpSlamStaticConfig,
+    *,
+    rng: np.random.Generator,
+) -> tuple[FactorGraphBelief, UpdateInfo]:
     """One scan of every anchor into the belief; the agent's message to features is its prediction, as published."""
     state, features = rng.permutation(belief.state), belief.features
     dims = belief.position.shape[1]
@@ -146,7 +151,7 @@ def update_belief(
         tuple(predicted[features.anchor == anchor] for anchor in range(len(scans))),
         float(np.logaddexp.reduce(log_agent) - np.log(len(log_agent))),
     )
-    return Belief(after, new_features, belief.undetected, next_ident), info
+    return FactorGraphBelief(after, new_features, belief.undetected, next_ident), info
 
 
 def _reach(state: Floats, features: Features, shifts: Integers, model: RangeModel) -> Floats:

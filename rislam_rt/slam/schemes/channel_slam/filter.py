@@ -20,14 +20,25 @@ from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.channel_slam import tracker
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
-from rislam_rt.slam.schemes.channel_slam.tracker import Tracks, assign, follow, no_tracks
+from rislam_rt.slam.schemes.channel_slam.tracker import RangeTracks, assign, follow, no_tracks
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance, begin
 from rislam_rt.slam.schemes.shared.association import Association
 from rislam_rt.slam.schemes.shared.correct import absorb, is_strong
-from rislam_rt.slam.schemes.shared.course import Course, advance, begin
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, outcome_of, reported
 from rislam_rt.slam.schemes.shared.scan import Scan
-from rislam_rt.slam.schemes.shared.sums import Sight, Sums, born, carry, join, kinds_of, look, no_sums, prune, spread_of
+from rislam_rt.slam.schemes.shared.sums import (
+    PredictedRanges,
+    Sums,
+    born,
+    carry,
+    join,
+    kinds_of,
+    look,
+    no_sums,
+    prune,
+    spread_of,
+)
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 STRAIN_RATE = 0.1
@@ -37,10 +48,10 @@ STRAIN_RATE = 0.1
 class ChannelSlamState(NamedTuple):
     """All that the filter knows."""
 
-    course: Course
+    course: AgentTrajectory
     sums: Sums
     """Virtual transmitters; `ident` is the label of the path."""
-    tracks: Tracks
+    tracks: RangeTracks
     strains: dict[int, float]
     """Running mean of the squared innovation of every virtual transmitter, by label."""
     next_label: int
@@ -93,10 +104,10 @@ def step(
     """
     check_step(dt, heading)
     state = _move(state, dt, config)._replace(heading=float(heading))
-    glance = observations_of(measurement, state.sensor.radio)
-    strong, free = is_strong(glance.ratio, config.specular_ratio), ~is_los(glance, state.body)
+    observed = observations_of(measurement, state.sensor.radio)
+    strong, free = is_strong(observed.ratio, config.specular_ratio), ~is_los(observed, state.body)
     rows = np.flatnonzero(free if config.planes else free & ~strong)
-    scan = Scan(glance.seen[rows, 0], np.maximum(glance.std[rows, 0], config.smallest_std))
+    scan = Scan(observed.seen[rows, 0], np.maximum(observed.std[rows, 0], config.smallest_std))
     turn = rotation_z(np.asarray(heading))
     upper = state.sensor.radio.array.pattern == "upper"
     model = Bistatic(turn @ state.body.tx_offset, turn @ state.body.rx_offset, upper)
@@ -173,7 +184,7 @@ def _correct(
 
 
 def _squares(
-    sums: Sums, sight: Sight, course: Course, scan: Scan, hit: Integers, shown: Integers
+    sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, hit: Integers, shown: Integers
 ) -> Floats:  # fmt: skip
     """Squared innovations over their variances, both of the whole sum of each virtual transmitter that was seen."""
     count, spread = len(sums.ident), spread_of(sight, course)

@@ -15,7 +15,7 @@ UNLABELLED = -1
 """Label of a range that continues no track."""
 
 
-class Tracks(NamedTuple):
+class RangeTracks(NamedTuple):
     """T tracks."""
 
     mean: Floats
@@ -29,18 +29,18 @@ class Tracks(NamedTuple):
     misses: Integers
     """(T,) cycles since the last range."""
 
-    def keep(self, rows: Booleans) -> "Tracks":
+    def keep(self, rows: Booleans) -> "RangeTracks":
         """Some of the tracks."""
-        return Tracks._make(column[rows] for column in self)
+        return RangeTracks._make(column[rows] for column in self)
 
 
-def no_tracks() -> Tracks:
+def no_tracks() -> RangeTracks:
     """None yet."""
     whole = np.zeros(0, dtype=np.int64)
-    return Tracks(np.zeros((0, 2)), np.zeros((0, 2, 2)), whole, whole, whole)
+    return RangeTracks(np.zeros((0, 2)), np.zeros((0, 2, 2)), whole, whole, whole)
 
 
-def advance(tracks: Tracks, dt: float, acceleration: float) -> Tracks:
+def advance(tracks: RangeTracks, dt: float, acceleration: float) -> RangeTracks:
     """Predict over `dt` [s], the rate drifting with white acceleration of standard deviation [m/s^2]."""
     transition = np.array([[1.0, dt], [0.0, 1.0]])
     noise = acceleration**2 * np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
@@ -48,7 +48,7 @@ def advance(tracks: Tracks, dt: float, acceleration: float) -> Tracks:
     return tracks._replace(mean=tracks.mean @ transition.T, covariance=covariance)
 
 
-def assign(tracks: Tracks, length: Floats, std: Floats, gate: float) -> Integers:
+def assign(tracks: RangeTracks, length: Floats, std: Floats, gate: float) -> Integers:
     """Track row (M,) that each range continues, -1 for none: the cheapest one-to-one assignment within the gate."""
     variance = tracks.covariance[:, 0, 0][:, None] + std**2
     square = (length - tracks.mean[:, :1]) ** 2 / variance
@@ -61,8 +61,8 @@ def assign(tracks: Tracks, length: Floats, std: Floats, gate: float) -> Integers
 
 
 def follow(
-    tracks: Tracks, found: Integers, length: Floats, std: Floats, rate_std: float, first: int
-) -> tuple[Tracks, Integers]:
+    tracks: RangeTracks, found: Integers, length: Floats, std: Floats, rate_std: float, first: int
+) -> tuple[RangeTracks, Integers]:
     """Tracks after their ranges, with new ones (labels from `first`) for ranges that continue none, and labels (M,)."""
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
     hit = np.flatnonzero(found != UNLABELLED)
@@ -72,12 +72,12 @@ def follow(
     covariance[rows] -= gain[:, :, None] * tracks.covariance[rows][:, None, 0]
     seen = np.zeros(len(tracks.label), dtype=np.int64)
     seen[rows] = 1
-    old = Tracks(mean, covariance, tracks.label, tracks.hits + seen, np.where(seen > 0, 0, tracks.misses + 1))
+    old = RangeTracks(mean, covariance, tracks.label, tracks.hits + seen, np.where(seen > 0, 0, tracks.misses + 1))
     spare = np.flatnonzero(found == UNLABELLED)
     spread = np.zeros((len(spare), 2, 2))
     spread[:, 0, 0], spread[:, 1, 1] = std[spare] ** 2, rate_std**2
     fresh = first + np.arange(len(spare))
-    new = Tracks(
+    new = RangeTracks(
         np.stack([length[spare], np.zeros(len(spare))], axis=1),
         spread,
         fresh,
@@ -86,4 +86,4 @@ def follow(
     )
     label = np.empty(len(length), dtype=np.int64)
     label[hit], label[spare] = tracks.label[rows], fresh
-    return Tracks._make(np.concatenate(pair) for pair in zip(old, new, strict=True)), label
+    return RangeTracks._make(np.concatenate(pair) for pair in zip(old, new, strict=True)), label

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.association import Association, associate
-from rislam_rt.slam.schemes.shared.course import Course
 from rislam_rt.slam.schemes.shared.scan import Odds, Scan
-from rislam_rt.slam.schemes.shared.sums import Sight, Sums, spread_of
+from rislam_rt.slam.schemes.shared.sums import PredictedRanges, Sums, spread_of
 
 NO_VARIANCE = 1e12
 """Variance [m^2] of a range that tells nothing."""
@@ -34,7 +34,9 @@ class Pull(NamedTuple):
     """(C,) logarithm of the factor on the Gaussian's share."""
 
 
-def claims(sums: Sums, sight: Sight, course: Course, scan: Scan, fresh: Floats, odds: Odds) -> Association:
+def claims(
+    sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, fresh: Floats, odds: Odds
+) -> Association:
     """Marginals of the association of K features and M ranges."""
     pair = np.zeros((len(sums.ident), len(scan.length)))
     np.add.at(pair, sums.owner, sums.share[:, None] * _ratios(sight.length, spread_of(sight, course), scan, odds))
@@ -50,7 +52,9 @@ def _ratios(length: Floats, spread: Floats, scan: Scan, odds: Odds) -> Floats:
     return np.where(square < 60.0, np.exp(-0.5 * square), 0.0) * peak
 
 
-def absorb(sums: Sums, sight: Sight, course: Course, scan: Scan, found: Association, odds: Odds) -> tuple[Sums, Course]:
+def absorb(
+    sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, found: Association, odds: Odds
+) -> tuple[Sums, AgentTrajectory]:
     """Features and course after the ranges, feature by feature, the surest first."""
     ref, edges = course.mean.copy(), np.searchsorted(sums.owner, np.arange(len(sums.ident) + 1))
     existence, share = sums.existence.copy(), sums.share.copy()
@@ -104,7 +108,7 @@ def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds)
     return Pull(miss, variance, np.log(total))
 
 
-def _mix(course: Course, gain: Floats, variance: Floats, miss: Floats, weight: Floats) -> Course:
+def _mix(course: AgentTrajectory, gain: Floats, variance: Floats, miss: Floats, weight: Floats) -> AgentTrajectory:
     """Course after one feature's message: moments over its Gaussians; the rest of the weight changes nothing."""
     rows = np.flatnonzero(weight > 1e-4)
     if not len(rows):

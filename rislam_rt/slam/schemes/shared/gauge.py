@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.schemes.shared.course import Course
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 
 LEAST_WAY = 1e-6
 """Displacement [m] or speed [m/s] below which there is no direction to speak of."""
@@ -30,7 +30,7 @@ class Reported(NamedTuple):
     """(2A, 2A)."""
 
 
-def over_all_turns(course: Course) -> Reported:
+def over_all_turns(course: AgentTrajectory) -> Reported:
     """Moments over turns and mirror images of the course about the start.
 
     The displacement is `L (cos t, sin t)` off the direction told, `L` as filtered, `t` normal with zero mean and the
@@ -69,7 +69,7 @@ def _frame(ahead: Floats, axes: int) -> Floats:
     return np.asarray(np.kron(np.eye(2), turn), dtype=np.float64)
 
 
-def _of_shape(course: Course, along: Floats, ahead: Floats) -> Floats:
+def _of_shape(course: AgentTrajectory, along: Floats, ahead: Floats) -> Floats:
     """Covariance (2A, 2A) of distance from the start and speed, in the places of "along"; of heights; zeros across."""
     axes, width = course.axes, course.width
     rows = np.zeros((width, len(course.mean)))

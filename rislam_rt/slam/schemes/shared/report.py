@@ -7,10 +7,10 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body, MapEstimate, SlamEstimate
-from rislam_rt.slam.schemes.shared.course import Course
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.gauge import over_all_turns
 from rislam_rt.slam.schemes.shared.sums import POINT, Sums, unit_of
-from rislam_rt.slam.step_info import Outcome
+from rislam_rt.slam.step_info import StepOutcome
 
 STEP = 1e-6
 """Step of central differences [m, 1, rad]."""
@@ -20,13 +20,13 @@ NIS_LIMIT = 3.0
 """Running mean of the NIS per degree of freedom above which a filter says that it has diverged."""
 
 
-def outcome_of(num_measurements: int, num_features: int, strain: float) -> Outcome:
+def outcome_of(num_measurements: int, num_features: int, strain: float) -> StepOutcome:
     """How a cycle went; `strain` is the running mean of the NIS per degree of freedom."""
     if num_measurements == 0:
-        return Outcome.NO_MEASUREMENTS
+        return StepOutcome.NO_MEASUREMENTS
     if num_features == 0:
-        return Outcome.NO_LANDMARKS
-    return Outcome.DIVERGED if strain > NIS_LIMIT else Outcome.OK
+        return StepOutcome.NO_LANDMARKS
+    return StepOutcome.DIVERGED if strain > NIS_LIMIT else StepOutcome.OK
 
 
 class Points(NamedTuple):
@@ -51,7 +51,7 @@ def lift(known: Floats, height: Floats) -> Floats:
 
 
 def reported(
-    course: Course, height: Floats, heading: float, body: Body, points: Points, num_samples: int
+    course: AgentTrajectory, height: Floats, heading: float, body: Body, points: Points, num_samples: int
 ) -> SlamEstimate:
     """Mean and covariance of the pose, samples of it, and the map."""
     belief, axes = over_all_turns(course), course.axes

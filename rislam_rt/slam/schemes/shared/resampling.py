@@ -94,7 +94,9 @@ def kernel_width(count: int, dims: int, effective: Floats) -> Floats:
     return min(silverman, 0.9) * np.sqrt(np.clip(1.0 - effective, 0.0, 1.0))
 
 
-def thin_out(clouds: Floats, log_weight: Floats, share: float, *, rng: np.random.Generator) -> tuple[Floats, Floats]:
+def resample_systematic(
+    clouds: Floats, log_weight: Floats, share: float, *, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
     """Partly resampled clouds (K, N, D) and the log weights (K, N) that are left to them.
 
     Particles are drawn by `weight^share` and keep `weight^(1 - share)`: improbable modes keep more particles than their

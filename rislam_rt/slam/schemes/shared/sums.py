@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.schemes.shared.course import Course, Step
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step
 from rislam_rt.slam.schemes.shared.ranges import Bistatic, length_of
 
 POINT, PLANE, DRIFT = 0, 1, 2
@@ -73,7 +73,7 @@ class Sums(NamedTuple):
     """(C,) shares of one feature sum to one."""
 
 
-class Sight(NamedTuple):
+class PredictedRanges(NamedTuple):
     """Ranges that C Gaussians predict, to first order in all and to second in the angles."""
 
     length: Floats
@@ -147,7 +147,7 @@ def _leg(distance: Floats, unit: Floats, end: Floats) -> Floats:
     return np.asarray(np.sqrt(np.maximum(square, 1e-4)))
 
 
-def look(sums: Sums, course: Course, place: Floats, model: Bistatic) -> Sight:
+def look(sums: Sums, course: AgentTrajectory, place: Floats, model: Bistatic) -> PredictedRanges:
     """Ranges of all Gaussians from the present position `place` (3,), by central differences."""
     owner, kind, mean = sums.owner, sums.kind, sums.mean
     spread = np.sum((sums.slope @ course.covariance) * sums.slope, axis=2)
@@ -168,16 +168,16 @@ def look(sums: Sums, course: Course, place: Floats, model: Bistatic) -> Sight:
     blind = course.turn()
     by_course -= np.outer(by_course @ blind, blind)
     own = np.einsum("ci,cij,cj->c", by_mean, sums.covariance, by_mean) + 0.5 * np.sum(bend**2, axis=1)
-    return Sight(seen[0] + 0.5 * bend.sum(axis=1), by_mean, by_course, own)
+    return PredictedRanges(seen[0] + 0.5 * bend.sum(axis=1), by_mean, by_course, own)
 
 
-def spread_of(sight: Sight, course: Course) -> Floats:
+def spread_of(sight: PredictedRanges, course: AgentTrajectory) -> Floats:
     """Variance (C,) of predicted ranges [m^2]."""
     return np.asarray(sight.own + np.sum((sight.by_course @ course.covariance) * sight.by_course, axis=1))
 
 
 def born(
-    length: Floats, std: Floats, kinds: Floats, existence: Floats, course: Course, place: Floats, turns: int,
+    length: Floats, std: Floats, kinds: Floats, existence: Floats, course: AgentTrajectory, place: Floats, turns: int,
     first: int,
 ) -> Sums:  # fmt: skip
     """One new feature a range, over all directions of the upper half space; `kinds` (M, 3) are shares of the kinds."""

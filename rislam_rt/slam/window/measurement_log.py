@@ -9,11 +9,11 @@ from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.returns import linearise
-from rislam_rt.slam.window.book import Book
-from rislam_rt.slam.window.forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.gauss import Quadratic, Window, poses
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.landmark_table import WindowTable
+from rislam_rt.slam.window.model_constants import CONSTANTS
+from rislam_rt.slam.window.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.steps import POSE
+from rislam_rt.slam.window.window_gaussian import Quadratic, Window, poses
 
 
 class Log(NamedTuple):
@@ -58,11 +58,12 @@ def empty_log() -> Log:
     return Log(count, wide, wide, none, none, count, count, np.zeros((0, 2, 5), dtype=np.int64), none, wide)
 
 
-def append(log: Log, glance: Observations, cycle: int, first: int) -> Log:
+def append(log: Log, observed: Observations, cycle: int, first: int) -> Log:
     """The log with a cycle's components, unexplained as yet, and without those before cycle `first`."""
-    count, old = len(glance.seen), log.take(slice(np.searchsorted(log.cycle, first), None))
+    count, old = len(observed.seen), log.take(slice(np.searchsorted(log.cycle, first), None))
     fresh = Log(
-        np.full(count, cycle), glance.seen, glance.std, glance.log_amplitude, glance.log_amplitude_std, glance.sides,
+        np.full(count, cycle), observed.seen, observed.std, observed.log_amplitude, observed.log_amplitude_std,
+        observed.sides,
         np.full(count, -1), np.full((count, 2, 5), UNKNOWN), np.zeros(count), np.zeros((count, 3)),
     )  # fmt: skip
     return Log(*(np.concatenate(pair) for pair in zip(old, fresh, strict=True)))
@@ -81,7 +82,9 @@ class Residuals(NamedTuple):
     """(A, 3, 4 + 3F) of the prediction by its pose and the features, likewise."""
 
 
-def residuals(log: Log, window: Window, book: Book, body: Body, heading: Floats, rows: Integers) -> Residuals:
+def residuals(
+    log: Log, window: Window, landmarks: WindowTable, body: Body, heading: Floats, rows: Integers
+) -> Residuals:
     """Of some explained rows of the log, at the present estimate; `heading` (K,) as the compass tells."""
     first = int(log.cycle[-1]) - window.num_poses + 1
     slot = log.cycle[rows] - first
@@ -93,8 +96,8 @@ def residuals(log: Log, window: Window, book: Book, body: Body, heading: Floats,
     both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
     every = np.concatenate([form[:, 0], form[both, 1]])
     distinct, column = unique_forms(every)
-    returns = compile_forms(book.rows(distinct))
-    linear = linearise(returns, features, book.anchor, ends)
+    returns = compile_forms(landmarks.rows(distinct))
+    linear = linearise(returns, features, landmarks.anchor, ends)
     by_heading = linear.by_heading(ends, place[:, :3]) if window.turns else None
     count, size = len(rows), POSE + features.size
 
@@ -128,11 +131,18 @@ def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
 
 def trust(left: Floats) -> Floats:
     """(A,) weight that Student's t gives residuals (A, 3)."""
-    return np.asarray((LEVELS.tail + 3.0) / (LEVELS.tail + np.vecdot(left, left)))
+    return np.asarray((CONSTANTS.tail + 3.0) / (CONSTANTS.tail + np.vecdot(left, left)))
 
 
 def renew(
-    window: Window, log: Log, book: Book, body: Body, heading: Floats, slots: Integers, *, even: bool = False
+    window: Window,
+    log: Log,
+    landmarks: WindowTable,
+    body: Body,
+    heading: Floats,
+    slots: Integers,
+    *,
+    even: bool = False,
 ) -> tuple[Window, Residuals]:
     """The quadratics of some slots, made at the present estimate; `even`: every component counts in full."""
     first = int(log.cycle[-1]) - window.num_poses + 1 if len(log.cycle) else 0
@@ -148,7 +158,7 @@ def renew(
     if not len(rows):
         nothing = Residuals(rows, rows, np.zeros((0, 3)), np.zeros((0, 3, size)))
         return window._replace(slots=Quadratic(hessian, gradient, middle)), nothing
-    found = residuals(log, window, book, body, heading, rows)
+    found = residuals(log, window, landmarks, body, heading, rows)
     weight = np.ones(len(rows)) if even else trust(found.left)
     start = np.searchsorted(found.slot, slots)
     stop = np.searchsorted(found.slot, slots, side="right")

@@ -4,34 +4,34 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.slam.returns import NONE, TX
-from rislam_rt.slam.window import gauss
-from rislam_rt.slam.window.book import Book, strike
+from rislam_rt.slam.window import window_gaussian
 from rislam_rt.slam.window.context import Context, resolve
-from rislam_rt.slam.window.expect import Expected
-from rislam_rt.slam.window.forms import UNKNOWN
-from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.log import Log, Residuals
+from rislam_rt.slam.window.landmark_table import WindowTable, remove_features
+from rislam_rt.slam.window.measurement_log import Log, Residuals
+from rislam_rt.slam.window.measurement_prediction import ExpectedComponents
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import FEWEST, RECENT
-from rislam_rt.slam.window.panel import unknown
-from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window.path_forms import UNKNOWN
+from rislam_rt.slam.window.ris_identification import unknown
+from rislam_rt.slam.window.tracks import WindowTracks
 
 
 def release(context: Context, keep: Booleans) -> Context:
     """The map without some features; what they explained is unexplained, and goes on as tracks."""
     if keep.all():
         return context
-    book, log = context.book, context.log
-    lost: Booleans = np.asarray(np.isin(log.form, book.ident[~keep]).any(axis=(1, 2)))
+    landmarks, log = context.landmarks, context.log
+    lost: Booleans = np.asarray(np.isin(log.form, landmarks.ident[~keep]).any(axis=(1, 2)))
     tracks, log = _resume(context.tracks, log, lost, context.cycle, context.window.step)
     form = log.form.copy()
     form[lost] = UNKNOWN
     log = log._replace(form=form)
-    window, book = gauss.drop_features(context.window, keep), strike(book, keep)
-    context = context._replace(window=window, book=book, log=log, tracks=tracks)
+    window, landmarks = window_gaussian.drop_features(context.window, keep), remove_features(landmarks, keep)
+    context = context._replace(window=window, landmarks=landmarks, log=log, tracks=tracks)
     return context._replace(window=resolve(context, 2)[0])
 
 
-def _resume(tracks: Tracks, log: Log, lost: Booleans, cycle: int, step: Floats) -> tuple[Tracks, Log]:
+def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Floats) -> tuple[WindowTracks, Log]:
     """One track for each form among the lost rows that was seen lately."""
     forms, which = np.unique(log.form[:, 0], axis=0, return_inverse=True)
     track = log.track.copy()
@@ -58,28 +58,30 @@ def _resume(tracks: Tracks, log: Log, lost: Booleans, cycle: int, step: Floats) 
         return tracks, log._replace(track=track)
     columns = [np.array([entry[place] for entry in fresh]) for place in range(len(fresh[0]))]
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], columns, strict=True))
-    return Tracks._make([*joined, ident]), log._replace(track=track)
+    return WindowTracks._make([*joined, ident]), log._replace(track=track)
 
 
-def condemned(book: Book, left: Residuals, log: Log, expected: Expected, covariance: Floats) -> Booleans:
+def condemned(
+    landmarks: WindowTable, left: Residuals, log: Log, expected: ExpectedComponents, covariance: Floats
+) -> Booleans:
     """(F,) features to take back: that do not exist, that their measurements contradict, or that follow from others."""
-    gone = book.log_odds < np.log(LEVELS.dead / (1.0 - LEVELS.dead))
+    gone = landmarks.log_odds < np.log(CONSTANTS.dead / (1.0 - CONSTANTS.dead))
     square = np.vecdot(left.left, left.left)
     form = log.form[left.row, 0]
-    for row, ident in enumerate(book.ident):
-        own = form[:, 0] == ident if not book.is_wall[row] else (form[:, 1:] == ident).any(axis=1)
-        alone = own & ((form[:, 1:] != NONE).sum(axis=1) <= int(book.is_wall[row]))
-        if alone.sum() >= FEWEST and np.median(square[alone]) > LEVELS.against:
+    for row, ident in enumerate(landmarks.ident):
+        own = form[:, 0] == ident if not landmarks.is_wall[row] else (form[:, 1:] == ident).any(axis=1)
+        alone = own & ((form[:, 1:] != NONE).sum(axis=1) <= int(landmarks.is_wall[row]))
+        if alone.sum() >= FEWEST and np.median(square[alone]) > CONSTANTS.against:
             gone[row] = True
-    return np.asarray(gone | derived(book, expected, covariance))
+    return np.asarray(gone | derived(landmarks, expected, covariance))
 
 
-def derived(book: Book, expected: Expected, covariance: Floats) -> Booleans:
+def derived(landmarks: WindowTable, expected: ExpectedComponents, covariance: Floats) -> Booleans:
     """(F,) young features whose own return is one that others throw as well, without anything free in it."""
-    found = np.zeros(len(book.ident), dtype=np.bool_)
+    found = np.zeros(len(landmarks.ident), dtype=np.bool_)
     forms = expected.forms
-    for row in (book.hits < 3 * LEVELS.window).nonzero()[0]:
-        own = [row, NONE, NONE, NONE, NONE] if not book.is_wall[row] else [TX, NONE, NONE, row, NONE]
+    for row in (landmarks.hits < 3 * CONSTANTS.window).nonzero()[0]:
+        own = [row, NONE, NONE, NONE, NONE] if not landmarks.is_wall[row] else [TX, NONE, NONE, row, NONE]
         place = (forms == own).all(axis=1).nonzero()[0]
         if not len(place):
             continue
@@ -100,23 +102,23 @@ def derived(book: Book, expected: Expected, covariance: Floats) -> Booleans:
 
 def behind(context: Context, wall: int) -> Booleans:
     """(F,) features that the newest wall stands before: what was held for them may be its doing."""
-    book, features = context.book, context.window.features
-    middle = gauss.now(context.window)[0][:3]
-    anchor = book.anchor[wall]
+    landmarks, features = context.landmarks, context.window.features
+    middle = window_gaussian.now(context.window)[0][:3]
+    anchor = landmarks.anchor[wall]
     span = features[wall] - anchor
     normal = span / np.linalg.norm(span)
     depth = (0.5 * (features[wall] + anchor) - middle) @ normal
     sign = 1.0 if depth > 0 else -1.0
-    found = np.zeros(len(book.ident), dtype=np.bool_)
-    for row in range(len(book.ident)):
-        if row == wall or book.hits[row] > 2 * LEVELS.window:
+    found = np.zeros(len(landmarks.ident), dtype=np.bool_)
+    for row in range(len(landmarks.ident)):
+        if row == wall or landmarks.hits[row] > 2 * CONSTANTS.window:
             continue  # what has stood for long stands: rooms that are not convex have walls before walls
         foot = features[row]
-        if book.is_wall[row]:
-            out = features[row] - book.anchor[row]
+        if landmarks.is_wall[row]:
+            out = features[row] - landmarks.anchor[row]
             out = out / np.linalg.norm(out)
-            foot = middle + ((0.5 * (features[row] + book.anchor[row]) - middle) @ out) * out
+            foot = middle + ((0.5 * (features[row] + landmarks.anchor[row]) - middle) @ out) * out
         at = slice(7 + 3 * row, 10 + 3 * row)
-        slack = LEVELS.depth + 2.0 * float(np.sqrt(np.trace(context.window.covariance[at, at])))
+        slack = CONSTANTS.depth + 2.0 * float(np.sqrt(np.trace(context.window.covariance[at, at])))
         found[row] = sign * ((foot - middle) @ normal) > abs(depth) + slack
     return found

@@ -27,11 +27,11 @@ from rislam_rt.slam.identity import (
 )
 from rislam_rt.slam.moments import even_draws, square_root
 from rislam_rt.slam.observations import PANEL, UNTOLD
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import CERTAIN, DRAWS
 
 
-class Identity(NamedTuple):
+class PanelIdentity(NamedTuple):
     """What N points are held to be."""
 
     log_grid: Floats
@@ -41,24 +41,24 @@ class Identity(NamedTuple):
     hidden: Floats
     """(N, Q + 1) probability that something stands in the way, were it each of the panels, and a scatterer."""
 
-    def take(self, rows: Integers | Booleans) -> "Identity":
+    def take(self, rows: Integers | Booleans) -> "PanelIdentity":
         """Only some of the points."""
-        return Identity(*(field[rows] for field in self))
+        return PanelIdentity(*(field[rows] for field in self))
 
-    def put(self, rows: Integers, fresh: "Identity") -> "Identity":
+    def put(self, rows: Integers, fresh: "PanelIdentity") -> "PanelIdentity":
         """With some of the points replaced."""
         fields = [field.copy() for field in self]
         for field, value in zip(fields, fresh, strict=True):
             field[rows] = value
-        return Identity(*fields)
+        return PanelIdentity(*fields)
 
-    def settled(self) -> "Identity":
+    def converged(self) -> "PanelIdentity":
         """With odds that new evidence can still turn."""
         return self._replace(log_ris=np.clip(self.log_ris, -CERTAIN, CERTAIN))
 
-    def join(self, other: "Identity") -> "Identity":
+    def join(self, other: "PanelIdentity") -> "PanelIdentity":
         """Both, one after the other."""
-        return Identity(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+        return PanelIdentity(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
 
 @lru_cache(maxsize=1)
@@ -68,16 +68,16 @@ def _strength_prior(middle: float, spread: float) -> Floats:
     return np.asarray(log - np.logaddexp.reduce(log))
 
 
-def unknown(count: int, panels: int = 1) -> Identity:
+def unknown(count: int, panels: int = 1) -> PanelIdentity:
     """Points of which nothing is known but that panels are fewer than scatterers."""
-    return Identity(
-        np.tile(_strength_prior(LEVELS.strength, LEVELS.strength_std), (count, 1)),
-        np.full((count, panels), np.log(LEVELS.panels)),
+    return PanelIdentity(
+        np.tile(_strength_prior(CONSTANTS.strength, CONSTANTS.strength_std), (count, 1)),
+        np.full((count, panels), np.log(CONSTANTS.panels)),
         np.zeros((count, panels + 1)),
     )  # fmt: skip
 
 
-class Sight(NamedTuple):
+class PanelObservation(NamedTuple):
     """One cycle's look at N points."""
 
     place: Floats
@@ -105,7 +105,7 @@ def spread_places(mean: Floats, covariance: Floats) -> Floats:
     return np.array(draws).reshape(len(mean), -1, 3)
 
 
-def gains(sight: Sight, ris: DataSheet | None, code: RisCode | None, radio: RadioConfig) -> Complexes | None:
+def gains(sight: PanelObservation, ris: DataSheet | None, code: RisCode | None, radio: RadioConfig) -> Complexes | None:
     """Gains (Q, N, S) of each panel, were it at each of the places; None without a panel."""
     if ris is None or code is None:
         return None
@@ -114,7 +114,7 @@ def gains(sight: Sight, ris: DataSheet | None, code: RisCode | None, radio: Radi
     return np.stack([panel_path_gain(spec, part, sight.place, *ends, ratio, radio) for spec, part in parts])
 
 
-def weigh(before: Identity, sight: Sight, gain: Complexes | None, sensor: SensorModel) -> Identity:
+def weigh(before: PanelIdentity, sight: PanelObservation, gain: Complexes | None, sensor: SensorModel) -> PanelIdentity:
     """The identities (N,) after one more cycle, in which the panels have one of the gains (Q, N, S)."""
     radio, count = sensor.radio, len(sight.place)
     if not count:
@@ -144,4 +144,4 @@ def weigh(before: Identity, sight: Sight, gain: Complexes | None, sensor: Sensor
         missed = np.stack([*panels, scatterer], axis=1)
         hidden[silent], surplus = weigh_silence(hidden[silent], np.exp(missed))
         log_ris[silent] += surplus
-    return Identity(log_grid, log_ris, hidden)
+    return PanelIdentity(log_grid, log_ris, hidden)

@@ -7,9 +7,9 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.moments import square_root
 from rislam_rt.slam.returns import AXES, NONE, reflect
-from rislam_rt.slam.window.book import Book
-from rislam_rt.slam.window.digest import Digest
-from rislam_rt.slam.window.trial import Trials
+from rislam_rt.slam.window.hypothesis_fits import Trials
+from rislam_rt.slam.window.landmark_table import WindowTable
+from rislam_rt.slam.window.track_summary import TrackSummary
 
 KINDS = (
     "wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same",
@@ -22,7 +22,7 @@ WALLS = (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE, IMAGE)
 """Kinds whose new feature is a wall."""
 
 
-class Known(NamedTuple):
+class KnownFeatures(NamedTuple):
     """Features of the map as affine maps and places; walls as images of the agent's present place."""
 
     place: Floats
@@ -45,14 +45,14 @@ class Hypotheses(NamedTuple):
     trials: Trials
 
 
-def known_features(mean: Floats, covariance: Floats, book: Book, middle: Floats) -> Known:
+def known_features(mean: Floats, covariance: Floats, landmarks: WindowTable, middle: Floats) -> KnownFeatures:
     """The map's features (F, 3), walls as images of `middle`, with their covariances (3F, 3F) block by block."""
     place, count = mean.copy(), len(mean)
     blocks = covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
     turn, shift = np.tile(AXES, (count, 1, 1)), np.zeros((count, 3))
-    walls = book.walls
+    walls = landmarks.walls
     if len(walls):
-        wall, anchor = place[walls], book.anchor[walls]
+        wall, anchor = place[walls], landmarks.anchor[walls]
         blocks[walls] = (slope := by_wall(middle, wall, anchor)) @ blocks[walls] @ np.swapaxes(slope, 1, 2)
         place[walls] = reflect(np.broadcast_to(middle, wall.shape), wall, anchor)
         span = place[walls] - middle
@@ -63,7 +63,7 @@ def known_features(mean: Floats, covariance: Floats, book: Book, middle: Floats)
     for row in range(count):
         root = square_root(blocks[row])
         roots[row, :, : root.shape[1]] = root
-    return Known(place, roots, turn, shift)
+    return KnownFeatures(place, roots, turn, shift)
 
 
 def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
@@ -75,9 +75,9 @@ def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
     return np.asarray(-2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]))
 
 
-def hypotheses(digest: Digest, known: Known, book: Book, use_vt: bool) -> Hypotheses:
+def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool) -> Hypotheses:
     """Every kind for every track, with its first guess; images of known points where wall returns tell no walls."""
-    count, walls = len(digest.seen), book.walls
+    count, walls = len(digest.seen), landmarks.walls
     seen, tx, rx = digest.mean
     ray, length = digest.direction, seen[:, 0]
     middle, image = digest.middle, rx + length[:, None] * digest.direction
@@ -108,7 +108,7 @@ def hypotheses(digest: Digest, known: Known, book: Book, use_vt: bool) -> Hypoth
             upright = reflect(anchor, image, tx)
             upright[:, 2] = middle[2]  # what lies higher comes of the edge
             add(BESIDE, wall, upright, NONE, NONE, (tx, tx))
-    pairs, points = _pairs(ray), book.points.tolist() if not use_vt else []
+    pairs, points = _pairs(ray), landmarks.points.tolist() if not use_vt else []
     for pair in pairs:
         add(TWO_WALLS, NONE, image - (pair @ tx[..., None])[..., 0], NONE, NONE, (tx, tx))
     images = [_image(digest, known.place[point], known.root[point]) for point in points]
@@ -128,7 +128,7 @@ def hypotheses(digest: Digest, known: Known, book: Book, use_vt: bool) -> Hypoth
     return Hypotheses(kind, walled, trials)
 
 
-def _over(known: Known, legs: Integers, spots: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
+def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
     """Turns (N, T, 2, 3, 3), shifts (N, T, 2, 3) and doubts (N, T, 2, 3, 3) of the walls that N kinds go over on either
     leg (N, 2), `NONE` for none, at about the places (N, 2, T, 3) of T tracks."""
     count, nowhere = spots.shape[2], (middle + 1.0, np.zeros((3, 3)), AXES, np.zeros(3))
@@ -139,7 +139,7 @@ def _over(known: Known, legs: Integers, spots: Floats, middle: Floats) -> tuple[
     return turns, shifts, doubt
 
 
-def _image(digest: Digest, spot: Floats, root: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def _image(digest: TrackSummary, spot: Floats, root: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """First guess of the wall (T, 3) that mirrors a point (3,), known to `root` (3, 3), and the `Trials` of that."""
     (seen, tx, rx), count = digest.mean, len(digest.seen)
     reach = np.maximum(seen[:, 0] - np.linalg.norm(spot - tx, axis=1), 0.1)
@@ -150,7 +150,7 @@ def _image(digest: Digest, spot: Floats, root: Floats) -> tuple[Floats, Floats, 
     return start, turn, shift, doubt
 
 
-def _beyond(kind: Integers, walled: Integers, known: Known) -> Floats:
+def _beyond(kind: Integers, walled: Integers, known: KnownFeatures) -> Floats:
     """(H, 3, 4) turn and shift of the known walls beside whose edges walls are sought; zero elsewhere."""
     found, rows = np.zeros((len(kind), 3, 4)), (kind == BESIDE).nonzero()[0]
     if len(rows):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Levels(NamedTuple):
+class ModelConstants(NamedTuple):
     """SI units; probabilities are a cycle's unless said otherwise."""
 
     window: int = 40
@@ -96,4 +96,4 @@ class Levels(NamedTuple):
         return float(np.log(self.upright / (1.0 - self.upright)))
 
 
-LEVELS = Levels()
+CONSTANTS = ModelConstants()

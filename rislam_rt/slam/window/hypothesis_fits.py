@@ -13,9 +13,9 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.returns import AXES
-from rislam_rt.slam.window.digest import Digest
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import HOPELESS, RIDGE, STEPS
+from rislam_rt.slam.window.track_summary import TrackSummary
 
 
 class Trials(NamedTuple):
@@ -60,7 +60,7 @@ class Fits(NamedTuple):
     """(H,) of a density 1 over the place, without the constants that hypotheses of a track share."""
 
 
-def try_all(trials: Trials, digest: Digest) -> Fits:
+def try_all(trials: Trials, digest: TrackSummary) -> Fits:
     """Fit everything; hypotheses that fall hopelessly behind after one step keep what they had then."""
     count = len(trials.track)
     active = np.arange(count)
@@ -91,7 +91,7 @@ def try_all(trials: Trials, digest: Digest) -> Fits:
             lost[active] = False
             cost[lost] = np.inf
     evidence = -0.5 * cost - 0.5 * log_det + 1.5 * np.log(2.0 * np.pi)
-    share = np.where(trials.mixed, LEVELS.weaker * (1.0 + error[:, -1]), 0.0)
+    share = np.where(trials.mixed, CONSTANTS.weaker * (1.0 + error[:, -1]), 0.0)
     # a component lies between the two that it is made of
     evidence -= 20.0 * (np.maximum(-share, 0.0) + np.maximum(share - 1.0, 0.0))
     return Fits(place, covariance, held, cost, share, evidence)
@@ -109,7 +109,7 @@ class _Equations(NamedTuple):
 
 
 def _equations(
-    trials: Trials, digest: Digest, rows: Integers, place: Floats, error: Floats, trust: Floats
+    trials: Trials, digest: TrackSummary, rows: Integers, place: Floats, error: Floats, trust: Floats
 ) -> _Equations:
     """Normal equations (H, 15, 15) of the rows, and their cost."""
     track, wall, pair = trials.track[rows], trials.is_wall[rows], trials.is_pair[rows]
@@ -168,7 +168,7 @@ def _equations(
     normal[:, common, common] += 1.0
     normal[:, own, own] += RIDGE
     slope[:, common] -= error
-    tail = LEVELS.tail
+    tail = CONSTANTS.tail
     cost = (tail + 3.0) * np.log1p(squared / tail).sum(axis=1) + np.vecdot(error, error)
     return _Equations(normal, slope, cost, (tail + 3.0) / (tail + squared))
 
@@ -189,9 +189,9 @@ def _mix(
     length = np.sqrt(np.vecdot(out, out))
     ray = out / length[..., None]
     gap = np.concatenate([length[..., None], ray[..., :2]], axis=-1) - value[both]
-    share = LEVELS.weaker * (1.0 + error[both, -1])[:, None, None]
+    share = CONSTANTS.weaker * (1.0 + error[both, -1])[:, None, None]
     value[both] += share * gap
-    split[both] = LEVELS.weaker * gap[..., None]
+    split[both] = CONSTANTS.weaker * gap[..., None]
     across = _by_image(ray, length)
     turned = across @ mirror[:, None, :, :3]
     by_new, by_agent = turned @ by_place[both], turned @ by_tx[both][:, None] - across
@@ -208,7 +208,7 @@ def _by_image(arrival: Floats, reach: Floats) -> Floats:
     return found
 
 
-def smooth_paths(digest: Digest) -> tuple[Floats, Floats]:
+def smooth_paths(digest: TrackSummary) -> tuple[Floats, Floats]:
     """Log evidence (T,) and cost (T,) of paths of no kind: length and cosines that change smoothly.
 
     Their first two derivatives are beforehand what the agent's own speed makes of things at rest or mirrored; the place
@@ -221,7 +221,7 @@ def smooth_paths(digest: Digest) -> tuple[Floats, Floats]:
     bend = speed**2 * np.stack([1.0 / reach, reach**-2.0, reach**-2.0], axis=1) + 0.1 * rate
     time = digest.time - digest.time.mean(axis=1, keepdims=True)
     rows = np.stack([np.ones(time.shape), time, 0.5 * time**2], axis=-1)[:, None]
-    tail = LEVELS.tail
+    tail = CONSTANTS.tail
     trust = np.ones(time.shape)
     value, weight = np.swapaxes(digest.seen, 1, 2), np.swapaxes(digest.weight, 1, 2)
     spread = np.stack([rate, bend], axis=-1)

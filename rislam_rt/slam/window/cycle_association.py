@@ -11,23 +11,29 @@ from rislam_rt.slam.associate import Candidates, pair_costs, squared_distance
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import TX, Poses
-from rislam_rt.slam.window import gauss
-from rislam_rt.slam.window.book import Book
-from rislam_rt.slam.window.expect import Clusters, Expected, Scene, cluster, expect
-from rislam_rt.slam.window.gauss import Window
-from rislam_rt.slam.window.learn import Sights, recall, visible
+from rislam_rt.slam.window import window_gaussian
+from rislam_rt.slam.window.landmark_table import WindowTable
+from rislam_rt.slam.window.landmark_update import VisibilityObservations, recall, visible
+from rislam_rt.slam.window.measurement_prediction import (
+    ExpectedComponents,
+    KnownEnvironment,
+    UnresolvedClusters,
+    cluster,
+    predict_returns,
+)
 from rislam_rt.slam.window.numerics import GATE
 from rislam_rt.slam.window.steps import HEAD
+from rislam_rt.slam.window.window_gaussian import Window
 
 
-class Look(NamedTuple):
+class CycleAssociation(NamedTuple):
     """A cycle as a belief sees it."""
 
     mean: Floats
     """(7 + 3F,) of the present."""
     poses: Poses
-    expected: Expected
-    groups: Clusters
+    expected: ExpectedComponents
+    groups: UnresolvedClusters
     shows: Floats
     """(C,) probability that each cluster shows."""
     scatter: Floats
@@ -44,63 +50,67 @@ class Look(NamedTuple):
     """Mean square of the innovations, normalised: about 1 when all is well."""
 
 
-def echoes(glance: Observations, cell: Floats) -> Booleans:
+def echoes(observed: Observations, cell: Floats) -> Booleans:
     """(M,) components that are others over again: what motion within the slot leaves of a strong one in the difference
     of two alternated codes.
 
     Two paths of one cell come out as one; a second component there comes from the difference, and if it did not run
     over the panel it is the stronger one.
     """
-    found = np.zeros(len(glance.log_amplitude), dtype=np.bool_)
-    if glance.panel_odds is None:
+    found = np.zeros(len(observed.log_amplitude), dtype=np.bool_)
+    if observed.panel_odds is None:
         return found
-    inside = (np.abs(glance.seen[:, None] - glance.seen) < cell).all(axis=-1)
-    stronger = glance.log_amplitude > glance.log_amplitude[:, None] + FAR_STRONGER
-    return np.asarray((inside & stronger).any(axis=1) & (glance.odds < 0.0))
+    inside = (np.abs(observed.seen[:, None] - observed.seen) < cell).all(axis=-1)
+    stronger = observed.log_amplitude > observed.log_amplitude[:, None] + FAR_STRONGER
+    return np.asarray((inside & stronger).any(axis=1) & (observed.odds < 0.0))
 
 
 FAR_STRONGER = 1.0
 """Log amplitude by which a component's echo is weaker: a turn of a fifth of a radian leaves a tenth."""
 
 
-def look(
-    window: Window, book: Book, sights: Sights, heading: float, scene: Scene, code: RisCode | None,
-    glance: Observations, strangers: Floats,
-) -> Look:  # fmt: skip
+def associate_cycle(
+    window: Window, landmarks: WindowTable, visibility: VisibilityObservations, heading: float,
+    scene: KnownEnvironment, code: RisCode | None,
+    observed: Observations, strangers: Floats,
+) -> CycleAssociation:  # fmt: skip
     """Expect, cluster, associate."""
-    mean, covariance = gauss.now(window)
+    mean, covariance = window_gaussian.now(window)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
-    expected = expect(mean[HEAD:].reshape(-1, 3), book, poses, mean[:3], scene, code)
-    sides = return_sides(expected.forms, book) if glance.side is not None else None
-    clear, scatter = recall(sights, expected, book)
+    expected = predict_returns(mean[HEAD:].reshape(-1, 3), landmarks, poses, mean[:3], scene, code)
+    sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
+    clear, scatter = recall(visibility, expected, landmarks)
     groups = cluster(expected, scene.sensor.cell_length, clear, None if sides is None else np.maximum(sides, OTHER))
     shows = visible(expected, groups, clear)
-    row, pick, gain, strain = _associate(expected, groups, shows, scatter, covariance, glance, sides, strangers)
+    row, pick, gain, strain = _associate(expected, groups, shows, scatter, covariance, observed, sides, strangers)
     alone = groups.by_itself == 1.0
     due, seen = shows[alone], np.isin(np.arange(len(shows)), row)[alone]
     miss = float(np.log1p(-due[~seen]).sum())
     surprise = (due.sum() - seen.sum()) / np.sqrt((due * (1.0 - due)).sum() + 0.25)
-    return Look(mean, poses, expected, groups, shows, scatter, row, pick, gain + miss, float(surprise), strain)
+    return CycleAssociation(
+        mean, poses, expected, groups, shows, scatter, row, pick, gain + miss, float(surprise), strain
+    )
 
 
-def return_sides(forms: Integers, book: Book) -> Integers:
+def return_sides(forms: Integers, landmarks: WindowTable) -> Integers:
     """(R,) which of the forms (R, 5) run over a panel; what does not is known for that once all panels are."""
-    held = [panel for panel in enumerate(book.panels) if panel[1] >= 0]
+    held = [panel for panel in enumerate(landmarks.panels) if panel[1] >= 0]
     if not held:
         return np.full(len(forms), UNTOLD)
-    sides = np.where((len(held) == len(book.panels)) | (forms[:, 0] == TX), OTHER, UNTOLD)
+    sides = np.where((len(held) == len(landmarks.panels)) | (forms[:, 0] == TX), OTHER, UNTOLD)
     for number, row in held:
         sides[forms[:, 0] == row] = PANEL + number
     return sides
 
 
 def _associate(
-    expected: Expected, groups: Clusters, shows: Floats, scatter: Floats, covariance: Floats, glance: Observations,
+    expected: ExpectedComponents, groups: UnresolvedClusters, shows: Floats, scatter: Floats, covariance: Floats,
+    observed: Observations,
     sides: Integers | None, strangers: Floats,
 ) -> tuple[Integers, Integers, float, float]:  # fmt: skip
     """Rows of the clusters that were seen, the components that they were seen as, the log likelihood gained over
     strangers, and the strain: the best assignment."""
-    if not len(groups.leader) or not len(glance.seen):
+    if not len(groups.leader) or not len(observed.seen):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), 0.0, 1.0
     lead, mate = groups.leader, groups.partner
     share = groups.share[:, None]
@@ -110,18 +120,18 @@ def _associate(
     spread = (jacobian.reshape(-1, jacobian.shape[-1]) @ covariance).reshape(jacobian.shape)
     spread = spread @ np.swapaxes(jacobian, 1, 2)
     extra = groups.disturbance + groups.share_variance[:, None] * gap**2
-    extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(glance.std, axis=0) ** 2
+    extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(observed.std, axis=0) ** 2
     spread[:, [0, 1, 2], [0, 1, 2]] += extra
     odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))
     side = np.full(len(lead), UNTOLD) if sides is None else sides[lead]
     candidates = Candidates(seen, spread, groups.log_amplitude, np.hypot(groups.log_amplitude_std, 0.15), odds, side)
-    cost = pair_costs(candidates, glance, GATE, strangers)
+    cost = pair_costs(candidates, observed, GATE, strangers)
     rows, columns = scipy.optimize.linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     # the cost counts what is missed: seen against missed, both against strangers
     gain = -0.5 * float(cost[rows[good], columns[good]].sum()) + float(np.log1p(-shows[rows[good]]).sum())
     rows, columns = rows[good], columns[good]
     noise = np.zeros((len(rows), 3, 3))
-    noise[:, [0, 1, 2], [0, 1, 2]] = glance.std[columns] ** 2
-    distance, _ = squared_distance(glance.seen[columns] - seen[rows], spread[rows] + noise)
+    noise[:, [0, 1, 2], [0, 1, 2]] = observed.std[columns] ** 2
+    distance, _ = squared_distance(observed.seen[columns] - seen[rows], spread[rows] + noise)
     return rows, columns, gain, float(distance.mean() / 3.0) if len(rows) else 1.0

@@ -19,7 +19,7 @@ UNKNOWN = -9
 """In a form's base: it is not known."""
 
 
-class Legs(NamedTuple):
+class FormLegs(NamedTuple):
     """Forms, joined from legs that many of them share."""
 
     returns: Returns
@@ -42,7 +42,7 @@ def forms_of(returns: Returns) -> Integers:
 
 
 @lru_cache(maxsize=64)
-def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces: int, use_vt: bool) -> Legs:
+def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces: int, use_vt: bool) -> FormLegs:
     """Every point over every pair of legs, and with `use_vt` the images of the Tx."""
     single = [(w, NONE) for w in walls] if max_bounces >= 1 else []
     double = [(a, b) for a, b in product(walls, walls) if a != b] if max_bounces >= 2 else []
@@ -57,7 +57,7 @@ def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces
     if use_vt:
         found += [(TX, NONE, NONE, *way) for way in ways[1:]]
     forms = np.array(found, dtype=np.int64).reshape(-1, 5)
-    return Legs(compile_forms(forms), (forms[:, 1:] != NONE).sum(axis=1))
+    return FormLegs(compile_forms(forms), (forms[:, 1:] != NONE).sum(axis=1))
 
 
 def possible_legs(legs: Integers, features: Floats, anchor: Floats, poses: Poses) -> Booleans:

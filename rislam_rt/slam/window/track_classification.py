@@ -7,12 +7,8 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.returns import AXES, NONE, TX
-from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.context import Context
-from rislam_rt.slam.window.digest import Digest
-from rislam_rt.slam.window.expect import Scene
-from rislam_rt.slam.window.gauss import Holds, no_holds
-from rislam_rt.slam.window.guesses import (
+from rislam_rt.slam.window.hypotheses import (
     BESIDE,
     IMAGE,
     LEVEL_TURN,
@@ -23,14 +19,18 @@ from rislam_rt.slam.window.guesses import (
     WALL,
     WALLS,
     Hypotheses,
-    Known,
+    KnownFeatures,
     hypotheses,
 )
-from rislam_rt.slam.window.identify import identify
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.hypothesis_fits import Fits, smooth_paths, try_all
+from rislam_rt.slam.window.landmark_table import WindowTable
+from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
-from rislam_rt.slam.window.panel import Identity, unknown
-from rislam_rt.slam.window.trial import Fits, smooth_paths, try_all
+from rislam_rt.slam.window.point_identification import identify
+from rislam_rt.slam.window.ris_identification import PanelIdentity, unknown
+from rislam_rt.slam.window.track_summary import TrackSummary
+from rislam_rt.slam.window.window_gaussian import DirectionPriors, no_holds
 
 LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 0.2]))
 """Log prior of each kind; over known walls, of all walls together; of known points in walls, of all points together."""
@@ -38,7 +38,7 @@ LOG_NONE = np.log(0.05)
 """Of a path of no kind here: over walls that the map lacks."""
 
 
-class Verdict(NamedTuple):
+class TrackDecision(NamedTuple):
     """What a track is held to be."""
 
     kind: int
@@ -50,13 +50,13 @@ class Verdict(NamedTuple):
     """(3,) of the new feature."""
     covariance: Floats
     """(3, 3), the poses held."""
-    holds: Holds
+    holds: DirectionPriors
     """What may be held of it beforehand; its row is 0."""
     share: float
     """Of the edge with the known wall in its place, where it comes out as one with that."""
     misfit: float
     """Standard deviations by which it costs more than noise makes it."""
-    identity: Identity
+    identity: PanelIdentity
     """(1,) who it is, if it is a point."""
 
     @property
@@ -90,9 +90,10 @@ _TEMPLATES = (
 
 
 def judge(
-    context: Context, ats: list[Integers], digest: Digest, known: Known, told: list[tuple[int, float, int]],
+    context: Context, ats: list[Integers], digest: TrackSummary, known: KnownFeatures,
+    told: list[tuple[int, float, int]],
     lonely: Floats, beside: Floats,
-) -> tuple[list[Verdict], Floats]:  # fmt: skip
+) -> tuple[list[TrackDecision], Floats]:  # fmt: skip
     """Verdicts of T tracks, and the posterior (E,) of each of the explanations by the map.
 
     Of these `told` gives track, log evidence, and the number of the panel that they run over, -1 for none.
@@ -100,29 +101,29 @@ def judge(
     `ats` are the tracks' rows of the log; `lonely` (T,) is the log probability that two walls throw so few single
     returns beside it, `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
     """
-    book, scene = context.book, context.scene
-    table = hypotheses(digest, known, book, scene.use_vt)
+    landmarks, scene = context.landmarks, context.scene
+    table = hypotheses(digest, known, landmarks, scene.use_vt)
     fits = try_all(table.trials, digest)
     track = table.trials.track
-    rivals = np.where(table.known >= 0, np.log(max(len(book.walls), 1)), 0.0)
-    rivals[table.kind == IMAGE] = np.log(max(len(book.points), 1))
+    rivals = np.where(table.known >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
+    rivals[table.kind == IMAGE] = np.log(max(len(landmarks.points), 1))
     evidence = fits.log_evidence + log_place(table, fits.place, digest.middle)
     evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair, lonely[track], 0.0)
-    evidence += _amplitudes(table, fits, digest, book, scene) + _opacity(table, fits, digest, known, book)
-    evidence += _beside(table, digest, known, book, scene)
-    gain = _upright(table, fits, digest, known, book)
+    evidence += _amplitudes(table, fits, digest, landmarks, scene) + _opacity(table, fits, digest, known, landmarks)
+    evidence += _beside(table, digest, known, landmarks, scene)
+    gain = _upright(table, fits, digest, known, landmarks)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
     over = identify(context, ats, table, fits, evidence)
     evidence += over.gain
-    for number, panel in enumerate(book.panels):
+    for number, panel in enumerate(landmarks.panels):
         if panel >= 0:
             evidence += np.where((table.kind == IMAGE) & (table.known == panel), over.elsewhere[track, number], 0.0)
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
-    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - LEVELS.log_volume + LOG_NONE + beside
+    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - CONSTANTS.log_volume + LOG_NONE + beside
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
-    none += np.logaddexp(np.log1p(-LEVELS.panels), np.log(LEVELS.panels) + over_panels)
+    none += np.logaddexp(np.log1p(-CONSTANTS.panels), np.log(CONSTANTS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
     evidence += _shared(table, fits, evidence, none, explained, digest.middle)
     verdicts, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
@@ -137,15 +138,15 @@ def judge(
         weighed = np.append(weight[best], weight[1 : 1 + len(own)][same])
         probability = float(np.exp(np.logaddexp.reduce(weighed) - total))
         if best == 0:
-            verdicts.append(Verdict(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody))
+            verdicts.append(TrackDecision(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody))
             continue
         at = own[best - 1]
         count = int((digest.weight[row, :, 0] > 0.0).sum())
         misfit = (fits.cost[at] - COST_MEAN * (count - 1.0)) / (COST_STD * np.sqrt(count))
         verdicts.append(
-            Verdict(
+            TrackDecision(
                 int(table.kind[at]), probability, int(table.known[at]), fits.place[at], fits.held[at],
-                beliefs(fits.place[at], digest, known, book) if table.trials.is_wall[at] else no_holds(),
+                beliefs(fits.place[at], digest, known, landmarks) if table.trials.is_wall[at] else no_holds(),
                 float(fits.share[at]), float(misfit), over.identity.take(np.array([at])),
             )
         )  # fmt: skip
@@ -169,19 +170,23 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
 
     Walls at any distance up to the ball's radius, in any direction: their places are images of the agent's, `middle`.
     """
-    reach = np.maximum(np.linalg.norm(place - middle, axis=1), 2.0 * LEVELS.depth)
-    wall = -np.log(4.0 * np.pi * reach**2 * 2.0 * LEVELS.size)
-    return np.where(table.trials.is_wall, wall, -LEVELS.log_volume - np.where(table.trials.is_pair, np.log(8.0), 0.0))
+    reach = np.maximum(np.linalg.norm(place - middle, axis=1), 2.0 * CONSTANTS.depth)
+    wall = -np.log(4.0 * np.pi * reach**2 * 2.0 * CONSTANTS.size)
+    return np.where(
+        table.trials.is_wall, wall, -CONSTANTS.log_volume - np.where(table.trials.is_pair, np.log(8.0), 0.0)
+    )
 
 
-def _beside(table: Hypotheses, digest: Digest, known: Known, book: Book, scene: Scene) -> Floats:
+def _beside(
+    table: Hypotheses, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, scene: KnownEnvironment
+) -> Floats:
     """(H,) log probability that a wall's return comes out by itself, or as one with its edge at a level wall.
 
     It hangs on how far apart the two would be.
     """
     track, found = table.trials.track, np.zeros(len(table.kind))
     length, cell = digest.mean[0][track, 0], float(scene.sensor.cell_length[0])
-    for wall in book.walls[np.abs(known.turn[book.walls, 2, 2]) > LEVEL_TURN]:
+    for wall in landmarks.walls[np.abs(known.turn[landmarks.walls, 2, 2]) > LEVEL_TURN]:
         rise = float(np.linalg.norm(known.place[wall] - digest.middle))
         gap = np.hypot(length, rise) - length
         found += np.where((table.kind == WALL) & (gap < CLOSE * cell), LOG_ALONE, 0.0)
@@ -238,16 +243,20 @@ COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(4 + 3) log(1 + chi^2 / 4)` for chi^2 with 3 degrees of freedom."""
 
 
-def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: Book, scene: Scene) -> Floats:
+def _amplitudes(
+    table: Hypotheses, fits: Fits, digest: TrackSummary, landmarks: WindowTable, scene: KnownEnvironment
+) -> Floats:
     """(H,) log density of the tracks' mean amplitudes, given what walls leave and how points scatter."""
     radio, track = scene.radio, table.trials.track
     level, seen, rx = digest.log_amplitude[track], digest.mean[0][track], digest.mean[2][track]
     free = np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * seen[:, 0]))
     has = (table.known >= 0) & (table.kind != BESIDE)
-    ratio = np.where(has, book.ratio[table.known], 0.0) if len(book.ident) else np.zeros(len(track))
-    variance = np.where(has, book.ratio_variance[table.known], 0.0) if len(book.ident) else np.zeros(len(track))
-    mirror = free + ratio + LEVELS.wall_ratio
-    spread = variance + LEVELS.wall_ratio_std**2 + LEVELS.fading**2
+    ratio = np.where(has, landmarks.ratio[table.known], 0.0) if len(landmarks.ident) else np.zeros(len(track))
+    variance = (
+        np.where(has, landmarks.ratio_variance[table.known], 0.0) if len(landmarks.ident) else np.zeros(len(track))
+    )
+    mirror = free + ratio + CONSTANTS.wall_ratio
+    spread = variance + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
     surplus = np.maximum(level - free - 0.2, 0.0)  # a mirror does not amplify
     wall = -0.5 * (level - mirror) ** 2 / spread - 0.5 * np.log(spread) - 20.0 * surplus**2
     reach = np.linalg.norm(fits.place - rx, axis=1)
@@ -255,36 +264,43 @@ def _amplitudes(table: Hypotheses, fits: Fits, digest: Digest, book: Book, scene
     far = np.clip(far, 0.05, np.maximum(seen[:, 0] - 0.05, 0.06))
     unit = np.log(point_amplitude(np.ones(len(far)), np.maximum(seen[:, 0] - far, 0.05), far, radio))
     bounces = np.where(table.kind == OVER_SAME, 2.0, 1.0)
-    mean = unit + np.log(LEVELS.strength) + ratio * bounces
-    spread = LEVELS.strength_std**2 + variance * bounces**2 + LEVELS.fading**2
+    mean = unit + np.log(CONSTANTS.strength) + ratio * bounces
+    spread = CONSTANTS.strength_std**2 + variance * bounces**2 + CONSTANTS.fading**2
     point = -0.5 * (level - mean) ** 2 / spread - 0.5 * np.log(spread)
-    double, wide = free + 2.0 * LEVELS.wall_ratio, 2.0 * LEVELS.wall_ratio_std**2 + LEVELS.fading**2
+    double, wide = free + 2.0 * CONSTANTS.wall_ratio, 2.0 * CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
     pair = -0.5 * (level - double) ** 2 / wide - 0.5 * np.log(wide) - 20.0 * surplus**2
     amplitude = np.where(table.trials.is_wall, wall, np.where(table.trials.is_pair, pair, point))
     image = (table.kind == IMAGE).nonzero()[0]
-    amplitude[image] = _image_amplitudes(table, image, digest, book, scene)
+    amplitude[image] = _image_amplitudes(table, image, digest, landmarks, scene)
     return amplitude
 
 
-def _image_amplitudes(table: Hypotheses, rows: Integers, digest: Digest, book: Book, scene: Scene) -> Floats:
+def _image_amplitudes(
+    table: Hypotheses, rows: Integers, digest: TrackSummary, landmarks: WindowTable, scene: KnownEnvironment
+) -> Floats:
     """The same of images of known points in new walls, hypotheses `rows` (R,); the panel's hangs on codes."""
     track, point = table.trials.track[rows], table.known[rows]
     first = np.maximum(np.linalg.norm(table.trials.shift[rows, 0] - digest.mean[1][track], axis=1), 0.05)
     unit = point_amplitude(np.ones(len(rows)), first, np.maximum(digest.mean[0][track, 0] - first, 0.05), scene.radio)
-    strength, doubt = (field[point] for field in book.log_strength)
-    mean, variance = np.log(unit) + strength + LEVELS.wall_ratio, doubt**2 + LEVELS.wall_ratio_std**2 + LEVELS.fading**2
-    off = np.where(np.isin(point, book.panels), 0.0, digest.log_amplitude[track] - mean)
+    strength, doubt = (field[point] for field in landmarks.log_strength)
+    mean, variance = (
+        np.log(unit) + strength + CONSTANTS.wall_ratio,
+        doubt**2 + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2,
+    )
+    off = np.where(np.isin(point, landmarks.panels), 0.0, digest.log_amplitude[track] - mean)
     return np.asarray(-0.5 * off**2 / variance - 0.5 * np.log(variance))
 
 
-def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: Book) -> Floats:
+def _opacity(
+    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
+) -> Floats:
     """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known."""
-    middle, walls, wall = digest.middle, book.walls, table.trials.is_wall
+    middle, walls, wall = digest.middle, landmarks.walls, table.trials.is_wall
     pair, tx = table.trials.is_pair[:, None], digest.mean[1][table.trials.track]
     image = (table.trials.turn[:, 0] @ tx[..., None])[..., 0] + fits.place
     # the last of two walls is somewhere on the ray to the image of both: as far as a single wall would be
     foot = np.where(wall[:, None], 0.5 * (fits.place + middle), np.where(pair, 0.5 * (image + middle), fits.place))
-    slack = LEVELS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
+    slack = CONSTANTS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
     total = np.zeros(len(foot))
     span = fits.place - middle
     normal = span / np.maximum(np.linalg.norm(span, axis=1), 1e-6)[:, None]
@@ -293,29 +309,29 @@ def _opacity(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
         reach = np.linalg.norm(out, axis=1)
         feet = 0.5 * (known.place[walls] + middle)
         depth = foot @ (out / reach[:, None]).T - np.vecdot(feet, out) / reach
-        total += LEVELS.log_rare * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        total += CONSTANTS.log_rare * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
         before = normal @ feet.T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, LEVELS.log_rare, 0.0) * (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
-    if len(book.points):
-        depth = normal @ known.place[book.points].T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, LEVELS.log_rare, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        total += np.where(wall, CONSTANTS.log_rare, 0.0) * (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+    if len(landmarks.points):
+        depth = normal @ known.place[landmarks.points].T - np.vecdot(foot, normal)[:, None]
+        total += np.where(wall, CONSTANTS.log_rare, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
     return total
 
 
-def beliefs(place: Floats, digest: Digest, known: Known, book: Book) -> Holds:
+def beliefs(place: Floats, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> DirectionPriors:
     """What may be held beforehand of a wall at `place` (3,): upright, at right angles to another; or level."""
     span = place - digest.middle
     reach = max(float(np.linalg.norm(span)), 0.1)
-    rise, std = abs(span[2]) / reach, LEVELS.lean * reach
+    rise, std = abs(span[2]) / reach, CONSTANTS.lean * reach
     axes: list[Floats] = []
     log_odds: list[float] = []
     if rise > 0.9:
         axes += [AXES[0], AXES[1]]
-        log_odds += 2 * [LEVELS.log_upright + np.log(reach)]
+        log_odds += 2 * [CONSTANTS.log_upright + np.log(reach)]
     elif rise < 0.35:
         axes.append(AXES[2])
-        log_odds.append(LEVELS.log_upright + np.log(reach))
-        others = known.place[book.walls] - digest.middle
+        log_odds.append(CONSTANTS.log_upright + np.log(reach))
+        others = known.place[landmarks.walls] - digest.middle
         if len(others):
             flat = np.linalg.norm(others[:, :2], axis=1) > 0.95 * np.linalg.norm(others, axis=1)
             off = np.arctan2(others[flat, 1], others[flat, 0]) - np.arctan2(span[1], span[0])
@@ -323,16 +339,18 @@ def beliefs(place: Floats, digest: Digest, known: Known, book: Book) -> Holds:
             if len(off) and np.min(np.abs(off)) < 0.15:
                 aim = np.arctan2(span[1], span[0]) + off[np.argmin(np.abs(off))]
                 axes.append(np.array([-np.sin(aim), np.cos(aim), 0.0]))
-                log_odds.append(np.log(LEVELS.square / (1.0 - LEVELS.square)) + np.log(np.pi / 2.0 * reach))
+                log_odds.append(np.log(CONSTANTS.square / (1.0 - CONSTANTS.square)) + np.log(np.pi / 2.0 * reach))
     count = len(axes)
     axis = np.array(axes).reshape(count, 3)
-    return Holds(
+    return DirectionPriors(
         np.zeros(count, dtype=np.int64), axis, axis @ digest.middle, np.full(count, std), np.array(log_odds),
         np.full(count, 0.5),
     )  # fmt: skip
 
 
-def _upright(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: Book) -> Floats:
+def _upright(
+    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
+) -> Floats:
     """Gain (H,) in log evidence by what walls are beforehand: each direction held, or anywhere in its width."""
     gain = np.zeros(len(fits.cost))
     trials, tx = table.trials, digest.mean[1]
@@ -343,21 +361,21 @@ def _upright(table: Hypotheses, fits: Fits, digest: Digest, known: Known, book: 
                 continue  # an edge under the ceiling: any elevation
             at = tx[trials.track[row]]
             place = digest.middle + turn @ at + place - at
-        holds = beliefs(place, digest, known, book)
+        holds = beliefs(place, digest, known, landmarks)
         span = place - digest.middle
         variance = np.vecdot(holds.axis, holds.axis @ fits.covariance[row]) + holds.std**2
         log_right = -0.5 * (holds.axis @ span) ** 2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
         # odds hold the width: right against a density of one over it
-        each = np.logaddexp(0.0, holds.log_odds + log_right) - np.logaddexp(0.0, LEVELS.log_upright)
+        each = np.logaddexp(0.0, holds.log_odds + log_right) - np.logaddexp(0.0, CONSTANTS.log_upright)
         gain[row] = (each[:1] if trials.is_pair[row] and turn[0, 0] < 0.0 else each).sum()
     return gain
 
 
-def wanted(verdict: Verdict, length: float) -> bool:
+def wanted(verdict: TrackDecision, length: float) -> bool:
     """Whether a verdict is clear enough to enter the map: likely, a fit, and known well enough to be linear in."""
     if verdict.kind < 0 or verdict.kind == TWO_WALLS:
         return False
     holds = verdict.holds
     information = np.linalg.inv(verdict.covariance) + (holds.axis.T / holds.std**2) @ holds.axis
     worst = np.sqrt(1.0 / np.linalg.eigvalsh(information)[0])
-    return bool(verdict.probability > LEVELS.born and verdict.misfit < LEVELS.fit and worst < 0.1 * length)
+    return bool(verdict.probability > CONSTANTS.born and verdict.misfit < CONSTANTS.fit and worst < 0.1 * length)

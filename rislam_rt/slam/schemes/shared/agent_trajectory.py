@@ -14,7 +14,7 @@ RIDGE = 1e-10
 """Added to correlations of past states, which are much alike."""
 
 
-class Course(NamedTuple):
+class AgentTrajectory(NamedTuple):
     """A Gaussian over W states of 2A numbers, A axes: position [m] and velocity [m/s]; the present one first."""
 
     mean: Floats
@@ -57,14 +57,14 @@ class Step(NamedTuple):
     """(2A, 2A) covariance of what the regression misses of the former present state."""
 
 
-def begin(position: Floats, velocity: Floats, position_std: float, velocity_std: float) -> Course:
+def begin(position: Floats, velocity: Floats, position_std: float, velocity_std: float) -> AgentTrajectory:
     """The start prior; position and velocity (A,)."""
     std = np.concatenate([np.full(len(position), position_std), np.full(len(velocity), velocity_std)])
     mean = np.concatenate([position, velocity])
-    return Course(mean, np.diag(std**2), mean, len(position), np.diag(std**2), position_std**2)
+    return AgentTrajectory(mean, np.diag(std**2), mean, len(position), np.diag(std**2), position_std**2)
 
 
-def advance(course: Course, dt: float, accelerate: Floats, keep: bool) -> tuple[Course, Step]:
+def advance(course: AgentTrajectory, dt: float, accelerate: Floats, keep: bool) -> tuple[AgentTrajectory, Step]:
     """Discrete white-noise acceleration of standard deviations `accelerate` (A,) [m/s^2] over `dt` [s].
 
     With `keep` the former present state stays as a past one, and nothing is missed. Without, it is left out: what
@@ -89,7 +89,7 @@ def advance(course: Course, dt: float, accelerate: Floats, keep: bool) -> tuple[
     return moved._replace(mean=mean[kept], covariance=covariance[np.ix_(kept, kept)], nominal=nominal[kept]), step
 
 
-def _regress(course: Course, move: Floats, noise: Floats) -> Step:
+def _regress(course: AgentTrajectory, move: Floats, noise: Floats) -> Step:
     """Former course on the new one, where the former present state is left out."""
     width, size = course.width, len(course.mean)
     scale = np.sqrt(np.maximum(np.diag(course.covariance), 1e-18))

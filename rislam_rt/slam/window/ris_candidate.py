@@ -8,16 +8,18 @@ from rislam_rt.slam.moments import even_draws
 from rislam_rt.slam.observations import OTHER
 from rislam_rt.slam.returns import Poses, reflect
 from rislam_rt.slam.ris_candidate import DEEP, DISMISSAL, PATIENCE, places
-from rislam_rt.slam.window.book import Book
-from rislam_rt.slam.window.expect import Scene
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.landmark_table import WindowTable
+from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import DRAWS
-from rislam_rt.slam.window.panel import Sight, gains, weigh
+from rislam_rt.slam.window.ris_identification import PanelObservation, gains, weigh
 from rislam_rt.slam.window.steps import HEAD
-from rislam_rt.slam.window.tracks import Tracks
+from rislam_rt.slam.window.tracks import WindowTracks
 
 
-def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: Scene, code: RisCode | None) -> Tracks:
+def weigh_tracks(
+    tracks: WindowTracks, cycle: int, poses: Poses, scene: KnownEnvironment, code: RisCode | None
+) -> WindowTracks:
     """The tracks after what this cycle tells of each, were it a point: is it a panel?"""
     rows = (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
@@ -26,40 +28,40 @@ def weigh_tracks(tracks: Tracks, cycle: int, poses: Poses, scene: Scene, code: R
     looks = tracks.mean[rows, None, :, 0] + even_draws(DRAWS, 3) * spread[:, None]
     place, _ = places(looks, poses)
     count = len(rows)
-    sight = Sight(
+    sight = PanelObservation(
         place, np.tile(poses.tx, (count, 1)), np.tile(poses.rx, (count, 1)), np.ones(count),
         np.exp(tracks.log_amplitude[rows]), tracks.side[rows], tracks.last[rows] == cycle,
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)
-    fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).settled()
+    fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).converged()
     return tracks._replace(**tracks.identity.put(rows, fresh)._asdict())
 
 
-def find_suspect(
-    tracks: Tracks, book: Book, mean: Floats, cycle: int, poses: Poses, panel: int = 0
+def find_candidate(
+    tracks: WindowTracks, landmarks: WindowTable, mean: Floats, cycle: int, poses: Poses, panel: int = 0
 ) -> PanelCandidate | None:
     """The point or track that is the likeliest to be a panel; None if nothing is likelier the panel than not.
 
     A track that seems to come from behind a wall may be the panel over that wall: aiming there would miss it.
     """
-    features, walls = mean[HEAD:].reshape(-1, 3), book.walls
-    points = book.points[~np.isin(book.points, book.panels)]  # what is another panel is not this one
+    features, walls = mean[HEAD:].reshape(-1, 3), landmarks.walls
+    points = landmarks.points[~np.isin(landmarks.points, landmarks.panels)]  # what is another panel is not this one
     patience = np.where(tracks.hits > 3, np.inf, np.minimum(tracks.hits - 1, PATIENCE))
     least = np.where(tracks.hits > 1, DISMISSAL, 0.0)
-    few = np.log(LEVELS.panels)  # the design asks what was measured, not how many panels there are
+    few = np.log(CONSTANTS.panels)  # the design asks what was measured, not how many panels there are
     told = tracks.log_ris[:, panel] - few
     rows = ((tracks.side != OTHER) & (cycle - tracks.last <= patience) & (told > least)).nonzero()[0]
     spots, _ = places(tracks.mean[rows, :, 0], poses)
     if len(walls) and len(rows):
         out = features[walls] - mean[:3]
-        image = reflect(np.broadcast_to(mean[:3], out.shape), features[walls], book.anchor[walls])
+        image = reflect(np.broadcast_to(mean[:3], out.shape), features[walls], landmarks.anchor[walls])
         gap = np.linalg.norm(spots[:, None] - image, axis=-1) - np.linalg.norm(spots - mean[:3], axis=1)[:, None]
         shown = (gap > -DEEP).all(axis=1)
         rows, spots = rows[shown], spots[shown]
-    odds = np.concatenate([book.log_ris[points, panel] - few, told[rows]])
+    odds = np.concatenate([landmarks.log_ris[points, panel] - few, told[rows]])
     if not len(odds) or odds.max() <= DISMISSAL:
         return None
     best = int(np.argmax(odds))
     if best < len(points):
-        return PanelCandidate(features[points[best]], int(book.hits[points[best]]), panel)
+        return PanelCandidate(features[points[best]], int(landmarks.hits[points[best]]), panel)
     return PanelCandidate(spots[best - len(points)], int(tracks.hits[rows[best - len(points)]]), panel)

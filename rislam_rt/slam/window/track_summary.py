@@ -12,17 +12,17 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import PANEL
-from rislam_rt.slam.window.gauss import Window, now, pose_covariance, poses
-from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.log import Log
+from rislam_rt.slam.window.measurement_log import Log
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import POINTS
 from rislam_rt.slam.window.steps import TURN
+from rislam_rt.slam.window.window_gaussian import Window, now, pose_covariance, poses
 
 TOGETHER = 10.0
 """Measurements over which the pull of neighbours keeps its sign."""
 
 
-class Digest(NamedTuple):
+class TrackSummary(NamedTuple):
     """T tracks, B normal points each; where `weight` is 0 there is none."""
 
     seen: Floats
@@ -65,7 +65,9 @@ class Digest(NamedTuple):
         return np.concatenate([flat, up[:, None]], axis=1)
 
 
-def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: Floats, cycle: int) -> Digest:
+def summarise_tracks(
+    log: Log, rows: list[Integers], window: Window, body: Body, heading: Floats, cycle: int
+) -> TrackSummary:
     """The histories `rows` of T tracks (rows of the log each, in time)."""
     mean, covariance = now(window)
     place, time = poses(window), np.concatenate([[0.0], np.cumsum(window.step)])
@@ -76,14 +78,14 @@ def digest(log: Log, rows: list[Integers], window: Window, body: Body, heading: 
         scatter_of(track, log.std[at], time[slot]) for track, at, slot in zip(seen, rows, slots, strict=True)
     ])  # fmt: skip
     # what the others show is what a short history has yet to show; it counts as much as four measurements
-    crowd = max(LEVELS.crowd, float(np.mean(np.minimum(scatter, 10.0) ** 2)))
+    crowd = max(CONSTANTS.crowd, float(np.mean(np.minimum(scatter, 10.0) ** 2)))
     number = np.array([len(at) for at in rows])[:, None]
     # the difference of two alternated codes holds the panel's paths and nothing of the others
     pure = np.array([bool((log.side[at] >= PANEL).all()) for at in rows])[:, None]
     around = np.where(pure, 1.0, crowd)
     scatter = np.sqrt((4.0 * around + number * scatter**2) / (4.0 + number))
     count = len(rows)
-    found = Digest(
+    found = TrackSummary(
         np.zeros((count, POINTS, 3)), np.zeros((count, POINTS, 3)), np.zeros((count, POINTS)),
         np.zeros((count, POINTS, 3)) + ends.tx[-1], np.zeros((count, POINTS, 3)) + ends.rx[-1],
         np.zeros((count, POINTS, 3, 6)), np.array([log.log_amplitude[at].mean() for at in rows]), scatter,
@@ -142,5 +144,5 @@ def scatter_of(seen: Floats, std: Floats, time: Floats) -> Floats:
             best = np.linalg.solve(normal + 1e-12 * np.eye(order), (rows * weight[:, None]).T @ seen[:, axis])
             squared[:, axis] = ((seen[:, axis] - rows @ best) / std[:, axis]) ** 2
         chi = (trust[:, None] * squared).sum(axis=0) / max(len(time) - order, 1)
-        trust = (LEVELS.tail + 3.0) / (LEVELS.tail + (squared / np.maximum(chi, 1.0)).sum(axis=1))
+        trust = (CONSTANTS.tail + 3.0) / (CONSTANTS.tail + (squared / np.maximum(chi, 1.0)).sum(axis=1))
     return np.sqrt(np.maximum(chi, 1.0))

@@ -7,14 +7,21 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.moments import even_draws, poses_of
 from rislam_rt.slam.observations import OTHER, UNTOLD
-from rislam_rt.slam.window.book import Book
 from rislam_rt.slam.window.context import Context
-from rislam_rt.slam.window.gauss import poses
-from rislam_rt.slam.window.guesses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.hypotheses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
+from rislam_rt.slam.window.hypothesis_fits import Fits
+from rislam_rt.slam.window.landmark_table import WindowTable
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import CERTAIN
-from rislam_rt.slam.window.panel import Identity, Sight, gains, spread_places, unknown, weigh
-from rislam_rt.slam.window.trial import Fits
+from rislam_rt.slam.window.ris_identification import (
+    PanelIdentity,
+    PanelObservation,
+    gains,
+    spread_places,
+    unknown,
+    weigh,
+)
+from rislam_rt.slam.window.window_gaussian import poses
 
 ASIDE = 12.0
 """Log evidence behind a track's best point from which on another place is not asked whether it is the panel's."""
@@ -25,7 +32,7 @@ class Identified(NamedTuple):
 
     gain: Floats
     """(H,) in log evidence, of points that may be the panel instead of a scatterer."""
-    identity: Identity
+    identity: PanelIdentity
     """(H,) who each is then."""
     elsewhere: Floats
     """(T, Q) log odds that a track runs over each panel by a way that is none of these, against none over it."""
@@ -33,14 +40,16 @@ class Identified(NamedTuple):
 
 def identify(context: Context, ats: list[Integers], table: Hypotheses, fits: Fits, evidence: Floats) -> Identified:
     """The tracks whose components are the log's rows `ats`: what comes of its being a panel that throws them."""
-    scene, book, panels = context.scene, context.book, context.scene.num_panels
+    scene, landmarks, panels = context.scene, context.landmarks, context.scene.num_panels
     elsewhere = np.full((len(ats), panels), -CERTAIN)
     found = Identified(np.zeros(len(evidence)), unknown(len(evidence), panels), elsewhere)
     if scene.ris is None:
         found.identity.log_ris[:] = -np.inf
         return found
     point = np.isin(table.kind, (POINT, OVER_RX, OVER_TX, OVER_SAME))
-    taken = -np.logaddexp.reduce(np.append(book.log_ris[book.points], np.zeros((1, panels)), axis=0), axis=0)  # but one
+    taken = -np.logaddexp.reduce(
+        np.append(landmarks.log_ris[landmarks.points], np.zeros((1, panels)), axis=0), axis=0
+    )  # but one
     for track, at in enumerate(ats):
         rows = (point & (table.trials.track == track)).nonzero()[0]
         if (context.log.side[at] == OTHER).all():
@@ -50,15 +59,15 @@ def identify(context: Context, ats: list[Integers], table: Hypotheses, fits: Fit
         fresh = _history(context, at, table, fits, np.append(near, rows[0]))
         fresh.log_ris[:-1] += taken
         found.gain[near] = np.logaddexp.reduce(np.pad(fresh.log_ris[:-1], ((0, 0), (1, 0))), axis=1)
-        found.gain[near] -= np.log1p(panels * LEVELS.panels)
+        found.gain[near] -= np.log1p(panels * CONSTANTS.panels)
         found.elsewhere[track] = fresh.log_ris[-1]
         found = found._replace(identity=found.identity.put(near, fresh.take(np.arange(len(near)))))
     # what is heard over walls alone may well be hidden straight ahead: silence there tells nothing
     found.identity.hidden[table.kind != POINT] = 1.0
-    return found._replace(identity=found.identity.settled())
+    return found._replace(identity=found.identity.converged())
 
 
-def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> Identity:
+def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> PanelIdentity:
     """Identities of the hypotheses `rows` (R,) of a track whose components are the log's rows `at`.
 
     The last row stands for a panel anywhere else: amplitudes scatter as they do.
@@ -67,9 +76,9 @@ def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows
     place = poses(window)
     ends = poses_of(place[:, :3], context.heading + place[:, 3], scene.body)
     turn, shift = np.swapaxes(table.trials.turn[rows], 2, 3), table.trials.shift[rows]
-    spots, ratio = spread_places(fits.place[rows], fits.held[rows]), _ratio(table, context.book, rows)
+    spots, ratio = spread_places(fits.place[rows], fits.held[rows]), _ratio(table, context.landmarks, rows)
     level = log.log_amplitude[at]
-    anywhere = np.exp(level.mean() + max(float(level.std()), LEVELS.fading) * even_draws(spots.shape[1], 1)[:, 0])
+    anywhere = np.exp(level.mean() + max(float(level.std()), CONSTANTS.fading) * even_draws(spots.shape[1], 1)[:, 0])
     first = context.cycle - window.num_poses + 1
     heard = {int(log.cycle[row] - first): row for row in at}
     found = unknown(count, scene.num_panels)
@@ -77,7 +86,7 @@ def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows
         row = heard.get(slot, -1)
         amplitude, side = (np.exp(log.log_amplitude[row]), log.side[row]) if row >= 0 else (1.0, UNTOLD)
         tx, rx = (end[slot] @ turn[:, leg] + shift[:, leg] for leg, end in enumerate((ends.tx, ends.rx)))
-        sight = Sight(
+        sight = PanelObservation(
             spots, tx, rx, ratio, np.full(count, amplitude), np.full(count, side), np.full(count, row >= 0)
         )  # fmt: skip
         gain = gains(sight, scene.ris, context.codes[slot], scene.radio)
@@ -87,9 +96,9 @@ def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows
     return found
 
 
-def _ratio(table: Hypotheses, book: Book, rows: Integers) -> Floats:
+def _ratio(table: Hypotheses, landmarks: WindowTable, rows: Integers) -> Floats:
     """(R,) amplitude that the known walls of hypotheses leave."""
-    if not len(book.ident):
+    if not len(landmarks.ident):
         return np.ones(len(rows))
     known, bounces = table.known[rows], np.where(table.kind[rows] == OVER_SAME, 2.0, 1.0)
-    return np.asarray(np.exp(np.where(known >= 0, book.ratio[known] * bounces, 0.0)))
+    return np.asarray(np.exp(np.where(known >= 0, landmarks.ratio[known] * bounces, 0.0)))

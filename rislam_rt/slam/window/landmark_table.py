@@ -6,11 +6,11 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.identity import STRENGTHS, panel_probabilities, strength_moments
-from rislam_rt.slam.window.levels import LEVELS
-from rislam_rt.slam.window.panel import Identity
+from rislam_rt.slam.window.model_constants import CONSTANTS
+from rislam_rt.slam.window.ris_identification import PanelIdentity
 
 
-class Book(NamedTuple):
+class WindowTable(NamedTuple):
     """F features."""
 
     ident: Integers
@@ -53,9 +53,9 @@ class Book(NamedTuple):
         return probability
 
     @property
-    def identity(self) -> Identity:
+    def identity(self) -> PanelIdentity:
         """(F,) what points are held to be."""
-        return Identity(self.log_grid, self.log_ris, self.hidden)
+        return PanelIdentity(self.log_grid, self.log_ris, self.hidden)
 
     @property
     def panels(self) -> tuple[int, ...]:
@@ -77,35 +77,37 @@ class Book(NamedTuple):
         return np.where(idents < 0, idents, place)
 
 
-def empty_book(panels: int = 1) -> Book:
+def empty_table(panels: int = 1) -> WindowTable:
     """Nothing known, in a room of so many panels."""
     none, count = np.zeros(0), np.zeros(0, dtype=np.int64)
-    return Book(
+    return WindowTable(
         count, np.zeros(0, dtype=np.bool_), np.zeros((0, 3)), count, none, none, none,
         np.zeros((0, len(STRENGTHS))), np.zeros((0, panels)), np.zeros((0, panels + 1)), 0,
     )  # fmt: skip
 
 
-def enter(book: Book, is_wall: bool, anchor: Floats, hits: int, log_odds: float, identity: Identity) -> Book:
-    """The book with one more feature, in the last row; `identity` (1,) of a point."""
-    return book._replace(
-        ident=np.append(book.ident, book.next_ident),
-        is_wall=np.append(book.is_wall, is_wall),
-        anchor=np.concatenate([book.anchor, anchor[None]]),
-        hits=np.append(book.hits, hits),
-        log_odds=np.append(book.log_odds, log_odds),
-        ratio=np.append(book.ratio, LEVELS.wall_ratio if is_wall else 0.0),
-        ratio_variance=np.append(book.ratio_variance, LEVELS.wall_ratio_std**2 if is_wall else 0.0),
-        **book.identity.join(identity)._asdict(),
-        next_ident=book.next_ident + 1,
+def enter(
+    landmarks: WindowTable, is_wall: bool, anchor: Floats, hits: int, log_odds: float, identity: PanelIdentity
+) -> WindowTable:
+    """The table with one more feature, in the last row; `identity` (1,) of a point."""
+    return landmarks._replace(
+        ident=np.append(landmarks.ident, landmarks.next_ident),
+        is_wall=np.append(landmarks.is_wall, is_wall),
+        anchor=np.concatenate([landmarks.anchor, anchor[None]]),
+        hits=np.append(landmarks.hits, hits),
+        log_odds=np.append(landmarks.log_odds, log_odds),
+        ratio=np.append(landmarks.ratio, CONSTANTS.wall_ratio if is_wall else 0.0),
+        ratio_variance=np.append(landmarks.ratio_variance, CONSTANTS.wall_ratio_std**2 if is_wall else 0.0),
+        **landmarks.identity.join(identity)._asdict(),
+        next_ident=landmarks.next_ident + 1,
     )
 
 
-def idents(book: Book, forms: Integers) -> Integers:
+def idents(landmarks: WindowTable, forms: Integers) -> Integers:
     """Forms (..., 5) of feature rows as forms of idents."""
-    if not len(book.ident):
+    if not len(landmarks.ident):
         return forms
-    return np.where(forms >= 0, book.ident[np.maximum(forms, 0)], forms)
+    return np.where(forms >= 0, landmarks.ident[np.maximum(forms, 0)], forms)
 
 
 def image_ident(point: Integers, wall: Integers) -> Integers:
@@ -113,16 +115,18 @@ def image_ident(point: Integers, wall: Integers) -> Integers:
     return np.asarray(10_000 + 1000 * point + wall)
 
 
-def strike(book: Book, keep: Booleans) -> Book:
-    """The book without some of its features."""
-    fields: dict[str, Any] = {name: getattr(book, name)[keep] for name in book._fields if name != "next_ident"}
-    return book._replace(**fields)
+def remove_features(landmarks: WindowTable, keep: Booleans) -> WindowTable:
+    """The table without some of its features."""
+    fields: dict[str, Any] = {
+        name: getattr(landmarks, name)[keep] for name in landmarks._fields if name != "next_ident"
+    }
+    return landmarks._replace(**fields)
 
 
-def learn_ratio(book: Book, wall: int, log_ratio: float) -> Book:
+def learn_ratio(landmarks: WindowTable, wall: int, log_ratio: float) -> WindowTable:
     """A wall's log amplitude ratio after one more return over it."""
-    gain = book.ratio_variance[wall] / (book.ratio_variance[wall] + LEVELS.fading**2)
-    ratio, variance = book.ratio.copy(), book.ratio_variance.copy()
+    gain = landmarks.ratio_variance[wall] / (landmarks.ratio_variance[wall] + CONSTANTS.fading**2)
+    ratio, variance = landmarks.ratio.copy(), landmarks.ratio_variance.copy()
     ratio[wall] += gain * (log_ratio - ratio[wall])
-    variance[wall] = max((1.0 - gain) * variance[wall], LEVELS.fading**2 / 10.0)
-    return book._replace(ratio=ratio, ratio_variance=variance)
+    variance[wall] = max((1.0 - gain) * variance[wall], CONSTANTS.fading**2 / 10.0)
+    return landmarks._replace(ratio=ratio, ratio_variance=variance)

@@ -40,7 +40,7 @@ class Quadratic(NamedTuple):
         return self.gradient + (self.hessian @ (x - self.middle)[..., None])[..., 0]
 
 
-class Holds(NamedTuple):
+class DirectionPriors(NamedTuple):
     """N beliefs about single directions of features: a wall is upright, level, at right angles to another, or not."""
 
     feature: Integers
@@ -57,10 +57,10 @@ class Holds(NamedTuple):
     """(N,) that it is right, at the last look: the weight with which it counts."""
 
 
-def no_holds() -> Holds:
+def no_holds() -> DirectionPriors:
     """Nothing believed beforehand."""
     none = np.zeros(0)
-    return Holds(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), none, none, none, none)
+    return DirectionPriors(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), none, none, none, none)
 
 
 class Window(NamedTuple):
@@ -80,7 +80,7 @@ class Window(NamedTuple):
     """(K, 4 + 3F): on each pose and the features."""
     covariance: Floats
     """(D, D) of head and accelerations, at the last solution."""
-    holds: Holds
+    holds: DirectionPriors
 
     @property
     def num_poses(self) -> int:
@@ -298,7 +298,7 @@ def weigh_holds(window: Window) -> Window:
     return window._replace(holds=holds._replace(probability=1.0 / (1.0 + np.exp(-odds))))
 
 
-def add_feature(window: Window, place: Floats, holds: Holds, ridge: float = 1e-6) -> Window:
+def add_feature(window: Window, place: Floats, holds: DirectionPriors, ridge: float = 1e-6) -> Window:
     """One more feature at `place` (3,), with what is held of it; all else is open, `ridge` [1/m^2] apart."""
     size = len(window.head)
     hessian = np.zeros((size + 3, size + 3))
@@ -313,7 +313,7 @@ def add_feature(window: Window, place: Floats, holds: Holds, ridge: float = 1e-6
     middle = np.concatenate([old.middle, np.broadcast_to(place, (count, 3))], axis=1)
     covariance = np.insert(np.insert(window.covariance, size * np.ones(3, int), 0.0, axis=0), [size] * 3, 0.0, axis=1)
     covariance[size : size + 3, size : size + 3] = np.eye(3)
-    joined = Holds._make(np.concatenate(pair) for pair in zip(window.holds, holds, strict=True))
+    joined = DirectionPriors._make(np.concatenate(pair) for pair in zip(window.holds, holds, strict=True))
     return window._replace(
         holds=joined,
         head=np.concatenate([window.head, place]),
@@ -340,7 +340,7 @@ def drop_features(window: Window, keep: Booleans) -> Window:
     kept = np.concatenate([inside, np.arange(size, len(window.covariance))])
     stay = keep[window.holds.feature]
     holds = window.holds._replace(feature=(np.cumsum(keep) - 1)[window.holds.feature])
-    holds = Holds._make(field[stay] for field in holds)
+    holds = DirectionPriors._make(field[stay] for field in holds)
     return window._replace(
         holds=holds,
         head=window.head[inside],

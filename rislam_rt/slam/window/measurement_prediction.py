@@ -10,17 +10,17 @@ from rislam_rt.model.sensor import SensorModel
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
-from rislam_rt.slam.window.book import Book
-from rislam_rt.slam.window.forms import enumerate_forms, forms_of, possible_legs
-from rislam_rt.slam.window.levels import LEVELS
+from rislam_rt.slam.window.landmark_table import WindowTable
+from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import EDGE, FAINT, LEVEL
+from rislam_rt.slam.window.path_forms import enumerate_forms, forms_of, possible_legs
 from rislam_rt.slam.window.steps import HEAD
 
 PANEL_STD = float(np.pi / np.sqrt(24.0))
 """Spread of the panel's predicted log amplitude: that of a Rayleigh variable, as phases hang on millimetres."""
 
 
-class Scene(NamedTuple):
+class KnownEnvironment(NamedTuple):
     """What the filter knows of the world beside its features."""
 
     body: Body
@@ -36,7 +36,7 @@ class Scene(NamedTuple):
         return 1 if self.ris is None else len(self.ris.panels)
 
 
-class Expected(NamedTuple):
+class ExpectedComponents(NamedTuple):
     """R returns worth looking for, at the mean belief."""
 
     forms: Integers
@@ -55,33 +55,39 @@ class Expected(NamedTuple):
     """(R,) probability that it shows, were nothing in its way and it alone."""
 
 
-def expect(
-    features: Floats, book: Book, poses: Poses, position: Floats, scene: Scene, code: RisCode | None
-) -> Expected:
+def predict_returns(
+    features: Floats,
+    landmarks: WindowTable,
+    poses: Poses,
+    position: Floats,
+    scene: KnownEnvironment,
+    code: RisCode | None,
+) -> ExpectedComponents:
     """All forms that are possible at the mean belief, arrive from above, and may be detected."""
-    legs = enumerate_forms(tuple(book.points.tolist()), tuple(book.walls.tolist()), scene.max_bounces, True)
+    legs = enumerate_forms(tuple(landmarks.points.tolist()), tuple(landmarks.walls.tolist()), scene.max_bounces, True)
     returns, bounces = legs.returns, legs.bounces
-    fine = possible_legs(returns.legs, features, book.anchor, poses)
+    fine = possible_legs(returns.legs, features, landmarks.anchor, poses)
     rows = (fine[returns.tx] & fine[returns.rx]).nonzero()[0]
     returns, bounces = compact(returns, rows), bounces[rows]
-    sight = observe(returns, features, book.anchor, poses)
-    level, spread = amplitudes(returns, features, book, sight.tx_length, sight.rx_length, poses, scene, code)
+    sight = observe(returns, features, landmarks.anchor, poses)
+    level, spread = amplitudes(returns, features, landmarks, sight.tx_length, sight.rx_length, poses, scene, code)
     detection = detection_probability(level, spread, scene.sensor)
     strong = scene.radio.integrated_snr(np.exp(level + spread)) > FAINT
     audible = ((sight.up > -LEVEL) & strong).nonzero()[0]
     returns = compact(returns, audible)
-    linear = linearise(returns, features, book.anchor, poses)
+    linear = linearise(returns, features, landmarks.anchor, poses)
     count = len(audible)
     jacobian = np.zeros((count, 3, HEAD + 3 * len(features)))
     jacobian[..., :3], jacobian[..., 6] = linear.by_pose, linear.by_heading(poses, position)
     jacobian[..., HEAD:] = linear.by_feature.reshape(count, 3, features.size)
-    return Expected(
+    return ExpectedComponents(
         forms_of(returns), linear.seen, jacobian, level[audible], spread[audible], bounces[audible], detection[audible]
     )
 
 
 def amplitudes(
-    returns: Returns, features: Floats, book: Book, tx_length: Floats, rx_length: Floats, poses: Poses, scene: Scene,
+    returns: Returns, features: Floats, landmarks: WindowTable, tx_length: Floats, rx_length: Floats, poses: Poses,
+    scene: KnownEnvironment,
     code: RisCode | None,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Log amplitude (R,) and its standard deviation (R,)."""
@@ -89,29 +95,35 @@ def amplitudes(
     if not len(returns.tx):
         return np.zeros(0), np.zeros(0)
     none = legs[:, 1:] == NONE
-    left = np.where(none, 0.0, book.ratio[legs[:, 1:]]).sum(axis=1)
-    doubt = np.where(none, 0.0, book.ratio_variance[legs[:, 1:]]).sum(axis=1)
+    left = np.where(none, 0.0, landmarks.ratio[legs[:, 1:]]).sum(axis=1)
+    doubt = np.where(none, 0.0, landmarks.ratio_variance[legs[:, 1:]]).sum(axis=1)
     ratio, variance = left[returns.tx] + left[returns.rx], doubt[returns.tx] + doubt[returns.rx]
     point = returns.point
     moving = point == TX
-    strength, strength_std = book.log_strength
+    strength, strength_std = landmarks.log_strength
     free = np.log(image_amplitude(rx_length, radio)) + ratio
     unit = point_amplitude(np.ones(()), np.maximum(tx_length, 1e-3), rx_length, radio)
     level = np.where(moving, free, np.log(unit) + ratio + strength[point])
-    spread = np.sqrt(np.where(moving, 0.0, strength_std[point] ** 2) + variance + (0.3 * LEVELS.fading) ** 2)
+    spread = np.sqrt(np.where(moving, 0.0, strength_std[point] ** 2) + variance + (0.3 * CONSTANTS.fading) ** 2)
     if scene.ris is None or code is None:
         return level, spread
-    for panel, spec, part in zip(book.panels, scene.ris.panels, scene.ris.parts(code), strict=True):
+    for panel, spec, part in zip(landmarks.panels, scene.ris.panels, scene.ris.parts(code), strict=True):
         if panel >= 0:
             rows = (point == panel).nonzero()[0]
-            gain = panel_gains(compact(returns, rows), features, book, poses, radio, spec, part)
+            gain = panel_gains(compact(returns, rows), features, landmarks, poses, radio, spec, part)
             level[rows] = np.log(np.maximum(gain, 1e-30)) + ratio[rows]
             spread[rows] = np.sqrt(PANEL_STD**2 + variance[rows])
     return level, spread
 
 
 def panel_gains(
-    returns: Returns, features: Floats, book: Book, poses: Poses, radio: RadioConfig, spec: RisSpec, code: RisCode
+    returns: Returns,
+    features: Floats,
+    landmarks: WindowTable,
+    poses: Poses,
+    radio: RadioConfig,
+    spec: RisSpec,
+    code: RisCode,
 ) -> Floats:
     """|gain| (R,) of a panel's returns with perfect walls."""
     legs, center = returns.legs, features[returns.legs[:, 0]]
@@ -121,7 +133,7 @@ def panel_gains(
         for column in (2, 1):
             rows = (legs[:, column] != NONE).nonzero()[0]
             walls = legs[rows, column]
-            end[rows] = reflect(end[rows], features[walls], book.anchor[walls])
+            end[rows] = reflect(end[rows], features[walls], landmarks.anchor[walls])
         ends.append(leg_response(spec, center, end, np.sqrt(gain), radio.wavelength))
     return np.abs(panel_gain(ends[0][returns.tx], ends[1][returns.rx], code))
 
@@ -133,7 +145,7 @@ def detection_probability(log_amplitude: Floats, spread: Floats, sensor: SensorM
     return np.asarray(each @ np.array([1.0, 4.0, 1.0]) / 6.0)
 
 
-class Clusters(NamedTuple):
+class UnresolvedClusters(NamedTuple):
     """C components that R expected returns come out as: the strongest of each cell leads."""
 
     leader: Integers
@@ -154,7 +166,9 @@ class Clusters(NamedTuple):
     """(C,) probability that it comes out by itself: 1 for leaders, less for what a leader should take in."""
 
 
-def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | None = None) -> Clusters:
+def cluster(
+    expected: ExpectedComponents, cell: Floats, clear: Floats, sides: Integers | None = None
+) -> UnresolvedClusters:
     """From the strongest down, each return takes in all that is in its cell; neighbours on the cell's edge disturb."""
     count = len(expected.seen)
     place, strength = expected.seen / cell, expected.log_amplitude
@@ -175,7 +189,7 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
         if taken[leader] or not len(members):
             continue
         taken[members] = True
-        by_itself[members] = np.maximum(1.0 - clear[leader], LEVELS.rare)
+        by_itself[members] = np.maximum(1.0 - clear[leader], CONSTANTS.rare)
         partner[leader] = members[np.argmax(strength[members])]
         total[leader] += power[members].sum()
     paired = (partner >= 0).nonzero()[0]
@@ -201,7 +215,7 @@ def cluster(expected: Expected, cell: Floats, clear: Floats, sides: Integers | N
     )
     share[twins], spread[twins] = 0.5, TWIN_STD**2
     fade = np.where(both, 0.7 * np.minimum(ratio, 1.0), 0.0)
-    return Clusters(
+    return UnresolvedClusters(
         leader,
         mate,
         share,
@@ -227,7 +241,11 @@ def _above(z: Floats) -> Floats:
 
 
 def conditioned_share(
-    clusters: Clusters, expected: Expected, row: Integers, log_amplitude: Floats, log_amplitude_std: Floats
+    clusters: UnresolvedClusters,
+    expected: ExpectedComponents,
+    row: Integers,
+    log_amplitude: Floats,
+    log_amplitude_std: Floats,
 ) -> tuple[Floats, Floats]:
     """Mean and variance (A,) of the partner's share in clusters `row` (A,), given the amplitudes measured.
 

@@ -1,0 +1,179 @@
+"""What a cycle teaches about the features themselves: strength, walls' losses, the panel, and what hides a path."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.model import RisCode
+from rislam_rt.slam.observations import UNTOLD, Observations
+from rislam_rt.slam.returns import NONE, TX, Poses
+from rislam_rt.slam.window.landmark_table import WindowTable, learn_ratio
+from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, KnownEnvironment, UnresolvedClusters
+from rislam_rt.slam.window.model_constants import CONSTANTS
+from rislam_rt.slam.window.numerics import SCATTER_RATE
+from rislam_rt.slam.window.ris_identification import PanelObservation, gains, spread_places, weigh
+from rislam_rt.slam.window.steps import HEAD
+from rislam_rt.slam.window.window_gaussian import Window
+
+
+class VisibilityObservations(NamedTuple):
+    """V forms that were looked for, and whether something stands in the way of each."""
+
+    code: Integers
+    """(V,) forms by ident, packed, sorted."""
+    clear: Floats
+    """(V,) probability that nothing does."""
+    scatter: Floats
+    """(V,) running mean square of its residuals in reported deviations: what the map lacks in its cell."""
+
+
+def no_observations() -> VisibilityObservations:
+    """Nothing looked for yet."""
+    return VisibilityObservations(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+
+
+def pack(forms: Integers, landmarks: WindowTable) -> Integers:
+    """Forms (R, 5) of rows as one number each, by ident."""
+    known = np.where(forms >= 0, landmarks.ident[np.maximum(forms, 0)], forms) if len(landmarks.ident) else forms
+    code = np.zeros(len(forms), dtype=np.int64)
+    for column in known.T:
+        code = code * 4096 + column + 1
+    return code
+
+
+def recall(
+    visibility: VisibilityObservations, expected: ExpectedComponents, landmarks: WindowTable
+) -> tuple[Floats, Floats]:
+    """Probability (R,) that nothing stands in the way of each return now, and its scatter (R,)."""
+    first, scatter = CONSTANTS.steady ** (1.0 + expected.bounces), np.full(len(expected.seen), CONSTANTS.crowd)
+    if len(visibility.code):
+        code = pack(expected.forms, landmarks)
+        place = np.minimum(np.searchsorted(visibility.code, code), len(visibility.code) - 1)
+        known = visibility.code[place] == code
+        first, scatter = (
+            np.where(known, visibility.clear[place], first),
+            np.where(known, visibility.scatter[place], scatter),
+        )
+    return np.asarray(first * (1.0 - CONSTANTS.blocked) + (1.0 - first) * CONSTANTS.cleared), scatter
+
+
+def seed(
+    visibility: VisibilityObservations, forms: Integers, landmarks: WindowTable, scatter: float
+) -> VisibilityObservations:
+    """A form that a new feature was found by: nothing hides it, and it scatters so much."""
+    code = np.append(visibility.code, pack(forms, landmarks))
+    order = np.argsort(code, kind="stable")
+    return VisibilityObservations(
+        code[order], np.append(visibility.clear, np.full(len(forms), 0.99))[order],
+        np.append(visibility.scatter, np.full(len(forms), scatter))[order],
+    )  # fmt: skip
+
+
+def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Floats) -> Floats:
+    """(C,) probability that each cluster shows."""
+    return np.asarray(CONSTANTS.shown * (expected.detection * clear)[groups.leader] * groups.by_itself).clip(
+        1e-4, CONSTANTS.shown
+    )
+
+
+def learn(
+    visibility: VisibilityObservations, landmarks: WindowTable, window: Window, expected: ExpectedComponents,
+    groups: UnresolvedClusters, shows: Floats, row: Integers,
+    pick: Integers, raw: Floats, observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
+) -> tuple[VisibilityObservations, WindowTable]:  # fmt: skip
+    """After clusters `row` (A,) were seen as components `pick` (A,) with residuals of mean square `raw` (A,)."""
+    if not len(expected.seen):
+        return visibility, landmarks
+    hit = np.zeros(len(groups.leader), dtype=np.bool_)
+    hit[row] = True
+    before, scatter = recall(visibility, expected, landmarks)
+    detection = CONSTANTS.shown * expected.detection
+    missed = before * (1.0 - detection) / (1.0 - before * detection)
+    after = before.copy()
+    told = hit | (groups.by_itself == 1.0)
+    after[groups.leader[told]] = np.where(hit, 0.995, missed[groups.leader])[told]
+    lead = groups.leader[row]
+    scatter[lead] += SCATTER_RATE * (np.minimum(raw, 30.0 * scatter[lead]) - scatter[lead])
+    alone = (groups.partner < 0) & (groups.by_itself == 1.0)
+    landmarks = _existence(landmarks, expected, groups, hit & alone, ~hit & alone, shows)
+    landmarks = _strengths(landmarks, window, expected, groups, row, pick, observed, poses, scene, code)
+    fresh = pack(expected.forms, landmarks)
+    keep = ~np.isin(visibility.code, fresh)
+    packed = np.concatenate([visibility.code[keep], fresh])
+    order = np.argsort(packed, kind="stable")
+    cleared, scattered = (
+        np.concatenate([visibility.clear[keep], after]),
+        np.concatenate([visibility.scatter[keep], scatter]),
+    )
+    return VisibilityObservations(packed[order], cleared[order], scattered[order]), landmarks
+
+
+def _existence(
+    landmarks: WindowTable,
+    expected: ExpectedComponents,
+    groups: UnresolvedClusters,
+    hit: Floats,
+    missed: Floats,
+    shows: Floats,
+) -> WindowTable:
+    """Every feature by the returns that only it explains: those over the fewest other features."""
+    odds, hits = landmarks.log_odds.copy(), landmarks.hits.copy()
+    for where, tell in ((hit, 1.0), (missed, 0.0)):
+        rows = where.nonzero()[0]
+        forms, bounces = expected.forms[groups.leader[rows]], expected.bounces[groups.leader[rows]]
+        for form, bounce, show in zip(forms, bounces, shows[rows], strict=True):
+            names = [part for part in form if part >= 0]
+            direct = (form[0] >= 0 and bounce == 0) or (form[0] == TX and bounce == 1)
+            if tell:
+                for name in names:
+                    odds[name] = min(odds[name] + (1.0 if direct else 0.3), 12.0)
+                    hits[name] += 1
+            elif direct:
+                odds[names[0]] += np.log1p(-show)
+    return landmarks._replace(log_odds=odds, hits=hits)
+
+
+def _strengths(
+    landmarks: WindowTable, window: Window, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers,
+    pick: Integers,
+    observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
+) -> WindowTable:  # fmt: skip
+    """Walls' losses, and who the points are, from components that came out alone."""
+    lead, alone = groups.leader[row], groups.partner[row] < 0
+    quiet = (groups.disturbance[row] < 0.25 * scene.sensor.cell_length**2).all(axis=1)
+    for place in (alone & quiet).nonzero()[0]:
+        form = expected.forms[lead[place]]
+        walls = [part for part in form[1:] if part != NONE]
+        if len(walls) == 1 and (form[0] == TX or expected.log_amplitude_std[lead[place]] < 0.5):
+            surplus = observed.log_amplitude[pick[place]] - expected.log_amplitude[lead[place]]
+            landmarks = learn_ratio(
+                landmarks, int(walls[0]), float(np.clip(landmarks.ratio[walls[0]] + surplus, -3.0, 0.1))
+            )
+    return _identities(landmarks, window, expected, groups, row, pick, observed, poses, scene, code)
+
+
+def _identities(
+    landmarks: WindowTable, window: Window, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers,
+    pick: Integers,
+    observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
+) -> WindowTable:  # fmt: skip
+    """What amplitude or silence of points that come straight, and alone, tells of who they are."""
+    component = np.full(len(groups.leader), -1)
+    component[row] = pick
+    lead = groups.leader
+    alone = (groups.partner < 0) & (groups.by_itself == 1.0) & (expected.bounces[lead] == 0)
+    points, heard = expected.forms[lead[alone], 0], component[alone]
+    if not len(points):
+        return landmarks
+    rows = HEAD + 3 * points[:, None] + np.arange(3)
+    blocks = window.covariance[rows[:, :, None], rows[:, None, :]]
+    count = len(points)
+    amplitude, side = np.append(np.exp(observed.log_amplitude), 1.0), np.append(observed.sides, UNTOLD)
+    sight = PanelObservation(
+        spread_places(window.features[points], blocks), np.tile(poses.tx, (count, 1)), np.tile(poses.rx, (count, 1)),
+        np.ones(count), amplitude[heard], side[heard], heard >= 0,
+    )  # fmt: skip
+    gain = gains(sight, scene.ris, code, scene.radio)
+    fresh = weigh(landmarks.identity.take(points), sight, gain, scene.sensor).converged()
+    return landmarks._replace(**landmarks.identity.put(points, fresh)._asdict())
