@@ -1,7 +1,7 @@
 """Does the window filter hang on a constant? Each at half and at twice its value, over recorded rooms.
 
-Probabilities have their odds halved and doubled. Every constant of `slam.window.levels` is changed by itself, and the
-same recorded measurements are filtered again. The table says by how much the median error relative to the start
+Probabilities have their odds halved and doubled. Every constant of `slam.window.model_constants` is changed by itself,
+and the same recorded measurements are filtered again. The table says by how much the median error relative to the start
 changes, and, as a median over a dozen rooms jitters by more than most constants do, the spread of the change room by
 room. The first line says what chance alone does: the same constants, delays moved by a billionth of a deviation.
 Record first: a pipeline of kind `unseen` with `save = "components"` (see docs/results/unseen.md). Run:

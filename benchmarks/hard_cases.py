@@ -43,7 +43,8 @@ from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import NestedConfig, SlamConfig, StartPrior, StepInfo, StepOutcome, estimate, init, predict, step
 from rislam_rt.slam.nested.filter import believed
-from rislam_rt.slam.window import WindowState, window_gaussian
+from rislam_rt.slam.window import WindowState
+from rislam_rt.slam.window.smoother import window_gaussian
 
 ROOM = Path(__file__).parents[1] / "scenes" / "paper_room"
 ROUNDING = 1e-10

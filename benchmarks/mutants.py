@@ -50,7 +50,7 @@ class Mutant(NamedTuple):
 MUTANTS = (
     Mutant("nothing", "constants.py", "", ""),
     Mutant(
-        "no update of the pose", "slam/window/window_gaussian.py",
+        "no update of the pose", "slam/window/smoother/window_gaussian.py",
         "        accel=window.accel + change[size:].reshape(window.accel.shape),",
         "        accel=window.accel,",
     ),
@@ -67,7 +67,7 @@ MUTANTS = (
         "        return StepOutcome.DIVERGED\n", "        return StepOutcome.OK\n",
     ),
     Mutant(
-        "every second birth of a wrong kind", "slam/window/births.py",
+        "every second birth of a wrong kind", "slam/window/births/births.py",
         "    forms[0] = [new if part == NEW else part for part in verdict.form]\n",
         "    forms[0] = [new if part == NEW else part for part in verdict.form]\n"
         "    if len(landmarks.ident) % 2:\n"

@@ -12,7 +12,7 @@ DIAGONAL = np.arange(3)
 
 
 class Candidates(NamedTuple):
-    """C things that a measurement may belong to."""
+    """C predicted returns, of landmarks or tracks, that a measurement may be assigned to."""
 
     seen: Floats
     """(C, 3) predicted length [m] and cosines."""

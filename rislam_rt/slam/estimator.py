@@ -7,9 +7,10 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam import window
-from rislam_rt.slam.config import SlamConfig, StartPrior
+from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested import filter as nested
 from rislam_rt.slam.nested import mapping as nested_map
+from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import StepInfo
 
 

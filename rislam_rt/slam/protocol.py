@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
-from rislam_rt.slam.config import StartPrior
+from rislam_rt.slam.start_prior import StartPrior
 
 
 class SlamEstimator(Protocol):

@@ -53,8 +53,6 @@ MAX_FILE_LINES = 400
 MAX_FUNCTION_LINES = 60
 MAX_FOLDER_LINES = 2500
 """Of a folder's own files, those of its sub-folders not counted."""
-BEING_REBUILT = {"slam/window"}
-"""Folders that may still be crowded, or import in a circle; each goes from here as it is done."""
 
 REGISTRIES = tuple(
     name + "." + domain

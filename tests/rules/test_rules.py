@@ -90,15 +90,13 @@ def test_what_is_allowed_passes(rule: Callable[[Source], Iterator[str]], path: s
 
 
 def test_no_folder_is_crowded() -> None:
-    crowded = {line.partition(":")[0] for line in rules.crowded_folders(rules.package_sources())}
-    assert crowded <= rules.BEING_REBUILT
+    assert not list(rules.crowded_folders(rules.package_sources()))
     full = [Source("a/b.py", "x = 1\n" * 2000), Source("a/c.py", "x = 1\n" * 501), Source("a/d/e.py", "x = 1\n" * 2500)]
     assert list(rules.crowded_folders(full)) == ["a: 2501 lines"]
 
 
 def test_no_folder_imports_in_a_circle() -> None:
-    circles = list(rules.circular_folders(rules.package_sources()))
-    assert {line.partition(":")[0] for line in circles} <= rules.BEING_REBUILT, circles
+    assert not list(rules.circular_folders(rules.package_sources()))
 
 
 @pytest.mark.parametrize(

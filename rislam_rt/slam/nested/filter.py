@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import wrap
 from rislam_rt.model import Body, DataSheet, Measurement, RadioConfig, RisCode, SensorModel
 from rislam_rt.slam.associate import associate
-from rislam_rt.slam.config import SlamConfig, StartPrior
+from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.moments import POSE, Moments, poses_of
 from rislam_rt.slam.nested.birth import Past, examine
@@ -25,6 +25,7 @@ from rislam_rt.slam.nested.track_classification import classify_tracks
 from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, has_ended, no_tracks
 from rislam_rt.slam.observations import PANEL, Observations, free_space, is_los, observations_of, stranger_density
 from rislam_rt.slam.returns import Poses, compact
+from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
 
 STRANGERS = np.array([1.3, 2.0, 3.0])

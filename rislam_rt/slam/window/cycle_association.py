@@ -11,10 +11,9 @@ from rislam_rt.slam.associate import Candidates, pair_costs, squared_distance
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import TX, Poses
-from rislam_rt.slam.window import window_gaussian
-from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.landmark_update import VisibilityObservations, recall, visible
-from rislam_rt.slam.window.measurement_prediction import (
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
+from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, visible
+from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,
     KnownEnvironment,
     UnresolvedClusters,
@@ -22,8 +21,9 @@ from rislam_rt.slam.window.measurement_prediction import (
     predict_returns,
 )
 from rislam_rt.slam.window.numerics import GATE
-from rislam_rt.slam.window.steps import HEAD
-from rislam_rt.slam.window.window_gaussian import Window
+from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.window_gaussian import Window
 
 
 class CycleAssociation(NamedTuple):

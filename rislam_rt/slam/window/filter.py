@@ -7,33 +7,36 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
-from rislam_rt.slam.config import SlamConfig, StartPrior
+from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.observations import Observations, is_los, observations_of, stranger_density
 from rislam_rt.slam.returns import TX
+from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
-from rislam_rt.slam.window import divergence, motion, recovery, tracks, window_gaussian
-from rislam_rt.slam.window.births import births
-from rislam_rt.slam.window.context import Context
+from rislam_rt.slam.window import tracks
+from rislam_rt.slam.window.births.births import births
+from rislam_rt.slam.window.births.context import Context
+from rislam_rt.slam.window.births.feature_removal import condemned, release
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes
-from rislam_rt.slam.window.excess import grow, take_in
-from rislam_rt.slam.window.feature_removal import condemned, release
-from rislam_rt.slam.window.landmark_table import WindowTable, empty_table, idents, image_ident
-from rislam_rt.slam.window.landmark_update import learn, no_observations
-from rislam_rt.slam.window.measurement_log import Log, Residuals, append, empty_log, renew
-from rislam_rt.slam.window.measurement_prediction import (
+from rislam_rt.slam.window.divergence import divergence_monitor, recovery
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, empty_table, idents, image_ident
+from rislam_rt.slam.window.landmarks.landmark_update import learn, no_observations
+from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,
     KnownEnvironment,
     UnresolvedClusters,
     conditioned_share,
 )
+from rislam_rt.slam.window.measurement_log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import DAMPING, REFRESH
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
+from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.smoother.excess import grow, take_in
+from rislam_rt.slam.window.smoother.steps import TURN
+from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.state import WindowState
-from rislam_rt.slam.window.steps import TURN
 from rislam_rt.slam.window.tracks import WindowTracks
-from rislam_rt.slam.window.window_gaussian import Window
 
 
 def init(
@@ -54,7 +57,7 @@ def init(
         0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels),
         no_observations(),
         gait, gait,
-        np.array([start.heading]), start.position_std * free, scene, divergence.SURE, False, 0.0,
+        np.array([start.heading]), start.position_std * free, scene, divergence_monitor.SURE, False, 0.0,
         (None,), np.zeros((6, 6)), np.zeros((0, 3)),
     )  # fmt: skip
 
@@ -104,7 +107,9 @@ def step(
     state = state._replace(tracks=followed.tracks, log=followed.log)
     jumped = state.doubt == 0.0
     if len(expected.seen) and len(observed.seen):
-        state = state._replace(doubt=divergence.advance(state.doubt, view.score, followed.followed, followed.kept))
+        state = state._replace(
+            doubt=divergence_monitor.advance(state.doubt, view.score, followed.followed, followed.kept)
+        )
     if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, poses, scene, code))
     visibility, landmarks = learn(
@@ -117,7 +122,7 @@ def step(
     state = _grown(state, left, expected, groups)
     state = state._replace(excess=take_in(state.excess, before[:6, :6], window_gaussian.now(state.window)[1][:6, :6]))
     outcome = _outcome(len(measurement), len(state.landmarks.ident), wrong or jumped or state.doubt >= 0.0)
-    if divergence.is_lost(state.doubt) and len(state.landmarks.ident):
+    if divergence_monitor.is_lost(state.doubt) and len(state.landmarks.ident):
         state = recovery.restart(state)
     info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.landmarks.points), outcome)
     return state._replace(cycle=state.cycle + 1), info
@@ -202,9 +207,9 @@ def _notice(
             if view.score + CONSTANTS.log_rare > best.score:
                 best, window = view, trial
     if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
-        by = divergence.jump(best, observed)
-        view = view_of(divergence.shifted(state.window, by)) if by.any() else best
-        if view.score + divergence.LOG_JUMP > max(best.score, divergence.SURE):
+        by = divergence_monitor.jump(best, observed)
+        view = view_of(divergence_monitor.shifted(state.window, by)) if by.any() else best
+        if view.score + divergence_monitor.LOG_JUMP > max(best.score, divergence_monitor.SURE):
             return recovery.landed(state, by), view
     return state._replace(window=window), best
 

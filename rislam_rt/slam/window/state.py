@@ -5,12 +5,12 @@ from typing import NamedTuple
 from rislam_rt.arrays import Floats
 from rislam_rt.model import RisCode
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.landmark_update import VisibilityObservations
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
+from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations
+from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.measurement_log import Log
-from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
+from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.tracks import WindowTracks
-from rislam_rt.slam.window.window_gaussian import Window
 
 
 class WindowState(NamedTuple):

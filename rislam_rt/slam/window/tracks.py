@@ -8,9 +8,9 @@ import scipy
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.associate import Candidates, pair_costs
 from rislam_rt.slam.observations import Observations
+from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import GATE
-from rislam_rt.slam.window.ris_identification import PanelIdentity, unknown
 
 WANDER = 1.0
 """Spread of an unexplained path's log amplitude from cycle to cycle: a panel's code may change."""

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam import window
-from rislam_rt.slam.window.factor import factorise, inverse
-from rislam_rt.slam.window.measurement_prediction import PANEL_STD
+from rislam_rt.slam.window.landmarks.measurement_prediction import PANEL_STD
 from rislam_rt.slam.window.model_constants import CONSTANTS, ModelConstants
+from rislam_rt.slam.window.smoother.factor import factorise, inverse
 
-SOURCES = [path.read_text() for path in Path(window.__file__).parent.glob("*.py")]
+SOURCES = [path.read_text() for path in Path(window.__file__).parent.rglob("*.py")]
 
 
 def test_there_are_at_most_25_constants_and_each_is_read():

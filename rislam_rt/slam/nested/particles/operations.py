@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body
-from rislam_rt.slam.config import SlamConfig, StartPrior
+from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.moments import Moments
 from rislam_rt.slam.nested.birth import Birth
 from rislam_rt.slam.nested.particles import belief
@@ -19,6 +19,7 @@ from rislam_rt.slam.nested.particles.update import FLOOR, Seen, look, trusted, w
 from rislam_rt.slam.nested.particles.update import update as absorb_all
 from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.returns import Returns
+from rislam_rt.slam.start_prior import StartPrior
 
 
 class PointParticles(NamedTuple):

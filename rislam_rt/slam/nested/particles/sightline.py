@@ -161,7 +161,7 @@ def _square(dx: Any, dy: Any, dz: Any) -> Any:
 
 
 def _offset(leg: Leg, take: Iterator[Any], x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
-    """From the device to the leg's far end."""
+    """Vector from the device to the far end of a particle's leg: its point, or the device mirrored."""
     if leg == Leg.POINT:
         return x + next(take), y + next(take), z + next(take)
     sx, sy, sz = x + next(take), y + next(take), z + next(take)

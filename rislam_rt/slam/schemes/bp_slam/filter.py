@@ -12,7 +12,6 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
-from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
@@ -34,6 +33,7 @@ from rislam_rt.slam.schemes.shared.sums import (
     prune,
     spread_of,
 )
+from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 FEWEST_FALSE = 1e-3

@@ -4,9 +4,9 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import MapEstimate
-from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, GaussianFeatures, spread_over
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
+from rislam_rt.slam.start_prior import StartPrior
 
 
 def start_variance(start: StartPrior) -> Floats:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.slam.schemes.bp_slam_static.association import associate_anchor, evaluate_ranges, pair_message
 from rislam_rt.slam.schemes.bp_slam_static.config import BpSlamStaticConfig
 from rislam_rt.slam.schemes.bp_slam_static.coupling import carry, correct_slopes
 from rislam_rt.slam.schemes.bp_slam_static.features import (
@@ -23,7 +24,6 @@ from rislam_rt.slam.schemes.bp_slam_static.features import (
     refresh,
     select,
 )
-from rislam_rt.slam.schemes.shared.association import Association, associate
 from rislam_rt.slam.schemes.shared.ranges import RangeModel
 from rislam_rt.slam.schemes.shared.resampling import (
     cell_levels,
@@ -36,8 +36,6 @@ from rislam_rt.slam.schemes.shared.resampling import (
 )
 from rislam_rt.slam.schemes.shared.scan import Scan, birth_ratio
 
-GATE = 5.0
-"""Standard deviations beyond which the likelihood of a range counts as zero (4e-6 of its peak)."""
 AGENT_MEMORY = 100.0
 """Steps over which the agent's error stays much the same."""
 
@@ -73,15 +71,6 @@ class UpdateInfo(NamedTuple):
     """Per anchor (K_a, 2): mean and standard deviation [m] of the range predicted for each."""
     log_evidence: float
     """Logarithm of the mean weight of the agent's particles; clutter alone counts as 0."""
-
-
-class _Evaluation(NamedTuple):
-    """Likelihood ratios p_d f(z|x,a) / clutter of one feature for the measurements within its gate."""
-
-    measurement: Integers
-    """(G,)."""
-    ratio: Floats
-    """(G, S, N) over pairings and feature particles."""
 
 
 def predict_belief(
@@ -120,11 +109,11 @@ def update_belief(
     next_ident = belief.next_ident
     for anchor, scan in enumerate(scans):
         rows = np.flatnonzero(features.anchor == anchor)
-        seen = [_evaluate(reach[row], scan, config) for row in rows]
+        seen = [evaluate_ranges(reach[row], scan, config) for row in rows]
         fresh = 1.0 + birth_ratio(scan, float(belief.undetected[anchor]), model, dims, config.odds)
-        result = _associate(seen, weight[rows], features.existence[rows], fresh, config)
+        result = associate_anchor(seen, weight[rows], features.existence[rows], fresh, config)
         for number, row in enumerate(rows):
-            gains[row] = _message(seen[number], result.to_feature[number], config)
+            gains[row] = pair_message(seen[number], result.to_feature[number], config)
         alive = result.unclaimed * (fresh - 1.0) / fresh
         new = np.flatnonzero(alive >= config.pruning_threshold)
         newborn.append(born(scan.take(new), anchor, state[:, :dims], alive[new], model, next_ident, config, rng=rng))
@@ -188,34 +177,6 @@ def _moved(newborn: Features, before: Floats, after: Floats) -> Features:
     """New features, about the agent's mean after the update."""
     shift = (after.mean(axis=0) - before.mean(axis=0)) @ newborn.slope
     return newborn._replace(cloud=newborn.cloud + shift[:, None])
-
-
-def _evaluate(reach: Floats, scan: Scan, config: BpSlamStaticConfig) -> _Evaluation:
-    """Likelihood ratios of one feature, from the ranges (S, N) of its pairs."""
-    low, high = reach.min(), reach.max()
-    near = np.flatnonzero((scan.length > low - GATE * scan.std) & (scan.length < high + GATE * scan.std))
-    scaled = (reach - scan.length[near, None, None]) / scan.std[near, None, None]
-    peak = config.detection_probability / (np.sqrt(2.0 * np.pi) * scan.std[near] * config.clutter_density)
-    scaled *= scaled
-    scaled *= -0.5
-    return _Evaluation(near, np.exp(scaled, out=scaled) * peak[:, None, None])
-
-
-def _associate(
-    seen: list[_Evaluation], weight: Floats, existence: Floats, fresh: Floats, config: BpSlamStaticConfig
-) -> Association:
-    """Loopy association of one anchor's features (K,) and measurements (M,)."""
-    pair = np.zeros((len(seen), len(fresh)))
-    for row, evaluation in enumerate(seen):
-        pair[row, evaluation.measurement] = existence[row] * (evaluation.ratio.mean(axis=1) @ weight[row])
-    missed = 1.0 - existence * config.detection_probability
-    return associate(missed, pair, fresh, config.iterations, config.tolerance)
-
-
-def _message(seen: _Evaluation, to_feature: Floats, config: BpSlamStaticConfig) -> Floats:
-    """(S, N) factor of every pair: missed, or made one of the measurements; never zero."""
-    weight = to_feature[seen.measurement]
-    return (1.0 - config.detection_probability) + np.einsum("g,gsn->sn", weight, seen.ratio)
 
 
 def _resample_agent(state: Floats, log_weight: Floats, *, rng: np.random.Generator) -> tuple[Floats, float]:

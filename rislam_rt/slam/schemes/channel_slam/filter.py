@@ -15,7 +15,6 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
-from rislam_rt.slam.config import StartPrior
 from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.channel_slam import tracker
@@ -39,6 +38,7 @@ from rislam_rt.slam.schemes.shared.sums import (
     prune,
     spread_of,
 )
+from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 STRAIN_RATE = 0.1

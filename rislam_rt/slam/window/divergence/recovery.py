@@ -3,12 +3,14 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.window import divergence, motion, tracks, window_gaussian
-from rislam_rt.slam.window.landmark_table import empty_table
-from rislam_rt.slam.window.landmark_update import no_observations
+from rislam_rt.slam.window import tracks
+from rislam_rt.slam.window.divergence import divergence_monitor
+from rislam_rt.slam.window.landmarks.landmark_table import empty_table
+from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.measurement_log import empty_log
+from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.smoother.steps import HEAD
 from rislam_rt.slam.window.state import WindowState
-from rislam_rt.slam.window.steps import HEAD
 
 
 def ask(state: WindowState) -> tuple[WindowState, bool]:
@@ -17,19 +19,21 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
         return state, False
     baseline = float(np.linalg.norm(state.scene.body.tx_offset - state.scene.body.rx_offset))
     if len(state.landmarks.ident):
-        if state.cycle % divergence.PAST == 0:
+        if state.cycle % divergence_monitor.PAST == 0:
             lively = float(np.sqrt(motion.expected_variance(state.level[0])))
-            odds = divergence.ask_picture(state.window, state.log, state.heading, baseline, lively)
-            state = state._replace(doubt=float(np.clip(state.doubt + odds, divergence.SURE, -divergence.SURE)))
+            odds = divergence_monitor.ask_picture(state.window, state.log, state.heading, baseline, lively)
+            state = state._replace(
+                doubt=float(np.clip(state.doubt + odds, divergence_monitor.SURE, -divergence_monitor.SURE))
+            )
         return state, False
-    told = None if state.asked else divergence.ask_tracks(state.window, state.log, state.heading, baseline)
+    told = None if state.asked else divergence_monitor.ask_tracks(state.window, state.log, state.heading, baseline)
     if told is None or told.log_odds <= 0.0:
         return state, False
     state = state._replace(asked=True)
     if not told.is_compass:
-        return state._replace(window=divergence.with_velocity(state.window, told.velocity, told.std)), True
+        return state._replace(window=divergence_monitor.with_velocity(state.window, told.velocity, told.std)), True
     # a compass that was wrong is not trusted: its offset is estimated from now on
-    window = divergence.with_free_compass(state.window, told.std / float(np.linalg.norm(told.velocity)))
+    window = divergence_monitor.with_free_compass(state.window, told.std / float(np.linalg.norm(told.velocity)))
     still = motion.first_motion_mode(0.0)[None]
     return state._replace(
         window=window, heading=state.heading + told.turn, turned=state.turned + told.turn,
@@ -43,7 +47,7 @@ def restart(state: WindowState) -> WindowState:
     mean, covariance = window_gaussian.now(window)
     lively = np.sqrt(motion.expected_variance(state.level))[[0, 0, 1]]
     std = np.sqrt(np.concatenate([np.full(3, 1e-10), np.diag(covariance)[3:6] + lively**2, [covariance[6, 6]]]))
-    away = divergence.JUMP * np.array([1.0, 1.0, float(state.config.height == "estimated")])
+    away = divergence_monitor.JUMP * np.array([1.0, 1.0, float(state.config.height == "estimated")])
     fresh = window_gaussian.begin(mean[:3], mean[3:6], std, turns=window.turns)
     fresh = fresh._replace(head=mean[:HEAD], prior=fresh.prior._replace(middle=mean[:HEAD]))
     return state._replace(
@@ -59,6 +63,6 @@ def landed(state: WindowState, by: Floats) -> WindowState:
     """After a jump: the last pose alone, with the map; held for lost until the next cycle agrees."""
     passed = np.concatenate([state.passed, window_gaussian.poses(state.window)[:-1, :3]])
     return state._replace(
-        window=divergence.landed(state.window, by), gait=state.level, heading=state.heading[-1:],
+        window=divergence_monitor.landed(state.window, by), gait=state.level, heading=state.heading[-1:],
         codes=state.codes[-1:], passed=passed, doubt=0.0,
     )  # fmt: skip

@@ -10,16 +10,17 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.window import egomotion, window_gaussian
 from rislam_rt.slam.window.cycle_association import CycleAssociation
-from rislam_rt.slam.window.egomotion import Rates
-from rislam_rt.slam.window.factor import inverse
+from rislam_rt.slam.window.divergence import egomotion
+from rislam_rt.slam.window.divergence.egomotion import Rates
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import LADDER
-from rislam_rt.slam.window.steps import HEAD
+from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother.factor import inverse
+from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.tracks import CYCLE
-from rislam_rt.slam.window.window_gaussian import Quadratic, Window
 
 RATE = 1e-4
 """Probability that a cycle is the one in which the agent is lost: once in 1000 s."""

@@ -7,8 +7,8 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.returns import AXES, NONE, TX
-from rislam_rt.slam.window.context import Context
-from rislam_rt.slam.window.hypotheses import (
+from rislam_rt.slam.window.births.context import Context
+from rislam_rt.slam.window.births.hypotheses import (
     BESIDE,
     IMAGE,
     LEVEL_TURN,
@@ -22,15 +22,15 @@ from rislam_rt.slam.window.hypotheses import (
     KnownFeatures,
     hypotheses,
 )
-from rislam_rt.slam.window.hypothesis_fits import Fits, smooth_paths, try_all
-from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
+from rislam_rt.slam.window.births.hypothesis_fits import Fits, smooth_paths, try_all
+from rislam_rt.slam.window.births.point_identification import identify
+from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
+from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
+from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
-from rislam_rt.slam.window.point_identification import identify
-from rislam_rt.slam.window.ris_identification import PanelIdentity, unknown
-from rislam_rt.slam.window.track_summary import TrackSummary
-from rislam_rt.slam.window.window_gaussian import DirectionPriors, no_holds
+from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors, no_holds
 
 LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 0.2]))
 """Log prior of each kind; over known walls, of all walls together; of known points in walls, of all points together."""

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.window import motion, window_gaussian
-from rislam_rt.slam.window.steps import HEAD, POSE
-from rislam_rt.slam.window.window_gaussian import DirectionPriors, Quadratic
+from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.smoother.steps import HEAD, POSE
+from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors, Quadratic
 
 DT, CYCLES, SIGMA_A = 0.1, 12, 0.5
 

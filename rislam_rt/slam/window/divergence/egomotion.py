@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, unique_forms
 from rislam_rt.slam.window.model_constants import CONSTANTS
-from rislam_rt.slam.window.path_forms import UNKNOWN
 
 WALK = 1.0
 """Standard deviation [m/s] of a velocity of which nothing is known."""

@@ -20,9 +20,9 @@ from rislam_rt.slam.identity import MODEL_ERROR
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.returns import TX as MOVING
 from rislam_rt.slam.window.cycle_association import return_sides
-from rislam_rt.slam.window.landmark_table import empty_table, enter
+from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
+from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, unknown, weigh
 from rislam_rt.slam.window.model_constants import CONSTANTS
-from rislam_rt.slam.window.ris_identification import PanelObservation, gains, spread_places, unknown, weigh
 
 SENSOR = SensorModel(RadioConfig(noise_psd=3.52e-12))
 SPEC = RisSpec(6, 6, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
@@ -131,7 +131,7 @@ def test_forms_take_the_side_of_the_panel_that_their_point_is_held_for():
 
 def test_panel_is_found_as_soon_as_it_was_heard_six_times():
     """Paper's room, 13 dB, random codes, alternated; until it is named there is a suspect."""
-    room, rng, cycles = Path(__file__).parents[3] / "scenes" / "paper_room", np.random.default_rng(4), 18
+    room, rng, cycles = Path(__file__).parents[4] / "scenes" / "paper_room", np.random.default_rng(4), 18
     scene, radio = load_scene(room), with_reference_snr(RadioConfig(), 13.0)
     motion = scene.agent[:cycles]
     motion = replace(motion, position=motion.position + np.array([1.7, 0.9, 0.4]))

@@ -7,13 +7,11 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.moments import even_draws, poses_of
 from rislam_rt.slam.observations import OTHER, UNTOLD
-from rislam_rt.slam.window.context import Context
-from rislam_rt.slam.window.hypotheses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
-from rislam_rt.slam.window.hypothesis_fits import Fits
-from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.model_constants import CONSTANTS
-from rislam_rt.slam.window.numerics import CERTAIN
-from rislam_rt.slam.window.ris_identification import (
+from rislam_rt.slam.window.births.context import Context
+from rislam_rt.slam.window.births.hypotheses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
+from rislam_rt.slam.window.births.hypothesis_fits import Fits
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
+from rislam_rt.slam.window.landmarks.ris_identification import (
     PanelIdentity,
     PanelObservation,
     gains,
@@ -21,7 +19,9 @@ from rislam_rt.slam.window.ris_identification import (
     unknown,
     weigh,
 )
-from rislam_rt.slam.window.window_gaussian import poses
+from rislam_rt.slam.window.model_constants import CONSTANTS
+from rislam_rt.slam.window.numerics import CERTAIN
+from rislam_rt.slam.window.smoother.window_gaussian import poses
 
 ASIDE = 12.0
 """Log evidence behind a track's best point from which on another place is not asked whether it is the panel's."""

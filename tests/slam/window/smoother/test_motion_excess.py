@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.window import motion
-from rislam_rt.slam.window.excess import grow, take_in
+from rislam_rt.slam.window.smoother import motion
+from rislam_rt.slam.window.smoother.excess import grow, take_in
 
 DT = 0.1
 

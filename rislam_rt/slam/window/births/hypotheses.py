@@ -7,9 +7,9 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.moments import square_root
 from rislam_rt.slam.returns import AXES, NONE, reflect
-from rislam_rt.slam.window.hypothesis_fits import Trials
-from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.track_summary import TrackSummary
+from rislam_rt.slam.window.births.hypothesis_fits import Trials
+from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 
 KINDS = (
     "wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same",

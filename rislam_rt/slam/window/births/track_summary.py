@@ -15,8 +15,8 @@ from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import POINTS
-from rislam_rt.slam.window.steps import TURN
-from rislam_rt.slam.window.window_gaussian import Window, now, pose_covariance, poses
+from rislam_rt.slam.window.smoother.steps import TURN
+from rislam_rt.slam.window.smoother.window_gaussian import Window, now, pose_covariance, poses
 
 TOGETHER = 10.0
 """Measurements over which the pull of neighbours keeps its sign."""

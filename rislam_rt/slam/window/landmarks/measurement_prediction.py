@@ -10,11 +10,11 @@ from rislam_rt.model.sensor import SensorModel
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
-from rislam_rt.slam.window.landmark_table import WindowTable
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
+from rislam_rt.slam.window.landmarks.path_forms import enumerate_forms, forms_of, possible_legs
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import EDGE, FAINT, LEVEL
-from rislam_rt.slam.window.path_forms import enumerate_forms, forms_of, possible_legs
-from rislam_rt.slam.window.steps import HEAD
+from rislam_rt.slam.window.smoother.steps import HEAD
 
 PANEL_STD = float(np.pi / np.sqrt(24.0))
 """Spread of the panel's predicted log amplitude: that of a Rayleigh variable, as phases hang on millimetres."""

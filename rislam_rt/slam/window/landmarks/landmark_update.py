@@ -8,13 +8,17 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.slam.observations import UNTOLD, Observations
 from rislam_rt.slam.returns import NONE, TX, Poses
-from rislam_rt.slam.window.landmark_table import WindowTable, learn_ratio
-from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, KnownEnvironment, UnresolvedClusters
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, learn_ratio
+from rislam_rt.slam.window.landmarks.measurement_prediction import (
+    ExpectedComponents,
+    KnownEnvironment,
+    UnresolvedClusters,
+)
+from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, weigh
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import SCATTER_RATE
-from rislam_rt.slam.window.ris_identification import PanelObservation, gains, spread_places, weigh
-from rislam_rt.slam.window.steps import HEAD
-from rislam_rt.slam.window.window_gaussian import Window
+from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.window_gaussian import Window
 
 
 class VisibilityObservations(NamedTuple):

@@ -6,13 +6,13 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import RisCode
-from rislam_rt.slam.window import window_gaussian
-from rislam_rt.slam.window.landmark_table import WindowTable
-from rislam_rt.slam.window.landmark_update import VisibilityObservations
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
+from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations
+from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.measurement_log import Log, Residuals, renew
-from rislam_rt.slam.window.measurement_prediction import KnownEnvironment
+from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.tracks import WindowTracks
-from rislam_rt.slam.window.window_gaussian import Window
 
 
 class Context(NamedTuple):

@@ -21,8 +21,8 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.window.factor import factorise, inverse
-from rislam_rt.slam.window.steps import FIRST, HEAD, POSE, TURN, basis, carry_on, latest, starts
+from rislam_rt.slam.window.smoother.factor import factorise, inverse
+from rislam_rt.slam.window.smoother.steps import FIRST, HEAD, POSE, TURN, basis, carry_on, latest, starts
 
 
 class Quadratic(NamedTuple):

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.window import divergence, egomotion, window_gaussian
-from rislam_rt.slam.window.egomotion import Rates
+from rislam_rt.slam.window.divergence import divergence_monitor, egomotion
+from rislam_rt.slam.window.divergence.egomotion import Rates
+from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log
-from rislam_rt.slam.window.path_forms import UNKNOWN
-from rislam_rt.slam.window.steps import HEAD
+from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother.steps import HEAD
 
 TOLD, STD = np.array([0.3, 0.1, 0.0]), np.full(3, 0.01)
 
@@ -78,23 +79,23 @@ def test_rates_are_those_of_walls_points_and_square_corners(heading):
 
 def test_the_chain_is_that_of_two_states():
     """Against the forward filter of the hidden chain, in probabilities."""
-    rng, odds = np.random.default_rng(4), divergence.SURE
-    least = 1.0 / (1.0 + 1.0 / divergence.RATE)
+    rng, odds = np.random.default_rng(4), divergence_monitor.SURE
+    least = 1.0 / (1.0 + 1.0 / divergence_monitor.RATE)
     lost = least
     for score in rng.normal(-0.3, 1.0, 60):
-        odds = divergence.advance(odds, score, 0, 0)
+        odds = divergence_monitor.advance(odds, score, 0, 0)
         passed = lost + (1.0 - lost) * least
         lost = np.clip(passed / (passed + (1.0 - passed) * np.exp(score)), least, 1.0 - least)
         assert odds == pytest.approx(np.log(lost / (1.0 - lost)), abs=1e-6)
-    assert not divergence.is_lost(divergence.SURE)
+    assert not divergence_monitor.is_lost(divergence_monitor.SURE)
 
 
 def test_tracks_that_end_at_once_make_a_loss_likelier_and_a_map_that_explains_does_not():
-    torn = divergence.advance(divergence.SURE, -3.0, 20, 3)
-    assert torn > 3.0 > divergence.advance(divergence.SURE, -3.0, 20, 18)
-    assert divergence.is_lost(torn)
-    assert not divergence.is_lost(divergence.advance(divergence.SURE, 40.0, 20, 3))
-    assert divergence.advance(torn, 30.0, 5, 5) == pytest.approx(divergence.SURE)
+    torn = divergence_monitor.advance(divergence_monitor.SURE, -3.0, 20, 3)
+    assert torn > 3.0 > divergence_monitor.advance(divergence_monitor.SURE, -3.0, 20, 18)
+    assert divergence_monitor.is_lost(torn)
+    assert not divergence_monitor.is_lost(divergence_monitor.advance(divergence_monitor.SURE, 40.0, 20, 3))
+    assert divergence_monitor.advance(torn, 30.0, 5, 5) == pytest.approx(divergence_monitor.SURE)
 
 
 def _window(rng):
@@ -113,17 +114,17 @@ def _window(rng):
 def test_after_a_jump_all_but_the_place_is_as_it_was():
     window, by = _window(np.random.default_rng(5)), np.array([0.7, -0.4, 0.0])
     mean, covariance = window_gaussian.now(window)
-    after, spread = window_gaussian.now(divergence.landed(window, by))
+    after, spread = window_gaussian.now(divergence_monitor.landed(window, by))
     np.testing.assert_allclose(after, mean + np.concatenate([by, np.zeros(len(mean) - 3)]), atol=1e-6)
     wide = covariance.copy()
-    wide[[0, 1], [0, 1]] += divergence.JUMP**2
+    wide[[0, 1], [0, 1]] += divergence_monitor.JUMP**2
     free = np.delete(np.arange(len(mean)), 6)  # the compass is held
     np.testing.assert_allclose(spread[np.ix_(free, free)], wide[np.ix_(free, free)], atol=1e-5)
 
 
 def test_a_look_elsewhere_moves_the_last_pose_alone():
     window, by = _window(np.random.default_rng(6)), np.array([0.7, -0.4, 0.1])
-    there = divergence.shifted(window, by)
+    there = divergence_monitor.shifted(window, by)
     np.testing.assert_allclose(
         window_gaussian.poses(there)[-1, :3] - window_gaussian.poses(window)[-1, :3], by, atol=1e-12
     )

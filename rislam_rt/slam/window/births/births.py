@@ -5,19 +5,20 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.returns import TX, linearise
-from rislam_rt.slam.window import tracks, window_gaussian
-from rislam_rt.slam.window.context import Context, resolve
-from rislam_rt.slam.window.feature_removal import behind, release
-from rislam_rt.slam.window.hypotheses import BESIDE, known_features
-from rislam_rt.slam.window.landmark_table import enter, idents
-from rislam_rt.slam.window.landmark_update import seed
-from rislam_rt.slam.window.measurement_prediction import ExpectedComponents, UnresolvedClusters
+from rislam_rt.slam.window import tracks
+from rislam_rt.slam.window.births.context import Context, resolve
+from rislam_rt.slam.window.births.feature_removal import behind, release
+from rislam_rt.slam.window.births.hypotheses import BESIDE, known_features
+from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, judge, wanted
+from rislam_rt.slam.window.births.track_summary import TrackSummary, summarise_tracks
+from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
+from rislam_rt.slam.window.landmarks.landmark_update import seed
+from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, UnresolvedClusters
+from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER, STRIDE
-from rislam_rt.slam.window.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.steps import HEAD
-from rislam_rt.slam.window.track_classification import NEW, TrackDecision, judge, wanted
-from rislam_rt.slam.window.track_summary import TrackSummary, summarise_tracks
+from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother.steps import HEAD
 
 
 def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClusters) -> Context:

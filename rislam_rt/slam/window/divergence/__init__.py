@@ -1,0 +1,1 @@
+"""Lost or not, and what becomes of the belief then."""
