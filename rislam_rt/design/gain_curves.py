@@ -80,7 +80,7 @@ def gain_curves(
 
 
 def direct_only(problem: DesignProblem) -> DesignProblem:
-    """The same places with the direct panel path alone: what Fig. 4(a) optimises."""
+    """The same design problem with the direct panel path alone: what Fig. 4(a) optimises."""
     return DesignProblem(
         problem.response[:, :1], problem.static_gain[:, :0], problem.gradient[:, :1], problem.prior, problem.scale,
         problem.levels, least_power=problem.least_power,

@@ -28,6 +28,13 @@ def angle_between(a: Floats, b: Floats) -> Floats:
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(np.asarray(a) * np.asarray(b), axis=-1))
 
 
+def rotation_about(axis: Floats, angle: float) -> Floats:
+    """(3, 3) rotation by an angle [rad] about an axis that is a unit vector (3,) (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
+
+
 def rotation_z(heading: Floats) -> Floats:
     """Rotation matrices (..., 3, 3) about z: body frame (x forward) to room frame."""
     heading = np.asarray(heading, dtype=np.float64)

@@ -150,7 +150,7 @@ def _near_pipeline(path: Path) -> str:
 
 
 def _override(table: dict[str, Any], setting: str) -> str:
-    """Put one `key=value` into the table; returns the key."""
+    """Put one `--set key=value` into a pipeline's table; returns the key."""
     key, equals, text = setting.partition("=")
     parts = key.strip().split(".")
     if not equals or len(parts) > MAX_LEVELS or not all(part.isidentifier() for part in parts):

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
-from rislam_rt.scene.importing.regions.connected_parts import connected
+from rislam_rt.geometry.connected_parts import connected
 from rislam_rt.scene.importing.regions.welded_mesh import Welded
 
 FLAT_ANGLE = np.radians(0.5)

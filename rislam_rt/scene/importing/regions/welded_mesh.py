@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.scene.importing.regions.connected_parts import connected
+from rislam_rt.geometry.connected_parts import connected
 
 WELD = 2e-5
 """[m] Corners nearer than this are one: what float32 leaves open in a file of 100 m, and no drawing means less."""
