@@ -64,8 +64,8 @@ def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator) ->
     if np.isnan(inputs.heading).any():
         if spec.slam.heading == "known":
             raise ConfigError(
-                "heading_rad: no such column, and slam.heading = 'known' takes it for the compass; add the column, or set "
-                "slam.heading=estimated"
+                "heading_rad: no such column, and slam.heading = 'known' takes it for the compass; add the column, or "
+                "set slam.heading=estimated"
             )
         inputs = inputs._replace(heading=np.full(len(inputs.time), inputs.start.heading))
     return replay(inputs, spec.model_dump(), spec.schemes[0], rng=rng)
