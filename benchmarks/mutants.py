@@ -102,7 +102,7 @@ MUTANTS = (
         "clip_to_unit_disc(blind_axes(found.points[:, 1:] * [1.0, -1.0], radio))",
     ),
     Mutant(
-        "a sweep's seed hangs on its order", "sweeps/axes.py",
+        "a sweep's seed hangs on its order", "sweeps/sweep.py",
         "            seed = int.from_bytes(_digest([drawn, repetition, sweep.seed])[:8]) >> 1",
         "            seed = int.from_bytes(_digest([len(cells), sweep.seed])[:8]) >> 1",
     ),

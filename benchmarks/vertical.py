@@ -16,7 +16,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.compare import compare_paths
-from rislam_rt.channel.compare.certificate import Identity
+from rislam_rt.channel.compare.explanation import Identity
 from rislam_rt.channel.compare.match import named_identity
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.traced import TracedChannel, shortest_segment

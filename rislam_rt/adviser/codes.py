@@ -40,7 +40,7 @@ def codes_of(paths: Paths, spec: DataSheet, radio: RadioConfig, *, rng: np.rando
 
 
 def aimed_codes(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Integers:
-    """(K, N, M) levels for each panel's path, of those that the array hears, that can be made strongest."""
+    """(K, N, M) levels of the advice's aimed code: of each panel the path, heard by the array, that gets strongest."""
     assert paths.ris is not None
     index = np.zeros((paths.num_cycles, spec.num_elements), dtype=np.int64)
     best = np.zeros((len(spec.panels), paths.num_cycles))

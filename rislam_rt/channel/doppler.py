@@ -145,7 +145,7 @@ def _strength(
 
 
 def _vertices(paths: Paths, walls: Walls, trajectory: Trajectory, rays: _Rays) -> Floats:
-    """Interaction points (K, P, V, 3) [m] in the order of travel."""
+    """Interaction points (K, P, V, 3) [m] of paths whose ends have moved on, in the order of travel."""
     ahead = _bounces(trajectory.tx, rays.departure, walls, paths.tx_walls)
     back = _bounces(trajectory.rx, rays.arrival, walls, paths.rx_walls[:, ::-1])[:, :, ::-1]
     vertices = np.array(paths.vertices)

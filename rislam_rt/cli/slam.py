@@ -87,7 +87,7 @@ def _prior(start: str, velocity: str, position_std: float, velocity_std: float) 
 
 
 def _body(tx: str | None, rx: str | None) -> "Body | None":
-    """Where Tx and Rx sit; None if nothing is said."""
+    """Where Tx and Rx sit on the agent, from the options; None if nothing is said."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.model import Body
 

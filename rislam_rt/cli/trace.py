@@ -98,7 +98,7 @@ def command(
 
 
 def check_new(folder: Path) -> None:
-    """Refuse a folder for a DeepMIMO scenario before anything is traced.
+    """For `trace --deepmimo`: refuse a folder that is there already, before anything is traced.
 
     Raises
     ------

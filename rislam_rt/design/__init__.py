@@ -4,12 +4,12 @@ from rislam_rt.design.belief import design_code, problem_from_belief
 from rislam_rt.design.convex_dual import dual_bound
 from rislam_rt.design.designers import DESIGNERS, designer
 from rislam_rt.design.gain_curves import GainCurves, GainInterval, design_along, direct_only, gain_curves
+from rislam_rt.design.genie import focus_codes, panel_columns, problem_from_paths
 from rislam_rt.design.objective import Objective, build_objective
-from rislam_rt.design.problem import DesignProblem
+from rislam_rt.design.problem import DesignProblem, problem_from_arrays
 from rislam_rt.design.relaxation import best_magnitudes, relaxation_bound
 from rislam_rt.design.result import Design, DesignConfig, Designer
 from rislam_rt.design.single_path import continuous_phases, exact_code, nearest_code
-from rislam_rt.design.truth import focus_codes, panel_columns, problem_from_arrays, problem_from_paths
 
 __all__ = [
     "DESIGNERS",

@@ -7,10 +7,10 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.design.designers import designer
+from rislam_rt.design.genie import problem_from_paths
 from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.result import DesignConfig
 from rislam_rt.design.single_path import exact_code
-from rislam_rt.design.truth import problem_from_paths
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import DataSheet, PathKind, Paths, RadioConfig, RisCode
 
@@ -80,7 +80,7 @@ def gain_curves(
 
 
 def direct_only(problem: DesignProblem) -> DesignProblem:
-    """The same places with the direct panel path alone: what Fig. 4(a) optimises."""
+    """The same design problem with the direct panel path alone: what Fig. 4(a) optimises."""
     return DesignProblem(
         problem.response[:, :1], problem.static_gain[:, :0], problem.gradient[:, :1], problem.prior, problem.scale,
         problem.levels, least_power=problem.least_power,

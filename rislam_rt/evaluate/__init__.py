@@ -12,14 +12,13 @@ from rislam_rt.evaluate.confidence_intervals import (
 )
 from rislam_rt.evaluate.consistency import Consistency, chi_square_bounds, consistency, normalised_squares
 from rislam_rt.evaluate.errors import TrajectoryError, align, position_errors, rmse, root_mean_square, trajectory_error
-from rislam_rt.evaluate.set_distances import Gospa, Ospa, gospa, match_points, ospa
+from rislam_rt.evaluate.set_distances import Gospa, gospa, match_points
 
 __all__ = [
     "AssociationScore",
     "Consistency",
     "Gospa",
     "Interval",
-    "Ospa",
     "TrajectoryError",
     "align",
     "association_fractions",
@@ -34,7 +33,6 @@ __all__ = [
     "mean_over_runs",
     "median_over_runs",
     "normalised_squares",
-    "ospa",
     "position_errors",
     "rms_over_runs",
     "rmse",

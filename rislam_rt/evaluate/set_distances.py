@@ -1,4 +1,4 @@
-"""Distances between sets of points of different sizes: OSPA and GOSPA, and the assignment behind them."""
+"""Distances between sets of points of different sizes: GOSPA, and the assignment behind them."""
 
 from typing import NamedTuple
 
@@ -7,14 +7,6 @@ import scipy
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.errors import ConfigError
-
-
-class Ospa(NamedTuple):
-    """OSPA distance [m] and its two parts, `distance^p = localisation^p + cardinality^p`."""
-
-    distance: float
-    localisation: float
-    cardinality: float
 
 
 class Gospa(NamedTuple):
@@ -26,24 +18,8 @@ class Gospa(NamedTuple):
     false: int
 
 
-def ospa(estimate: Floats, truth: Floats, *, cutoff: float = 1.0, order: float = 2.0) -> Ospa:
-    """Optimal sub-pattern assignment metric between point sets (N, D) and (M, D).
-
-    Schuhmacher, Vo and Vo, IEEE Trans. Signal Process. 56 (2008): the p-mean over max(N, M) of the assigned distances,
-    cut off at c, and of c for each point left over. Two empty sets are 0 apart.
-    """
-    distance = _distances(estimate, truth, cutoff, order)
-    larger = max(distance.shape)
-    if larger == 0:
-        return Ospa(0.0, 0.0, 0.0)
-    rows, cols = scipy.optimize.linear_sum_assignment(distance**order)
-    local = float(np.sum(distance[rows, cols] ** order)) / larger
-    count = cutoff**order * abs(distance.shape[0] - distance.shape[1]) / larger
-    return Ospa((local + count) ** (1.0 / order), local ** (1.0 / order), count ** (1.0 / order))
-
-
 def gospa(estimate: Floats, truth: Floats, *, cutoff: float = 1.0, order: float = 2.0) -> Gospa:
-    """Generalised OSPA (alpha = 2) between estimates (N, D) and truth (M, D).
+    """Generalised optimal sub-pattern assignment metric (alpha = 2) between estimates (N, D) and truth (M, D).
 
     Rahmathullah, Garcia-Fernandez and Svensson, FUSION 2017: not divided by the number of points, and each missed or
     false one costs `c^p / 2`, so that a pair further apart than c counts as one of each.

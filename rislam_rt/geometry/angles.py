@@ -18,12 +18,6 @@ def angles_from_direction(direction: Floats) -> tuple[Floats, Floats]:
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
 
-def direction_from_angles(theta: Floats, phi: Floats) -> Floats:
-    """Unit vectors (..., 3) of zenith and azimuth (...,) [rad]."""
-    theta, phi = np.broadcast_arrays(np.asarray(theta, dtype=np.float64), np.asarray(phi, dtype=np.float64))
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
-
-
 def wrap(angle: Floats) -> Floats:
     """Angles (...,) [rad] brought to (-pi, pi]."""
     return -((-np.asarray(angle, dtype=np.float64) + np.pi) % (2.0 * np.pi) - np.pi)
@@ -32,6 +26,13 @@ def wrap(angle: Floats) -> Floats:
 def angle_between(a: Floats, b: Floats) -> Floats:
     """Angle (...,) [rad] between directions (..., 3), exact for small angles too (atan2 of cross and dot)."""
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(np.asarray(a) * np.asarray(b), axis=-1))
+
+
+def rotation_about(axis: Floats, angle: float) -> Floats:
+    """(3, 3) rotation by an angle [rad] about an axis that is a unit vector (3,) (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
 
 
 def rotation_z(heading: Floats) -> Floats:

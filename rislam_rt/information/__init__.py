@@ -19,9 +19,10 @@ from rislam_rt.information.landmark_model import (
     build_landmark_model,
     fewer_rows,
 )
+from rislam_rt.information.motion_prior import MotionPrior
 from rislam_rt.information.outcome import Outcome
 from rislam_rt.information.position import PositionBound, position_bound, position_information, range_information
-from rislam_rt.information.posterior_crlb import MotionPrior, PosteriorBound, posterior_bound
+from rislam_rt.information.posterior_crlb import PosteriorBound, posterior_bound
 from rislam_rt.information.prior import assumed_std, prior_from_covariance
 from rislam_rt.information.resolution import certainty_share, resolved_probability
 

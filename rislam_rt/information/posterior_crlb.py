@@ -6,29 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.arrays import Floats, freeze
-from rislam_rt.errors import ConfigError
 from rislam_rt.information.landmark_model import LinearMeasurements
-
-
-@dataclass(frozen=True, slots=True)
-class MotionPrior:
-    """White-noise acceleration, and what is known of the start. Per axis, one standard deviation."""
-
-    acceleration: float = 0.01
-    """sigma_a [m/s^2]."""
-    start_position: float = 0.01
-    """[m]."""
-    start_velocity: float = 0.01
-    """[m/s]."""
-    axes: int = 2
-    """2: height known, the agent moves in a horizontal plane; 3: all of it unknown."""
-
-    def __post_init__(self) -> None:
-        for name in ("acceleration", "start_position", "start_velocity"):
-            if not getattr(self, name) >= 0.0:
-                raise ConfigError(f"motion.{name}: {getattr(self, name)} received; give a standard deviation")
-        if self.axes not in (2, 3):
-            raise ConfigError(f"motion.axes: {self.axes} received; give 2 or 3")
+from rislam_rt.information.motion_prior import MotionPrior
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,13 +7,12 @@ says.
 """
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.arrays import Floats
 from rislam_rt.measurement.components import (
-    NoiselessComponents,
+    ReportedComponents,
     blind_axes,
     capped_cosine_std,
     clip_to_unit_disc,
@@ -23,6 +22,7 @@ from rislam_rt.measurement.components import (
     single,
 )
 from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.false_alarms import draw_false_alarms
 from rislam_rt.measurement.joint_bound import joint_errors
 from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
 from rislam_rt.measurement.received import Received
@@ -32,21 +32,6 @@ from rislam_rt.model import Measurement, PathTruth, RadioConfig, SensorModel
 
 NEGLIGIBLE = 1e-3
 """Paths this far below the detection threshold are left out: they move an amplitude at the threshold by 3 %."""
-
-
-class ReportedComponents(NamedTuple):
-    """N components of one capture as the receiver reports them."""
-
-    path: Integers
-    """(N,) column of the strongest path, -1 for a false one."""
-    points: Floats
-    """(N, 3) delay [s] and cosines."""
-    deviation: Floats
-    """(N, 3)."""
-    gain: Complexes
-    """(N,)."""
-    gain_std: Floats
-    """(N,) of the complex gain."""
 
 
 def measure_bound(
@@ -109,18 +94,6 @@ def _capture(
     # Deviations go as one over the amplitude: this is the bound at the measured one.
     deviation = errors.deviation * (np.abs(parts.gain) / np.maximum(np.abs(gain), 1e-300))[:, None]
     true = ReportedComponents(parts.path[seen], points[seen], deviation[seen], gain[seen], errors.gain_std[seen])
-    return ReportedComponents._make(np.concatenate(fields) for fields in zip(true, _clutter(sensor, rng), strict=True))
-
-
-def _clutter(sensor: SensorModel, rng: np.random.Generator) -> ReportedComponents:
-    """Poisson many, even over the delay window and the disc of cosines; amplitudes as of noise above the threshold."""
-    radio, count = sensor.radio, rng.poisson(sensor.false_alarms)
-    tau = rng.uniform(*sensor.window, count)
-    radius, azimuth = np.sqrt(rng.uniform(size=count)), rng.uniform(-np.pi, np.pi, count)
-    cosines = np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth)])
-    snr = sensor.threshold + rng.exponential(size=count)
-    phase = np.exp(2j * np.pi * rng.uniform(size=count))
-    gain = phase * np.sqrt(snr * radio.noise_psd / (radio.array.num_antennas * radio.energy))
-    parts = NoiselessComponents(np.full(count, -1), tau, cosines, gain)
-    errors = lone_errors(parts, radio, np.zeros((count, 5)))
-    return ReportedComponents(parts.path, np.column_stack([tau, cosines]), errors.deviation, gain, errors.gain_std)
+    return ReportedComponents._make(
+        np.concatenate(fields) for fields in zip(true, draw_false_alarms(sensor, rng=rng), strict=True)
+    )

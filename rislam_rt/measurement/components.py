@@ -1,4 +1,4 @@
-"""Components before noise: single paths, or several that come out as one; and the bound of a lone one."""
+"""Components before noise: single paths, or several that come out as one; and how well a lone one can be measured."""
 
 from typing import NamedTuple
 
@@ -36,6 +36,21 @@ class ComponentErrors(NamedTuple):
     """(N, 3) their standard deviations."""
     gain_std: Floats
     """(N,) standard deviation of the complex gain."""
+
+
+class ReportedComponents(NamedTuple):
+    """N components of one capture as the receiver reports them."""
+
+    path: Integers
+    """(N,) column of the strongest path, -1 for a false one."""
+    points: Floats
+    """(N, 3) delay [s] and cosines."""
+    deviation: Floats
+    """(N, 3)."""
+    gain: Complexes
+    """(N,)."""
+    gain_std: Floats
+    """(N,) of the complex gain."""
 
 
 def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:

@@ -11,8 +11,9 @@ from functools import lru_cache
 import numpy as np
 import scipy
 
+from rislam_rt.measurement.components import NoiselessComponents, ReportedComponents, lone_errors
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.model import RadioConfig
+from rislam_rt.model import RadioConfig, SensorModel
 
 
 def detection_threshold(radio: RadioConfig, config: ReceiverConfig) -> float:
@@ -76,3 +77,17 @@ def _threshold_of_rate(rate: float, radio: RadioConfig, window: float) -> float:
     return float(
         scipy.optimize.brentq(lambda level: expected_false_alarms(level, radio, window) - rate, lowest, highest)
     )
+
+
+def draw_false_alarms(sensor: SensorModel, *, rng: np.random.Generator) -> ReportedComponents:
+    """Poisson many, even over the delay window and the disc of cosines; amplitudes as of noise above the threshold."""
+    radio, count = sensor.radio, rng.poisson(sensor.false_alarms)
+    tau = rng.uniform(*sensor.window, count)
+    radius, azimuth = np.sqrt(rng.uniform(size=count)), rng.uniform(-np.pi, np.pi, count)
+    cosines = np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth)])
+    snr = sensor.threshold + rng.exponential(size=count)
+    phase = np.exp(2j * np.pi * rng.uniform(size=count))
+    gain = phase * np.sqrt(snr * radio.noise_psd / (radio.array.num_antennas * radio.energy))
+    parts = NoiselessComponents(np.full(count, -1), tau, cosines, gain)
+    errors = lone_errors(parts, radio, np.zeros((count, 5)))
+    return ReportedComponents(parts.path, np.column_stack([tau, cosines]), errors.deviation, gain, errors.gain_std)

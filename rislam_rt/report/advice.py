@@ -16,7 +16,7 @@ from rislam_rt.adviser.cost import cost_words
 from rislam_rt.adviser.coverage import Coverage
 from rislam_rt.adviser.remedies import detection_label
 from rislam_rt.model import Scene
-from rislam_rt.report.room import draw_plan
+from rislam_rt.report.map_from_above import draw_plan
 from rislam_rt.report.style import save_figure, styled
 
 STEPS_DB = np.arange(-18.0, 31.0, 6.0)

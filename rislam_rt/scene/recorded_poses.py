@@ -92,7 +92,7 @@ def parse_csv(content: bytes, named: Mapping[str, str]) -> RecordedPoses:
 
 
 def _column(what: str, header: Sequence[str], named: Mapping[str, str]) -> tuple[int, float] | None:
-    """Where a quantity stands, and its unit; None for one that may be left out."""
+    """Column of a recorded trajectory's file that holds a quantity, and its unit; None for one that may be left out."""
     if what in named:
         if named[what] not in header:
             raise Fault(f"no column '{named[what]}' for '{what}' in the trajectory", f"it has {_few(header)}")

@@ -74,20 +74,6 @@ class SlamConfig:
         return np.array([1.0, 1.0, 1.0 if self.height == "estimated" else 0.0])
 
 
-GONE = {
-    name: f"it is now 'nested.{name}', and of the filter 'nested' alone"
-    for name in ("gate", "specular_ratio", "classifier", "birth_cycles", "window", "birth_margin", "max_misses",
-                 "merge_distance", "resample_below", "adaptive", "weighting")
-} | {
-    "agent_particles": "it is now 'nested.num_agents'",
-    "landmark_particles": "it is now 'nested.num_points'",
-    "machine": "it is now 'nested.engine'",
-    "num_particles": "the default filter holds one Gaussian, whatever the start's spread; remove it",
-    "particle_share": "the default filter holds one Gaussian, whatever the start's spread; remove it",
-}  # fmt: skip
-"""Settings of `[slam]` that there were, and where each went."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class StartPrior:
     """What the agent is told about its first pose: a Gaussian about it."""

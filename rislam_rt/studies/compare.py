@@ -28,7 +28,7 @@ class Certificate(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """All rooms, and the certificate of the room that is to be shown."""
+    """A study of both channels: all rooms, and the certificate of the room that is to be shown."""
 
     rows: list[Validation]
     certificate: Certificate | None

@@ -20,13 +20,12 @@ from rislam_rt.pipeline.specification.section import Positive, Section
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
 from rislam_rt.storage.files import write_atomic
-from rislam_rt.sweeps.axes import Axis, Scalar, Sweep, Value, parse_axis
+from rislam_rt.sweeps.axes import Axis, Scalar, Value, parse_axis
 from rislam_rt.sweeps.record import json_bytes
 from rislam_rt.sweeps.store import DONE, MISSING, Row, csv_bytes
+from rislam_rt.sweeps.sweep import Sweep
 
 FUNCTION = f"{__name__}:run_cell"
-STORED_AS = "rislam_rt.pipeline.sweeps.slam:run_cell"
-"""Its first name, by which stored cells know it."""
 
 
 class SweepSection(Section):
@@ -136,7 +135,6 @@ def slam_sweep(
         {"beside": os.path.abspath(path.parent)},
         _depends(path, tuple(found)),
         spec.name,
-        STORED_AS,
     )
 
 

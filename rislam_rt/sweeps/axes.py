@@ -1,15 +1,12 @@
 """What a sweep goes through: typed values of any setting, repetitions, and the cells that they make."""
 
-import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from itertools import product
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.toml import parse_toml, put_dotted
+from rislam_rt.toml import parse_toml
 
 Scalar = str | int | float | bool
 Value = Scalar | list[Scalar]
@@ -38,89 +35,6 @@ class Axis:
             raise ConfigError(f"axis '{self.key}': mixes {' and '.join(sorted(kinds))}; give values of one type")
         if len({json.dumps(value) for value in self.values}) < len(self.values):
             raise ConfigError(f"axis '{self.key}': a value comes twice; give each once")
-
-
-@dataclass(frozen=True, slots=True)
-class Sweep:
-    """A function, its settings, and what to vary. Nothing here depends on the order of axes or values but the table."""
-
-    function: str
-    """`module:function`, importable in every worker. It takes (settings, seed) and returns a mapping of names to
-    numbers, text, lists and mappings of these. What differs from run to run (times) goes under the name `timing`."""
-    axes: tuple[Axis, ...] = ()
-    base: Mapping[str, Any] = field(default_factory=dict)
-    """Settings common to all cells: nested mappings of plain values, as from a TOML file."""
-    repetitions: int = 1
-    seed: int = 0
-    """Of the whole sweep."""
-    paired: tuple[str, ...] = ()
-    """Axes that leave the seed alone, so that cells which differ in them only draw the same numbers."""
-    local: Mapping[str, Any] = field(default_factory=dict)
-    """Settings that results do not depend on, as folders: the function gets them, no file has them."""
-    depends: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None
-    """What else a cell's result depends on, from its settings: versions, the hash of a room."""
-    name: str = "sweep"
-    stored_as: str = ""
-    """The function's name in files and in cells' names, if that is another: the one it had when first stored, so that
-    a function that has moved finds its results."""
-
-    @property
-    def label(self) -> str:
-        """The function's name in files."""
-        return self.stored_as or self.function
-
-    def __post_init__(self) -> None:
-        module, colon, function = self.function.partition(":")
-        if not (colon and all(part.isidentifier() for part in [*module.split("."), function])):
-            raise ConfigError(f"sweep function: '{self.function}' received; give 'package.module:function'")
-        if self.repetitions < 1:
-            raise ConfigError(f"repetitions: {self.repetitions} received; give at least 1")
-        keys = [axis.key for axis in self.axes]
-        for key in keys:
-            clash = [other for other in keys if other != key and other.startswith(key + ".")]
-            if keys.count(key) > 1 or clash:
-                raise ConfigError(f"axis '{key}': set twice ({', '.join(clash) or key}); give each setting one axis")
-        for key in self.paired:
-            if key not in keys:
-                raise ConfigError(f"paired: '{key}' is no axis; give some of {', '.join(keys) or 'none'}")
-
-
-class Cell(NamedTuple):
-    """One evaluation of the function."""
-
-    ident: str
-    """32 hexadecimal digits, from a hash of all below and the function's name: the name of its file."""
-    point: Mapping[str, Value]
-    """Its values along the axes."""
-    repetition: int
-    settings: Mapping[str, Any]
-    """Base and point, nested."""
-    seed: int
-    """63 bits, from a hash of the sweep's seed, the repetition, and the values along the axes that are not paired."""
-    depends: Mapping[str, Any]
-
-
-def build_cells(sweep: Sweep) -> list[Cell]:
-    """All cells: the last axis varies fastest, repetitions faster still.
-
-    Raises
-    ------
-    ConfigError
-        A key leads through a value that is no table, or the settings are no plain data.
-    """
-    cells = []
-    for values in product(*(axis.values for axis in sweep.axes)):
-        point = dict(zip((axis.key for axis in sweep.axes), values, strict=True))
-        settings = dict(sweep.base)
-        for key, value in point.items():
-            settings = put_dotted(settings, key, value)
-        depends = dict(sweep.depends(settings)) if sweep.depends else {}
-        drawn = {key: value for key, value in point.items() if key not in sweep.paired}
-        for repetition in range(sweep.repetitions):
-            seed = int.from_bytes(_digest([drawn, repetition, sweep.seed])[:8]) >> 1
-            ident = _digest([sweep.label, settings, repetition, seed, depends]).hex()[:32]
-            cells.append(Cell(ident, point, repetition, settings, seed, depends))
-    return cells
 
 
 def parse_axis(text: str) -> Axis:
@@ -161,12 +75,3 @@ def _kind(value: Value) -> str:
     if isinstance(value, list):
         return "lists"
     return "text" if isinstance(value, str) else "numbers"
-
-
-def _digest(content: Any) -> bytes:
-    """SHA-256 of plain data in one spelling: sorted keys, shortest numbers that read back the same."""
-    try:
-        text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise ConfigError(f"sweep settings: not plain data ({error}); give numbers, text, lists and tables") from None
-    return hashlib.sha256(text.encode()).digest()

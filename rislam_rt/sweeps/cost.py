@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from rislam_rt.sweeps.axes import Cell
+from rislam_rt.sweeps.sweep import Cell
 
 
 class SweepCost(NamedTuple):

@@ -8,7 +8,6 @@ from time import monotonic
 from typing import NamedTuple
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.sweeps.axes import Cell, Sweep, build_cells
 from rislam_rt.sweeps.cost import SweepCost, estimate_cost
 from rislam_rt.sweeps.local_pool import Run, local_pool
 from rislam_rt.sweeps.store import (
@@ -23,6 +22,7 @@ from rislam_rt.sweeps.store import (
     write_cell,
     write_table,
 )
+from rislam_rt.sweeps.sweep import Cell, Sweep, build_cells
 from rislam_rt.sweeps.work import LOST, CellOutcome, Task, find_function
 
 TABLE_SECONDS = 1.0
@@ -177,7 +177,7 @@ class _Board:
     def take(self, ident: str, outcome: CellOutcome) -> None:
         """A cell has ended."""
         cell = self.rows[ident].cell
-        self.rows[ident] = row = write_cell(self.folder, cell, self.sweep.label, outcome)
+        self.rows[ident] = row = write_cell(self.folder, cell, self.sweep.function, outcome)
         append_timing(self.folder, cell, outcome)
         self.timings.append({"point": cell.point, "seconds": outcome.seconds})
         self.left.pop(ident)

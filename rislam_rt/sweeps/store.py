@@ -18,8 +18,8 @@ from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.storage.files import TEMPORARY, make_folders, remove_empty, remove_temporaries, write_atomic
 from rislam_rt.storage.lock import LOCK_FILE, hold
 from rislam_rt.storage.seal import read_sealed, seal
-from rislam_rt.sweeps.axes import Cell, Sweep
 from rislam_rt.sweeps.record import flatten, json_bytes
+from rislam_rt.sweeps.sweep import Cell, Sweep
 from rislam_rt.sweeps.work import CellOutcome
 
 SWEEP_FILE = "sweep.json"
@@ -104,7 +104,7 @@ def write_sweep(folder: Path, sweep: Sweep) -> None:
     """
     about = {
         "name": sweep.name,
-        "function": sweep.label,
+        "function": sweep.function,
         "axes": [{"key": axis.key, "values": list(axis.values)} for axis in sweep.axes],
         "base": dict(sweep.base),
         "repetitions": sweep.repetitions,

@@ -15,7 +15,7 @@ from rislam_rt.pipeline.recordings.inputs import dataset_to_inputs, inputs_to_da
 from rislam_rt.pipeline.scores.summary import landmark_scores, landmark_track
 from rislam_rt.report.code_pictures import draw_run_codes
 from rislam_rt.report.conclusions import panel_found_at
-from rislam_rt.report.room import draw_above
+from rislam_rt.report.map_from_above import draw_above
 from rislam_rt.shipped import find_pipeline, find_room
 
 SET = [

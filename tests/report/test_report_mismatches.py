@@ -7,8 +7,8 @@ from test_report_swept import RECORD, rows
 
 from rislam_rt.report.swept import write_swept
 from rislam_rt.studies.swept import HardwareSpec, RobustnessSpec
-from rislam_rt.sweeps.axes import Cell
 from rislam_rt.sweeps.store import Row
+from rislam_rt.sweeps.sweep import Cell
 
 COMPASS = {
     "name": "compass",

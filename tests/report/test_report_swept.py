@@ -13,8 +13,8 @@ from rislam_rt.report.swept.rooms import budget, missed_aims
 from rislam_rt.studies.claims import judge, read_results
 from rislam_rt.studies.swept import AblationsSpec, Fig4bSpec, Fig4cSpec, RoomsSpec, group_rows
 from rislam_rt.studies.swept.sweep import SNR
-from rislam_rt.sweeps.axes import Cell
 from rislam_rt.sweeps.store import Row
+from rislam_rt.sweeps.sweep import Cell
 
 RECORD = {
     "kind": "made up", "seed": 7, "scenes": {"paper_room": {"sha256": "0" * 64}}, "versions": {},

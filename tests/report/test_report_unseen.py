@@ -14,7 +14,7 @@ from rislam_rt.report.unseen.terminal import print_cards
 from rislam_rt.studies.unseen import UnseenSpec
 from rislam_rt.studies.unseen.sweep import SNR
 from rislam_rt.sweeps import Row
-from rislam_rt.sweeps.axes import Cell
+from rislam_rt.sweeps.sweep import Cell
 
 RECORD = {"settings": {"cycles": 200, "depth": 2}, "code": "abc"}
 

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from rislam_rt.errors import SceneError
+from rislam_rt.geometry.connected_parts import connected_triangles
 from rislam_rt.model import Body, RadioConfig, Reflector, RisPanel, RxArray, Scatterer, Scene, Trajectory
 from rislam_rt.scene import check_scene, load_scene
 from rislam_rt.scene.built_in_rooms.shapes import block, box_walls, grid, joined
-from rislam_rt.scene.check.mesh_queries import components, ray_hits, sphere_directions, touching, winding
+from rislam_rt.scene.check.mesh_queries import ray_hits, sphere_directions, touching, winding
 from rislam_rt.scene.meshes import Mesh
 
 Change = Callable[[Scene], Scene]
@@ -291,9 +292,9 @@ def test_touching_equals_brute_force_over_samples() -> None:
     assert not near[distance > 0.03].any()  # beyond a corner the edges' lines reach further than the triangle
 
 
-def test_components_counts_pieces_not_vertices() -> None:
+def test_connected_triangles_counts_pieces_not_vertices() -> None:
     pieces = joined([block([0, 0, 0], [1, 1, 1]), block([2, 0, 0], [3, 1, 1]), block([1, 1, 1], [1.5, 2, 2])])
-    label = components(pieces.vertices[pieces.faces])
+    label = connected_triangles(pieces.vertices[pieces.faces])
     assert np.array_equal(label[:12], np.full(12, label[0]))
     assert label[12] != label[0]
     assert label[24] == label[0]  # the third box shares a corner with the first

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,6 @@ import sweep_cells
 from rislam_rt.errors import ConfigError, ResultError, SetupError
 from rislam_rt.sweeps import Axis, Sweep, SweepOptions, build_cells, parse_axis, run_sweep
 from rislam_rt.sweeps.cost import estimate_cost
-from rislam_rt.sweeps.store import read_row
 
 HERE = Path(__file__).parent
 AXES = (Axis("x", (1, 2, 3)), Axis("word", ("one", "two")))
@@ -84,13 +82,6 @@ def test_axes_are_typed(text, values):
     axis = parse_axis(text)
     assert axis.values == values
     assert [type(v) for v in axis.values] == [type(v) for v in values]
-
-
-def test_a_function_that_moved_finds_its_cells(whole):
-    folder, report = whole
-    moved = replace(DRAW, function="elsewhere:draw", stored_as=DRAW.function)
-    assert [read_row(folder, cell).state for cell in build_cells(moved)] == len(report.rows) * ["done"]
-    assert build_cells(moved) == build_cells(DRAW)
 
 
 @pytest.mark.parametrize("text", ["", "a", "=1", "a=", "a=1,,2", "a=1,x", "a=1,true", "a=nan", "a=1,1", "a..b=1"])

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.channel.compare.certificate import SHORTEST_SEGMENT
+from rislam_rt.channel.compare.explanation import SHORTEST_SEGMENT
 from rislam_rt.channel.compare.match import compare_paths
 from rislam_rt.channel.compare.report import PathReport
 from rislam_rt.channel.image_source import ImageSourceChannel

@@ -167,7 +167,7 @@ class PathReport:
         }
 
     def _nearest(self, error: Floats, limit: Floats) -> dict[str, Any]:
-        """Range of a quantity's limits, and the path that comes nearest to its own."""
+        """For the comparison's JSON: range of a quantity's limits, and the path that comes nearest to its own."""
         if len(error) == 0:
             return {}
         share = error / limit

@@ -13,7 +13,6 @@ from rislam_rt.pipeline.specification.radio import RadioSection, build_radio
 from rislam_rt.pipeline.specification.section import Section
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.shipped import shipped_pipelines
-from rislam_rt.slam.config import GONE
 from rislam_rt.spelling import did_you_mean, nearest
 from rislam_rt.toml import MAX_LEVELS, parse_toml
 
@@ -151,7 +150,7 @@ def _near_pipeline(path: Path) -> str:
 
 
 def _override(table: dict[str, Any], setting: str) -> str:
-    """Put one `key=value` into the table; returns the key."""
+    """Put one `--set key=value` into a pipeline's table; returns the key."""
     key, equals, text = setting.partition("=")
     parts = key.strip().split(".")
     if not equals or len(parts) > MAX_LEVELS or not all(part.isidentifier() for part in parts):
@@ -196,9 +195,6 @@ def _remark(item: Any, model: type[BaseModel]) -> str:
     if item["type"] == "missing":
         return f"{place}: missing; add it"
     if item["type"] == "extra_forbidden":
-        section, name = ("", *map(str, item["loc"]))[-2:]
-        if section == "slam" and name in GONE:
-            return f"{place}: no setting any more; {GONE[name]}"
         near = _near_key([str(part) for part in item["loc"]], model)
         return f"{place}: unknown key; {did_you_mean(near) or 'remove it or mend its name'}"
     message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())

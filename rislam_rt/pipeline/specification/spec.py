@@ -293,7 +293,7 @@ def share_settings(content: dict[str, Any]) -> dict[str, Any]:
 
 
 class Settings(NamedTuple):
-    """The records that the parts of a run take, made from a specification."""
+    """A specification turned into the records that the parts of a run take, in SI units."""
 
     radio: RadioConfig
     receiver: ReceiverConfig

@@ -31,7 +31,7 @@ from rislam_rt.sweeps.record import json_bytes, plain_result
 
 
 class StudyLayout(NamedTuple):
-    """How a study is told."""
+    """How a swept study is told: what its files, figure and page hold."""
 
     content: dict[str, Any]
     draw: Callable[[], Figure]

@@ -32,7 +32,7 @@ they are as reported. What false components do to the agent: [receiver](../recei
 
 
 def hardware_content(groups: Sequence[Group], spec: HardwareSpec) -> dict[str, Any]:
-    """Plain data: one entry a level and way of meeting it with its scores, and how far each fault may go."""
+    """Plain data of the hardware study: scores of every fault at every level and way of meeting it, and its limits."""
     found = {str(group.point["variant"]): group for group in groups}
     ideal = _means(found.get("reference"), "receiver")
     entries = [{"fault": "none", "level": "", "note": "ideal", "way": "built", **ideal}]

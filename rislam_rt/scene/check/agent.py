@@ -5,8 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.geometry.connected_parts import connected_triangles
 from rislam_rt.model import RadioConfig
-from rislam_rt.scene.check.mesh_queries import components, crossings, ray_hits, sphere_directions, touching, winding
+from rislam_rt.scene.check.mesh_queries import crossings, ray_hits, sphere_directions, touching, winding
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 
@@ -99,7 +100,7 @@ def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
         low, high = mine.min(axis=(0, 1)), mine.max(axis=(0, 1))
         if (point < low).any() or (point > high).any():
             continue
-        label = components(mine)
+        label = connected_triangles(mine)
         for piece in range(label.max() + 1):
             solid = mine[label == piece]
             if np.prod(np.ptp(solid.reshape(-1, 3), axis=0)) > 0.1 * scene_box or abs(winding(point, solid)) < 0.5:

@@ -74,22 +74,6 @@ def winding(point: Floats, triangles: Floats) -> float:
     return float(np.sum(np.arctan2(top, below)) / (2.0 * np.pi))
 
 
-def components(triangles: Floats, tolerance: float = 1e-6) -> Integers:
-    """Number (T,) of the connected piece each triangle belongs to; corners within `tolerance` [m] are one."""
-    _, corner = np.unique(np.round(triangles.reshape(-1, 3) / tolerance), axis=0, return_inverse=True)
-    faces = corner.reshape(-1, 3)
-    label = np.arange(faces.max(initial=-1) + 1)
-    while True:
-        lowest = label[faces].min(axis=1)
-        new = label.copy()
-        np.minimum.at(new, faces, lowest[:, None])
-        new = new[new]
-        if (new == label).all():
-            break
-        label = new
-    return np.asarray(np.unique(label[faces[:, 0]], return_inverse=True)[1], dtype=np.int64)
-
-
 def sphere_directions(count: int) -> Floats:
     """Unit vectors (count, 3) spread evenly (Fibonacci lattice)."""
     k = np.arange(count) + 0.5

@@ -94,7 +94,7 @@ def _far_point(file: str, field: str, point: Floats, bounds: Floats) -> Iterator
 
 
 def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, float]]:
-    """Dotted field and largest value of every place that a path of keys leads to; lists of tables count each."""
+    """Lengths in a scene file: dotted field and largest value wherever a path of keys leads; lists of tables: each."""
     for field, value in _places(table, path, ""):
         numbers = value if isinstance(value, list) else [value]
         if numbers and all(_is_number(number) for number in numbers):

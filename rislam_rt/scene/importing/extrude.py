@@ -1,7 +1,7 @@
 """From a floor plan to walls, floor and ceiling: doors and windows are cut out, and closed where they are."""
 
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -15,47 +15,16 @@ from rislam_rt.scene.importing.polygons import inside_loop, triangulate
 from rislam_rt.scene.importing.regions.mesh_simplification import as_mesh
 from rislam_rt.scene.importing.regions.region_groups import numbered, plain_name
 from rislam_rt.scene.importing.room_draft import RoomDraft
+from rislam_rt.scene.importing.wall_lines import SAME_LINE, Line, Spans, wall_lines, without_span
 from rislam_rt.scene.meshes import Mesh
 
-SAME_LINE = 5e-3
-"""[m] Walls whose lines are nearer than this are one."""
-PARALLEL = np.radians(0.2)
-SNAP = 0.05
-"""[m] An end of a wall this near another wall reaches it."""
 THICKEST = 0.6
 """[m] An opening goes through all walls this near it that run along it: both faces of a thick wall."""
 ALONG = np.radians(5.0)
 _SIDES = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
 
-Spans = list[tuple[float, float]]
 Entry = tuple[str, Mesh, dict[str, Any] | None]
 """Name, mesh and own material."""
-
-
-class Line(NamedTuple):
-    """A straight line of walls."""
-
-    start: Floats
-    """(2,) [m]."""
-    along: Floats
-    """(2,) unit vector."""
-    spans: Spans
-    """[m] From where to where along the line there is wall."""
-    material: dict[str, Any] | None
-    name: str
-
-    @property
-    def across(self) -> Floats:
-        """(2,) unit vector to its left."""
-        return np.array([-self.along[1], self.along[0]])
-
-    def at(self, place: float, height: float) -> Floats:
-        """(3,) [m]."""
-        return np.append(self.start + place * self.along, height)
-
-    def distance(self, points: Floats) -> Floats:
-        """Signed distances (...,) [m] of points (..., 2), positive to its left."""
-        return np.asarray((points - self.start) @ self.across)
 
 
 def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft:
@@ -66,7 +35,7 @@ def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft
     Fault
         An opening lies on no wall, or a material was given for a name that nothing has.
     """
-    lines = _wall_lines(plan)
+    lines = wall_lines(plan)
     cuts = [_cut_lines(opening, lines) for opening in plan.openings]
     entries: list[Entry] = []
     flat = _floor_triangles(plan, lines)
@@ -110,79 +79,6 @@ def _named(entries: list[Entry], plan: FloorPlan, options: ImportOptions) -> Roo
     return RoomDraft(reflectors, {}, remarks + palette.remarks())
 
 
-def _wall_lines(plan: FloorPlan) -> list[Line]:
-    """Walls along one line, joined; those drawn by themselves come before the edges of rooms, which yield to them."""
-    drawn = [(line, material, name) for line, material, name in plan.walls]
-    edges = [np.stack([a, b]) for room in plan.rooms for a, b in zip(room, np.roll(room, -1, axis=0), strict=True)]
-    lines: list[Line] = []
-    for ends, material, name in [*drawn, *((edge, None, "") for edge in edges)]:
-        length = float(np.linalg.norm(ends[1] - ends[0]))
-        if length < 1e-3:
-            continue
-        along = (ends[1] - ends[0]) / length
-        mine = [k for k in lines if _is_on(k, ends, along)]
-        places = [(0.0, length)]
-        for other in mine:
-            if other.material == material and other.name == name:
-                continue
-            a, b = sorted(float(x) for x in (other.start + np.outer([s for p in other.spans for s in p], other.along)
-                                             - ends[0]) @ along)[:: max(2 * len(other.spans) - 1, 1)]  # fmt: skip
-            places = _without(places, a, b)
-        same = next((k for k in mine if k.material == material and k.name == name), None)
-        if same is None:
-            if places:
-                lines.append(Line(ends[0], along, places, material, name))
-            continue
-        for low, high in places:
-            ends_on = sorted(float((ends[0] + p * along - same.start) @ same.along) for p in (low, high))
-            same.spans[:] = _joined_spans([*same.spans, (ends_on[0], ends_on[1])])
-    return [line._replace(spans=_snapped(line, lines)) for line in lines]
-
-
-def _is_on(line: Line, ends: Floats, along: Floats) -> bool:
-    turn = abs(float(line.along[0] * along[1] - line.along[1] * along[0]))
-    return turn < PARALLEL and float(np.abs(line.distance(ends)).max()) < SAME_LINE
-
-
-def _joined_spans(spans: Spans) -> Spans:
-    found: Spans = []
-    for low, high in sorted(spans):
-        if found and low <= found[-1][1] + SAME_LINE:
-            found[-1] = (found[-1][0], max(found[-1][1], high))
-        else:
-            found.append((low, high))
-    return found
-
-
-def _without(spans: Spans, low: float, high: float) -> Spans:
-    found: Spans = []
-    for a, b in spans:
-        found += [(x, y) for x, y in ((a, min(b, low)), (max(a, high), b)) if y - x > SAME_LINE]
-    return found
-
-
-def _snapped(line: Line, lines: list[Line]) -> Spans:
-    """Spans whose ends reach the walls that they nearly touch."""
-    meets = []
-    for other in lines:
-        slope = float(line.along @ other.across)
-        if abs(slope) > np.sin(np.radians(5.0)):
-            place = -float(other.distance(line.start)) / slope
-            on = float((line.start + place * line.along - other.start) @ other.along)
-            if any(low - SNAP <= on <= high + SNAP for low, high in other.spans):
-                meets.append(place)
-    near = np.array(meets)
-    found = []
-    for span in line.spans:
-        ends = []
-        for end in span:
-            best = near[np.argmin(np.abs(near - end))] if len(near) else end
-            ends.append(float(best) if abs(best - end) <= SNAP else end)
-        if ends[1] - ends[0] > SAME_LINE:
-            found.append((ends[0], ends[1]))
-    return found
-
-
 def _cut_lines(opening: Opening, lines: list[Line]) -> list[int]:
     """The lines that an opening goes through."""
     along = (opening.ends[1] - opening.ends[0]) / np.linalg.norm(opening.ends[1] - opening.ends[0])
@@ -217,7 +113,7 @@ def _cells(line: Line, holes: list[tuple[float, float, float, float]], height: f
             open_here = [hole for hole in holes if hole[0] < 0.5 * (a + b) < hole[1]]
             solid: Spans = [(0.0, height)]
             for hole in open_here:
-                solid = _without(solid, hole[2], hole[3])
+                solid = without_span(solid, hole[2], hole[3])
             found += [_panel(line, a, b, bottom, top) for bottom, top in solid]
     return found
 

@@ -41,7 +41,7 @@ class XmlPart:
 
 @dataclass(slots=True)
 class XmlScene:
-    """What a scene file holds that a radio sees."""
+    """What a Mitsuba scene (XML) holds that a radio sees."""
 
     parts: list[XmlPart] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)

@@ -6,6 +6,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.geometry.angles import rotation_about
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, read_inside
 from rislam_rt.scene.xml.parse import children
@@ -133,10 +134,8 @@ def _numbers(part: Element) -> list[float]:
 
 
 def _rotation(axis: Floats, angle: float) -> Floats:
-    """(3, 3) rotation by an angle [rad] about an axis (Rodrigues)."""
+    """(3, 3) as `<rotate>` asks for it."""
     length = np.linalg.norm(axis)
     if not length > 0.0:
         raise Fault("<rotate> without an axis", "give x, y and z of one")
-    x, y, z = axis / length
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
+    return rotation_about(axis / length, angle)

@@ -43,7 +43,7 @@ class Training(NamedTuple):
 
 
 def run_training(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Tell = tell_nobody) -> Training:
-    """Everything that a specification asks for; its seed decides all draws.
+    """Train and score the classifier as a specification asks; its seed decides all draws.
 
     Raises
     ------

@@ -20,8 +20,6 @@ from rislam_rt.sweeps.work import one_line
 from rislam_rt.toml import put_dotted
 
 FUNCTION = f"{__name__}:run_cell"
-STORED_AS = "rislam_rt.pipeline.studies.swept.cell:run_cell"
-"""Its first name, by which stored cells know it."""
 CLOCK = ("seconds", "step_seconds", "over_budget")
 """Scores that differ from run to run."""
 

@@ -10,7 +10,7 @@ from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions
 from rislam_rt.scene import load_scene
-from rislam_rt.studies.swept.cell import FUNCTION, STORED_AS, cell_spec
+from rislam_rt.studies.swept.cell import FUNCTION, cell_spec
 from rislam_rt.studies.swept.spec import (
     AblationsSpec,
     Fig4bSpec,
@@ -24,7 +24,6 @@ from rislam_rt.sweeps import Axis, Sweep
 
 RECEIVER = "rislam_rt.studies.swept.receiver:run_cell"
 """Of a cell that looks at the receiver alone."""
-RECEIVER_STORED_AS = "rislam_rt.pipeline.studies.swept.receiver:run_cell"
 SNR = "run.radio.reference_snr_db"
 """Axis of Fig. 4(b)."""
 
@@ -58,12 +57,11 @@ def build_sweep(spec: SweptSpec, pipeline: Path, scene: Path | None = None) -> S
     variants = {variant.name: dict(variant.set) for variant in spec.all_variants}
     local = {"beside": os.path.abspath(beside), "variants": variants}
     keys = tuple(axis.key for axis in axes)
-    function, stored = FUNCTION, STORED_AS
+    function = FUNCTION
     if isinstance(spec, HardwareSpec):
-        base["places"], function, stored = spec.places, RECEIVER, RECEIVER_STORED_AS
+        base["places"], function = spec.places, RECEIVER
     return Sweep(
         function, axes, base, spec.repetitions, spec.seed, keys, local, _depends(pipeline, local), spec.name,
-        stored,
     )  # fmt: skip
 
 

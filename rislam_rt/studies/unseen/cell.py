@@ -24,8 +24,6 @@ from rislam_rt.studies.unseen.truth import build_truth
 from rislam_rt.sweeps.work import one_line
 
 FUNCTION = f"{__name__}:run_cell"
-STORED_AS = "rislam_rt.pipeline.studies.unseen.cell:run_cell"
-"""Its first name, by which stored cells know it."""
 SEEN_BY_TRACER_NOT = ("name", "description", "scene", "seed", "schemes", "receiver", "design", "slam")
 """Settings that the true motion and the paths do not depend on, beside those of the rivals and the noise."""
 

@@ -16,7 +16,7 @@ from rislam_rt.pipeline.store.identity import code_digest
 from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.storage.files import write_atomic
 from rislam_rt.studies.swept.cell import cell_spec
-from rislam_rt.studies.unseen.cell import FUNCTION, STORED_AS, scheme_here
+from rislam_rt.studies.unseen.cell import FUNCTION, scheme_here
 from rislam_rt.studies.unseen.spec import UnseenSpec
 from rislam_rt.sweeps import Axis, Sweep
 
@@ -24,8 +24,7 @@ SNR = "run.radio.reference_snr_db"
 LEDGER = ("date", "first", "rooms", "snr_db", "variants", "code", "settings")
 """Columns of the ledger of test runs."""
 CODE_DIGITS = 16
-"""Of the code's hash in the ledger. Rows written before it was `identity.code_digest` have another hash of their code:
-they stay as what was run then."""
+"""Of the code's hash in the ledger."""
 
 
 def build_unseen(spec: UnseenSpec, pipeline: Path, data: Path) -> Sweep:
@@ -48,7 +47,7 @@ def build_unseen(spec: UnseenSpec, pipeline: Path, data: Path) -> Sweep:
     local = {"variants": variants, "data": str(data.absolute())}
     keys = tuple(axis.key for axis in axes)
     depends = _Depends(pipeline, local)
-    return Sweep(FUNCTION, tuple(axes), base, 1, spec.seed, keys, local, depends, spec.name, STORED_AS)
+    return Sweep(FUNCTION, tuple(axes), base, 1, spec.seed, keys, local, depends, spec.name)
 
 
 class _Depends:

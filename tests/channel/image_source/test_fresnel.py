@@ -14,7 +14,7 @@ from rislam_rt.channel.image_source.fresnel import (
     slab_coefficients,
 )
 from rislam_rt.errors import SceneError
-from rislam_rt.geometry.angles import direction_from_angles
+from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, PathKind, RadioConfig
 from rislam_rt.model.itu import ITU_MATERIALS
 
@@ -74,7 +74,7 @@ def test_a_multilayer_sum_gives_the_same_slab():
 
 def test_polarisation_basis_is_right_handed_and_ignores_the_sense_of_travel():
     rng = np.random.default_rng(0)
-    k = direction_from_angles(np.arccos(rng.uniform(-1, 1, 50)), rng.uniform(-np.pi, np.pi, 50))
+    k = unit(rng.standard_normal((50, 3)))
     theta, phi = polarisation_basis(k)
     np.testing.assert_allclose(np.cross(theta, phi), k, atol=1e-12)
     np.testing.assert_allclose(polarisation_basis(-k)[0], theta, atol=1e-12)

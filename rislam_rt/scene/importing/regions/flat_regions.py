@@ -3,28 +3,14 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
+from rislam_rt.geometry.connected_parts import connected
+from rislam_rt.scene.importing.regions.welded_mesh import Welded
 
-WELD = 2e-5
-"""[m] Corners nearer than this are one: what float32 leaves open in a file of 100 m, and no drawing means less."""
 FLAT_ANGLE = np.radians(0.5)
 """Neighbours that meet at less than this are one plane: half a degree looks flat to whoever drew it."""
-
-
-class Welded(NamedTuple):
-    """A mesh whose triangles share their corners."""
-
-    vertices: Floats
-    """(V, 3) [m]."""
-    faces: Integers
-    """(F, 3)."""
-    part: Integers
-    """(F,) part of the file that each comes from."""
 
 
 class Edges(NamedTuple):
@@ -62,23 +48,6 @@ class FlatRegions(NamedTuple):
         return self.mesh.faces[np.isin(self.region, regions)]
 
 
-def weld(triangles: list[Floats]) -> Welded:
-    """Join the corners of parts (T, 3, 3) [m]; triangles without area and doubles are left out."""
-    corners = np.concatenate([t.reshape(-1, 3) for t in triangles])
-    part = np.repeat(np.arange(len(triangles)), [len(t) for t in triangles])
-    vertices, index = np.unique(corners, axis=0, return_inverse=True)
-    pairs = cKDTree(vertices).query_pairs(WELD, output_type="ndarray")
-    group = connected(pairs, len(vertices))
-    _, first = np.unique(group, return_index=True)
-    vertices, faces = vertices[first], group[index.ravel()].reshape(-1, 3)
-    edge = vertices[np.roll(faces, -1, axis=1)] - vertices[faces]
-    height = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
-    solid = height > WELD * np.linalg.norm(edge, axis=-1).max(axis=1)
-    _, single = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-    keep = np.intersect1d(np.flatnonzero(solid), single)
-    return Welded(vertices, faces[keep], part[keep])
-
-
 def find_facets(mesh: Welded) -> FlatRegions:
     """Part a welded mesh into flat regions: neighbours of one part that meet at less than `FLAT_ANGLE`."""
     triangles = mesh.vertices[mesh.faces]
@@ -111,13 +80,6 @@ def crease_groups(facets: FlatRegions, chosen: Booleans, low: float, high: float
     a, b = region[edges.a], region[edges.b]
     joined = (a != b) & (edges.turn >= low) & (edges.turn <= high) & chosen[a] & chosen[b]
     return connected(np.stack([a[joined], b[joined]], axis=-1), len(facets.area))
-
-
-def connected(pairs: Integers, count: int) -> Integers:
-    """Number (count,) of the group that each belongs to, pairs (P, 2) being joined."""
-    ones = np.ones(len(pairs), dtype=np.int8)
-    graph = coo_matrix((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
 def _edges(faces: Integers, normal: Floats) -> Edges:

@@ -7,7 +7,8 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
-from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions, bounds_of, connected
+from rislam_rt.geometry.connected_parts import connected
+from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions, bounds_of
 
 SPAN = 0.6
 """A piece that spans this share of the room along two axes is its shell."""

@@ -6,7 +6,7 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, Welded
+from rislam_rt.scene.importing.regions.flat_regions import FlatRegions
 from rislam_rt.scene.importing.regions.surfaces import (
     ClutterMesh,
     SortedSurfaces,
@@ -15,8 +15,10 @@ from rislam_rt.scene.importing.regions.surfaces import (
     off_planes,
     surface_area,
 )
-from rislam_rt.scene.importing.scans.scan import WIDTHS, ScanPlane, downsample_mesh, find_planes
+from rislam_rt.scene.importing.regions.welded_mesh import Welded
+from rislam_rt.scene.importing.scans.point_cloud import downsample_mesh
 from rislam_rt.scene.importing.scans.scan_outline import BRIDGE, CELL, Outline, outline_planes
+from rislam_rt.scene.importing.scans.scan_planes import WIDTHS, ScanPlane, find_planes
 
 FLAT_SHARE = 0.3
 """Of a mesh's area: where less of it is in wide flat regions, it is a scan."""

@@ -2,41 +2,12 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats, Integers
-from rislam_rt.design.problem import DesignProblem
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.design.problem import DesignProblem, problem_from_arrays
 from rislam_rt.design.single_path import exact_code
 from rislam_rt.errors import ConfigError
-from rislam_rt.information import range_information, vertex_gradient
+from rislam_rt.information import vertex_gradient
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode
-
-
-def problem_from_arrays(
-    response: Complexes, static_gain: Complexes, gradient: Floats, radio: RadioConfig, levels: int,
-    prior: Floats | None = None, least_snr: float = 0.0, panels: tuple[tuple[int, slice], ...] = ((0, slice(None)),),
-) -> DesignProblem:  # fmt: skip
-    """A problem of one position from plain arrays.
-
-    Parameters
-    ----------
-    response
-        (P, N, M) element responses of the panel paths, the direct one first.
-    static_gain
-        (S,) gains of the landmark paths that do not meet the panel.
-    gradient
-        (P + S, 2) horizontal gradients of the path lengths, panel paths first.
-    prior
-        (2, 2) information [1/m^2] beforehand; none by default.
-    least_snr
-        SNR over all antennas, linear, at which a path is detected every other time; 0: all paths count.
-    panels
-        Where there are several: as in `DesignProblem`.
-    """
-    unit_snr = float(radio.integrated_snr(np.ones(())))
-    prior = np.zeros((2, 2)) if prior is None else prior
-    return DesignProblem(
-        response[None], static_gain[None], gradient[None], prior, float(range_information(np.array(unit_snr), radio)),
-        levels, least_power=least_snr / unit_snr, panels=panels,
-    )  # fmt: skip
 
 
 def panel_columns(paths: Paths, cycle: int) -> Integers:

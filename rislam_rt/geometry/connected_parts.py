@@ -1,0 +1,30 @@
+"""Connected parts: of a graph, and of a mesh whose triangles share corners."""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from rislam_rt.arrays import Floats, Integers
+
+
+def connected(pairs: Integers, count: int) -> Integers:
+    """Number (count,) of the group that each belongs to, pairs (P, 2) being joined."""
+    ones = np.ones(len(pairs), dtype=np.int8)
+    graph = coo_matrix((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def connected_triangles(triangles: Floats, tolerance: float = 1e-6) -> Integers:
+    """Number (T,) of the connected piece each triangle belongs to; corners within `tolerance` [m] are one."""
+    _, corner = np.unique(np.round(triangles.reshape(-1, 3) / tolerance), axis=0, return_inverse=True)
+    faces = corner.reshape(-1, 3)
+    label = np.arange(faces.max(initial=-1) + 1)
+    while True:
+        lowest = label[faces].min(axis=1)
+        new = label.copy()
+        np.minimum.at(new, faces, lowest[:, None])
+        new = new[new]
+        if (new == label).all():
+            break
+        label = new
+    return np.asarray(np.unique(label[faces[:, 0]], return_inverse=True)[1], dtype=np.int64)

@@ -1,0 +1,177 @@
+"""A run's map from above: room, path, landmarks and walls, true and estimated, one panel a scheme."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from rislam_rt.arrays import Floats
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.constants import COPLANAR_OFFSET
+from rislam_rt.model import Scene, SchemeResult, SlamResult
+from rislam_rt.pipeline.scores.summary import landmark_track, match_walls
+from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace, section
+from rislam_rt.report.style import TRUTH, WALL, scheme_colour, styled
+
+ZOOM = 0.25
+"""Half the width [m] of the close-up of the path's end, unless the error is larger."""
+
+SHADE = "#d9cdb8"
+"""Colour of what hides and does not reflect."""
+
+WALL_NAME, MOST_NAMES = "#54606e", 40
+"""Colour of walls' names, and how many are written at most."""
+
+
+def draw_above(result: SlamResult) -> Figure:
+    """One panel a scheme: room, path, landmarks and walls, true and estimated, and a close-up of the path's end."""
+    schemes = list(result.schemes.values())
+    low, high = result.scene.bounds
+    aspect = (high[1] - low[1]) / (high[0] - low[0])
+    with styled():
+        figure = Figure(figsize=(5.4 * len(schemes), 5.4 * aspect + 1.4))
+        axes = figure.subplots(1, len(schemes), squeeze=False, sharey=True)[0]
+        final = [scheme.position[-1, :2] - result.scene.agent.position[-1, :2] for scheme in schemes]
+        half = max(ZOOM, 2.5 * float(np.linalg.norm(final, axis=1).max()))
+        for axis, scheme in zip(axes, schemes, strict=True):
+            draw_plan(axis, result.scene)
+            _draw_estimate(axis, result.scene, scheme)
+            _draw_close_up(axis, result.scene, scheme, half)
+            error = np.sqrt(np.mean(np.sum((scheme.position - result.scene.agent.position) ** 2, axis=1)))
+            axis.set_title(f"{scheme.scheme}: agent RMSE {100.0 * error:.1f} cm", weight="bold")
+            axis.set_xlabel("x [m]")
+        axes[0].set_ylabel("y [m]")
+        figure.legend(handles=_legend(), loc="outside lower center", ncols=4, fontsize=9)
+    return figure
+
+
+def draw_plan(axis: Axes, scene: Scene) -> None:
+    """Walls (thick where they stand at the agent's height), occluders, path and landmarks as they are."""
+    walls, path = build_walls(scene), scene.agent.position
+    cuts = section(walls.triangles, float(path[-1, 2]))
+    axis.add_collection(PolyCollection(list(walls.occluders.triangles[..., :2]), color=SHADE, lw=0.5, zorder=0))
+    axis.add_collection(LineCollection(list(outline_edges(walls)[..., :2]), colors="#dddddd", lw=0.8, zorder=0))
+    axis.add_collection(LineCollection(list(cuts), colors=WALL, lw=3.0, capstyle="round", zorder=1))
+    axis.plot(path[:, 0], path[:, 1], color=TRUTH, lw=4.0, alpha=0.25, zorder=2)
+    axis.plot(path[0, 0], path[0, 1], "o", color=TRUTH, ms=5, zorder=3)
+    axis.annotate("start", (path[0, 0], path[0, 1]), (6, -10), textcoords="offset points", fontsize=9)
+    for scatterer in scene.scatterers:
+        _mark(axis, scatterer.position, scatterer.name, "o")
+    for panel in scene.panels:
+        _mark(axis, panel.center, panel.name, "s")
+    axis.set_aspect("equal")
+    axis.grid(False)
+
+
+def wall_places(scene: Scene) -> list[tuple[str, Floats]]:
+    """Names of the reflectors, and the middle (3,) [m] of the largest wall of each; not of all, if they are many."""
+    named = [(reflector.name, largest_middle(reflector.triangles)) for reflector in scene.reflectors]
+    return named[:MOST_NAMES]
+
+
+def largest_middle(triangles: Floats) -> Floats:
+    """Centroid (3,) [m] of the largest of triangles (T, 3, 3), with those that share its plane."""
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    area = np.linalg.norm(across, axis=1)
+    normal = across[np.argmax(area)] / max(float(area.max()), 1e-300)
+    height = (triangles - triangles[np.argmax(area), 0]) @ normal
+    same = np.abs(height).max(axis=1) < COPLANAR_OFFSET
+    return np.asarray(np.average(triangles[same].mean(axis=1), axis=0, weights=area[same]))
+
+
+def name_walls(axis: Axes, scene: Scene) -> None:
+    """Names at walls that stand up, along them; a floor or a ceiling has none from above."""
+    paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
+    for (name, point), reflector in zip(wall_places(scene), scene.reflectors, strict=False):
+        extent = np.ptp(reflector.vertices, axis=0)
+        if extent[2] < 0.2 * extent[:2].max():
+            continue
+        turn = 90.0 if extent[1] > 2.0 * extent[0] else 0.0
+        x, y, _ = point.tolist()
+        axis.text(
+            x, y, name, fontsize=7, color=WALL_NAME, ha="center", va="center", rotation=turn, zorder=3, bbox=paper
+        )
+
+
+def _mark(axis: Axes, point: Floats, name: str, marker: str) -> None:
+    """A true landmark, its name and height beside it."""
+    axis.plot(point[0], point[1], marker, ms=13, mfc="none", mec=TRUTH, mew=1.6, zorder=5)
+    paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
+    axis.annotate(f"{name}\nz = {point[2]:.1f} m", (point[0], point[1]), (12, 0), textcoords="offset points",
+                  va="center", fontsize=9, zorder=7, bbox=paper)  # fmt: skip
+
+
+def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
+    """What the agent holds after the last cycle."""
+    colour = scheme_colour(scheme.scheme)
+    axis.plot(scheme.position[:, 0], scheme.position[:, 1], color=colour, lw=1.4, zorder=4)
+    walls = build_walls(scene)
+    low, high = scene.bounds
+    margin = 0.06 * (high - low)
+    box = np.stack([low - margin, high + margin])
+    matched = match_walls(walls, scheme.map)
+    height = float(scene.agent.position[-1, 2])
+    for row in matched[matched >= 0]:
+        segment = plane_trace(scheme.map.wall_normal[row], scheme.map.wall_offset[row], height, box)
+        if segment is not None:
+            axis.plot(segment[:, 0], segment[:, 1], color=colour, lw=1.4, ls=(0, (5, 3)), zorder=4)
+    columns = landmark_track(scene, scheme).column[-1]
+    rows = [int(np.flatnonzero(scheme.map.ident == scheme.ident[c])[0]) for c in columns if c >= 0]
+    for row in rows:
+        point = scheme.map.position[row]
+        axis.plot(point[0], point[1], "x", color=colour, ms=9, mew=2.2, zorder=6)
+        ring = ellipse(point[:2], scheme.map.covariance[row, :2, :2])
+        axis.plot(ring[:, 0], ring[:, 1], color=colour, lw=1.0, zorder=6)
+    for number, panel in enumerate(
+        scene.panels if len(scene.panels) > 1 else ()
+    ):  # of several: which is held for which
+        row = scheme.map.panel_row(number)
+        if row >= 0:
+            point = scheme.map.position[row]
+            axis.annotate(f"held for {panel.name}", (point[0], point[1]), (-8, -14), textcoords="offset points",
+                          ha="right", fontsize=8, color=colour, zorder=7)  # fmt: skip
+
+
+def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) -> None:
+    """The last stretch of the path, magnified, with the believed 2 sigma ellipse of the last position."""
+    truth, estimate = scene.agent.position[-1, :2], scheme.position[-1, :2]
+    colour = scheme_colour(scheme.scheme)
+    low, high = scene.bounds[:, :2]
+    # The corner of the room that is farthest from everything drawn holds the close-up.
+    busy = np.concatenate([scene.agent.position[:, :2], scene.landmark_positions[:, :2]])
+    side = 0.36 * float(np.min(high - low))
+    corners = [np.array([x, y]) for x in (low[0] + 0.03 * side, high[0] - 1.03 * side)
+               for y in (low[1] + 0.03 * side, high[1] - 1.03 * side)]  # fmt: skip
+    free = [np.min(np.linalg.norm(busy - (corner + 0.5 * side), axis=1)) for corner in corners]
+    x, y = corners[int(np.argmax(free))]
+    inset = axis.inset_axes((float(x), float(y), side, side), transform=axis.transData, zorder=8)
+    inset.plot(*scene.agent.position[:, :2].T, color=TRUTH, lw=4.0, alpha=0.25)
+    inset.plot(*truth, "o", color=TRUTH, ms=5)
+    inset.plot(*scheme.position[:, :2].T, color=colour, lw=1.4)
+    inset.plot(*estimate, "o", color=colour, ms=5)
+    inset.plot(*ellipse(estimate, scheme.covariance[-1, :2, :2]).T, color=colour, lw=1.0)
+    inset.set_xlim(truth[0] - half, truth[0] + half)
+    inset.set_ylim(truth[1] - half, truth[1] + half)
+    inset.set_aspect("equal")
+    inset.set_xticks([])
+    inset.set_yticks([])
+    inset.text(0.5, 0.03, f"end, {100.0 * 2.0 * half:.0f} cm wide", fontsize=8.5, ha="center",
+               transform=inset.transAxes)  # fmt: skip
+    for spine in inset.spines.values():
+        spine.set_visible(True)
+        spine.set_color("#555555")
+    axis.indicate_inset_zoom(inset, edgecolor="#555555")
+
+
+def _legend() -> list[Line2D]:
+    grey = "#555555"
+    return [
+        Line2D([], [], color=WALL, lw=3.0, label="true wall"),
+        Line2D([], [], color=grey, lw=1.4, ls=(0, (5, 3)), label="estimated wall"),
+        Line2D([], [], color=TRUTH, lw=4.0, alpha=0.25, label="true path"),
+        Line2D([], [], color=grey, lw=1.4, label="estimated path"),
+        Line2D([], [], ls="", marker="o", mfc="none", mec=TRUTH, ms=10, label="true scatterer"),
+        Line2D([], [], ls="", marker="s", mfc="none", mec=TRUTH, ms=10, label="true RIS"),
+        Line2D([], [], ls="", marker="x", color=grey, ms=8, mew=2.0, label="estimated landmark, 2σ"),
+    ]

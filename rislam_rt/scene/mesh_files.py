@@ -1,0 +1,41 @@
+"""The mesh files of a scene, each read once."""
+
+from pathlib import Path
+
+import numpy as np
+
+from rislam_rt.scene.mesh_containers import too_many_faces
+from rislam_rt.scene.mesh_placement import UNITS, place_mesh
+from rislam_rt.scene.meshes import MAX_COORDINATE, MAX_MESH_BYTES, Mesh, MeshReader, read_inside
+from rislam_rt.scene.schema import (
+    LimitsSection,
+    MeshesSection,
+    OccluderSection,
+    ReflectorSection,
+    ScattererSection,
+)
+
+
+class MeshFiles:
+    """The mesh files of a scene: each is read once and kept for the digest, and together they have so many faces."""
+
+    def __init__(self, folder: Path, limits: LimitsSection, lying: MeshesSection) -> None:
+        self.folder, self.limits, self.lying = folder, limits, lying
+        self.contents: dict[str, bytes] = {}
+        self.reader = MeshReader()
+        self.faces = 0
+
+    def mesh(self, place: str, section: ReflectorSection | ScattererSection | OccluderSection) -> Mesh:
+        """The mesh `file` or `file#node`, placed as its section says, or else all meshes of the scene."""
+        name, _, node = place.partition("#")
+        if name not in self.contents:
+            self.contents[name] = read_inside(self.folder, name, MAX_MESH_BYTES)
+        most = self.limits.faces
+        up, unit = section.up_axis or self.lying.up, UNITS[section.units or self.lying.units]
+        reach = MAX_COORDINATE / unit
+        mesh = self.reader.parse(self.contents[name], name, node or None, most, self.limits.nodes, reach)
+        self.faces += len(mesh.faces)
+        if self.faces > most:
+            raise too_many_faces(self.faces, most)
+        origin = self.lying.origin if section.origin is None else section.origin
+        return place_mesh(mesh, up, unit, np.array(origin))
