@@ -187,7 +187,7 @@ def go(name: str, folder: Path) -> tuple[list[str], bool]:
     schemes = json.loads((folder / "run.json").read_text())["schemes"] if ran else {}
     error = schemes.get("optimized", {}).get("rmse_m")
     counts = f"{len(scene.reflectors)} / {len(build_walls(scene))}"
-    counts += f" / {sum(len(shade.faces) for shade in scene.shades)}"
+    counts += f" / {sum(len(shade.faces) for shade in scene.occluders)}"
     print("\n".join(f"    {line}" for line in said.splitlines()), flush=True)
     row = [name, counts, *(f"{seconds:.1f}" for seconds in (new, check, compare, run)), str(report["matched"]),
            str(unexplained), f"{100 * error:.1f}" if error is not None else "-"]  # fmt: skip

@@ -51,7 +51,7 @@ def command(
 
     A run's folder holds its measurements, too: with its config.toml they give the run's estimate again.
 
-    Example: rislam-rt slam mine.csv --start 0.5,0.7,0.5 --set radio.noise_psd=1e-12 --set slam.use_vt=true
+    Example: rislam-rt slam mine.csv --start 0.5,0.7,0.5 --set radio.noise_psd=1e-12
 
     Example: rislam-rt slam RUN/measurements_random.nc --config RUN/config.toml --truth RUN/truth.tum
     """
@@ -62,7 +62,8 @@ def command(
     from rislam_rt.pipeline.specification.radio import build_radio
 
     spec = load_spec(config, set_ or ())
-    prior = None if start is None else _prior(start, velocity, spec.start.position_std_m, spec.start.velocity_std_m_s)
+    stds = (spec.start.position_std_m, spec.start.velocity_std_m_s, float(np.deg2rad(spec.start.heading_std_deg)))
+    prior = None if start is None else _prior(start, velocity, stds)
     inputs = read_inputs(measurements, prior, build_radio(spec.radio), _body(tx, rx))
     true = None if truth is None else _true_positions(truth, len(inputs.time))
     folder = _new_folder(out or Path(f"{measurements.stem}-slam"))
@@ -76,14 +77,14 @@ def command(
     write_json(json, summary)
 
 
-def _prior(start: str, velocity: str, position_std: float, velocity_std: float) -> "StartPrior":
+def _prior(start: str, velocity: str, stds: tuple[float, float, float]) -> "StartPrior":
     import numpy as np
 
     from rislam_rt.slam import StartPrior
 
     first, speed = _triple("--start", start), _triple("--velocity", velocity)
     heading = float(np.arctan2(speed[1], speed[0])) if np.hypot(speed[0], speed[1]) > 0.0 else 0.0
-    return StartPrior(first, speed, heading, position_std, velocity_std)
+    return StartPrior(first, speed, heading, *stds)
 
 
 def _body(tx: str | None, rx: str | None) -> "Body | None":

@@ -1,6 +1,9 @@
 """`show --html` and `report --gif`: files that stand alone, and one line for what cannot be."""
 
+import json
 from pathlib import Path
+
+from rislam_rt.storage.seal import seal
 
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
 
@@ -42,3 +45,17 @@ def test_report_writes_a_moving_picture(run, tmp_path):
     assert "moving picture: run.gif" in out
     assert (tmp_path / "run.gif").read_bytes().startswith(b"GIF89a")
     assert (tmp_path / "r" / "report.html").exists()
+
+
+def test_report_of_a_run_with_settings_of_another_version_is_one_line(run, tmp_path):
+    short = ("--set", "channel=image_source", "--set", "cycles=3", "--set", "depth=0", "--set", 'schemes=["random"]')
+    assert run("run", PIPELINE, *short, "--no-report", "--out", "r")[0] == 0
+    marker = tmp_path / "r" / "run.json"
+    about = json.loads(marker.read_text())
+    del about["checksum"], about["schema"]
+    about["config"]["slam"] |= {"num_particles": 1, "gate": 16.3}
+    marker.write_text(json.dumps(seal(about)))
+    code, _, err = run("report", "r")
+    assert code == 2
+    assert "settings that this one does not take (slam.num_particles and 1 more)" in err
+    assert len(err.splitlines()) == 1

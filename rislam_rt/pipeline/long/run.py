@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic import ValidationError
 
 from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.model import Scene, SlamResult
@@ -142,11 +143,13 @@ def read_any(folder: Path) -> LongRun:
     Raises
     ------
     ResultError
-        One of its files is missing, damaged or changed.
+        One of its files is missing, damaged or changed; another version wrote it, with settings that this one lacks.
     ConfigError
         The folder is not a completed run.
     """
     about = read_marker(folder) if (folder / RUN_FILE).is_file() else {}
+    if "config" in about:
+        _check_settings(folder, about["config"])
     if "slices" not in about:
         result = read_run(folder)
         return LongRun(summarise(result), result)
@@ -156,6 +159,19 @@ def read_any(folder: Path) -> LongRun:
     with reading_run(folder):
         scene = replace(load_scene(folder / "scene"), digest=about["scene"]["sha256"])
         return gather_long(folder, scene, about, about["identity"])
+
+
+def _check_settings(folder: Path, config: Mapping[str, Any]) -> None:
+    """Whether this version knows the settings that the run was made with: its bounds are worked out from them."""
+    try:
+        PipelineSpec.model_validate(dict(config))
+    except ValidationError as error:
+        strange = ".".join(str(part) for part in error.errors()[0]["loc"])
+        more = f" and {error.error_count() - 1} more" if error.error_count() > 1 else ""
+        raise ResultError(
+            f"{folder}: made by another version of the program, with settings that this one does not take ({strange}"
+            f"{more}); report it with that version, or run again with another --out"
+        ) from None
 
 
 def _complete(store: RunFolder, scene: Scene, found: LongRun, about: Mapping[str, Any]) -> None:

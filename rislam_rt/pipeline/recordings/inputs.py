@@ -57,7 +57,7 @@ class Inputs(NamedTuple):
     time: Floats
     """(K,) [s] since the first cycle."""
     heading: Floats
-    """(K,) [rad], of the compass."""
+    """(K,) [rad], of the compass; NaN without one."""
     measurements: tuple[Measurement, ...]
     """(K,)."""
     codes: tuple[RisCode | None, ...]

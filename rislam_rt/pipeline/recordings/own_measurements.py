@@ -23,7 +23,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
         "s",
         "of the cycle; rows of one time are one cycle, a row without a delay is a cycle in which nothing was heard",
     ),
-    "heading_rad": ("rad", 'compass; may be left out with slam.heading = "velocity"'),
+    "heading_rad": ("rad", 'compass; may be left out with slam.heading = "estimated"'),
     "delay_s": ("s", "of the component, Tx to Rx"),
     "cos_x": ("1", "direction cosine of the arriving ray along the body's x (forward)"),
     "cos_y": ("1", "along the body's y (left); the ray arrives from above"),
@@ -55,7 +55,19 @@ def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator) ->
         From `read_inputs`, `inputs_of` or a recording.
     spec
         Radio, receiver and estimator; the estimator is that of the first of its schemes.
+
+    Raises
+    ------
+    ConfigError
+        No compass told the headings, and the estimator is to take them for known.
     """
+    if np.isnan(inputs.heading).any():
+        if spec.slam.heading == "known":
+            raise ConfigError(
+                "heading_rad: no such column, and slam.heading = 'known' takes it for the compass; add the column, or "
+                "set slam.heading=estimated"
+            )
+        inputs = inputs._replace(heading=np.full(len(inputs.time), inputs.start.heading))
     return replay(inputs, spec.model_dump(), spec.schemes[0], rng=rng)
 
 
@@ -141,6 +153,8 @@ def inputs_of(
         )
     if "heading_rad" in columns:  # the compass shows the first heading, too
         start = replace(start, heading=float(heading[0]))
+    else:
+        heading = np.full(len(cycles), np.nan)
     nothing = (None,) * len(cycles)
     made = Inputs(start, body or Body(), None, cycles - cycles[0], heading, tuple(measurements), nothing)
     return check_inputs(made, place)

@@ -121,6 +121,17 @@ def test_a_cycle_in_which_nothing_is_heard_counts(table: Table, spec: PipelineSp
     assert len(localise(inputs, spec, rng=np.random.default_rng(0)).estimates) == CYCLES + 1
 
 
+def test_without_a_compass_the_heading_has_to_be_estimated(table: Table, spec: PipelineSpec) -> None:
+    """Zeros in its stead would be taken for a compass that shows them: nothing is taken for known that nothing told."""
+    rows = {name: column for name, column in table.items() if name != "heading_rad"}
+    inputs = inputs_of(rows, StartPrior(np.zeros(3), np.zeros(3), 0.3), build_radio(spec.radio))
+    with pytest.raises(ConfigError, match="heading_rad: no such column"):
+        localise(inputs, spec, rng=np.random.default_rng(0))
+    free = spec.model_copy(update={"slam": spec.slam.model_copy(update={"heading": "estimated"})})
+    answers = localise(inputs, free, rng=np.random.default_rng(0))
+    assert answers.estimates[0].heading == pytest.approx(0.3, abs=1e-12)
+
+
 def test_two_cosines_of_no_direction_are_refused(table: Table, spec: PipelineSpec) -> None:
     """0.8 and 0.7: the squares sum to 1.13. Six digits of a ray on the horizon pass."""
     start, rows = StartPrior(np.zeros(3), np.zeros(3), 0.0), len(table["time_s"])
