@@ -1,14 +1,16 @@
 """Connected parts: of a graph, and of a mesh whose triangles share corners."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from rislam_rt.arrays import Floats, Integers
 
 
 def connected(pairs: Integers, count: int) -> Integers:
     """Number (count,) of the group that each belongs to, pairs (P, 2) being joined."""
+    # half a second of imports that a list of settings does without
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
     ones = np.ones(len(pairs), dtype=np.int8)
     graph = coo_matrix((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
