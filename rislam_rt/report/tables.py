@@ -45,7 +45,14 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     rows.append(["association right", *(f"{s['association']['accuracy']:.0%}" for s in schemes)])
     rows.append(["over budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)])
     rows.append(["diverged", *("yes" if s["diverged"] else "no" for s in schemes)])
+    rows.append(["held itself for lost", *(_said(s["outcomes"]) for s in schemes)])
     return rows
+
+
+def _said(outcomes: Mapping[str, int]) -> str:
+    """In how many cycles an estimator said, without the truth, that it had diverged."""
+    cycles = outcomes.get("diverged", 0)
+    return f"in {cycles} of {sum(outcomes.values())} cycles" if cycles else "never"
 
 
 def path_table(paths: Paths) -> list[dict[str, Any]]:
