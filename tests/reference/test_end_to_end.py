@@ -1,4 +1,4 @@
-"""The whole chain on a short stretch of the paper's room, traced: what `make demo` does, forty cycles past the panel."""
+"""The whole chain on a stretch of the paper's room, traced: what `make demo` does, forty cycles past the panel."""
 
 from dataclasses import replace
 from pathlib import Path

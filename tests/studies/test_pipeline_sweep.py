@@ -104,6 +104,8 @@ def test_a_cell_is_the_run_of_its_seed(swept):
     score = summarise(result)["schemes"]["random"]
     assert row.result["schemes"]["random"]["rmse_m"] == score["rmse_m"]
     assert row.result["schemes"]["random"]["walls"] == score["walls"]
+    # at the start it is the start's own deviation: 0.01 m an axis, of which wall returns take nothing
+    assert score["bound_m"] == pytest.approx(np.sqrt(2.0) * 0.01, rel=1e-2)
 
 
 def test_what_the_clock_says_stays_out_of_the_cells(swept):

@@ -240,7 +240,7 @@ def test_a_delay_at_the_edge_of_the_window_passes(table: Table, spec: PipelineSp
 def test_a_start_told_wrong_is_said_where_nobody_knows_the_truth(
     table: Table, recorded: tuple[Inputs, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A speed wrong by 1 m/s, in measurements of a second: on the screen and in the table of cycles; told right, not."""
+    """A speed wrong by 1 m/s, in a second's measurements: on the screen and in the table of cycles; told right, not."""
     inputs, _ = recorded
     file, rows = tmp_path / "mine.csv", sum(time < inputs.time[10] for time in table["time_s"])
     with file.open("w", newline="") as lines:
@@ -252,7 +252,7 @@ def test_a_start_told_wrong_is_said_where_nobody_knows_the_truth(
         for value in (inputs.start.position, inputs.body.tx_offset, inputs.body.rx_offset)
     )
     for off in (0.0, 1.0):
-        speed = inputs.start.velocity + [off, 0.0, 0.0]
+        speed = inputs.start.velocity + off * np.eye(3)[0]
         command(
             file, find_pipeline("trace_then_slam"), set_=CHANGES, start=start, tx=tx, rx=rx,
             velocity=",".join(map(repr, map(float, speed))), out=tmp_path / f"out{off}",
