@@ -68,6 +68,10 @@ MUTANTS = (
         "        return StepOutcome.DIVERGED\n", "        return StepOutcome.OK\n",
     ),
     Mutant(
+        "no run counts as lost", "pipeline/scores/summary.py",
+        "    return bool((errors > least).any())", "    return bool((errors > np.inf * least).any())",
+    ),
+    Mutant(
         "every second birth of a wrong kind", "slam/window/births/births.py",
         "    landmarks = enter(context.landmarks, verdict.is_wall,",
         "    landmarks = enter(context.landmarks, verdict.is_wall != bool(new % 2),",
@@ -117,7 +121,7 @@ MUTANTS = (
     Mutant(
         "another room is the same run", "pipeline/store/identity.py",
         '            "scene": {"name": scene.name, "sha256": scene.digest},',
-        '            "scene": {"name": scene.name},',
+        '            "scene": {"name": scene.name, "sha256": ""},',
     ),
 )  # fmt: skip
 
