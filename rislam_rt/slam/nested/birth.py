@@ -26,14 +26,13 @@ from rislam_rt.slam.nested.hypotheses import (
     fit_floor,
     fit_reciprocal,
     initial_value,
-    panel_surplus,
     plausible,
     slack_of_height,
 )
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, enter
 from rislam_rt.slam.nested.mirrors import is_behind_mirror, mirror_images
 from rislam_rt.slam.nested.moments import Moments
-from rislam_rt.slam.nested.tracks import LandmarkTracks, overstatement
+from rislam_rt.slam.nested.tracks import LandmarkTracks, overstatement, panel_surplus
 from rislam_rt.slam.observations import PANEL, UNTOLD, same_side
 from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe
 
@@ -62,8 +61,7 @@ class BirthDecision(NamedTuple):
     parent: int
     """Feature row of the point, -1 without one."""
     fit: Fit
-    upright: bool = False
-    """Whether a wall is taken to be upright, as its returns do not tell."""
+    upright: bool = False  # of a wall, as its returns do not tell
 
 
 class BirthContext(NamedTuple):

@@ -26,8 +26,6 @@ CONVERGED = 1e-3
 """Length [m] of a step after which a fit has settled."""
 TAIL = 4.0
 """Degrees of freedom of Student's t: paths that nobody expected, in the same cell, make the errors' tails heavy."""
-MAX_PANEL_ODDS = 8.0
-"""Log odds of panel against scatterer that count most for a point: amplitudes alone do not make one."""
 COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(TAIL + 3) log(1 + chi^2 / TAIL)` for chi^2 with 3 degrees of freedom."""
 HELD = 1e-3
@@ -68,7 +66,7 @@ class History(NamedTuple):
     """(6, D) square root of the covariance of today's position and velocity, through which all poses err together;
     no columns where the poses are taken as certain."""
     panel: float = 0.0
-    """By how much chi^2 its amplitudes speak for a point (see `panel_surplus`)."""
+    """By how much chi^2 its amplitudes speak for a point (see `tracks.panel_surplus`)."""
     side: int = UNTOLD
     """Whether it runs over the panel (see `tracks.Observations`)."""
 
@@ -311,11 +309,3 @@ def _features(feature: Floats, parent: Floats | None) -> Floats:
     known = np.empty((*feature.shape[:-1], 1, 2, 3))
     known[..., 0, 0, :], known[..., 0, 1, :] = feature, parent
     return known
-
-
-def panel_surplus(log_ris: float) -> float:
-    """What amplitudes tell for a point, as chi^2: it may be the panel or a scatterer, an image is the latter alone.
-
-    Before a panel is known, that is: its own images change with the code as well.
-    """
-    return 2.0 * float(np.logaddexp(0.0, min(log_ris, MAX_PANEL_ODDS)) - np.log(2.0))
