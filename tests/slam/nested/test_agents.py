@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import chi2
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.slam.nested.config import NestedConfig
 from rislam_rt.slam.nested.particles import agents
+from rislam_rt.slam.nested.particles.config import NestedConfig
 from rislam_rt.slam.nested.particles.kld_sampling import kld_count, num_agents, num_points, occupied_cells
 
 

@@ -6,11 +6,11 @@ from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.birth import Birth
-from rislam_rt.slam.nested.config import NestedConfig
 from rislam_rt.slam.nested.hypotheses import POINT
 from rislam_rt.slam.nested.particles.belief import Nested, absorb, mean_covariances, renew
 from rislam_rt.slam.nested.particles.belief import initialise_landmark as place
 from rislam_rt.slam.nested.particles.cloud import CloudEngine
+from rislam_rt.slam.nested.particles.config import NestedConfig
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, trace_sightline
 from rislam_rt.slam.nested.particles.update import FLOOR, trusted
 from rislam_rt.slam.returns import Returns, linearise

@@ -3,10 +3,10 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.nested.config import NestedConfig
 from rislam_rt.slam.nested.particles import agents
 from rislam_rt.slam.nested.particles.belief import Nested, absorb, initialise_landmark
 from rislam_rt.slam.nested.particles.cloud import LEAST_STD, CloudEngine
+from rislam_rt.slam.nested.particles.config import NestedConfig
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline
 
 SEED = 7
