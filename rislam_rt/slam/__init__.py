@@ -2,7 +2,7 @@
 
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.estimator import estimate, init, predict, revisit, smoothed, step
-from rislam_rt.slam.nested.particles.config import NestedConfig
+from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import StepInfo, StepOutcome
 

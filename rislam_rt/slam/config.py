@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
-from rislam_rt.slam.nested.particles.config import NestedConfig
+from rislam_rt.slam.nested_config import NestedConfig
 
 FILTERS = ("window", "nested")
 """Filters with the same inputs and outputs."""

@@ -31,7 +31,7 @@ from rislam_rt.slam.nested.hypotheses import (
 )
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, enter
 from rislam_rt.slam.nested.mirrors import is_behind_mirror, mirror_images
-from rislam_rt.slam.nested.particles.moments import Moments
+from rislam_rt.slam.nested.moments import Moments
 from rislam_rt.slam.nested.tracks import LandmarkTracks, overstatement, panel_surplus
 from rislam_rt.slam.observations import PANEL, UNTOLD, same_side
 from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe

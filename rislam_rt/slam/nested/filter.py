@@ -17,8 +17,8 @@ from rislam_rt.slam.nested.divergence_monitor import DivergenceMonitor, check
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, empty_table, remove
 from rislam_rt.slam.nested.landmark_update import Hits, learn
 from rislam_rt.slam.nested.measurement_prediction import MapBelief, detection_share, expected_returns
+from rislam_rt.slam.nested.moments import POSE, Moments
 from rislam_rt.slam.nested.particles import operations
-from rislam_rt.slam.nested.particles.moments import POSE, Moments
 from rislam_rt.slam.nested.particles.operations import ParticleUpdate, PointParticles
 from rislam_rt.slam.nested.prune import keepers
 from rislam_rt.slam.nested.ris_candidate import weigh_tracks

@@ -15,7 +15,7 @@ from rislam_rt.slam.nested.landmark_table import LandmarkTable
 from rislam_rt.slam.nested.landmark_update import TOLD
 from rislam_rt.slam.nested.measurement_prediction import MapBelief
 from rislam_rt.slam.nested.mirrors import is_behind_mirror, mirror_images
-from rislam_rt.slam.nested.particles.moments import Moments
+from rislam_rt.slam.nested.moments import Moments
 from rislam_rt.slam.nested.tracks import LandmarkTracks
 from rislam_rt.slam.observations import PANEL, UNTOLD
 from rislam_rt.slam.ris_candidate import DEEP, DISMISSAL, PATIENCE, places

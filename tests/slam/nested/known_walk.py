@@ -10,8 +10,8 @@ from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.birth import Birth, BirthDecision
 from rislam_rt.slam.nested.hypotheses import IMAGE, POINT, History, fit_feature, initial_value
+from rislam_rt.slam.nested.moments import Moments
 from rislam_rt.slam.nested.particles import operations
-from rislam_rt.slam.nested.particles.moments import Moments
 from rislam_rt.slam.returns import NONE, Returns, observe
 
 BODY = Body(np.array([-0.04388, -0.02397, 0.0]), np.array([0.04388, 0.02397, 0.0]))

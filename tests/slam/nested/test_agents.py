@@ -6,8 +6,8 @@ from scipy.stats import chi2
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.slam.nested.particles import agents
-from rislam_rt.slam.nested.particles.config import NestedConfig
 from rislam_rt.slam.nested.particles.kld_sampling import kld_count, num_agents, num_points, occupied_cells
+from rislam_rt.slam.nested_config import NestedConfig
 
 
 def weighted(rng: np.random.Generator, count: int = 300) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,7 @@ from rislam_rt.slam.nested.landmark_table import LandmarkTable, empty_table, ent
 from rislam_rt.slam.nested.landmark_update import Hits, learn
 from rislam_rt.slam.nested.mapping import WALL_HITS, build_map
 from rislam_rt.slam.nested.measurement_prediction import MapBelief, detection_share, expected_returns
-from rislam_rt.slam.nested.particles.moments import POSE, Moments
+from rislam_rt.slam.nested.moments import POSE, Moments
 from rislam_rt.slam.nested.prune import keepers
 from rislam_rt.slam.nested.tracks import no_tracks
 from rislam_rt.slam.observations import Observations

@@ -8,7 +8,7 @@ from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.landmark_table import empty_table
 from rislam_rt.slam.nested.measurement_prediction import MapBelief
-from rislam_rt.slam.nested.particles.moments import POSE, Moments
+from rislam_rt.slam.nested.moments import POSE, Moments
 from rislam_rt.slam.nested.ris_candidate import find_panel_candidate, weigh_tracks
 from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, no_tracks
 from rislam_rt.slam.observations import Observations

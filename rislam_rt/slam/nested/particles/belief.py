@@ -7,12 +7,12 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
+from rislam_rt.slam.nested.moments import POSE, Moments, normalised, where
 from rislam_rt.slam.nested.particles import agents
 from rislam_rt.slam.nested.particles.cloud import HOPELESS, Cloud, CloudEngine, Kernel, kernel_width
-from rislam_rt.slam.nested.particles.config import NestedConfig
 from rislam_rt.slam.nested.particles.kld_sampling import num_agents, num_points
-from rislam_rt.slam.nested.particles.moments import POSE, Moments, normalised, where
 from rislam_rt.slam.nested.particles.sightline import Sighting, pack
+from rislam_rt.slam.nested_config import NestedConfig
 
 PRIMES = (7919, 5003, 3001, 1009, 409, 211, 101, 53, 29, 13, 7, 5, 3)
 """Strides of the permutations; one that does not divide M is taken."""

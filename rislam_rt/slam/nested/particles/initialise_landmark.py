@@ -10,9 +10,9 @@ from rislam_rt.slam.nested.hypotheses import POINT
 from rislam_rt.slam.nested.particles.belief import Nested, absorb, mean_covariances, renew
 from rislam_rt.slam.nested.particles.belief import initialise_landmark as place
 from rislam_rt.slam.nested.particles.cloud import CloudEngine
-from rislam_rt.slam.nested.particles.config import NestedConfig
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, trace_sightline
 from rislam_rt.slam.nested.particles.update import FLOOR, trusted
+from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.returns import Returns, linearise
 
 ITERATIONS = 4

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.nested.particles.config import NestedConfig
+from rislam_rt.slam.nested_config import NestedConfig
 
 KLD_ERROR = 0.05
 """Largest Kullback-Leibler distance between the particles and what they stand for."""

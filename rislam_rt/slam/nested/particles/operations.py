@@ -8,16 +8,16 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested.birth import Birth
+from rislam_rt.slam.nested.moments import Moments
 from rislam_rt.slam.nested.particles import belief
 from rislam_rt.slam.nested.particles import initialise_landmark as history
 from rislam_rt.slam.nested.particles.backend import pick_engine
 from rislam_rt.slam.nested.particles.belief import Nested
 from rislam_rt.slam.nested.particles.cloud import CloudEngine
-from rislam_rt.slam.nested.particles.config import NestedConfig
-from rislam_rt.slam.nested.particles.moments import Moments
 from rislam_rt.slam.nested.particles.prior_map import set_prior_map as place_known
 from rislam_rt.slam.nested.particles.update import FLOOR, Seen, look, trusted, whitened
 from rislam_rt.slam.nested.particles.update import update as absorb_all
+from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.returns import Returns
 from rislam_rt.slam.start_prior import StartPrior
 

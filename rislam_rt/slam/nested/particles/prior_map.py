@@ -6,8 +6,8 @@ from rislam_rt.arrays import Floats
 from rislam_rt.slam.nested.particles import agents
 from rislam_rt.slam.nested.particles.belief import Nested, absorb, initialise_landmark
 from rislam_rt.slam.nested.particles.cloud import LEAST_STD, CloudEngine
-from rislam_rt.slam.nested.particles.config import NestedConfig
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline
+from rislam_rt.slam.nested_config import NestedConfig
 
 SEED = 7
 """Of the draws that spread a given map over the agent particles: the map is data, and the same each time."""

@@ -7,11 +7,11 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.nested.moments import POSE, Moments
 from rislam_rt.slam.nested.particles.belief import Nested, absorb, gaussian, mean_covariances
 from rislam_rt.slam.nested.particles.cloud import CloudEngine
-from rislam_rt.slam.nested.particles.config import NestedConfig
-from rislam_rt.slam.nested.particles.moments import POSE, Moments
 from rislam_rt.slam.nested.particles.sightline import Sighting, trace_sightline
+from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.returns import NONE, Returns, linearise
 
 TAIL = 4.0
