@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rislam_rt.cli.options import JsonFile, write_json
+from rislam_rt.cli.output_files import OUTPUT
 
 if TYPE_CHECKING:
     from rislam_rt.model import SlamResult
@@ -16,8 +17,11 @@ def command(
     rerun: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write a recording for the Rerun viewer (.rrd); needs the extra `viz`."),
+        OUTPUT,
     ] = None,
-    gif: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a moving picture of the run (.gif).")] = None,
+    gif: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a moving picture of the run (.gif)."), OUTPUT
+    ] = None,
     json: JsonFile = None,
 ) -> None:
     """Score a completed run again and draw its figures and page, which holds a map with a slider over the time.
