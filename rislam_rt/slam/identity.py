@@ -8,7 +8,7 @@ in which a landmark does not show count too: of a path near the threshold only t
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.model import RadioConfig
 from rislam_rt.ris.path_gain import point_amplitude
 
@@ -137,6 +137,21 @@ def panel_probabilities(log_ris: Floats) -> Floats:
         rest = np.logaddexp.reduce([before[:-1, a] + after[1:, b] for a, b in apart], axis=0)
         probability[:, panel] = np.exp(table[:, panel] + rest - total)
     return probability.reshape(log_ris.shape)
+
+
+def ris_probabilities(log_ris: Floats, points: Integers) -> Floats:
+    """(F, Q) of being each panel, from log odds (F, Q); 0 but for the rows `points`."""
+    probability = np.zeros(log_ris.shape)
+    probability[points] = panel_probabilities(log_ris[points])
+    return probability
+
+
+def panel_rows(probability: Floats) -> tuple[int, ...]:
+    """(Q,) row of the landmark held for each panel (probability (F, Q) above one half), -1 where none is."""
+    if not len(probability):
+        return (-1,) * probability.shape[1]
+    rows = np.argmax(probability, axis=0)
+    return tuple(int(row) if probability[row, panel] > 0.5 else -1 for panel, row in enumerate(rows))
 
 
 def _log_ways(table: Floats) -> Floats:

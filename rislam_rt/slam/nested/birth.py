@@ -152,9 +152,9 @@ def examine(
         moments.features, table, moments.position, predicted, mirror_images(tracks, moments, table, past.body), config
     )
     moving = tracks.moving.copy()
-    doubt = square_root(moments.covariance[:6, :6])
+    uncertainty = square_root(moments.covariance[:6, :6])
     for row in due:
-        history, slots = track_history(tracks, row, past, doubt, free_space, threshold)
+        history, slots = track_history(tracks, row, past, uncertainty, free_space, threshold)
         if is_explained(tracks, row, history, scene):
             continue
         unknown = [panel for panel, holder in enumerate(table.holders) if holder < 0]
@@ -175,11 +175,11 @@ def examine(
 
 
 def track_history(
-    tracks: LandmarkTracks, row: int, past: Past, doubt: Floats, free_space: float, threshold: float
+    tracks: LandmarkTracks, row: int, past: Past, uncertainty: Floats, free_space: float, threshold: float
 ) -> tuple[History, Integers]:
     """A track's measurements with the mean believed poses, and the rows of the past that they belong to.
 
-    `doubt` (6, D) is the square root of the pose's covariance, `free_space` the log amplitude after 1 m.
+    `pose_uncertainty` (6, D) is the square root of the pose's covariance, `free_space` the log amplitude after 1 m.
     """
     rows = (tracks.cycle[row] >= 0).nonzero()[0]
     poses = poses_of(past.position[rows], past.heading[rows], past.body)
@@ -187,7 +187,7 @@ def track_history(
     ratio = float(tracks.log_amplitude[row] - free_space + np.log(tracks.mean[row, 0, 0]))
     faint = overstatement(tracks, past.cycle, threshold)[row]
     seen, std = tracks.seen[row, rows], tracks.std[row, rows] * faint
-    return History(seen, std, poses, lag, ratio, doubt, side=int(tracks.side[row])), rows
+    return History(seen, std, poses, lag, ratio, uncertainty, side=int(tracks.side[row])), rows
 
 
 def is_explained(tracks: LandmarkTracks, row: int, history: History, scene: BirthContext) -> bool:

@@ -105,7 +105,7 @@ def _sightings(
     poses = poses_of(belief.position, belief.heading, seen.body)
     features = belief.mean.copy()
     features[:, owner] = belief.centre[:, owner]
-    doubt = _uncertainties(belief, owner, seen)
+    uncertainty = _uncertainties(belief, owner, seen)
     found = []
     for row in rows:
         lines = tuple(
@@ -113,7 +113,7 @@ def _sightings(
         )
         common = np.array([config.common_length_std, *[config.common_cosine_std] * 2]) ** 2
         variance = seen.noise[row] if config.weighting == "crlb" else common
-        covariance = np.diag(variance) + doubt[row]
+        covariance = np.diag(variance) + uncertainty[row]
         power = float(rho[row]) if config.weighting == "power" else 1.0
         factor = float(np.log(rho[row])) if config.weighting == "paper" else 0.0
         found.append(Sighting(lines, seen.seen[row], covariance, power, factor))
