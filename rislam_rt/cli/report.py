@@ -38,7 +38,7 @@ def command(
         raise ConfigError(f"--gif: '{gif}' received; give a name that ends in .gif")
     summary, result = read_any(run)
     if rerun is not None:
-        from rislam_rt.report.rerun_recording import recording_bytes
+        from rislam_rt.report.exports.rerun_recording import recording_bytes
         from rislam_rt.storage.files import write_atomic
 
         write_atomic(rerun, recording_bytes(result, run.resolve().name))
@@ -54,7 +54,7 @@ def command(
 
 def _write_gif(result: "SlamResult", file: Path) -> Path:
     from rislam_rt.cli.progress import show_progress
-    from rislam_rt.report.animation import gif_bytes
+    from rislam_rt.report.exports.animation import gif_bytes
     from rislam_rt.storage.files import write_atomic
 
     with show_progress() as tell:

@@ -67,7 +67,7 @@ def command(
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.signals import load_signals_spec, signal_settings
     from rislam_rt.pipeline.specification.read import load_radio
-    from rislam_rt.report.deepmimo import deepmimo_files
+    from rislam_rt.report.exports.deepmimo import deepmimo_files
     from rislam_rt.report.tables import path_table, print_paths
     from rislam_rt.scene.file_names import safe_name
     from rislam_rt.scene.write import write_files
@@ -108,7 +108,7 @@ def check_new(folder: Path) -> None:
         It is there already, or has a name that the package cannot load.
     """
     from rislam_rt.errors import ConfigError
-    from rislam_rt.report.deepmimo import check_name
+    from rislam_rt.report.exports.deepmimo import check_name
 
     check_name(folder.name)
     if folder.exists():
