@@ -15,7 +15,6 @@ from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.births import births
-from rislam_rt.slam.window.births.context import Context
 from rislam_rt.slam.window.births.feature_removal import condemned, release
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes
 from rislam_rt.slam.window.divergence import divergence_monitor, recovery
@@ -132,22 +131,11 @@ def _grown(
     state: WindowState, left: Residuals, expected: ExpectedComponents, groups: UnresolvedClusters
 ) -> WindowState:
     """With what the evidence has turned against taken back, or else with what is born."""
-    context = Context(
-        state.window, state.landmarks, state.log, state.tracks, state.heading, state.scene, state.cycle,
-        state.visibility,
-        state.codes,
-    )  # fmt: skip
+    fresh = True
     if state.cycle % REFRESH == 0 and len(state.landmarks.ident):
-        gone = condemned(context.landmarks, left, context.log, expected, window_gaussian.now(context.window)[1])
-        context, fresh = release(context, ~gone), not gone.any()
-    else:
-        fresh = True
-    if fresh:
-        context = births(context, expected, groups)
-    return state._replace(
-        window=context.window, landmarks=context.landmarks, log=context.log, tracks=context.tracks,
-        visibility=context.visibility
-    )  # fmt: skip
+        gone = condemned(state.landmarks, left, state.log, expected, window_gaussian.now(state.window)[1])
+        state, fresh = release(state, ~gone), not gone.any()
+    return births(state, expected, groups) if fresh else state
 
 
 def _move(state: WindowState, dt: float, heading: float) -> WindowState:
