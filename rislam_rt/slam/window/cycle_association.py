@@ -113,12 +113,11 @@ def _associate(
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), 0.0, 1.0
     lead, mate = groups.leader, groups.partner
     share = groups.share[:, None]
-    gap = np.where(mate[:, None] >= 0, expected.seen[mate] - expected.seen[lead], 0.0)
-    seen = expected.seen[lead] + share * gap
+    seen = expected.seen[lead] + share * groups.gap
     jacobian = expected.jacobian[lead] + share[..., None] * (expected.jacobian[mate] - expected.jacobian[lead])
     spread = (jacobian.reshape(-1, jacobian.shape[-1]) @ covariance).reshape(jacobian.shape)
     spread = spread @ np.swapaxes(jacobian, 1, 2)
-    extra = groups.disturbance + groups.share_variance[:, None] * gap**2
+    extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
     extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(observed.std, axis=0) ** 2
     spread[:, [0, 1, 2], [0, 1, 2]] += extra
     odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))

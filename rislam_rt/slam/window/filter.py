@@ -26,6 +26,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     UnresolvedClusters,
     conditioned_share,
 )
+from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import DAMPING, REFRESH
@@ -255,14 +256,11 @@ def _explain(
     at = len(log.cycle) - count + pick
     lead, mate = groups.leader[row], groups.partner[row]
     share, variance = conditioned_share(groups, expected, row, log.log_amplitude[at], log.log_amplitude_std[at])
-    form, shares, extra = log.form.copy(), log.share.copy(), log.extra.copy()
-    form[at, 0] = idents(landmarks, expected.forms[lead])
-    both = mate >= 0
-    form[at[both], 1] = idents(landmarks, expected.forms[mate[both]])
-    gap = np.where(both[:, None], expected.seen[mate] - expected.seen[lead], 0.0)
-    shares[at], extra[at] = np.where(both, share, 0.0), groups.disturbance[row] + variance[:, None] * gap**2
-    extra[at] += CONSTANTS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
-    return log._replace(form=form, share=shares, extra=extra)
+    both = (mate >= 0)[:, None]
+    forms = np.stack([expected.forms[lead], np.where(both, expected.forms[mate], UNKNOWN)], axis=1)
+    extra = groups.disturbance[row] + variance[:, None] * groups.gap[row] ** 2
+    extra += CONSTANTS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
+    return log.explain(at, idents(landmarks, forms), np.where(both[:, 0], share, 0.0), extra)
 
 
 def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:
