@@ -70,13 +70,6 @@ def normalised(log_weight: Floats) -> tuple[Floats, float]:
     return log_weight - total, total
 
 
-def systematic_ancestors(log_weight: Floats, count: int, *, rng: np.random.Generator) -> Integers:
-    """Ancestors (count,) by systematic resampling: particle i is drawn `count w_i` times on average, unbiased."""
-    edges = np.cumsum(np.exp(log_weight))
-    comb = (np.arange(count) + rng.random()) / count * edges[-1]
-    return np.minimum(np.searchsorted(edges, comb, side="right"), len(log_weight) - 1)
-
-
 def square_root(covariance: Floats) -> Floats:
     """A factor (D, K) with `factor @ factor.T = covariance`, null directions left out."""
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
