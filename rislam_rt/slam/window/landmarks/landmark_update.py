@@ -70,7 +70,7 @@ def seed(
 def _joined(visibility: VisibilityObservations, fresh: tuple[Integers, Floats, Floats]) -> VisibilityObservations:
     every = [np.concatenate(pair) for pair in zip(visibility, fresh, strict=True)]
     order = np.argsort(every[0], kind="stable")
-    return VisibilityObservations(*(field[order] for field in every))
+    return VisibilityObservations._make(field[order] for field in every)
 
 
 def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Floats) -> Floats:
@@ -103,7 +103,7 @@ def learn(
     landmarks = _strengths(landmarks, window, expected, groups, row, pick, observed, poses, scene, code)
     fresh = pack(expected.forms, landmarks)
     keep = ~np.isin(visibility.code, fresh)
-    kept = VisibilityObservations(*(field[keep] for field in visibility))
+    kept = VisibilityObservations._make(field[keep] for field in visibility)
     return _joined(kept, (fresh, after, scatter)), landmarks
 
 
