@@ -7,7 +7,6 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.returns import AXES, NONE, TX
-from rislam_rt.slam.window.births.context import Context
 from rislam_rt.slam.window.births.hypotheses import (
     BESIDE,
     IMAGE,
@@ -31,6 +30,7 @@ from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, un
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors, no_holds
+from rislam_rt.slam.window.state import WindowState
 
 LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 0.2]))
 """Log prior of each kind; over known walls, of all walls together; of known points in walls, of all points together."""
@@ -90,7 +90,7 @@ _TEMPLATES = (
 
 
 def judge(
-    context: Context, ats: list[Integers], digest: TrackSummary, known: KnownFeatures,
+    context: WindowState, ats: list[Integers], digest: TrackSummary, known: KnownFeatures,
     told: list[tuple[int, float, int]],
     lonely: Floats, beside: Floats,
 ) -> tuple[list[TrackDecision], Floats]:  # fmt: skip
@@ -282,10 +282,10 @@ def _image_amplitudes(
     track, point = table.trials.track[rows], table.known[rows]
     first = np.maximum(np.linalg.norm(table.trials.shift[rows, 0] - digest.mean[1][track], axis=1), 0.05)
     unit = point_amplitude(np.ones(len(rows)), first, np.maximum(digest.mean[0][track, 0] - first, 0.05), scene.radio)
-    strength, doubt = (field[point] for field in landmarks.log_strength)
+    strength, uncertainty = (field[point] for field in landmarks.log_strength)
     mean, variance = (
         np.log(unit) + strength + CONSTANTS.wall_ratio,
-        doubt**2 + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2,
+        uncertainty**2 + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2,
     )
     off = np.where(np.isin(point, landmarks.panels), 0.0, digest.log_amplitude[track] - mean)
     return np.asarray(-0.5 * off**2 / variance - 0.5 * np.log(variance))

@@ -12,6 +12,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import PANEL
+from rislam_rt.slam.ris_candidate import rays
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import POINTS
@@ -35,7 +36,7 @@ class TrackSummary(NamedTuple):
     """(T, B, 3) [m]."""
     rx: Floats
     """(T, B, 3) [m]."""
-    doubt: Floats
+    uncertainty: Floats
     """(T, B, 3, 6) square root of the covariance of the poses' common errors of place and velocity."""
     log_amplitude: Floats
     """(T,) mean."""
@@ -44,7 +45,7 @@ class TrackSummary(NamedTuple):
     middle: Floats
     """(3,) where the agent is now: the anchor of new walls."""
     speed: float
-    """[m/s] of the agent, and something for its doubt."""
+    """[m/s] of the agent, and something for its uncertainty."""
     twist: Floats
     """(T, B, 3, H) square root of the covariance with which the heading's error moves what is seen; H = 0 if known."""
 
@@ -59,10 +60,7 @@ class TrackSummary(NamedTuple):
     @property
     def direction(self) -> Floats:
         """(T, 3) mean directions of arrival in the room's axes."""
-        flat = self.mean[0][:, 1:]
-        flat = flat / np.maximum(1.0, np.linalg.norm(flat, axis=1))[:, None]
-        up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=1), 0.0))
-        return np.concatenate([flat, up[:, None]], axis=1)
+        return rays(self.mean[0], 0.0)
 
 
 def summarise_tracks(
@@ -110,7 +108,7 @@ def summarise_tracks(
     root = np.linalg.cholesky(covariance[:6, :6] + np.diag(1e-6 * scale + 1e-14))
     across = np.stack([0.0 * found.seen[..., 0], found.seen[..., 2], -found.seen[..., 1]], axis=-1)
     found = found._replace(twist=across[..., None] * turned[:, :, None])
-    return found._replace(doubt=np.asarray(root[:3] + found.time[..., None, None] * root[3:6], dtype=np.float64))
+    return found._replace(uncertainty=np.asarray(root[:3] + found.time[..., None, None] * root[3:6], dtype=np.float64))
 
 
 def heading_roots(window: Window) -> Floats:
