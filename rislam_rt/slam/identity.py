@@ -8,7 +8,7 @@ in which a landmark does not show count too: of a path near the threshold only t
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.model import RadioConfig
 from rislam_rt.ris.path_gain import point_amplitude
 
@@ -18,12 +18,8 @@ MODEL_ERROR = 0.05
 """Relative error of predicted amplitudes: geometry, and what the amplitude law leaves out."""
 DOUBT = 4.0
 """Largest log-likelihood ratio that one cycle may add, so that one freak amplitude decides nothing."""
-TOLD = 2.0
-"""Log-likelihood ratio for the panel of a component that only the panel's paths can cause: it may come over walls."""
 SHOWN = 0.9
 """Probability that a path above the threshold is reported at all: others may shade it or merge with it."""
-MAX_PANEL_ODDS = 8.0
-"""Log odds of panel against scatterer that count most for a point: amplitudes alone do not make one."""
 BLOCKED = 0.02
 """Probability that in a cycle something comes to stand in the way of a path; it stays until the path shows again."""
 BEYOND = 8.0
@@ -110,14 +106,6 @@ def weigh_silence(hidden: Floats, missed: Floats) -> tuple[Floats, Floats]:
     return before / silence, np.clip(surplus, -DOUBT, DOUBT)
 
 
-def panel_surplus(log_ris: float) -> float:
-    """What amplitudes tell for a point, as chi^2: it may be the panel or a scatterer, an image is the latter alone.
-
-    Before a panel is known, that is: its own images change with the code as well.
-    """
-    return 2.0 * float(np.logaddexp(0.0, min(log_ris, MAX_PANEL_ODDS)) - np.log(2.0))
-
-
 def panel_probabilities(log_ris: Floats) -> Floats:
     """Probability of each of P points of being each panel, from log odds (P, Q) against scatterer; for one (P,) alike.
 
@@ -137,6 +125,21 @@ def panel_probabilities(log_ris: Floats) -> Floats:
         rest = np.logaddexp.reduce([before[:-1, a] + after[1:, b] for a, b in apart], axis=0)
         probability[:, panel] = np.exp(table[:, panel] + rest - total)
     return probability.reshape(log_ris.shape)
+
+
+def ris_probabilities(log_ris: Floats, points: Integers) -> Floats:
+    """(F, Q) of being each panel, from log odds (F, Q); 0 but for the rows `points`."""
+    probability = np.zeros(log_ris.shape)
+    probability[points] = panel_probabilities(log_ris[points])
+    return probability
+
+
+def panel_rows(probability: Floats) -> tuple[int, ...]:
+    """(Q,) row of the landmark held for each panel (probability (F, Q) above one half), -1 where none is."""
+    if not len(probability):
+        return (-1,) * probability.shape[1]
+    rows = np.argmax(probability, axis=0)
+    return tuple(int(row) if probability[row, panel] > 0.5 else -1 for panel, row in enumerate(rows))
 
 
 def _log_ways(table: Floats) -> Floats:

@@ -182,9 +182,9 @@ def test_labels_are_idents_of_the_map(clear: tuple[Heard, Course]) -> None:
 
 
 def motion_prior(level: float) -> float:
-    """Variance of the first step's acceleration, of a liveliness told to be `level`: of the mixture of all gaits."""
-    gait = model.first_motion_mode(level) @ model.transition(CONSTANTS.stay)
-    return float(model.expected_variance(gait))
+    """Variance of the first step's acceleration, of a liveliness told to be `level`: of the mixture of all modes."""
+    motion_mode = model.first_motion_mode(level) @ model.transition(CONSTANTS.stay)
+    return float(model.expected_variance(motion_mode))
 
 
 def test_prediction_is_the_belief_without_a_measurement(clear: tuple[Heard, Course]) -> None:
@@ -196,7 +196,7 @@ def test_prediction_is_the_belief_without_a_measurement(clear: tuple[Heard, Cour
     after, info = step(state, none, None, 0.5, 0.0, CONFIG, rng=rng)
     belief = estimate(after, CONFIG)
     np.testing.assert_allclose(belief.position, heard.start.position + 0.5 * heard.start.velocity, atol=1e-12)
-    # the calm gait moves the estimate, and what a lively one adds is carried beside it: the variance of both together
+    # the calm mode moves the estimate, and what a lively one adds is carried beside it: the variance of both together
     push = [motion_prior(level) for level in (CONFIG.sigma_a, 0.0)]
     want = 0.01**2 + 0.5**2 * 0.01**2 + (0.5 * 0.5**2) ** 2 * push[0]
     height = (0.5 * 0.5**2) ** 2 * push[1]

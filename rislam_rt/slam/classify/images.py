@@ -27,7 +27,7 @@ class Image(NamedTuple):
     """The best parents of T tracks."""
 
     misfit: Floats
-    """(T,) squared distance in standard deviations, doubts about the parents added; `FAR` without any."""
+    """(T,) squared distance in standard deviations, uncertainty of the parents added; `FAR` without any."""
     strength: Floats
     """(T,) log strength beyond the predicted, 0 without any."""
     mirror: Floats
@@ -73,12 +73,14 @@ def image_misfit(seen: Floats, std: Floats, strength: Floats, offset: Floats, st
     walls = np.argsort(wall_cost - 2.0 * strength + 0.3 * length, kind="stable")[:MAX_WALLS]
     points = np.argsort(point_cost + 0.7 * length, kind="stable")[:MAX_POINTS]
     mirrors = _mirrors(shown[walls], offset, strength[walls], wall_cost[walls], walls)
-    place, level, doubt, parents = _predict(mirrors, point[points], offset, strength[points], length[points], points)
-    doubt = doubt + point_cost[parents[:, 0]]
+    place, level, uncertainty, parents = _predict(
+        mirrors, point[points], offset, strength[points], length[points], points
+    )
+    uncertainty = uncertainty + point_cost[parents[:, 0]]
     variance = std[:, None] ** 2 + std[parents[:, 0]] ** 2 + np.array([LENGTH_FLOOR, COSINE_FLOOR, COSINE_FLOOR]) ** 2
     here = np.concatenate([seen[:, :1], flat], axis=1)
     miss = np.sum((here[:, None] - place) ** 2 / variance, axis=2)
-    miss += ((strength[:, None] - level) / STRENGTH_STD) ** 2 + doubt
+    miss += ((strength[:, None] - level) / STRENGTH_STD) ** 2 + uncertainty
     own = (np.arange(count)[:, None, None] == parents).any(axis=2)
     miss = np.where(own, FAR, np.minimum(miss, FAR))
     best = np.argmin(miss, axis=1)
@@ -109,7 +111,7 @@ def _mirrors(shown: Floats, offset: Floats, strength: Floats, cost: Floats, wall
 def _predict(
     mirrors: _Mirrors, point: Floats, offset: Floats, strength: Floats, length: Floats, points: Integers
 ) -> tuple[Floats, Floats, Floats, Integers]:
-    """Place (C, 3), log strength (C,), doubt (C,) and parents (C, 5) of the paths over points and mirrors."""
+    """Place (C, 3), log strength (C,), uncertainty (C,) and parents (C, 5) of the paths over points and mirrors."""
     rx, tx = np.nonzero(mirrors.bounces[:, None] + mirrors.bounces <= 2)
     keep = mirrors.bounces[rx] + mirrors.bounces[tx] > 0
     rx, tx = rx[keep], tx[keep]
@@ -120,9 +122,9 @@ def _predict(
     cosines = image[:, rx, :2] / to_rx[:, rx, None]
     level = (strength - np.log(length))[:, None] + np.log(total) + mirrors.strength[rx] + mirrors.strength[tx]
     level += np.log(to_rx[:, :1] * to_tx[:, :1] / (to_rx[:, rx] * to_tx[:, tx]))
-    doubt = np.broadcast_to(mirrors.cost[rx] + mirrors.cost[tx], total.shape)
+    uncertainty = np.broadcast_to(mirrors.cost[rx] + mirrors.cost[tx], total.shape)
     # what would come from below the horizon is not heard
-    doubt = np.where(image[:, rx, 2] < -COSINE_FLOOR * to_rx[:, rx], FAR, doubt)
+    uncertainty = np.where(image[:, rx, 2] < -COSINE_FLOOR * to_rx[:, rx], FAR, uncertainty)
     walls = np.concatenate([mirrors.walls[rx], mirrors.walls[tx]], axis=1)
     parents = np.concatenate(
         [
@@ -132,7 +134,7 @@ def _predict(
         axis=2,
     )
     place = np.concatenate([total[..., None], cosines], axis=2)
-    return place.reshape(-1, 3), level.ravel(), doubt.ravel(), parents.reshape(-1, 5)
+    return place.reshape(-1, 3), level.ravel(), uncertainty.ravel(), parents.reshape(-1, 5)
 
 
 def _mirror_gap(point: Floats, shown: Floats, offset: Floats, walls: Integers, cost: Floats) -> Floats:

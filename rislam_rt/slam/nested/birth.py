@@ -9,8 +9,8 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Body
 from rislam_rt.slam.associate import squared_distance
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.identity import DOUBT, panel_surplus
-from rislam_rt.slam.moments import Moments, poses_of, square_root
+from rislam_rt.slam.identity import DOUBT
+from rislam_rt.slam.moments import poses_of, square_root
 from rislam_rt.slam.nested.birth_scheduling import PARALLEL, due_tracks
 from rislam_rt.slam.nested.candidates import PredictedMeasurements, explained
 from rislam_rt.slam.nested.hypotheses import (
@@ -31,7 +31,8 @@ from rislam_rt.slam.nested.hypotheses import (
 )
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, enter
 from rislam_rt.slam.nested.mirrors import is_behind_mirror, mirror_images
-from rislam_rt.slam.nested.tracks import LandmarkTracks, overstatement
+from rislam_rt.slam.nested.moments import Moments
+from rislam_rt.slam.nested.tracks import LandmarkTracks, overstatement, panel_surplus
 from rislam_rt.slam.observations import PANEL, UNTOLD, same_side
 from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe
 
@@ -60,8 +61,7 @@ class BirthDecision(NamedTuple):
     parent: int
     """Feature row of the point, -1 without one."""
     fit: Fit
-    upright: bool = False
-    """Whether a wall is taken to be upright, as its returns do not tell."""
+    upright: bool = False  # of a wall, as its returns do not tell
 
 
 class BirthContext(NamedTuple):
@@ -152,9 +152,9 @@ def examine(
         moments.features, table, moments.position, predicted, mirror_images(tracks, moments, table, past.body), config
     )
     moving = tracks.moving.copy()
-    doubt = square_root(moments.covariance[:6, :6])
+    uncertainty = square_root(moments.covariance[:6, :6])
     for row in due:
-        history, slots = track_history(tracks, row, past, doubt, free_space, threshold)
+        history, slots = track_history(tracks, row, past, uncertainty, free_space, threshold)
         if is_explained(tracks, row, history, scene):
             continue
         unknown = [panel for panel, holder in enumerate(table.holders) if holder < 0]
@@ -175,11 +175,11 @@ def examine(
 
 
 def track_history(
-    tracks: LandmarkTracks, row: int, past: Past, doubt: Floats, free_space: float, threshold: float
+    tracks: LandmarkTracks, row: int, past: Past, uncertainty: Floats, free_space: float, threshold: float
 ) -> tuple[History, Integers]:
     """A track's measurements with the mean believed poses, and the rows of the past that they belong to.
 
-    `doubt` (6, D) is the square root of the pose's covariance, `free_space` the log amplitude after 1 m.
+    `pose_uncertainty` (6, D) is the square root of the pose's covariance, `free_space` the log amplitude after 1 m.
     """
     rows = (tracks.cycle[row] >= 0).nonzero()[0]
     poses = poses_of(past.position[rows], past.heading[rows], past.body)
@@ -187,7 +187,7 @@ def track_history(
     ratio = float(tracks.log_amplitude[row] - free_space + np.log(tracks.mean[row, 0, 0]))
     faint = overstatement(tracks, past.cycle, threshold)[row]
     seen, std = tracks.seen[row, rows], tracks.std[row, rows] * faint
-    return History(seen, std, poses, lag, ratio, doubt, side=int(tracks.side[row])), rows
+    return History(seen, std, poses, lag, ratio, uncertainty, side=int(tracks.side[row])), rows
 
 
 def is_explained(tracks: LandmarkTracks, row: int, history: History, scene: BirthContext) -> bool:

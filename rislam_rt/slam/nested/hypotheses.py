@@ -62,18 +62,18 @@ class History(NamedTuple):
     """(K,) time [s] since each measurement."""
     ratio: float
     """Log of the amplitude over that of free space of the same length."""
-    doubt: Floats
+    uncertainty: Floats
     """(6, D) square root of the covariance of today's position and velocity, through which all poses err together;
     no columns where the poses are taken as certain."""
     panel: float = 0.0
-    """By how much chi^2 its amplitudes speak for a point (see `identity.panel_surplus`)."""
+    """By how much chi^2 its amplitudes speak for a point (see `tracks.panel_surplus`)."""
     side: int = UNTOLD
     """Whether it runs over the panel (see `tracks.Observations`)."""
 
     @property
     def pose_uncertainty(self) -> Floats:
         """(K, 3, D) the same for the positions at the measurements."""
-        return self.doubt[:3] - self.lag[:, None, None] * self.doubt[3:]
+        return self.uncertainty[:3] - self.lag[:, None, None] * self.uncertainty[3:]
 
 
 def fit_feature(
@@ -87,9 +87,9 @@ def fit_feature(
 ) -> Fit:
     """Gauss-Newton from `start` (..., 3), measurements far off counting for less (Student's t).
 
-    `parent` (..., 3) is the known point of an image hypothesis. With `history.doubt` the pose is fitted along, held by
-    its own covariance: a wrong speed must not speak against a hypothesis that is right. `upright` is the standard
-    deviation [m] of the feature's height about the anchor's, 0 lean for a wall.
+    `parent` (..., 3) is the known point of an image hypothesis. With `history.pose_uncertainty` the pose is fitted
+    along, held by its own covariance: a wrong speed must not speak against a hypothesis that is right. `upright` is the
+    standard deviation [m] of the feature's height about the anchor's, 0 lean for a wall.
     """
     anchors = np.stack([anchor, anchor])
     solution = _solve(kind, np.array(start), parent, anchors, history, None, upright)
@@ -101,13 +101,13 @@ def fit_feature(
         solution = _solve(kind, feature, parent, anchors, history, solution.trust, upright)
         if length.max() < CONVERGED:
             break
-    return Fit(solution.feature, np.asarray(np.linalg.inv(_held(solution.gram, history.doubt))), solution.cost)
+    return Fit(solution.feature, np.asarray(np.linalg.inv(_held(solution.gram, history.uncertainty))), solution.cost)
 
 
-def _held(gram: Floats, doubt: Floats) -> Floats:
+def _held(gram: Floats, uncertainty: Floats) -> Floats:
     """Information (..., 3, 3) on the feature, today's position held and the velocity as uncertain as it is."""
-    size = doubt.shape[1]
-    inner = gram[..., :size, :size] + np.eye(size) + doubt[:3].T @ doubt[:3] / HELD**2
+    size = uncertainty.shape[1]
+    inner = gram[..., :size, :size] + np.eye(size) + uncertainty[:3].T @ uncertainty[:3] / HELD**2
     lost = gram[..., size:-1, :size] @ np.linalg.solve(inner, gram[..., :size, size:-1])
     return np.asarray(gram[..., size:-1, size:-1] - lost)
 
@@ -138,16 +138,16 @@ def _solve(
     upright: float = np.inf,
 ) -> _Solution:
     linear = linearise(kind, _features(feature, parent), anchors, history.poses)
-    by_doubt = linear.by_pose @ history.pose_uncertainty[:, None]
-    # what comes out as one lies halfway between: by the doubt's D numbers, by the feature's three, and the prediction
-    columns = np.concatenate([by_doubt, linear.by_feature[..., 0, :], linear.seen[..., None]], axis=-1)
+    by_uncertainty = linear.by_pose @ history.pose_uncertainty[:, None]
+    # what comes out as one lies halfway between: by the pose's D numbers, by the feature's three, and the prediction
+    columns = np.concatenate([by_uncertainty, linear.by_feature[..., 0, :], linear.seen[..., None]], axis=-1)
     columns = columns[..., 0, :, :] if len(kind.tx) == 1 else columns.mean(axis=-3)
     columns[..., -1] = history.seen - columns[..., -1]
     columns /= history.std[..., None]
     weighted = columns if trust is None else columns * trust[..., None, None]
     tall = (*columns.shape[:-3], -1, columns.shape[-1])
     gram = np.swapaxes(weighted.reshape(tall), -1, -2) @ columns.reshape(tall)
-    size = history.doubt.shape[1]
+    size = history.uncertainty.shape[1]
     gram[..., size:-1, size:-1] += np.diag([RIDGE, RIDGE, RIDGE + upright**-2])
     solved = np.linalg.solve(gram[..., :size, :size] + np.eye(size), gram[..., :size, size:])
     rest = gram[..., size:, size:] - gram[..., size:, :size] @ solved
@@ -240,7 +240,7 @@ def _fit_opposite(wall: Floats, anchor: Floats, history: History) -> Fit:
     poses = history.poses
     tx = np.broadcast_to(poses.tx.mean(axis=-2, keepdims=True), poses.tx.shape)
     still = Poses(tx, tx + poses.rx - poses.tx, poses.heading)
-    return fit_feature(MOVING, wall, None, anchor, history._replace(poses=still, doubt=np.zeros((6, 0))), 6)
+    return fit_feature(MOVING, wall, None, anchor, history._replace(poses=still, uncertainty=np.zeros((6, 0))), 6)
 
 
 def _fit_edge(wall: Floats, anchor: Floats, history: History) -> Fit:

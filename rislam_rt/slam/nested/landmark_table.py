@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.identity import STRENGTHS, panel_probabilities, strength_moments
+from rislam_rt.slam.identity import STRENGTHS, panel_rows, ris_probabilities, strength_moments
 
 UNSEEN_RATIO = -0.3
 """Log amplitude ratio expected of a wall before its returns were seen (0.74)."""
@@ -63,18 +63,12 @@ class LandmarkTable(NamedTuple):
     @property
     def ris_probability(self) -> Floats:
         """(F, Q) of being each panel; 0 for walls."""
-        probability, points = np.zeros(self.log_ris.shape), self.points
-        probability[points] = panel_probabilities(self.log_ris[points])
-        return probability
+        return ris_probabilities(self.log_ris, self.points)
 
     @property
     def holders(self) -> tuple[int, ...]:
         """(Q,) row of the landmark held for each panel (probability above one half), -1 where none is."""
-        probability = self.ris_probability
-        if not len(probability):
-            return (-1,) * probability.shape[1]
-        rows = np.argmax(probability, axis=0)
-        return tuple(int(row) if probability[row, panel] > 0.5 else -1 for panel, row in enumerate(rows))
+        return panel_rows(self.ris_probability)
 
     @property
     def log_strength(self) -> tuple[Floats, Floats]:

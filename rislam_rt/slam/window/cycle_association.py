@@ -3,11 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
-from rislam_rt.slam.associate import Candidates, pair_costs, squared_distance
+from rislam_rt.slam.associate import Candidates, cheapest, pair_costs, squared_distance
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import TX, Poses
@@ -130,11 +129,9 @@ def _associate(
     level, doubt = groups.log_amplitude[near], np.hypot(groups.log_amplitude_std[near], 0.15)
     candidates = Candidates(seen, spread, level, doubt, odds, side)
     cost = pair_costs(candidates, observed, GATE, strangers)
-    rows, columns = scipy.optimize.linear_sum_assignment(cost)
-    good = cost[rows, columns] < 0.0
+    rows, columns = cheapest(cost)
     # the cost counts what is missed: seen against missed, both against strangers
-    gain = -0.5 * float(cost[rows[good], columns[good]].sum()) + float(np.log1p(-shows[rows[good]]).sum())
-    rows, columns = rows[good], columns[good]
+    gain = -0.5 * float(cost[rows, columns].sum()) + float(np.log1p(-shows[rows]).sum())
     noise = np.zeros((len(rows), 3, 3))
     noise[:, [0, 1, 2], [0, 1, 2]] = observed.std[columns] ** 2
     distance, _ = squared_distance(observed.seen[columns] - seen[rows], spread[rows] + noise)

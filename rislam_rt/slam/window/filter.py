@@ -52,11 +52,11 @@ def init(
     scene = KnownEnvironment(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
     lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if turns else ()))
-    gait = np.stack([motion.first_motion_mode(level) for level in lively])
+    motion_mode = np.stack([motion.first_motion_mode(level) for level in lively])
     return WindowState(
         0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels),
         no_observations(),
-        gait, gait,
+        motion_mode, motion_mode,
         np.array([start.heading]), start.position_std * free, scene, divergence_monitor.SURE, False, 0.0,
         (None,), np.zeros((6, 6)), np.zeros((0, 3)),
     )  # fmt: skip
@@ -105,10 +105,10 @@ def step(
     turn += float(np.diff(window_gaussian.poses(state.window)[-2:, 3]).sum())
     followed = _follow(state, mean, observed, (~taken).nonzero()[0], dt, turn, bend)
     state = state._replace(tracks=followed.tracks, log=followed.log)
-    jumped = state.doubt == 0.0
+    jumped = state.lost_log_odds == 0.0
     if len(expected.seen) and len(observed.seen):
         state = state._replace(
-            doubt=divergence_monitor.advance(state.doubt, view.score, followed.followed, followed.kept)
+            lost_log_odds=divergence_monitor.advance(state.lost_log_odds, view.score, followed.followed, followed.kept)
         )
     if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, poses, scene, code))
@@ -121,8 +121,8 @@ def step(
     state, wrong = recovery.ask(state)
     state = _grown(state, left, expected, groups)
     state = state._replace(excess=take_in(state.excess, before[:6, :6], window_gaussian.now(state.window)[1][:6, :6]))
-    outcome = _outcome(len(measurement), len(state.landmarks.ident), wrong or jumped or state.doubt >= 0.0)
-    if divergence_monitor.is_lost(state.doubt) and len(state.landmarks.ident):
+    outcome = _outcome(len(measurement), len(state.landmarks.ident), wrong or jumped or state.lost_log_odds >= 0.0)
+    if divergence_monitor.is_lost(state.lost_log_odds) and len(state.landmarks.ident):
         state = recovery.restart(state)
     info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.landmarks.points), outcome)
     return state._replace(cycle=state.cycle + 1), info
@@ -154,9 +154,9 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     """The window with a new pose, without its oldest one when it is full."""
     if dt <= 0.0 and state.cycle == 0:
         return state._replace(heading=np.array([heading]))
-    window, gait, headings, passed = state.window, state.gait, state.heading, state.passed
+    window, motion_mode, headings, passed = state.window, state.motion_mode, state.heading, state.passed
     while window.num_poses >= CONSTANTS.window:
-        gait = motion.forward(gait, _likelihoods(window, 1)[:, 0], CONSTANTS.stay)
+        motion_mode = motion.forward(motion_mode, _likelihoods(window, 1)[:, 0], CONSTANTS.stay)
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = window_gaussian.slide(window), headings[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)
@@ -166,7 +166,7 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         window = window_gaussian.extend(window, dt, precision := _precisions(level))
         excess = grow(state.excess, dt, motion.expected_variance(level)[COLUMNS[:3]] - 1.0 / precision[:3])
     return state._replace(
-        window=window, gait=gait, heading=np.append(headings, heading), excess=excess, passed=passed
+        window=window, motion_mode=motion_mode, heading=np.append(headings, heading), excess=excess, passed=passed
     )  # fmt: skip
 
 
@@ -303,7 +303,7 @@ def widen_motion(state: WindowState) -> WindowState:
     window = state.window
     if not len(window.accel) or state.config.motion == "told":
         return state
-    posterior, level = motion.smooth(state.gait, _likelihoods(window, len(window.accel)), CONSTANTS.stay)
+    posterior, level = motion.smooth(state.motion_mode, _likelihoods(window, len(window.accel)), CONSTANTS.stay)
     fresh = _precisions(posterior)
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))

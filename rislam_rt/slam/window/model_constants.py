@@ -1,4 +1,4 @@
-"""Every constant of the window filter: a physical quantity or a stated level, with its source."""
+"""Constants of the window filter's model: physical quantities and stated levels, each with its source."""
 
 from typing import NamedTuple
 
@@ -11,8 +11,7 @@ class ModelConstants(NamedTuple):
     window: int = 40
     """Poses that are re-linearised: a batch over 40 cycles does what one over the run does."""
     rare: float = 0.02
-    """Probability of what happens every 5 s: a gait changes; something comes to stand in a path's way, or leaves
-    hidden what lies behind it."""
+    """Probability of what happens every 5 s: the motion mode changes; something comes to stand in a path's way."""
     tail: float = 4.0
     """Degrees of freedom of Student's t, where the receiver tells no tails: neighbours that the map lacks."""
     wall_ratio: float = -0.6

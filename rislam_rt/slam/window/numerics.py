@@ -1,4 +1,7 @@
-"""Steps of the solver and limits of what is worth a look: they are no part of the model."""
+"""Steps of the solver and limits of what is worth a look.
+
+Some belong to the model and are not in its table: `LADDER`, `SHORTER`, `BEARING`, `ALIGNED`.
+"""
 
 import numpy as np
 

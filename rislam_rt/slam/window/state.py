@@ -23,7 +23,7 @@ class WindowState(NamedTuple):
     log: Log
     tracks: WindowTracks
     visibility: VisibilityObservations
-    gait: Floats
+    motion_mode: Floats
     """(2, L) probabilities of the liveliness of the step before the window's first, across and upwards; (3, L) with
     the rate of turn, where the heading is not known."""
     level: Floats
@@ -33,7 +33,7 @@ class WindowState(NamedTuple):
     shift: Floats
     """(3,) [m] standard deviation of the start's position: what no measurement tells."""
     scene: KnownEnvironment
-    doubt: float
+    lost_log_odds: float
     """Log odds that the agent is lost: that the map explains nothing of what is heard (see `divergence`)."""
     asked: bool
     """Whether the first tracks told that the start is another."""

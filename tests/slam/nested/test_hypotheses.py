@@ -152,7 +152,7 @@ def test_floor_costs_no_more_than_a_free_wall_for_data_of_a_floor() -> None:
 
 
 def test_a_wrong_speed_does_not_speak_against_the_truth() -> None:
-    """With the pose's doubt fitted along, a point stays plausible when the believed trail drifts by 0.03 m/s.
+    """With the pose's uncertainty fitted along, a point stays plausible when the believed trail drifts by 0.03 m/s.
 
     And its own covariance covers what the drift did to it: chi^2, 3 degrees of freedom, 99.9 %: 16.3.
     """
@@ -160,9 +160,9 @@ def test_a_wrong_speed_does_not_speak_against_the_truth() -> None:
     lag = 0.1 * np.arange(CYCLES)[::-1]
     drift = np.array([0.03, -0.02, 0.0]) * -lag[:, None]
     poses = case.history.poses._replace(tx=case.history.poses.tx + drift, rx=case.history.poses.rx + drift)
-    doubt = np.diag([0.01, 0.01, 0.0, 0.03, 0.03, 0.0])[:, [0, 1, 3, 4]]
+    uncertainty = np.diag([0.01, 0.01, 0.0, 0.03, 0.03, 0.0])[:, [0, 1, 3, 4]]
     wrong = case.history._replace(poses=poses, lag=lag)
-    blind, open_ = (fitted(POINT, Case(h, PARENT)) for h in (wrong, wrong._replace(doubt=doubt)))
+    blind, open_ = (fitted(POINT, Case(h, PARENT)) for h in (wrong, wrong._replace(uncertainty=uncertainty)))
     assert blind is not None
     assert open_ is not None
     assert not plausible(blind, CYCLES, 3)
@@ -191,10 +191,10 @@ def test_a_point_is_known_as_well_where_the_agent_is_not() -> None:
     history = history._replace(lag=np.linspace(4.0, 0.0, CYCLES))
     fits = []
     for position, velocity in ((0.0, 0.0), (1.0, 0.0), (0.0, 0.02)):
-        doubt = np.diag([position, position, 0.0, velocity, velocity, 0.0])[:, [0, 1, 3, 4]]
+        uncertainty = np.diag([position, position, 0.0, velocity, velocity, 0.0])[:, [0, 1, 3, 4]]
         first = initial_value(POINT, None, ANCHOR, history)
         assert first is not None
-        fits.append(fit_feature(POINT, first, None, ANCHOR, history._replace(doubt=doubt), 10))
+        fits.append(fit_feature(POINT, first, None, ANCHOR, history._replace(uncertainty=uncertainty), 10))
     spread = [np.sqrt(np.linalg.eigvalsh(fit.covariance)[-1]) for fit in fits]
     np.testing.assert_allclose(spread[1], spread[0], rtol=0.1)
     assert spread[2] > 1.2 * spread[0]

@@ -6,7 +6,8 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
-from rislam_rt.slam.moments import POSE, Moments, poses_of
+from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.nested.moments import POSE, Moments
 from rislam_rt.slam.nested.particles.belief import Nested, absorb, gaussian, mean_covariances
 from rislam_rt.slam.nested.particles.cloud import CloudEngine
 from rislam_rt.slam.nested.particles.sightline import Sighting, trace_sightline
@@ -105,7 +106,7 @@ def _sightings(
     poses = poses_of(belief.position, belief.heading, seen.body)
     features = belief.mean.copy()
     features[:, owner] = belief.centre[:, owner]
-    doubt = _uncertainties(belief, owner, seen)
+    uncertainty = _uncertainties(belief, owner, seen)
     found = []
     for row in rows:
         lines = tuple(
@@ -113,7 +114,7 @@ def _sightings(
         )
         common = np.array([config.common_length_std, *[config.common_cosine_std] * 2]) ** 2
         variance = seen.noise[row] if config.weighting == "crlb" else common
-        covariance = np.diag(variance) + doubt[row]
+        covariance = np.diag(variance) + uncertainty[row]
         power = float(rho[row]) if config.weighting == "power" else 1.0
         factor = float(np.log(rho[row])) if config.weighting == "paper" else 0.0
         found.append(Sighting(lines, seen.seen[row], covariance, power, factor))

@@ -31,7 +31,7 @@ from rislam_rt.slam.schemes.shared.sums import (
     look,
     no_sums,
     prune,
-    spread_of,
+    range_moments,
 )
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
@@ -176,9 +176,6 @@ def _claimed(
     sums, numbers = state.sums, np.full(len(scan.length), UNUSED)
     feature, shown = np.nonzero((found.feature[:, :-1] > 0.5) & (sums.existence > config.detection_threshold)[:, None])
     numbers[shown] = sums.ident[feature]
-    spread = spread_of(sight, state.course)
-    count = len(sums.ident)
-    mean = np.bincount(sums.owner, sums.share * sight.length, minlength=count)
-    second = np.bincount(sums.owner, sums.share * (spread + (sight.length - mean[sums.owner]) ** 2), minlength=count)
-    nis = np.sum((scan.length[shown] - mean[feature]) ** 2 / (second[feature] + scan.std[shown] ** 2))
+    mean, variance = range_moments(sums, sight, state.course)
+    nis = np.sum((scan.length[shown] - mean[feature]) ** 2 / (variance[feature] + scan.std[shown] ** 2))
     return numbers, float(nis)

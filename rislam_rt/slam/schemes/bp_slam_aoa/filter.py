@@ -36,7 +36,7 @@ CHANGE = 0.05
 UNSEEN = 0.7
 """Share of what is expected and not yet seen that stays unseen in a cycle."""
 RARE = 1e-6
-"""Density of first sights while gaits are weighed: a surprise, but not an impossible one."""
+"""Density of first sights while motion modes are weighed: a surprise, but not an impossible one."""
 VERTICAL_STD = 0.003
 """White vertical acceleration of an agent on a level floor [m/s^2]."""
 STRAIN_RATE = 0.05
@@ -53,7 +53,7 @@ class BpSlamAoaState(NamedTuple):
     """Share of the features that were expected at the start, and were never seen."""
     next_ident: int
     cycle: int
-    gait: Floats
+    motion_mode: Floats
     """(4,) probabilities that the last step was calm, lively, fast, climbing."""
     heading: float
     """[rad]."""
@@ -73,9 +73,9 @@ def init(
     std = np.concatenate([np.zeros(3), start.velocity_std * np.array([1.0, 1.0, 0.0])])
     mean = np.concatenate([np.zeros(3), start.velocity])
     course = AgentTrajectory(mean, np.diag(std**2), mean, 3, np.diag(std**2), 0.0)
-    gait = np.array([1.0, 0.0, 0.0, 0.0])
+    motion_mode = np.array([1.0, 0.0, 0.0, 0.0])
     return BpSlamAoaState(
-        course, no_features(6), 1.0, 0, 0, gait, float(start.heading), 1.0, start, body, sensor
+        course, no_features(6), 1.0, 0, 0, motion_mode, float(start.heading), 1.0, start, body, sensor
     )  # fmt: skip
 
 
@@ -151,8 +151,8 @@ def _levels(config: BpSlamAoaConfig) -> Floats:
     return np.array([[calm, calm, up], [lively, lively, up], [fast, fast, up], [calm, calm, lively]])
 
 
-def _gaits(config: BpSlamAoaConfig) -> Floats:
-    """(4, 4) probabilities of the gait of a step after that of the step before."""
+def _mode_changes(config: BpSlamAoaConfig) -> Floats:
+    """(4, 4) probabilities of the motion mode of a step after that of the step before."""
     calm = config.calm_again
     move = np.full((4, 4), CHANGE * (1.0 - calm))
     move[0], move[:, 0] = CALM_ENDS * calm / 3.0, calm
@@ -164,11 +164,11 @@ def _gaits(config: BpSlamAoaConfig) -> Floats:
 def _predict(
     state: BpSlamAoaState, dt: float, scan: ComponentScan, config: BpSlamAoaConfig
 ) -> tuple[BpSlamAoaState, View, Ends]:  # fmt: skip
-    """Agent and features carried to this cycle, by the gait that explains what is heard best."""
+    """Agent and features carried to this cycle, by the motion mode that explains what is heard best."""
     turn = rotation_z(np.asarray(state.heading))
     upper = state.sensor.radio.array.pattern == "upper"
     ends = Ends(turn @ state.body.tx_offset, turn @ state.body.rx_offset, turn, upper)
-    levels, free, prior = _levels(config), free_space(state.sensor.radio), state.gait @ _gaits(config)
+    levels, free, prior = _levels(config), free_space(state.sensor.radio), state.motion_mode @ _mode_changes(config)
 
     def ahead(level: int) -> tuple[BpSlamAoaState, View]:
         if dt == 0.0:
@@ -192,12 +192,12 @@ def _predict(
         for level in range(4):
             more = np.diag((0.5 * dt**2 * levels[level]) ** 2 - (0.5 * dt**2 * levels[0]) ** 2)
             scores[level] += claims(moved.features, view, likelihoods(view, spread, scan, more), rare)[1]
-    gait = np.exp(scores - scores.max())
-    best = int(np.argmax(gait))
+    motion_mode = np.exp(scores - scores.max())
+    best = int(np.argmax(motion_mode))
     if best:
         moved, view = ahead(best)
     unseen = config.birth_mean + (1.0 - config.birth_mean) * UNSEEN * state.fresh if dt > 0.0 else state.fresh
-    return moved._replace(gait=gait / gait.sum(), fresh=unseen), view, ends
+    return moved._replace(motion_mode=motion_mode / motion_mode.sum(), fresh=unseen), view, ends
 
 
 def _survive(features: GaussianFeatures, carried: Step, config: BpSlamAoaConfig) -> GaussianFeatures:

@@ -36,7 +36,7 @@ from rislam_rt.slam.schemes.shared.sums import (
     look,
     no_sums,
     prune,
-    spread_of,
+    range_moments,
 )
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
@@ -187,10 +187,8 @@ def _squares(
     sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, hit: Integers, shown: Integers
 ) -> Floats:  # fmt: skip
     """Squared innovations over their variances, both of the whole sum of each virtual transmitter that was seen."""
-    count, spread = len(sums.ident), spread_of(sight, course)
-    mean = np.bincount(sums.owner, sums.share * sight.length, minlength=count)
-    second = np.bincount(sums.owner, sums.share * (spread + (sight.length - mean[sums.owner]) ** 2), minlength=count)
-    return (scan.length[shown] - mean[hit]) ** 2 / (second[hit] + scan.std[shown] ** 2)
+    mean, variance = range_moments(sums, sight, course)
+    return (scan.length[shown] - mean[hit]) ** 2 / (variance[hit] + scan.std[shown] ** 2)
 
 
 def _give_birth(

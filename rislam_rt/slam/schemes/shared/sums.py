@@ -231,3 +231,11 @@ def prune(sums: Sums, least_existence: float, least_share: float, most: int) -> 
         sums.existence[keep], sums.ident[keep], owner, sums.kind[rows], sums.mean[rows], sums.slope[rows],
         sums.covariance[rows], sums.share[rows] / total[owner],
     )  # fmt: skip
+
+
+def range_moments(sums: Sums, sight: PredictedRanges, course: AgentTrajectory) -> tuple[Floats, Floats]:
+    """Mean [m] and variance [m^2] (F,) of each feature's range, over its whole sum."""
+    count = len(sums.ident)
+    mean = np.bincount(sums.owner, sums.share * sight.length, minlength=count).astype(float)
+    apart = spread_of(sight, course) + (sight.length - mean[sums.owner]) ** 2
+    return mean, np.bincount(sums.owner, sums.share * apart, minlength=count).astype(float)

@@ -181,7 +181,7 @@ def _explain(
     weight = np.array([1.0 - groups.share[column], groups.share[column]])[: len(parts)]
     weight = weight / weight.sum()
     value = np.einsum("r,krj->kj", weight, linear.seen)
-    by_pose = np.einsum("r,krij->kij", weight, linear.by_pose) @ histories.doubt[row, used]
+    by_pose = np.einsum("r,krij->kij", weight, linear.by_pose) @ histories.uncertainty[row, used]
     by_pose = np.concatenate([by_pose, histories.twist[row, used]], axis=-1)
     wide = linear.by_feature.reshape(*linear.seen.shape, features.size)
     by_map = np.einsum("r,krij->kij", weight, wide) @ root

@@ -114,29 +114,29 @@ def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTabl
     images = [_image(digest, known.place[point], known.root[point]) for point in points]
     for point, (start, *_) in zip(points, images, strict=True):
         add(IMAGE, point, start, NONE, NONE, (tx, tx))
-    turns, shifts, doubts = _over(known, np.array(legs), np.array(spots), middle)
+    turns, shifts, spreads = _over(known, np.array(legs), np.array(spots), middle)
     for row, pair in zip((np.array(kinds) == TWO_WALLS).nonzero()[0], pairs, strict=True):
         turns[row, :, 0] = pair
     for row, (_, *parts) in zip((np.array(kinds) == IMAGE).nonzero()[0], images, strict=True):
-        turns[row], shifts[row], doubts[row] = parts
+        turns[row], shifts[row], spreads[row] = parts
     kind, walled = np.repeat(kinds, count), np.repeat(knowns, count)
     trials = Trials(
         np.tile(np.arange(count), len(kinds)), np.isin(kind, WALLS), kind == TWO_WALLS, np.concatenate(starts),
-        turns.reshape(-1, 2, 3, 3), shifts.reshape(-1, 2, 3), doubts.reshape(-1, 2, 3, 3), kind == BESIDE,
+        turns.reshape(-1, 2, 3, 3), shifts.reshape(-1, 2, 3), spreads.reshape(-1, 2, 3, 3), kind == BESIDE,
         _beyond(kind, walled, known), kind == IMAGE,
     )  # fmt: skip
     return Hypotheses(kind, walled, trials)
 
 
 def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
-    """Turns (N, T, 2, 3, 3), shifts (N, T, 2, 3) and doubts (N, T, 2, 3, 3) of the walls that N kinds go over on either
-    leg (N, 2), `NONE` for none, at about the places (N, 2, T, 3) of T tracks."""
+    """Turns (N, T, 2, 3, 3), shifts (N, T, 2, 3) and covariances (N, T, 2, 3, 3) of the walls that N kinds go over on
+    either leg (N, 2), `NONE` for none, at about the places (N, 2, T, 3) of T tracks."""
     count, nowhere = spots.shape[2], (middle + 1.0, np.zeros((3, 3)), AXES, np.zeros(3))
     place, root, turn, shift = (np.concatenate([field, none[None]]) for field, none in zip(known, nowhere, strict=True))
     slope = by_wall(spots, place[legs][:, :, None], middle)
-    doubt = np.swapaxes(slope @ root[legs][:, :, None], 1, 2)
+    uncertainty = np.swapaxes(slope @ root[legs][:, :, None], 1, 2)
     turns, shifts = (np.repeat(field[legs][:, None], count, axis=1) for field in (turn, shift))
-    return turns, shifts, doubt
+    return turns, shifts, uncertainty
 
 
 def _image(digest: TrackSummary, spot: Floats, root: Floats) -> tuple[Floats, Floats, Floats, Floats]:
@@ -146,8 +146,8 @@ def _image(digest: TrackSummary, spot: Floats, root: Floats) -> tuple[Floats, Fl
     anchor = np.broadcast_to(digest.middle, rx.shape)
     start = reflect(anchor, rx + reach[:, None] * digest.direction, np.broadcast_to(spot, rx.shape))
     parts = ((np.zeros((3, 3)), AXES), (spot, np.zeros(3)), (root, np.zeros((3, 3))))
-    turn, shift, doubt = (np.tile(np.stack(pair), (count, *(1,) * (pair[1].ndim + 1))) for pair in parts)
-    return start, turn, shift, doubt
+    turn, shift, uncertainty = (np.tile(np.stack(pair), (count, *(1,) * (pair[1].ndim + 1))) for pair in parts)
+    return start, turn, shift, uncertainty
 
 
 def _beyond(kind: Integers, walled: Integers, known: KnownFeatures) -> Floats:

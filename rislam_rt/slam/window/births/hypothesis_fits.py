@@ -33,7 +33,7 @@ class Trials(NamedTuple):
     """(H, 2, 3, 3) for a wall: S_in, S_out; for a point: S_t, S_r."""
     shift: Floats
     """(H, 2, 3) likewise."""
-    doubt: Floats
+    uncertainty: Floats
     """(H, 2, 3, 3) square roots of the covariance with which the two maps move what they map (at about the start)."""
     mixed: Booleans
     """(H,) whether it comes out as one with what a known wall makes of it (`beyond`), at an unknown share between."""
@@ -115,7 +115,7 @@ def _equations(
     track, wall, pair = trials.track[rows], trials.is_wall[rows], trials.is_pair[rows]
     moving = wall | pair
     tx, rx = digest.tx[track], digest.rx[track]
-    turn, shift, doubt = trials.turn[rows], trials.shift[rows], trials.doubt[rows]
+    turn, shift, uncertainty = trials.turn[rows], trials.shift[rows], trials.uncertainty[rows]
     first, second = turn[:, 0], turn[:, 1]
     # a point: fixed images; a wall: the image of the Tx, which moves
     span = place - digest.middle
@@ -146,13 +146,13 @@ def _equations(
     new[..., 0, :] += toward @ first
     pose = by_image @ (by_tx[:, None] - AXES)
     pose[..., 0, :] -= toward
-    maps_out = by_image @ doubt[:, None, 1]
-    inside = np.where(wall[:, None, None], (second @ flip) @ doubt[:, 0], 0.0)
+    maps_out = by_image @ uncertainty[:, None, 1]
+    inside = np.where(wall[:, None, None], (second @ flip) @ uncertainty[:, 0], 0.0)
     maps_in = by_image @ inside[:, None]
-    maps_in[..., 0, :] += (toward[..., None, :] @ doubt[:, None, 0])[..., 0, :]
+    maps_in[..., 0, :] += (toward[..., None, :] @ uncertainty[:, None, 0])[..., 0, :]
     split = _mix(trials, rows, rx, image, error, (by_place, by_tx), (seen, new, pose))
     wide = np.concatenate(
-        [digest.twist[track], pose @ digest.doubt[track], maps_in, maps_out, split, new], axis=-1
+        [digest.twist[track], pose @ digest.uncertainty[track], maps_in, maps_out, split, new], axis=-1
     )  # fmt: skip
     weight = digest.weight[track]
     wide *= weight[..., None]

@@ -282,10 +282,10 @@ def _image_amplitudes(
     track, point = table.trials.track[rows], table.known[rows]
     first = np.maximum(np.linalg.norm(table.trials.shift[rows, 0] - digest.mean[1][track], axis=1), 0.05)
     unit = point_amplitude(np.ones(len(rows)), first, np.maximum(digest.mean[0][track, 0] - first, 0.05), scene.radio)
-    strength, doubt = (field[point] for field in landmarks.log_strength)
+    strength, uncertainty = (field[point] for field in landmarks.log_strength)
     mean, variance = (
         np.log(unit) + strength + CONSTANTS.wall_ratio,
-        doubt**2 + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2,
+        uncertainty**2 + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2,
     )
     off = np.where(np.isin(point, landmarks.panels), 0.0, digest.log_amplitude[track] - mean)
     return np.asarray(-0.5 * off**2 / variance - 0.5 * np.log(variance))

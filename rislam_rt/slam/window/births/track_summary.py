@@ -35,7 +35,7 @@ class TrackSummary(NamedTuple):
     """(T, B, 3) [m]."""
     rx: Floats
     """(T, B, 3) [m]."""
-    doubt: Floats
+    uncertainty: Floats
     """(T, B, 3, 6) square root of the covariance of the poses' common errors of place and velocity."""
     log_amplitude: Floats
     """(T,) mean."""
@@ -44,7 +44,7 @@ class TrackSummary(NamedTuple):
     middle: Floats
     """(3,) where the agent is now: the anchor of new walls."""
     speed: float
-    """[m/s] of the agent, and something for its doubt."""
+    """[m/s] of the agent, and something for its uncertainty."""
     twist: Floats
     """(T, B, 3, H) square root of the covariance with which the heading's error moves what is seen; H = 0 if known."""
 
@@ -110,7 +110,7 @@ def summarise_tracks(
     root = np.linalg.cholesky(covariance[:6, :6] + np.diag(1e-6 * scale + 1e-14))
     across = np.stack([0.0 * found.seen[..., 0], found.seen[..., 2], -found.seen[..., 1]], axis=-1)
     found = found._replace(twist=across[..., None] * turned[:, :, None])
-    return found._replace(doubt=np.asarray(root[:3] + found.time[..., None, None] * root[3:6], dtype=np.float64))
+    return found._replace(uncertainty=np.asarray(root[:3] + found.time[..., None, None] * root[3:6], dtype=np.float64))
 
 
 def heading_roots(window: Window) -> Floats:

@@ -1,4 +1,4 @@
-"""What becomes of the belief once it is in doubt: another start, another place, or a new beginning."""
+"""What becomes of the belief once it may be lost: another start, another place, or a new beginning."""
 
 import numpy as np
 
@@ -23,7 +23,9 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
             lively = float(np.sqrt(motion.expected_variance(state.level[0])))
             odds = divergence_monitor.ask_picture(state.window, state.log, state.heading, baseline, lively)
             state = state._replace(
-                doubt=float(np.clip(state.doubt + odds, divergence_monitor.SURE, -divergence_monitor.SURE))
+                lost_log_odds=float(
+                    np.clip(state.lost_log_odds + odds, divergence_monitor.SURE, -divergence_monitor.SURE)
+                )
             )
         return state, False
     told = None if state.asked else divergence_monitor.ask_tracks(state.window, state.log, state.heading, baseline)
@@ -37,7 +39,7 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
     still = motion.first_motion_mode(0.0)[None]
     return state._replace(
         window=window, heading=state.heading + told.turn, turned=state.turned + told.turn,
-        gait=np.concatenate([state.gait, still]), level=np.concatenate([state.level, still]),
+        motion_mode=np.concatenate([state.motion_mode, still]), level=np.concatenate([state.level, still]),
     ), True  # fmt: skip
 
 
@@ -53,8 +55,9 @@ def restart(state: WindowState) -> WindowState:
     return state._replace(
         window=fresh, landmarks=empty_table(state.scene.num_panels)._replace(next_ident=state.landmarks.next_ident),
         log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), visibility=no_observations(),
-        gait=state.level,
-        heading=state.heading[-1:], shift=np.hypot(state.shift, away), doubt=0.0, asked=False,
+        motion_mode=state.level,
+        heading=state.heading[-1:], shift=np.hypot(state.shift, away), lost_log_odds=0.0, asked=False,
+        excess=np.zeros_like(state.excess),
         codes=state.codes[-1:], passed=np.concatenate([state.passed, window_gaussian.poses(window)[:-1, :3]]),
     )  # fmt: skip
 
@@ -63,6 +66,6 @@ def landed(state: WindowState, by: Floats) -> WindowState:
     """After a jump: the last pose alone, with the map; held for lost until the next cycle agrees."""
     passed = np.concatenate([state.passed, window_gaussian.poses(state.window)[:-1, :3]])
     return state._replace(
-        window=divergence_monitor.landed(state.window, by), gait=state.level, heading=state.heading[-1:],
-        codes=state.codes[-1:], passed=passed, doubt=0.0,
+        window=divergence_monitor.landed(state.window, by), motion_mode=state.level, heading=state.heading[-1:],
+        codes=state.codes[-1:], passed=passed, lost_log_odds=0.0,
     )  # fmt: skip

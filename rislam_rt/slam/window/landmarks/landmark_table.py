@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.identity import STRENGTHS, panel_probabilities, strength_moments
+from rislam_rt.slam.identity import STRENGTHS, panel_rows, ris_probabilities, strength_moments
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity
 from rislam_rt.slam.window.model_constants import CONSTANTS
 
@@ -48,9 +48,7 @@ class WindowTable(NamedTuple):
     @property
     def ris_probability(self) -> Floats:
         """(F, Q) of being each panel; 0 for walls."""
-        probability, points = np.zeros(self.log_ris.shape), self.points
-        probability[points] = panel_probabilities(self.log_ris[points])
-        return probability
+        return ris_probabilities(self.log_ris, self.points)
 
     @property
     def identity(self) -> PanelIdentity:
@@ -60,11 +58,7 @@ class WindowTable(NamedTuple):
     @property
     def panels(self) -> tuple[int, ...]:
         """(Q,) row of the point held for each panel, -1 without one."""
-        probability = self.ris_probability
-        if not len(probability):
-            return (-1,) * probability.shape[1]
-        rows = np.argmax(probability, axis=0)
-        return tuple(int(row) if probability[row, panel] > 0.5 else -1 for panel, row in enumerate(rows))
+        return panel_rows(self.ris_probability)
 
     @property
     def log_strength(self) -> tuple[Floats, Floats]:
@@ -112,7 +106,7 @@ def idents(landmarks: WindowTable, forms: Integers) -> Integers:
 
 def image_ident(point: Integers, wall: Integers) -> Integers:
     """Numbers (...,) of the images of points in walls, from the numbers of both."""
-    return np.asarray(10_000 + 1000 * point + wall)
+    return np.asarray(((point + 1) << 32) + wall)
 
 
 def remove_features(landmarks: WindowTable, keep: Booleans) -> WindowTable:

@@ -97,8 +97,8 @@ def amplitudes(
         return np.zeros(0), np.zeros(0)
     none = legs[:, 1:] == NONE
     left = np.where(none, 0.0, landmarks.ratio[legs[:, 1:]]).sum(axis=1)
-    doubt = np.where(none, 0.0, landmarks.ratio_variance[legs[:, 1:]]).sum(axis=1)
-    ratio, variance = left[returns.tx] + left[returns.rx], doubt[returns.tx] + doubt[returns.rx]
+    uncertainty = np.where(none, 0.0, landmarks.ratio_variance[legs[:, 1:]]).sum(axis=1)
+    ratio, variance = left[returns.tx] + left[returns.rx], uncertainty[returns.tx] + uncertainty[returns.rx]
     point = returns.point
     moving = point == TX
     strength, strength_std = landmarks.log_strength
@@ -183,11 +183,11 @@ def cluster(
     mate = np.where(taken[leader], -1, partner[leader])
     both = mate >= 0
     ratio = np.where(both, np.exp(strength[mate] - strength[leader]), 0.0)
-    doubt = np.where(both, np.hypot(expected.log_amplitude_std[mate], expected.log_amplitude_std[leader]), 0.0)
+    uncertainty = np.where(both, np.hypot(expected.log_amplitude_std[mate], expected.log_amplitude_std[leader]), 0.0)
     twins = both & (expected.forms[leader] == reciprocal(expected.forms[mate])).all(axis=1)
-    doubt[twins] = TWIN_STD
-    # a ratio r leaves a mean share of 0 below one and 1 above, of variance r^2/2: averaged over the doubt about r
-    lean = _above(np.log(np.maximum(ratio, 1e-9)) / np.maximum(doubt, 1e-3))
+    uncertainty[twins] = TWIN_STD
+    # a ratio r leaves a mean share of 0 below one and 1 above, of variance r^2/2: averaged over the uncertainty about r
+    lean = _above(np.log(np.maximum(ratio, 1e-9)) / np.maximum(uncertainty, 1e-3))
     share = np.where(both, lean, 0.0)
     spread = np.where(
         both,
@@ -281,11 +281,11 @@ def conditioned_share(
     whole = np.exp(2.0 * log_amplitude[both])
     first, second = np.exp(2.0 * expected.log_amplitude[lead]), np.exp(2.0 * expected.log_amplitude[mate])
     told = 0.5 * (whole + second - first) / whole
-    doubt = (first * expected.log_amplitude_std[lead]) ** 2 + (second * expected.log_amplitude_std[mate]) ** 2
-    doubt = doubt / whole**2 + (0.5 * (1.0 - 2.0 * told) * 2.0 * log_amplitude_std[both]) ** 2 + 1e-4
+    uncertainty = (first * expected.log_amplitude_std[lead]) ** 2 + (second * expected.log_amplitude_std[mate]) ** 2
+    uncertainty = uncertainty / whole**2 + (0.5 * (1.0 - 2.0 * told) * 2.0 * log_amplitude_std[both]) ** 2 + 1e-4
     prior = variance[both]
     twins = prior <= TWIN_STD**2
-    gain = np.where(twins, 0.0, prior / (prior + doubt))
+    gain = np.where(twins, 0.0, prior / (prior + uncertainty))
     share[both] = np.clip(share[both] + gain * (told - share[both]), 0.0, 1.0)
     variance[both] = (1.0 - gain) * prior
     return share, variance

@@ -1,9 +1,9 @@
 """How much farther off the agent may be than its calm motion makes it, where nothing measures how lively it is.
 
-The window's estimate takes each step by its expected precision: that of the calmest gait that may be. It is the better
-estimate, but the covariance of its error hangs on the expected variance, that of the liveliest. What the second has
-over the first is carried along as the error of a Kalman filter with a wrong model is: grown by each step, and taken in
-by what is measured (Gelb 1974, chapter 7: suboptimal filter design and sensitivity analysis).
+The window's estimate takes each step by its expected precision: that of the calmest motion mode that may be. It is
+the better estimate, but the covariance of its error hangs on the expected variance, that of the liveliest. What the
+second has over the first is carried along as the error of a Kalman filter with a wrong model is: grown by each step,
+and taken in by what is measured (Gelb 1974, chapter 7: suboptimal filter design and sensitivity analysis).
 """
 
 import numpy as np

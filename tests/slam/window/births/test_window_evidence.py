@@ -17,8 +17,8 @@ def _digest(count, *, std=0.01, rng):
     time = np.linspace(-3.0, 0.0, count)
     place = np.stack([0.3 * time, 0.2 * time + 0.05 * time**2, np.full(count, 1.0)], axis=1)
     ends = poses_of(place, 0.3 + 0.1 * time, Body())
-    doubt = 1e-3 * rng.standard_normal((3, 6))
-    wide = doubt + time[:, None, None] * 1e-3 * rng.standard_normal((3, 6))
+    uncertainty = 1e-3 * rng.standard_normal((3, 6))
+    wide = uncertainty + time[:, None, None] * 1e-3 * rng.standard_normal((3, 6))
     weight = np.full((1, count, 3), 1.0 / std)
     return TrackSummary(
         np.zeros((1, count, 3)), weight, time[None], ends.tx[None], ends.rx[None], wide[None],
@@ -58,15 +58,23 @@ def _trials(kind, digest, rng):
     else:
         turn[0, 0] = np.diag([-1.0, -1.0, 1.0])
         start = np.array([3.0, 2.0, 1.0])
-    doubt = 1e-3 * rng.standard_normal((1, 2, 3, 3))
+    uncertainty = 1e-3 * rng.standard_normal((1, 2, 3, 3))
     if kind == "pair":
-        doubt[:] = 0.0
+        uncertainty[:] = 0.0
     flags = np.array([kind in ("wall", "edge", "image")]), np.array([kind == "pair"])
     mixed = np.array([kind == "edge"])
     beyond = np.zeros((1, 3, 4))
     beyond[0, :, :3], beyond[0, :, 3] = _mirror(digest.middle, digest.middle + np.array([0.2, 0.0, 3.0]))
     return Trials(
-        np.zeros(1, dtype=np.int64), *flags, start[None], turn, shift, doubt, mixed, beyond, np.array([kind == "image"])
+        np.zeros(1, dtype=np.int64),
+        *flags,
+        start[None],
+        turn,
+        shift,
+        uncertainty,
+        mixed,
+        beyond,
+        np.array([kind == "image"]),
     )
 
 
@@ -122,8 +130,10 @@ def test_evidence_is_the_integral_of_the_likelihood():
     rng = np.random.default_rng(7)
     digest = _digest(8, std=0.02, rng=rng)
     trials = _trials("point", digest, rng)
-    trials = trials._replace(turn=np.tile(AXES, (1, 2, 1, 1)), shift=np.zeros((1, 2, 3)), doubt=np.zeros((1, 2, 3, 3)))
-    digest = digest._replace(doubt=np.zeros(digest.doubt.shape))
+    trials = trials._replace(
+        turn=np.tile(AXES, (1, 2, 1, 1)), shift=np.zeros((1, 2, 3)), uncertainty=np.zeros((1, 2, 3, 3))
+    )
+    digest = digest._replace(uncertainty=np.zeros(digest.uncertainty.shape))
     truth = trials.start[0]
     poses = Poses(digest.tx[0], digest.rx[0], np.zeros(digest.tx.shape[1]))  # cosines in the room's axes
     form = np.array([(0, NONE, NONE, NONE, NONE)])
