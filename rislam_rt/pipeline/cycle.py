@@ -75,7 +75,11 @@ class Receptions(dict[tuple[int, bytes, int], tuple[Measurement | None, Measurem
     """
 
     def measure(
-        self, cycle: int, code: bytes, previous: Measurement | None, receive: Callable[[], tuple[Measurement, PathTruth]]
+        self,
+        cycle: int,
+        code: bytes,
+        previous: Measurement | None,
+        receive: Callable[[], tuple[Measurement, PathTruth]],
     ) -> tuple[Measurement, PathTruth, float]:
         """Components of a cycle, which paths they were, and the seconds that finding them took the first time."""
         key = cycle, code, id(previous)
