@@ -9,7 +9,8 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedCompo
 CELL = np.array([0.3, 0.5, 0.5])
 
 
-def test_returns_out_of_reach_change_nothing(monkeypatch, count=80, heard=40):
+def test_returns_out_of_reach_change_nothing(monkeypatch):
+    count, heard = 80, 40
     rng = np.random.default_rng(5)
     seen = rng.uniform([1.0, -1.0, -1.0], [12.0, 1.0, 1.0], (count, 3))
     root = 0.002 * rng.standard_normal((10, 10))
