@@ -20,7 +20,8 @@ def returns(count, *, rng):
 
 
 @pytest.mark.parametrize("told", [False, True])
-def test_the_strongest_of_a_cell_takes_in_the_others(told, count=60):
+def test_the_strongest_of_a_cell_takes_in_the_others(told):
+    count = 60
     rng = np.random.default_rng(3)
     expected, clear = returns(count, rng=rng), rng.uniform(0.2, 1.0, count)
     sides = rng.integers(2, size=count) if told else None
