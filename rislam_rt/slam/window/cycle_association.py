@@ -144,4 +144,4 @@ def _within_reach(seen: Floats, variance: Floats, observed: Observations) -> Int
     for axis in range(3):
         gap = seen[:, axis, None] - observed.seen[:, axis]
         near &= gap**2 <= GATE * (variance[:, axis, None] + observed.std[:, axis] ** 2)
-    return np.asarray(near.any(axis=1).nonzero()[0])
+    return np.flatnonzero(near.any(axis=1))
