@@ -113,9 +113,8 @@ def _associate(
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), 0.0, 1.0
     lead, mate = groups.leader, groups.partner
     share = groups.share[:, None]
-    gap = np.where(mate[:, None] >= 0, expected.seen[mate] - expected.seen[lead], 0.0)
-    seen = expected.seen[lead] + share * gap
-    extra = groups.disturbance + groups.share_variance[:, None] * gap**2
+    seen = expected.seen[lead] + share * groups.gap
+    extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
     extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(observed.std, axis=0) ** 2
     most = np.abs(expected.jacobian) @ np.sqrt(np.diagonal(covariance))  # no correlation makes a deviation larger
     near = _within_reach(seen, (most[lead] + share * (most[mate] - most[lead])) ** 2 + extra, observed)
