@@ -61,7 +61,7 @@ newest: $(READY)
 interop: $(READY)
 	@$(BIN)/python -m venv .venv-interop
 	@.venv-interop/bin/python -m pip install --quiet --disable-pip-version-check -e '.[interop]' pytest pytest-timeout
-	@.venv-interop/bin/python -m pytest -m interop tests/report/test_interop.py
+	@.venv-interop/bin/python -m pytest -m interop tests/report/exports/test_interop.py
 
 lock:
 	@uv pip compile --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 --extra dev \

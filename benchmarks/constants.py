@@ -41,7 +41,7 @@ def use(levels: ModelConstants) -> None:
     """Every module of the filter reads these from now on."""
     for name, module in sys.modules.items():
         if name.startswith("rislam_rt.slam.window") and hasattr(module, "CONSTANTS"):
-            module.LEVELS = levels  # type: ignore[attr-defined]
+            module.CONSTANTS = levels  # type: ignore[attr-defined]
 
 
 def error(path: Path, cycles: int, nudge: float = 0.0) -> float:

@@ -3,10 +3,13 @@
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
+LEAST_LIKE = 0.75
+"""Share of letters that two spellings of one word have in common; `num_particles` and `num_samples` have 0.67."""
+
 
 def nearest(word: str, known: Iterable[str], most: int = 1) -> list[str]:
     """Of the known words those that are spelt nearly so, the nearest first."""
-    return get_close_matches(word, list(known), n=most)
+    return get_close_matches(word, list(known), n=most, cutoff=LEAST_LIKE)
 
 
 def did_you_mean(near: Sequence[str]) -> str:

@@ -18,6 +18,7 @@ from rislam_rt.cli import (
     sweep,
     trace,
 )
+from rislam_rt.cli.output_files import with_overwrite
 from rislam_rt.cli.verbosity import with_verbosity
 
 app = typer.Typer(
@@ -28,7 +29,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for _command in (run, sweep, slam, pipelines, config, new, check, export, show, trace, compare, design, report, doctor):
-    app.command(_command.__name__.rpartition(".")[2])(with_verbosity(_command.command))
+    app.command(_command.__name__.rpartition(".")[2])(with_verbosity(with_overwrite(_command.command)))
 
 
 def _print_version(wanted: bool) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, SceneFolder, Settings, pipeline_file, write_json
+from rislam_rt.cli.output_files import OUTPUT
 
 if TYPE_CHECKING:
     from rislam_rt.pipeline.specification.spec import Settings as Records
@@ -27,7 +28,7 @@ def command(
     ] = MAIN_JOB,
     set_: Settings = None,
     picture: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw where the panel can be heard (PNG, SVG or PDF).")
+        Path | None, typer.Option(metavar="FILE", help="Draw where the panel can be heard (PNG, SVG or PDF)."), OUTPUT
     ] = None,
     json: JsonFile = None,
 ) -> None:  # fmt: skip

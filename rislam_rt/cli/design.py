@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from rislam_rt.cli.options import ChannelName, Depth, JsonFile, RadioSettings, SceneFolder, Seed, write_json
+from rislam_rt.cli.output_files import OUTPUT
 
 
 def command(
@@ -15,7 +16,7 @@ def command(
     channel: ChannelName = "image_source",
     seed: Seed = 7,
     set_: RadioSettings = None,
-    figure: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the codes (PNG or SVG).")] = None,
+    figure: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the codes (PNG or SVG)."), OUTPUT] = None,
     json: JsonFile = None,
 ) -> None:
     """Design the panel's code for one position with every method, and say how far each is from the optimum.

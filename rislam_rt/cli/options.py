@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from rislam_rt.cli.output_files import OUTPUT
 from rislam_rt.shipped import find_pipeline, find_room
 
 
@@ -50,7 +51,9 @@ RadioSettings = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="Change a setting radio.*, as in a pipeline; repeatable."),
 ]
 JsonFile = Annotated[
-    Path | None, typer.Option("--json", metavar="FILE", help="Write what is printed to FILE, machine-readable.")
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write what is printed to FILE, machine-readable."),
+    OUTPUT,
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of all random draws.")]
 Depth = Annotated[int, typer.Option(min=0, max=4, help="Largest number of wall bounces on a path.")]
@@ -85,6 +88,6 @@ def write_json(file: Path | None, content: dict[str, Any]) -> None:
         return
     import json
 
-    from rislam_rt.storage.files import write_atomic
+    from rislam_rt.storage.files import MARK, write_atomic
 
-    write_atomic(file, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
+    write_atomic(file, (json.dumps({**content, "origin": MARK}, indent=2, allow_nan=False) + "\n").encode())

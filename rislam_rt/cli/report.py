@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rislam_rt.cli.options import JsonFile, write_json
+from rislam_rt.cli.output_files import OUTPUT
 
 if TYPE_CHECKING:
     from rislam_rt.model import SlamResult
@@ -16,8 +17,11 @@ def command(
     rerun: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write a recording for the Rerun viewer (.rrd); needs the extra `viz`."),
+        OUTPUT,
     ] = None,
-    gif: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a moving picture of the run (.gif).")] = None,
+    gif: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a moving picture of the run (.gif)."), OUTPUT
+    ] = None,
     json: JsonFile = None,
 ) -> None:
     """Score a completed run again and draw its figures and page, which holds a map with a slider over the time.
@@ -34,7 +38,7 @@ def command(
         raise ConfigError(f"--gif: '{gif}' received; give a name that ends in .gif")
     summary, result = read_any(run)
     if rerun is not None:
-        from rislam_rt.report.rerun_recording import recording_bytes
+        from rislam_rt.report.exports.rerun_recording import recording_bytes
         from rislam_rt.storage.files import write_atomic
 
         write_atomic(rerun, recording_bytes(result, run.resolve().name))
@@ -50,7 +54,7 @@ def command(
 
 def _write_gif(result: "SlamResult", file: Path) -> Path:
     from rislam_rt.cli.progress import show_progress
-    from rislam_rt.report.animation import gif_bytes
+    from rislam_rt.report.exports.animation import gif_bytes
     from rislam_rt.storage.files import write_atomic
 
     with show_progress() as tell:

@@ -155,6 +155,7 @@ def compute_run(
 
                 typer.echo(f"report: {write_report(result, summary, folder)}")
     except KeyboardInterrupt:
-        raise Interrupted(f"interrupted: {kept} schemes kept; the same command goes on from there") from None
+        said = f"{kept} schemes kept; the same command goes on from there" if kept else "nothing was kept"
+        raise Interrupted(f"interrupted: {said}") from None
     typer.echo(f"run folder: {folder}")
     write_json(given.json, summary)

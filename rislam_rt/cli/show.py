@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rislam_rt.cli.options import MAIN_JOB, Depth, SceneFolder, Settings, pipeline_file
+from rislam_rt.cli.output_files import OUTPUT, check_output
 
 if TYPE_CHECKING:
     from rislam_rt.model import Scene
@@ -14,9 +15,13 @@ if TYPE_CHECKING:
 
 def command(
     scene: SceneFolder,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Picture to write (PNG, SVG or PDF).")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Picture to write (PNG, SVG or PDF)."), OUTPUT
+    ] = None,
     html: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a view that turns, with paths; for any browser, offline.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a view that turns, with paths; for any browser, offline."),
+        OUTPUT,
     ] = None,
     depth: Depth = 1,
     pipeline: Annotated[
@@ -43,18 +48,19 @@ def command(
 
         picture_kind(out)  # before anything is worked out
     opened = open_scene(scene, settings.radio if settings is not None else None)
-    opened.warn()
     room = opened.scene
+    picture = out or (check_output(Path(f"{safe_name(room.name)}.png")) if html is None else None)
+    opened.warn()
     print_scene(room)
     if html is not None and settings is not None:
         typer.echo(f"view: {_write_view(room, settings, depth, html)}")
-    if out is None and html is not None:
+    if picture is None:
         return
     from rislam_rt.report.room import draw_scene
 
     with show_progress() as tell:
         tell("draw", 0, 1)
-        file = draw_scene(room, out or Path(f"{safe_name(room.name)}.png"))
+        file = draw_scene(room, picture)
         tell("draw", 1, 1)
     typer.echo(f"picture: {file}")
 

@@ -33,7 +33,7 @@ def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
-    from rislam_rt.report.study import write_comparison
+    from rislam_rt.report.studies.files import write_comparison
     from rislam_rt.report.tables import print_validation
     from rislam_rt.studies.compare import comparison_table, run_comparison
     from rislam_rt.studies.spec import study_record
@@ -67,8 +67,8 @@ def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
     from rislam_rt.cli.scenes import open_scene, scene_of
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
-    from rislam_rt.report.fig4a import fig4a_table, findings_of
-    from rislam_rt.report.study import write_fig4a
+    from rislam_rt.report.studies.fig4a import fig4a_table, findings_of
+    from rislam_rt.report.studies.files import write_fig4a
     from rislam_rt.scene.file_names import safe_name
     from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
     from rislam_rt.studies.spec import study_record
@@ -127,7 +127,7 @@ def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
 def run_claims(spec: "ClaimsSpec", given: StudyOptions) -> None:
     """The claims' table, from what other studies left behind."""
     from rislam_rt.errors import ConfigError
-    from rislam_rt.report.claims import write_claims
+    from rislam_rt.report.studies.claims import write_claims
     from rislam_rt.studies.claims import judge, read_results
 
     if given.scene is not None:

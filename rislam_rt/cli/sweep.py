@@ -71,7 +71,7 @@ def _run(sweep: "Sweep", target: Path, effort: "SweepOptions") -> "SweepReport":
     """The sweep with its bar; scores and their picture grow beside the table."""
     from rislam_rt.cli.progress import show_sweep
     from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.report.sweep import draw_scores
+    from rislam_rt.report.studies.sweep import draw_scores
     from rislam_rt.studies.pipeline_sweep import score_rows, write_scores
     from rislam_rt.sweeps import build_cells, run_sweep
     from rislam_rt.sweeps.store import check_folder

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from rislam_rt.cli.options import ChannelName, Depth, JsonFile, SceneFolder, write_json
+from rislam_rt.cli.output_files import OUTPUT, check_output
 
 if TYPE_CHECKING:
     from rislam_rt.model import Paths, RadioConfig, Scene
@@ -47,6 +48,7 @@ def command(
     out: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write NetCDF: all paths; <scene>-signals.nc by default with --signals."),
+        OUTPUT,
     ] = None,
     deepmimo: Annotated[
         Path | None,
@@ -65,7 +67,7 @@ def command(
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.signals import load_signals_spec, signal_settings
     from rislam_rt.pipeline.specification.read import load_radio
-    from rislam_rt.report.deepmimo import deepmimo_files
+    from rislam_rt.report.exports.deepmimo import deepmimo_files
     from rislam_rt.report.tables import path_table, print_paths
     from rislam_rt.scene.file_names import safe_name
     from rislam_rt.scene.write import write_files
@@ -106,7 +108,7 @@ def check_new(folder: Path) -> None:
         It is there already, or has a name that the package cannot load.
     """
     from rislam_rt.errors import ConfigError
-    from rislam_rt.report.deepmimo import check_name
+    from rislam_rt.report.exports.deepmimo import check_name
 
     check_name(folder.name)
     if folder.exists():
@@ -139,6 +141,7 @@ def trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, 
 
     from rislam_rt.pipeline.dataset import paths_to_dataset
     from rislam_rt.pipeline.run import build_channel
+    from rislam_rt.storage.files import MARK
     from rislam_rt.storage.netcdf import write_dataset
 
     begin = perf_counter()
@@ -146,7 +149,7 @@ def trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, 
     seconds = perf_counter() - begin
     if file is None:
         return TraceResult(paths, seconds, AT_REST, {})
-    write_dataset(paths_to_dataset(paths, scene.agent), file)
+    write_dataset(paths_to_dataset(paths, scene.agent).assign_attrs(history=MARK), file)
     return TraceResult(paths, seconds, AT_REST, {"files": {"paths": str(file)}})
 
 
@@ -168,8 +171,10 @@ def trace_signals(
         mean_components,
         signals_size,
     )
+    from rislam_rt.storage.files import MARK
     from rislam_rt.storage.netcdf import write_dataset
 
+    check_output(file)
     spec = load_signals_spec(settings)
     size = signals_size(scene, spec)
     check_space(file, size)
@@ -186,7 +191,7 @@ def trace_signals(
         data = build_signals(
             scene, paths, spec, rng=noise, on_cycle=lambda: tell("estimate", next(done), paths.num_cycles)
         )
-    write_dataset(data, file)
+    write_dataset(data.assign_attrs(history=MARK), file)
     shape = {**size._asdict(), "file_bytes": file.stat().st_size, "mean_components": mean_components(data)}
     return TraceResult(
         paths,

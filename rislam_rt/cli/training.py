@@ -25,7 +25,7 @@ def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
-    from rislam_rt.report.classifier import (
+    from rislam_rt.report.studies.classifier import (
         classifier_page,
         classifier_table,
         draw_importance,

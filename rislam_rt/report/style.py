@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind
-from rislam_rt.storage.files import write_atomic
+from rislam_rt.storage.files import MARK, write_atomic
 
 DPI = 120
 TRUTH = "black"
@@ -48,6 +48,8 @@ KIND = {
     PathKind.VRIS: "#F3B583",
 }
 """Colour of each path class."""
+MARKED_BY = {"png": "Comment", "svg": "Description", "pdf": "Subject"}
+"""Formats of pictures, and the field of each that holds the program's mark."""
 SETTINGS: dict[Any, Any] = {
     "font.size": 10,
     "axes.titlesize": 11,
@@ -97,7 +99,7 @@ def picture_kind(path: Path) -> str:
         It is none that can be drawn.
     """
     kind = path.suffix.lstrip(".").lower()
-    if kind not in ("png", "svg", "pdf"):
+    if kind not in MARKED_BY:
         raise ConfigError(f"{path}: no picture of that ending; give a name that ends in .png, .svg or .pdf")
     return kind
 
@@ -114,6 +116,6 @@ def save_figure(figure: Figure, path: Path) -> Path:
     """
     kind = picture_kind(path)
     buffer = io.BytesIO()
-    _save(figure, buffer, format=kind, dpi=DPI)
+    _save(figure, buffer, format=kind, dpi=DPI, metadata={MARKED_BY[kind]: MARK})
     write_atomic(path, buffer.getvalue())
     return path

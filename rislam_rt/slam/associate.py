@@ -36,13 +36,17 @@ def associate(candidates: Candidates, observations: Observations, gate: float, s
     delay and cosines) do not compete at all.
     """
     chosen = np.full(len(candidates.seen), -1)
-    if not len(candidates.seen) or not len(observations.seen):
-        return chosen
-    cost = pair_costs(candidates, observations, gate, strangers)
+    if len(chosen) and len(observations.seen):
+        rows, columns = cheapest(pair_costs(candidates, observations, gate, strangers))
+        chosen[rows] = columns
+    return chosen
+
+
+def cheapest(cost: Floats) -> tuple[Integers, Integers]:
+    """Rows and columns of the one assignment of least cost (R, C), of those pairs that lower it."""
     rows, columns = scipy.optimize.linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
-    chosen[rows[good]] = columns[good]
-    return chosen
+    return rows[good], columns[good]
 
 
 def pair_costs(candidates: Candidates, observations: Observations, gate: float, strangers: Floats | float) -> Floats:

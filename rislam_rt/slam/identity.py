@@ -18,12 +18,8 @@ MODEL_ERROR = 0.05
 """Relative error of predicted amplitudes: geometry, and what the amplitude law leaves out."""
 DOUBT = 4.0
 """Largest log-likelihood ratio that one cycle may add, so that one freak amplitude decides nothing."""
-TOLD = 2.0
-"""Log-likelihood ratio for the panel of a component that only the panel's paths can cause: it may come over walls."""
 SHOWN = 0.9
 """Probability that a path above the threshold is reported at all: others may shade it or merge with it."""
-MAX_PANEL_ODDS = 8.0
-"""Log odds of panel against scatterer that count most for a point: amplitudes alone do not make one."""
 BLOCKED = 0.02
 """Probability that in a cycle something comes to stand in the way of a path; it stays until the path shows again."""
 BEYOND = 8.0
@@ -108,14 +104,6 @@ def weigh_silence(hidden: Floats, missed: Floats) -> tuple[Floats, Floats]:
     silence = before + (1.0 - before) * missed
     surplus = np.log(silence[:, :-1]) - np.log(silence[:, -1:])
     return before / silence, np.clip(surplus, -DOUBT, DOUBT)
-
-
-def panel_surplus(log_ris: float) -> float:
-    """What amplitudes tell for a point, as chi^2: it may be the panel or a scatterer, an image is the latter alone.
-
-    Before a panel is known, that is: its own images change with the code as well.
-    """
-    return 2.0 * float(np.logaddexp(0.0, min(log_ris, MAX_PANEL_ODDS)) - np.log(2.0))
 
 
 def panel_probabilities(log_ris: Floats) -> Floats:

@@ -1,80 +1,18 @@
-"""Mean and covariance of what a filter believes: all that the front end (association, births, map) asks of it."""
+"""Ends of the agent at its poses; samples of Gaussians without a random number."""
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
 from rislam_rt.slam.returns import Poses
-
-POSE = 7
-"""Numbers of the pose: position, velocity, heading. The features, three numbers each, follow them."""
-
-
-class Moments(NamedTuple):
-    """The belief's first two moments over pose and F features."""
-
-    mean: Floats
-    """(7 + 3F,) position [m], velocity [m/s], heading [rad], features [m]."""
-    covariance: Floats
-    """(7 + 3F, 7 + 3F)."""
-
-    @property
-    def position(self) -> Floats:
-        """(3,) [m]."""
-        return self.mean[:3]
-
-    @property
-    def velocity(self) -> Floats:
-        """(3,) [m/s]."""
-        return self.mean[3:6]
-
-    @property
-    def heading(self) -> float:
-        """[rad]."""
-        return float(self.mean[6])
-
-    @property
-    def features(self) -> Floats:
-        """(F, 3) [m]."""
-        return self.mean[POSE:].reshape(-1, 3)
-
-    def block(self, feature: int) -> Floats:
-        """(3, 3) [m^2] covariance of one feature."""
-        return self.covariance[where(feature), where(feature)]
-
-    def columns(self, features: Integers) -> Integers:
-        """Columns (3P,) of some features."""
-        return np.asarray((POSE + 3 * np.asarray(features, dtype=np.int64)[:, None] + np.arange(3)).ravel())
-
-
-def where(feature: int) -> slice:
-    """Columns of one feature in the moments."""
-    return slice(POSE + 3 * feature, POSE + 3 * feature + 3)
 
 
 def poses_of(position: Floats, heading: Floats, body: Body) -> Poses:
     """Ends of agents at positions (..., 3) with headings that broadcast against the leading axes."""
     return Poses(*body.ends(position, heading), np.asarray(heading))
-
-
-def normalised(log_weight: Floats) -> tuple[Floats, float]:
-    """Log weights that sum to one, and the logarithm of what they summed to; hopeless weights become equal ones."""
-    top = float(np.max(log_weight))
-    if not np.isfinite(top):
-        return np.full(len(log_weight), -np.log(len(log_weight))), -np.inf
-    total = top + float(np.log(np.sum(np.exp(log_weight - top))))
-    return log_weight - total, total
-
-
-def systematic_ancestors(log_weight: Floats, count: int, *, rng: np.random.Generator) -> Integers:
-    """Ancestors (count,) by systematic resampling: particle i is drawn `count w_i` times on average, unbiased."""
-    edges = np.cumsum(np.exp(log_weight))
-    comb = (np.arange(count) + rng.random()) / count * edges[-1]
-    return np.minimum(np.searchsorted(edges, comb, side="right"), len(log_weight) - 1)
 
 
 def square_root(covariance: Floats) -> Floats:

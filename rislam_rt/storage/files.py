@@ -5,6 +5,7 @@ import re
 import tempfile
 from collections.abc import Iterable
 from contextlib import suppress
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
 from rislam_rt.errors import StoreError
@@ -12,6 +13,20 @@ from rislam_rt.errors import StoreError
 PREFIX, SUFFIX = ".rislam-rt-", ".tmp"
 TEMPORARY = re.compile(r"\.rislam-rt-[a-z0-9_]{8}\.tmp")
 """Names under which files grow; nobody else gives such names, and no other file is ever removed."""
+
+MARK = "made by rislam-rt"
+"""Stands in every file that a command writes under a name that the user gave."""
+RECORDING = (b"RRF", b"rislam_rt")
+"""How a Rerun recording begins, and the application that it names."""
+
+
+def is_own(path: Path) -> bool:
+    """Whether nothing of the user's is lost by writing to a path: no file, an empty one, or one with our mark."""
+    if not path.is_file() or path.stat().st_size == 0 or _is_device(path):
+        return True
+    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
+        head, application = RECORDING
+        return content.find(MARK.encode()) >= 0 or (content[:3] == head and content.find(application) >= 0)
 
 
 def write_atomic(path: Path, content: bytes) -> None:

@@ -201,6 +201,18 @@ def test_an_own_room_is_called_after_its_folder(run, tmp_path):
     assert [path.name[:26] for path in (tmp_path / "runs").iterdir()] == ["trace_then_slam-my_room-7-"]
 
 
+def test_a_run_interrupted_at_once_says_that_nothing_was_kept(run, monkeypatch):
+    import rislam_rt.pipeline as module
+
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, "run_slam", interrupted)
+    code, _, err = run("run", PIPELINE, *SHORT, "--no-report")
+    assert code == 130
+    assert err.splitlines()[-1] == "interrupted: nothing was kept"
+
+
 @pytest.mark.parametrize("blow", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_run_goes_on(run, tmp_path, monkeypatch, blow):
     import rislam_rt.pipeline.run as module

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from rislam_rt.storage.files import is_own
 from rislam_rt.storage.seal import seal
 
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
@@ -44,6 +45,7 @@ def test_report_writes_a_moving_picture(run, tmp_path):
     assert code == 0
     assert "moving picture: run.gif" in out
     assert (tmp_path / "run.gif").read_bytes().startswith(b"GIF89a")
+    assert is_own(tmp_path / "run.gif")
     assert (tmp_path / "r" / "report.html").exists()
 
 

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from rislam_rt.report.claims import claims_page, write_claims
+from rislam_rt.report.studies.claims import claims_page, write_claims
 from rislam_rt.report.swept import write_swept
 from rislam_rt.report.swept.entries import bound_beside, scheme_entry, what_limits
 from rislam_rt.report.swept.rooms import budget, missed_aims

@@ -43,7 +43,7 @@ ONLY_IN = {
     "random": (),
     "evo": (),
     "deepmimo": (),
-    "rerun": ("report/rerun_recording.py",),
+    "rerun": ("report/exports/rerun_recording.py",),
 }
 """Where a foreign package may be imported inside the package: the tracer in one folder, evo (GPL) nowhere."""
 

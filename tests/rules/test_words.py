@@ -7,34 +7,15 @@ import rule_book as rules
 import word_rules
 from rule_book import Source
 
-EXCEPTIONS = Path(__file__).parent / "old_names.txt"
-
-
-def read_exceptions() -> tuple[set[str], set[str]]:
-    """Files whose names are not looked at yet, and class names that still stand twice."""
-    lines = {line.strip() for line in EXCEPTIONS.read_text(encoding="utf-8").splitlines()} - {""}
-    lines = {line for line in lines if not line.startswith("#")}
-    return {line for line in lines if line.endswith(".py")}, {line for line in lines if not line.endswith(".py")}
-
 
 def test_names_are_the_words_of_the_field() -> None:
-    files, _ = read_exceptions()
-    breaches = [b for source in rules.package_sources() for b in word_rules.word_breaches(source, files)]
+    breaches = [b for source in rules.package_sources() for b in word_rules.word_breaches(source)]
     assert not breaches, "\n" + "\n".join(breaches)
 
 
 def test_no_class_name_stands_twice() -> None:
-    _, doubled = read_exceptions()
-    breaches = list(word_rules.doubled_classes(rules.package_sources(), doubled))
+    breaches = list(word_rules.doubled_classes(rules.package_sources()))
     assert not breaches, "\n" + "\n".join(breaches)
-
-
-def test_exceptions_are_in_the_one_folder_that_may_have_them() -> None:
-    """The list shrinks to nothing: no other folder may go on it."""
-    files, doubled = read_exceptions()
-    assert all(file.startswith(word_rules.NOT_YET) for file in files)
-    outside = [s for s in rules.package_sources() if not s.path.startswith(word_rules.NOT_YET)]
-    assert not list(word_rules.doubled_classes(outside, doubled))
 
 
 @pytest.mark.parametrize(
@@ -56,7 +37,6 @@ def test_a_name_that_is_not_the_fields_is_noticed(path: str, text: str, tmp_path
     file.write_text(text, encoding="utf-8")
     source = Source(path, file.read_text(encoding="utf-8"))
     assert list(word_rules.word_breaches(source))
-    assert not list(word_rules.word_breaches(source, {path}))
 
 
 @pytest.mark.parametrize(
@@ -74,9 +54,7 @@ def test_the_fields_words_pass(path: str, text: str) -> None:
 def test_a_class_name_that_stands_twice_is_noticed() -> None:
     first, second = Source("slam/a.py", "class Leg: ..."), Source("channel/b.py", "class Leg: ...")
     assert list(word_rules.doubled_classes([first, second]))
-    assert not list(word_rules.doubled_classes([first, second], {"Leg"}))
-    third = Source("report/c.py", "class Leg: ...")
-    assert list(word_rules.doubled_classes([first, second, third], {"Leg"}))
+    assert not list(word_rules.doubled_classes([first, Source("report/c.py", "class Bone: ...")]))
 
 
 def test_every_word_has_one_that_stands_in_its_place() -> None:

@@ -3,14 +3,11 @@
 import ast
 import re
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 
 from rule_book import ROOT, Source
 
 GLOSSARY = ROOT / "docs" / "glossary.md"
-
-NOT_YET = "slam/"
-"""The one folder that exceptions may name."""
 
 
 def listed(section: str, text: str | None = None) -> dict[str, str]:
@@ -35,10 +32,8 @@ def names_of(source: Source) -> Iterator[tuple[str, str, bool]]:
             yield f"{source.path}:{node.lineno}", node.name, isinstance(node, ast.ClassDef)
 
 
-def word_breaches(source: Source, exceptions: Collection[str] = ()) -> Iterator[str]:
+def word_breaches(source: Source) -> Iterator[str]:
     """Names with a word that is not the field's."""
-    if source.path in exceptions:
-        return
     parts, wholes = listed("Not the field's words"), listed("Not alone")
     for place, name, is_whole in names_of(source):
         words = words_of(name)
@@ -49,14 +44,13 @@ def word_breaches(source: Source, exceptions: Collection[str] = ()) -> Iterator[
             yield f"{place}: '{name}' alone: say {wholes['_'.join(words)]} (docs/glossary.md)"
 
 
-def doubled_classes(sources: Iterable[Source], exceptions: Collection[str] = ()) -> Iterator[str]:
-    """Class names that stand twice; an exception may stand outside `slam/` once."""
+def doubled_classes(sources: Iterable[Source]) -> Iterator[str]:
+    """Class names that stand twice."""
     places = defaultdict(list)
     for source in sources:
         for node in ast.walk(source.tree):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places[node.name].append(source.path)
     for name, files in places.items():
-        counted = [file for file in files if name not in exceptions or not file.startswith(NOT_YET)]
-        if len(counted) > 1:
+        if len(files) > 1:
             yield f"class {name} stands in {', '.join(files)}"

@@ -14,8 +14,8 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.pipeline import PipelineSpec, load_spec
 from rislam_rt.pipeline.specification.radio import build_radio
-from rislam_rt.report.certificate import draw_certificate
-from rislam_rt.report.fig4a import claims, fig4a_csv, fig4a_page, findings_of
+from rislam_rt.report.studies.certificate import draw_certificate
+from rislam_rt.report.studies.fig4a import claims, fig4a_csv, fig4a_page, findings_of
 from rislam_rt.report.style import to_png
 from rislam_rt.scene import load_scene
 from rislam_rt.studies import CompareSpec, Fig4aSpec, load_any

@@ -117,6 +117,7 @@ def build_spec(table: Table, model: type[Spec], check: Callable[[Spec], object])
     except ValidationError as error:
         items = error.errors(include_url=False, include_context=False)
         items = [item for item in items if item["loc"] == ("kind",)] or items  # a file of another kind has other keys
+        items = [item for item in items if item["type"] == "missing" or _is_said(content, item["loc"])] or items
         raise ConfigError(
             *(f"{_source(path, _place(item), changed)}: {_remark(item, model)}" for item in items)
         ) from None
@@ -203,15 +204,24 @@ def _remark(item: Any, model: type[BaseModel]) -> str:
     return f"{place}: {str(item['input'])[:60]!r} received; {message[:1].lower()}{message[1:]}"
 
 
+def _is_said(content: Any, place: tuple[Any, ...]) -> bool:
+    """Whether a pipeline's table has the key at fault itself, not handed on from another section."""
+    for part in place:
+        if not isinstance(content, dict):
+            return True  # of a list or a value, all is said
+        if part not in content:
+            return False
+        content = content[part]
+    return True
+
+
 def _near_key(words: list[str], model: type[BaseModel]) -> list[str]:
-    """What an unknown key was meant to be: one of the same table, or else the key of that name of another."""
+    """What an unknown key was meant to be: that of the same name in another table, or else one of the same table."""
     keys = _keys(model)
     table = ".".join(word for word in words[:-1] if not word.isdigit())
     own = [key.rpartition(".")[2] for key in keys if key.rpartition(".")[0] == table]
-    if near := nearest(words[-1], own):
-        return near
     names = {key.rpartition(".")[2]: key for key in reversed(keys)}  # of several tables the first
-    return [names[words[-1]]] if words[-1] in names else []
+    return [names[words[-1]]] if words[-1] in names else nearest(words[-1], own)
 
 
 def _keys(section: type[BaseModel], above: str = "") -> list[str]:

@@ -7,6 +7,8 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import Any
 
+from rislam_rt.storage.files import MARK
+
 SCRIPTS = ("space.js", "draw.js", "view.js", "beliefs.js", "start.js")
 """In the order of their needs; the last finds the views of a page and starts them."""
 
@@ -34,6 +36,7 @@ def view_script() -> str:
 def view_page(title: str, about: str, data: Mapping[str, Any]) -> str:
     """A page of its own."""
     return _asset("page.html").format(
+        mark=MARK,
         title=html.escape(title),
         about=html.escape(about),
         style=view_style(),

@@ -9,8 +9,8 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Body
 from rislam_rt.slam.associate import squared_distance
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.identity import DOUBT, panel_surplus
-from rislam_rt.slam.moments import Moments, poses_of, square_root
+from rislam_rt.slam.identity import DOUBT
+from rislam_rt.slam.moments import poses_of, square_root
 from rislam_rt.slam.nested.birth_scheduling import PARALLEL, due_tracks
 from rislam_rt.slam.nested.candidates import PredictedMeasurements, explained
 from rislam_rt.slam.nested.hypotheses import (
@@ -31,7 +31,8 @@ from rislam_rt.slam.nested.hypotheses import (
 )
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, enter
 from rislam_rt.slam.nested.mirrors import is_behind_mirror, mirror_images
-from rislam_rt.slam.nested.tracks import LandmarkTracks, overstatement
+from rislam_rt.slam.nested.moments import Moments
+from rislam_rt.slam.nested.tracks import LandmarkTracks, overstatement, panel_surplus
 from rislam_rt.slam.observations import PANEL, UNTOLD, same_side
 from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe
 
@@ -60,8 +61,7 @@ class BirthDecision(NamedTuple):
     parent: int
     """Feature row of the point, -1 without one."""
     fit: Fit
-    upright: bool = False
-    """Whether a wall is taken to be upright, as its returns do not tell."""
+    upright: bool = False  # of a wall, as its returns do not tell
 
 
 class BirthContext(NamedTuple):

@@ -66,7 +66,7 @@ class History(NamedTuple):
     """(6, D) square root of the covariance of today's position and velocity, through which all poses err together;
     no columns where the poses are taken as certain."""
     panel: float = 0.0
-    """By how much chi^2 its amplitudes speak for a point (see `identity.panel_surplus`)."""
+    """By how much chi^2 its amplitudes speak for a point (see `tracks.panel_surplus`)."""
     side: int = UNTOLD
     """Whether it runs over the panel (see `tracks.Observations`)."""
 

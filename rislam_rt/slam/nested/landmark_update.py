@@ -10,7 +10,6 @@ from rislam_rt.information import amplitude_std
 from rislam_rt.model import RisCode
 from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.identity import (
-    TOLD,
     add_evidence,
     log_panel,
     log_panel_missed,
@@ -18,15 +17,18 @@ from rislam_rt.slam.identity import (
     log_scatterer_missed,
     weigh_silence,
 )
-from rislam_rt.slam.moments import Moments, poses_of, square_root
+from rislam_rt.slam.moments import poses_of, square_root
 from rislam_rt.slam.nested.candidates import PredictedMeasurements
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, image_idents, learn_ratio
 from rislam_rt.slam.nested.measurement_prediction import ExpectedReturns, MapBelief
+from rislam_rt.slam.nested.moments import Moments
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.returns import NONE, TX, Returns, compact, observe
 
 BELIEF_SAMPLES = 24
 """Samples of the belief over which the panel's predicted gain is averaged."""
+TOLD = 2.0
+"""Log-likelihood ratio for the panel of a component that only the panel's paths can cause: it may come over walls."""
 CERTAIN = 30.0
 """Log odds beyond which a point's identity is no longer in question."""
 DRIFT_RATE = 0.04

@@ -17,6 +17,8 @@ LOST = np.log(0.01)
 """Log probability of a gap below which a track has ended."""
 FAINTEST = 0.1
 """Least share of cycles from which the strength of a path is reckoned."""
+MAX_PANEL_ODDS = 8.0
+"""Log odds of panel against scatterer that count most for a point: amplitudes alone do not make one."""
 
 
 class LandmarkTracks(NamedTuple):
@@ -214,3 +216,11 @@ def begin(
         observations.sides[picks],
     )
     return LandmarkTracks._make(np.concatenate([old, new]) for old, new in zip(tracks, fresh, strict=True))
+
+
+def panel_surplus(log_ris: float) -> float:
+    """What amplitudes tell for a point, as chi^2: it may be the panel or a scatterer, an image is the latter alone.
+
+    Before a panel is known, that is: its own images change with the code as well.
+    """
+    return 2.0 * float(np.logaddexp(0.0, min(log_ris, MAX_PANEL_ODDS)) - np.log(2.0))

@@ -3,11 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
-from rislam_rt.slam.associate import Candidates, pair_costs, squared_distance
+from rislam_rt.slam.associate import Candidates, cheapest, pair_costs, squared_distance
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import TX, Poses
@@ -114,23 +113,20 @@ def _associate(
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), 0.0, 1.0
     lead, mate = groups.leader, groups.partner
     share = groups.share[:, None]
-    gap = np.where(mate[:, None] >= 0, expected.seen[mate] - expected.seen[lead], 0.0)
-    seen = expected.seen[lead] + share * gap
+    seen = expected.seen[lead] + share * groups.gap
     jacobian = expected.jacobian[lead] + share[..., None] * (expected.jacobian[mate] - expected.jacobian[lead])
     spread = (jacobian.reshape(-1, jacobian.shape[-1]) @ covariance).reshape(jacobian.shape)
     spread = spread @ np.swapaxes(jacobian, 1, 2)
-    extra = groups.disturbance + groups.share_variance[:, None] * gap**2
+    extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
     extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(observed.std, axis=0) ** 2
     spread[:, [0, 1, 2], [0, 1, 2]] += extra
     odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))
     side = np.full(len(lead), UNTOLD) if sides is None else sides[lead]
     candidates = Candidates(seen, spread, groups.log_amplitude, np.hypot(groups.log_amplitude_std, 0.15), odds, side)
     cost = pair_costs(candidates, observed, GATE, strangers)
-    rows, columns = scipy.optimize.linear_sum_assignment(cost)
-    good = cost[rows, columns] < 0.0
+    rows, columns = cheapest(cost)
     # the cost counts what is missed: seen against missed, both against strangers
-    gain = -0.5 * float(cost[rows[good], columns[good]].sum()) + float(np.log1p(-shows[rows[good]]).sum())
-    rows, columns = rows[good], columns[good]
+    gain = -0.5 * float(cost[rows, columns].sum()) + float(np.log1p(-shows[rows]).sum())
     noise = np.zeros((len(rows), 3, 3))
     noise[:, [0, 1, 2], [0, 1, 2]] = observed.std[columns] ** 2
     distance, _ = squared_distance(observed.seen[columns] - seen[rows], spread[rows] + noise)

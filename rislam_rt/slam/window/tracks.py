@@ -3,10 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.associate import Candidates, pair_costs
+from rislam_rt.slam.associate import Candidates, cheapest, pair_costs
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.model_constants import CONSTANTS
@@ -93,10 +92,8 @@ def match(
     candidates = Candidates(
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
     )
-    cost = pair_costs(candidates, observed.take(free), GATE, strangers)
-    rows, columns = scipy.optimize.linear_sum_assignment(cost)
-    good = cost[rows, columns] < 0.0
-    return rows[good], free[columns[good]]
+    rows, columns = cheapest(pair_costs(candidates, observed.take(free), GATE, strangers))
+    return rows, free[columns]
 
 
 def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: Integers, cycle: int) -> WindowTracks:

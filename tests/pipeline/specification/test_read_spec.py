@@ -108,6 +108,14 @@ def test_bad_override_is_laid_to_the_command_line(write, setting):
         load_spec(write(MINIMAL), [setting])
 
 
+@pytest.mark.parametrize("setting", ["slam.use_vt=maybe", "motion.sigma_a_m_s2=-3", "bp_slam.sigma_a=-1"])
+def test_a_setting_handed_on_to_other_sections_is_complained_about_once(write, setting):
+    with pytest.raises(ConfigError) as caught:
+        load_spec(write(MINIMAL), [setting])
+    assert len(caught.value.lines) == 1
+    assert caught.value.lines[0].startswith(f"--set: {setting.partition('=')[0]}")
+
+
 def test_missing_file_and_folder(tmp_path):
     with pytest.raises(ConfigError, match="no such pipeline file"):
         load_spec(tmp_path / "none.toml")

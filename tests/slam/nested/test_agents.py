@@ -54,13 +54,6 @@ def test_posterior_of_other_weights_stays_near_the_samples_own(rng: np.random.Ge
     np.testing.assert_allclose(covariance, plain[1], atol=10.0 / np.sqrt(count))
 
 
-def test_systematic_resampling_is_unbiased(rng: np.random.Generator) -> None:
-    """Mean counts over 4000 draws: each count has a standard deviation of at most 0.5."""
-    weight, _ = weighted(rng, 20)
-    draws = [np.bincount(agents.systematic_ancestors(weight, 50, rng=rng), minlength=20) for _ in range(4000)]
-    np.testing.assert_allclose(np.mean(draws, axis=0), 50 * weight, atol=5 * 0.5 / np.sqrt(4000))
-
-
 def test_noise_has_exact_moments_and_knows_nothing_of_the_state(rng: np.random.Generator) -> None:
     _, values = weighted(rng)
     noise = agents.exact_noise(values, 3, rng=rng)

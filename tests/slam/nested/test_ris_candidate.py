@@ -5,9 +5,10 @@ import pytest
 
 from rislam_rt.model import Body, RadioConfig, RisCode, RisSpec, SensorModel
 from rislam_rt.ris.path_gain import panel_path_gain
-from rislam_rt.slam.moments import POSE, Moments, poses_of
+from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.landmark_table import empty_table
 from rislam_rt.slam.nested.measurement_prediction import MapBelief
+from rislam_rt.slam.nested.moments import POSE, Moments
 from rislam_rt.slam.nested.ris_candidate import find_panel_candidate, weigh_tracks
 from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, no_tracks
 from rislam_rt.slam.observations import Observations

@@ -86,5 +86,5 @@ def test_an_estimated_height_is_a_proper_belief() -> None:
         state, _ = bp_slam.step(state, nothing, None, CYCLE if cycle else 0.0, HEADING, config, rng=rng)
     belief = bp_slam.estimate(state, config)
     assert np.linalg.eigvalsh(belief.covariance)[0] > 0.0
-    assert np.allclose(belief.covariance, state.course.covariance[:6, :6], rtol=1e-9, atol=1e-15)
+    assert np.allclose(belief.covariance, state.agent.course.covariance[:6, :6], rtol=1e-9, atol=1e-15)
     assert np.allclose(belief.position, room.start.position + 29 * CYCLE * room.start.velocity, rtol=0.0, atol=1e-12)

@@ -11,6 +11,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.nested.particles.cloud import kernel_width
+from rislam_rt.slam.systematic_resampling import systematic_ancestors
 
 ROOM = 10
 """Particles a dimension that are needed to correct a covariance."""
@@ -42,13 +43,6 @@ def moments(weight: Floats, values: Floats) -> tuple[Floats, Floats]:
     mean = weight @ values
     centred = values - mean
     return mean, (centred * weight[:, None]).T @ centred
-
-
-def systematic_ancestors(weight: Floats, count: int, *, rng: np.random.Generator) -> Integers:
-    """Ancestors (count,) by systematic resampling: particle i is drawn `count w_i` times on average, unbiased."""
-    edges = np.cumsum(weight)
-    comb = (np.arange(count) + rng.random()) / count * edges[-1]
-    return np.minimum(np.searchsorted(edges, comb, side="right"), len(weight) - 1)
 
 
 def whiten(weight: Floats, values: Floats) -> Whitened:

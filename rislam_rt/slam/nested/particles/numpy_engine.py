@@ -6,6 +6,7 @@ import numpy.typing as npt
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.nested.particles.cloud import DEEPEST, HOPELESS, Cloud, CloudSums, Kernel, combine, restoring_map
 from rislam_rt.slam.nested.particles.sightline import Kinds, log_likelihood
+from rislam_rt.slam.systematic_resampling import ancestors_at
 
 Singles = npt.NDArray[np.float32]
 CACHE = 16384
@@ -59,7 +60,7 @@ class NumpyEngine:
         keep = np.float32(np.sqrt(1.0 - kernel.width**2))
         for rows in _chunks(count, size):
             log_weight = cloud.log_weight[cloud.row[rows]] - cloud.log_total[rows, None]
-            ancestors = _ancestors(np.exp(np.maximum(log_weight, -80.0)), size, kernel.comb[rows])
+            ancestors = ancestors_at(np.exp(np.maximum(log_weight, -80.0)), size, kernel.comb[rows])
             points = np.empty((len(ancestors), 3, size), dtype=np.float32)
             points[:, :, place] = np.take_along_axis(cloud.points[cloud.block[rows]], ancestors[:, None], axis=2)
             points = keep * points + np.float32(kernel.width) * points[:, :, partner]
@@ -89,11 +90,3 @@ def _sum_up(log_weight: Singles, x: Singles, y: Singles, z: Singles) -> Floats:
     pairs = [(weight, weight), (wx, x), (wy, y), (wz, z), (wx, y), (wx, z), (wy, z)]
     square, *second = (np.einsum("nm,nm->n", a, b) for a, b in pairs)
     return np.stack([top, weight.sum(axis=1), square, wx.sum(axis=1), wy.sum(axis=1), wz.sum(axis=1), *second])
-
-
-def _ancestors(weight: Floats, size: int, comb: Floats) -> Integers:
-    """Systematic resampling of each row: every particle is drawn `size * weight` times on average."""
-    edges = np.cumsum(weight, axis=1)
-    teeth = (np.arange(size) + comb[:, None]) / size * edges[:, -1:]
-    rows = [np.searchsorted(edge, tooth, side="right") for edge, tooth in zip(edges, teeth, strict=True)]
-    return np.minimum(np.array(rows, dtype=np.int64).reshape(len(weight), size), weight.shape[1] - 1)

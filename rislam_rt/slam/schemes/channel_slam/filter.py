@@ -13,18 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.inputs import check_step
-from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.channel_slam import tracker
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
 from rislam_rt.slam.schemes.channel_slam.tracker import RangeTracks, assign, follow, no_tracks
-from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance, begin
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.association import Association
-from rislam_rt.slam.schemes.shared.correct import absorb, is_strong
+from rislam_rt.slam.schemes.shared.correct import absorb
+from rislam_rt.slam.schemes.shared.delay_agent import DelayAgent, begin_agent, hear_ranges, move_agent, reported
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
-from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, lift, outcome_of, reported
+from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
 from rislam_rt.slam.schemes.shared.scan import Scan
 from rislam_rt.slam.schemes.shared.sums import (
     PredictedRanges,
@@ -48,28 +47,13 @@ STRAIN_RATE = 0.1
 class ChannelSlamState(NamedTuple):
     """All that the filter knows."""
 
-    course: AgentTrajectory
+    agent: DelayAgent
     sums: Sums
     """Virtual transmitters; `ident` is the label of the path."""
     tracks: RangeTracks
     strains: dict[int, float]
     """Running mean of the squared innovation of every virtual transmitter, by label."""
     next_label: int
-    cycle: int
-    height: Floats
-    """(2,) height [m] and vertical velocity [m/s], where they are known."""
-    heading: float
-    """[rad]."""
-    strain: float
-    """Running mean of the NIS per degree of freedom: 1 when all is well."""
-    body: Body
-    sensor: SensorModel
-    """What the agent is told of its receiver."""
-
-    @property
-    def pose(self) -> Floats:
-        """(2, 3) position [m] and velocity [m/s] that the filter works at."""
-        return lift(self.course.mean[: self.course.width], self.height)
 
 
 def init(
@@ -77,13 +61,8 @@ def init(
     rng: np.random.Generator,
 ) -> ChannelSlamState:  # fmt: skip
     """The start prior, and no paths. `ris` is taken for the interface and not used; nothing is drawn."""
-    axes = int(config.axes.sum())
-    course = begin(start.position[:axes], start.velocity[:axes], start.position_std, start.velocity_std)
-    height = np.array([start.position[2], start.velocity[2]])
-    sums = no_sums(len(course.mean))
-    return ChannelSlamState(
-        course, sums, no_tracks(), {}, 0, 0, height, float(start.heading), 1.0, body, sensor
-    )  # fmt: skip
+    agent = begin_agent(start, int(config.axes.sum()), body, sensor)
+    return ChannelSlamState(agent, no_sums(len(agent.course.mean)), no_tracks(), {}, 0)
 
 
 def predict(state: ChannelSlamState, dt: float, config: ChannelSlamConfig) -> SlamEstimate:
@@ -103,42 +82,35 @@ def step(
         Time step or heading is no number.
     """
     check_step(dt, heading)
-    state = _move(state, dt, config)._replace(heading=float(heading))
-    observed = observations_of(measurement, state.sensor.radio)
-    strong, free = is_strong(observed.ratio, config.specular_ratio), ~is_los(observed, state.body)
-    rows = np.flatnonzero(free if config.planes else free & ~strong)
-    scan = Scan(observed.seen[rows, 0], np.maximum(observed.std[rows, 0], config.smallest_std))
-    turn = rotation_z(np.asarray(heading))
-    upper = state.sensor.radio.array.pattern == "upper"
-    model = Bistatic(turn @ state.body.tx_offset, turn @ state.body.rx_offset, upper)
+    state = _move(state, dt, config)
+    state = state._replace(agent=state.agent._replace(heading=float(heading)))
+    rows, scan, strong, model = hear_ranges(state.agent, measurement, config)
     state, label = _label(state, scan, dt, config)
     state, squares = _correct(state, label, scan, model, config)
-    state = _give_birth(state, label, scan, strong[rows], config)
+    state = _give_birth(state, label, scan, strong, config)
     nis, dof = float(squares.sum()), len(squares)
-    strain = state.strain + 0.5 * STRAIN_RATE * (nis / dof - state.strain) if dof else state.strain
+    agent = state.agent.strained(nis, dof, 0.5 * STRAIN_RATE)
     landmark = np.full(len(measurement), REMOVED)
     landmark[rows] = np.where(np.isin(label, state.sums.ident), label, UNUSED)
     shown = len(state.sums.ident)
-    report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, shown, outcome_of(len(measurement), shown, strain))
-    return state._replace(strain=strain), report
+    report = StepInfo(landmark, 1.0, False, nis, dof, 0.0, shown, outcome_of(len(measurement), shown, agent.strain))
+    return state._replace(agent=agent), report
 
 
 def estimate(state: ChannelSlamState, config: ChannelSlamConfig) -> SlamEstimate:
     """Mean and covariance of the pose, samples of it, and virtual transmitters that are no longer anywhere."""
     found = known_points(state.sums, 0.5)
     clear = np.trace(found.covariance, axis1=1, axis2=2) < config.shown_std**2
-    return reported(state.course, state.height, state.heading, state.body, found.keep(clear), config.num_samples)
+    return reported(state.agent, found.keep(clear), config.num_samples)
 
 
 def _move(state: ChannelSlamState, dt: float, config: ChannelSlamConfig) -> ChannelSlamState:
     """Agent and virtual transmitters after `dt` [s]; the past state of every `course_stride` cycles is kept."""
     if dt == 0.0:
         return state
-    keep = len(state.course.mean) == state.course.width or state.cycle % config.course_stride == 0
-    course, moved = advance(state.course, dt, np.full(state.course.axes, config.sigma_a), keep)
+    agent, step = move_agent(state.agent, dt, config.sigma_a, config.course_stride)
     wander = np.array([config.drift_length_std, config.drift_angle_std, 0.0])
-    height = state.height + np.array([dt * state.height[1], 0.0])
-    return state._replace(course=course, sums=carry(state.sums, moved, wander), height=height, cycle=state.cycle + 1)
+    return state._replace(agent=agent, sums=carry(state.sums, step, wander))
 
 
 def _label(
@@ -147,7 +119,7 @@ def _label(
     """Tracks after this cycle's ranges, and the label (M,) of each range; virtual transmitters of ended tracks go."""
     tracks = tracker.advance(state.tracks, dt, config.range_acceleration)
     found = assign(tracks, scan.length, scan.std, config.gate)
-    speed = float(np.linalg.norm(state.pose[1]))
+    speed = float(np.linalg.norm(state.agent.pose[1]))
     tracks, label = follow(tracks, found, scan.length, scan.std, 2.0 * speed + 0.02, state.next_label)
     patience = np.where(tracks.hits >= config.confirm_hits, config.max_misses, 1)
     tracks = tracks.keep(tracks.misses <= patience)
@@ -169,18 +141,19 @@ def _correct(
     state: ChannelSlamState, label: Integers, scan: Scan, model: Bistatic, config: ChannelSlamConfig
 ) -> tuple[ChannelSlamState, Floats]:
     """Course and virtual transmitters after their ranges; those that do not fit their path for long are dropped."""
-    sight = look(state.sums, state.course, state.pose[0], model)
+    agent = state.agent
+    sight = look(state.sums, agent.course, agent.pose[0], model)
     own = (state.sums.ident[:, None] == label).astype(float)
     hit, shown = np.nonzero(own)
-    squares = _squares(state.sums, sight, state.course, scan, hit, shown)
+    squares = _squares(state.sums, sight, agent.course, scan, hit, shown)
     missed = 1.0 - own.sum(axis=1, keepdims=True)
     found = Association(own, np.concatenate([own, missed], axis=1), 1.0 - own.sum(axis=0), 1)
-    sums, course = absorb(state.sums, sight, state.course, scan, found, config.odds)
+    sums, course = absorb(state.sums, sight, agent.course, scan, found, config.odds)
     strains = dict(state.strains)
     for name, square in zip(sums.ident[hit].tolist(), squares.tolist(), strict=True):
         strains[name] = strains.get(name, 1.0) + STRAIN_RATE * (square - strains.get(name, 1.0))
     fit = np.array([strains.get(name, 1.0) <= config.strain_limit for name in sums.ident.tolist()], dtype=bool)
-    return _keep(state._replace(sums=sums, course=course, strains=strains), fit, config), squares
+    return _keep(state._replace(sums=sums, agent=agent._replace(course=course), strains=strains), fit, config), squares
 
 
 def _squares(
@@ -202,9 +175,8 @@ def _give_birth(
     for row in rows:
         one = slice(row, row + 1)
         new = born(
-            scan.length[one], scan.std[one], kinds_of(strong[one], config.wanderers), np.ones(1), state.course,
-            state.pose[0], config.birth_turns,
-            int(label[row]),
+            scan.length[one], scan.std[one], kinds_of(strong[one], config.wanderers), np.ones(1),
+            state.agent.course, state.agent.pose[0], config.birth_turns, int(label[row]),
         )  # fmt: skip
         sums = join(sums, new)
     return state._replace(sums=sums)

@@ -6,9 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.model import Body, MapEstimate, SlamEstimate
-from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
-from rislam_rt.slam.schemes.shared.gauge import over_all_turns
+from rislam_rt.model import SlamEstimate
 from rislam_rt.slam.schemes.shared.sums import POINT, Sums, unit_of
 from rislam_rt.slam.step_info import StepOutcome
 
@@ -50,23 +48,6 @@ def lift(known: Floats, height: Floats) -> Floats:
     return known if known.shape[1] == 3 else np.concatenate([known, height[:, None]], axis=1)
 
 
-def reported(
-    course: AgentTrajectory, height: Floats, heading: float, body: Body, points: Points, num_samples: int
-) -> SlamEstimate:
-    """Mean and covariance of the pose, samples of it, and the map."""
-    belief, axes = over_all_turns(course), course.axes
-    position, velocity = lift(belief.mean, height)
-    rows = np.r_[0:axes, 3 : 3 + axes]
-    covariance = np.zeros((6, 6))
-    covariance[np.ix_(rows, rows)] = belief.covariance
-    # the same draws in every cycle: the samples move smoothly, and nothing depends on who drew before
-    draws = np.random.default_rng(0).standard_normal((num_samples, 3))
-    value, vector = np.linalg.eigh(covariance[:3, :3])
-    samples = position + draws @ (vector * np.sqrt(np.maximum(value, 0.0))).T
-    samples[:, axes:] = position[axes:]
-    return SlamEstimate(position, velocity, heading, covariance, samples, body, _map(points))
-
-
 def ahead_of(now: SlamEstimate, dt: float) -> SlamEstimate:
     """The belief carried over `dt` [s] without noise."""
     move, way = np.eye(6), dt * now.velocity
@@ -92,11 +73,3 @@ def known_points(sums: Sums, threshold: float) -> Points:
     own = jacobian @ sums.covariance[part] @ jacobian.swapaxes(1, 2) + apart[:, :, None] * apart[:, None]
     np.add.at(covariance, row, share[:, None, None] * own)
     return Points(sums.ident[shown], mean, covariance)
-
-
-def _map(points: Points) -> MapEstimate:
-    count = len(points.ident)
-    return MapEstimate(
-        points.ident, points.mean, points.covariance, np.full(count, -1), np.zeros(count), np.zeros(count),
-        np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2)),
-    )  # fmt: skip

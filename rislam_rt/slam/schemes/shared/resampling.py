@@ -3,6 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.slam.systematic_resampling import ancestors_at
 
 CELL = 16
 """Particles that a kernel looks at: few enough for a thin ring to look straight, enough for a covariance."""
@@ -14,14 +15,6 @@ def systematic_rows(weight: Floats, *, rng: np.random.Generator) -> Integers:
     The ancestors come in the order of the particles, so that neighbours in a sorted cloud stay neighbours.
     """
     return ancestors_at(weight, weight.shape[1], rng.random(len(weight)))
-
-
-def ancestors_at(weight: Floats, size: int, comb: Floats) -> Integers:
-    """Ancestors (K, size) by systematic resampling of each row of (K, N), from where its comb (K,) in [0, 1) starts."""
-    edges = np.cumsum(weight, axis=1)
-    teeth = (np.arange(size) + comb[:, None]) / size * edges[:, -1:]
-    rows = [np.searchsorted(edge, tooth, side="right") for edge, tooth in zip(edges, teeth, strict=True)]
-    return np.minimum(np.array(rows, dtype=np.int64).reshape(len(weight), size), weight.shape[1] - 1)
 
 
 def effective_fraction(weight: Floats) -> Floats:

@@ -164,6 +164,8 @@ class UnresolvedClusters(NamedTuple):
     """(C,)."""
     by_itself: Floats
     """(C,) probability that it comes out by itself: 1 for leaders, less for what a leader should take in."""
+    gap: Floats
+    """(C, 3) from the leader to its partner, in what is seen of them; 0 without one."""
 
 
 def cluster(
@@ -224,6 +226,7 @@ def cluster(
         np.where(taken[leader], strength[leader], 0.5 * np.log(total[leader])),
         np.hypot(expected.log_amplitude_std[leader], fade),
         by_itself[leader],
+        np.where(both[:, None], expected.seen[mate] - expected.seen[leader], 0.0),
     )
 
 

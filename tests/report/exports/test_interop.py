@@ -11,12 +11,12 @@ import pytest
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.pipeline import load_spec, run_slam
-from rislam_rt.report.deepmimo import deepmimo_files
-from rislam_rt.report.rerun_recording import recording_bytes
+from rislam_rt.report.exports.deepmimo import deepmimo_files
+from rislam_rt.report.exports.rerun_recording import recording_bytes
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.write import write_files
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 pytestmark = [pytest.mark.interop, pytest.mark.filterwarnings("default")]
 
 

@@ -17,6 +17,7 @@ from rislam_rt.report.map_from_above import draw_plan
 from rislam_rt.report.style import TRUTH, scheme_colour, styled
 from rislam_rt.report.view.room_data import spread
 from rislam_rt.report.view.run_data import KNOWN
+from rislam_rt.storage.files import MARK
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -50,7 +51,14 @@ def gif_bytes(result: SlamResult, tell: Tell = tell_nobody) -> bytes:
     target = io.BytesIO()
     durations = [FRAME_MS] * (len(pictures) - 1) + [LAST_MS]
     pictures[0].save(
-        target, format="GIF", save_all=True, append_images=pictures[1:], duration=durations, loop=0, optimize=True
+        target,
+        format="GIF",
+        save_all=True,
+        append_images=pictures[1:],
+        duration=durations,
+        loop=0,
+        optimize=True,
+        comment=MARK,
     )
     return target.getvalue()
 

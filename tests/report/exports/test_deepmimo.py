@@ -12,10 +12,10 @@ from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Material, RadioConfig
-from rislam_rt.report.deepmimo import check_name, deepmimo_files
+from rislam_rt.report.exports.deepmimo import check_name, deepmimo_files
 from rislam_rt.scene import load_scene
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from rislam_rt.channel.compare import validation_page
-from rislam_rt.report.certificate import draw_certificate
-from rislam_rt.report.fig4a import draw_fig4a, fig4a_csv, fig4a_page
+from rislam_rt.report.studies.certificate import draw_certificate
+from rislam_rt.report.studies.fig4a import draw_fig4a, fig4a_csv, fig4a_page
 from rislam_rt.report.style import to_png
 from rislam_rt.storage.files import write_atomic
 from rislam_rt.studies.compare import Comparison

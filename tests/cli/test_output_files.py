@@ -1,0 +1,56 @@
+"""A command replaces the files that the program made, and no others unless it is told to."""
+
+import pytest
+
+from rislam_rt.storage.files import is_own, write_atomic
+
+VIEW = ("show", "empty_box", "-q", "--depth", 0)
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        (("config", "--explain", "slam.sigma_a"), "--json found.json"),
+        (VIEW, "--html room.html"),
+        (VIEW, "--out room.png"),
+        (VIEW, "--out room.svg"),
+        (VIEW, "--out room.pdf"),
+        (("trace", "empty_box", "--channel", "image_source", "--cycles", 1), "--out paths.nc"),
+    ],
+)
+def test_a_file_of_the_users_stays_unless_told_otherwise(run, tmp_path, words, name):
+    option, _, file = name.partition(" ")
+    theirs = tmp_path / file
+    theirs.write_text("notes on rislam_rt, of my own")
+    code, out, err = run(*words, option, file)
+    assert code == 2
+    assert not out
+    assert (
+        err == f"error: {name}: is there already, and not of this program's making; give another name, or --overwrite\n"
+    )
+    assert theirs.read_text() == "notes on rislam_rt, of my own"
+    assert run(*words, option, file, "--overwrite")[0] == 0
+    assert run(*words, option, file)[0] == 0  # now it is the program's own
+    assert theirs.stat().st_size > 100
+
+
+def test_a_name_that_the_command_chose_is_looked_at_too(run, tmp_path):
+    (tmp_path / "empty_box.png").write_text("mine")
+    code, _, err = run("show", "empty_box")
+    assert code == 2
+    assert err.startswith("error: empty_box.png: is there already")
+    (tmp_path / "empty_box-signals.nc").write_text("mine")
+    code, _, err = run("trace", "empty_box", "--channel", "image_source", "--signals", "--cycles", 1)
+    assert code == 2
+    assert err.startswith("error: empty_box-signals.nc: is there already")
+    assert {path.read_text() for path in tmp_path.iterdir()} == {"mine"}
+
+
+def test_what_loses_nothing_is_free(tmp_path):
+    assert is_own(tmp_path / "none")
+    assert is_own(tmp_path)  # the disk refuses a folder by itself
+    write_atomic(tmp_path / "empty", b"")
+    assert is_own(tmp_path / "empty")
+    for content, own in ((b"RRF2\0\0rislam_rt", True), (b"RRF2\0\0other", False), (b"rislam_rt", False)):
+        write_atomic(tmp_path / "run.rrd", content)
+        assert is_own(tmp_path / "run.rrd") is own
