@@ -1,4 +1,4 @@
-"""Where a panel can be heard: SNR of its direct path under the best code, over the floor at the agent's height."""
+"""Coverage of a panel, where it can be heard: SNR of its direct path under the best code, at the agent's height."""
 
 from dataclasses import replace
 from typing import NamedTuple

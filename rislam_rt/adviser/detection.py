@@ -1,4 +1,4 @@
-"""What the receiver would make of the paths at one place: the chance that it reports each landmark, without noise."""
+"""Detection at one place: the chance that the receiver reports each landmark, without noise being drawn."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What would help a landmark that is not heard: a larger panel or scatterer, less noise, a nearer way."""
+"""Remedies for a landmark that is not heard: a larger panel or scatterer, less noise, a nearer way."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence

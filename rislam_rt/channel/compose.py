@@ -1,4 +1,5 @@
-"""From legs to paths: LOS and VT are single legs; PS, VS, RIS and VRIS join a Tx leg and an Rx leg at a landmark."""
+"""Legs composed to paths: LOS and VT are single legs; PS, VS, RIS and VRIS join a Tx leg and an Rx leg at a
+landmark."""
 
 from collections.abc import Sequence
 from typing import Any

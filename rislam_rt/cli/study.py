@@ -1,4 +1,4 @@
-"""What `rislam-rt run` does with a pipeline that is not the main job."""
+"""Studies: what `rislam-rt run` does with a pipeline that is not the main job."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""How much a command says beside its result: `-q` no bars and no warnings, `-v` what it used, and where it failed."""
+"""Verbosity, what a command says beside its result: `-q` no bars and warnings, `-v` what it used, where it failed."""
 
 import inspect
 from collections.abc import Callable

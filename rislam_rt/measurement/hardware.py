@@ -1,4 +1,4 @@
-"""What a real front end does to the signal: an array that is not as drawn, leakage left over, converters, oscillators.
+"""Hardware faults of a real front end: an array not as drawn, leakage left over, converters, oscillator, gain.
 
 The chain of one capture, from the paths to the samples that the estimator gets: elements at other places than drawn;
 coupling between them; gain and phase of each receive chain; what is left of the leakage after its cancellation, random

@@ -1,4 +1,4 @@
-"""A room: reflecting meshes, point scatterers, panels, and the agent's true motion."""
+"""A scene: reflecting meshes, point scatterers, panels, and the agent's true motion."""
 
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,4 +1,4 @@
-"""Where a run's random numbers come from: a child for each purpose, and for each cycle."""
+"""Seeds of a run's random numbers: a child for each purpose, and for each cycle."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""One look for all figures: colours that colour-blind readers can tell apart (Okabe and Ito), sizes, file writing."""
+"""One style for all figures: colours that colour-blind readers can tell apart (Okabe and Ito), sizes, file writing."""
 
 import io
 import warnings

@@ -1,4 +1,4 @@
-"""`scene.toml`: the keys, their types and ranges. Unknown keys are refused; all bad fields are found at once."""
+"""Schema of `scene.toml`: keys, types and ranges. Unknown keys are refused; all bad fields are found at once."""
 
 import unicodedata
 from pathlib import Path

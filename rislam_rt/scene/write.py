@@ -1,4 +1,4 @@
-"""From a `Scene` to a scene folder, whole or not at all."""
+"""Writing a `Scene` as a scene folder, whole or not at all."""
 
 import os
 import shutil

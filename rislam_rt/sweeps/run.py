@@ -1,4 +1,4 @@
-"""The engine: what is there already is not done again, what fails is written down, and the rest goes on."""
+"""Running a sweep: what is there already is not done again, what fails is written down, and the rest goes on."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack

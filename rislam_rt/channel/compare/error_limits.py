@@ -1,4 +1,4 @@
-"""How far apart two right answers may be, path by path: rounding, the room's size, the lengths of paths.
+"""Error limits, path by path, between two right answers: rounding, the room's size, the lengths of paths.
 
 Rounding is half a unit in the last place, `u = 2^-24` in float32, of the numbers rounded: coordinates up to the room's
 extent E about the tracer's zero, and up to E + L for the images of a leg of length L. With b bounces one end of the

@@ -1,4 +1,4 @@
-"""What a comparison of two path sets found."""
+"""The report of a comparison of two path sets: what was found."""
 
 from collections import Counter
 from dataclasses import dataclass

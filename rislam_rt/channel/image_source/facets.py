@@ -1,4 +1,4 @@
-"""Walls as the image method needs them: which part of a plane is solid, who stands on which side, who hides whom."""
+"""Facets of walls for the image method: which part of a plane is solid, who stands on which side, who hides whom."""
 
 from dataclasses import dataclass
 

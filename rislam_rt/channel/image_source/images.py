@@ -1,4 +1,4 @@
-"""From wall sequences to legs: mirror the far end, walk back from the device, test facets and occlusion."""
+"""Legs from wall sequences by images: mirror the far end, walk back from the device, test facets and occlusion."""
 
 from typing import NamedTuple
 

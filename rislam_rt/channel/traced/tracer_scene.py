@@ -1,4 +1,4 @@
-"""The room as Sionna RT sees it: one mesh a material, triangle numbers kept, so that every hit names its wall."""
+"""The tracer's scene, as Sionna RT sees the room: one mesh a material, so that every hit names its wall."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

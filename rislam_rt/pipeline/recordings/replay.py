@@ -1,4 +1,4 @@
-"""What an estimator was given, cycle by cycle, and what it answered: so that others can be given the same."""
+"""Replay of what an estimator was given, cycle by cycle, and what it answered."""
 
 from collections.abc import Mapping, Sequence
 from time import process_time

@@ -1,4 +1,4 @@
-"""The scores of a run: agent, each landmark, each wall, for every scheme."""
+"""Summary of a run's scores: agent, each landmark, each wall, for every scheme."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple

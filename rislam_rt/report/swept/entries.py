@@ -1,4 +1,4 @@
-"""One line a point and scheme of a swept study: numbers for tables, CSV and JSON, and how they are written."""
+"""Entries of a swept study, one a point and scheme: numbers for tables, CSV and JSON, and how they are written."""
 
 import csv
 import io

@@ -1,4 +1,4 @@
-"""From a floor plan to walls, floor and ceiling: doors and windows are cut out, and closed where they are."""
+"""A floor plan extruded to walls, floor and ceiling: doors and windows are cut out, and closed where they are."""
 
 from itertools import pairwise
 from typing import Any

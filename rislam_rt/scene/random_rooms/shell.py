@@ -1,4 +1,4 @@
-"""Floor, walls and ceiling over a plan."""
+"""Shell of a random room: floor, walls and ceiling over a plan."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""A Mitsuba or Sionna RT scene file as meshes with names and materials."""
+"""Reading a Mitsuba or Sionna RT scene file as meshes with names and materials."""
 
 import importlib.util
 import re

@@ -1,4 +1,4 @@
-"""What this cycle's measurements may belong to: expected returns of the map first, tracks behind them."""
+"""Candidates for this cycle's measurements: expected returns of the map first, tracks behind them."""
 
 from typing import NamedTuple
 

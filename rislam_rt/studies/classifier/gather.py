@@ -1,4 +1,4 @@
-"""Labelled tracks from walks: what the receiver reports, tracked as the agent would, and what each truly was."""
+"""Gathering labelled tracks from walks: what the receiver reports, tracked as the agent would, and what each was."""
 
 from typing import NamedTuple
 

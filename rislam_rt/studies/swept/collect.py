@@ -1,4 +1,4 @@
-"""From the cells of a swept study to numbers with intervals. Failures are counted, never dropped."""
+"""Collecting the cells of a swept study as numbers with intervals. Failures are counted, never dropped."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""What a cell leaves beside its scores: recorded runs, rooms, samples."""
+"""Files to save beside a cell's scores: recorded runs, rooms, samples."""
 
 from collections.abc import Mapping
 from pathlib import Path

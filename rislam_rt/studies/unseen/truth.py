@@ -1,4 +1,4 @@
-"""What a run's score is measured against: true motion, landmarks, walls, when each could be heard, and the bounds."""
+"""The truth that a run's score is measured against: motion, landmarks, walls, when each could be heard, the bounds."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
