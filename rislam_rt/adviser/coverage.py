@@ -61,7 +61,7 @@ def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
 
 
 def _direct_margins(scene: Scene, points: Floats, settings: Settings) -> Floats:
-    """(panels, N) [dB] at points (N, 3), the agent headed along x."""
+    """Coverage (panels, N) [dB] of direct paths at points (N, 3), the agent headed along x."""
     assert scene.ris is not None
     count = len(points)
     still = Trajectory(

@@ -226,7 +226,8 @@ def _distortion(config: HardwareConfig, radio: RadioConfig, left: float | None) 
 
 
 def _clipped(level: float) -> float:
-    """Share of the power of a normal signal that the hardware clips above `level` deviations; 0 for none."""
+    """Share of the power of a normal signal that hardware clips above `level` deviations, what is cut off squared; 0
+    for none."""
     if not level:
         return 0.0
     tail = 0.5 * scipy.special.erfc(level / np.sqrt(2.0))

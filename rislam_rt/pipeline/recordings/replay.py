@@ -45,7 +45,7 @@ def answers_from_arrays(
     lost: Booleans | None = None,
     landmark: Sequence[Integers] | None = None,
 ) -> Answers:
-    """The answers of an estimator that is none of this package's, from plain arrays.
+    """Answers to a replayed recording by an estimator that is none of this package's, from plain arrays.
 
     Parameters
     ----------
