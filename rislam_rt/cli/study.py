@@ -1,4 +1,4 @@
-"""What `rislam-rt run` does with a pipeline that is not the main job."""
+"""Studies: what `rislam-rt run` does with a pipeline that is not the main job."""
 
 import os
 from pathlib import Path
@@ -60,7 +60,7 @@ def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
 
 
 def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
-    """Fig. 4(a): gain against distance."""
+    """Run the study of Fig. 4(a): gain against distance."""
     import numpy as np
 
     from rislam_rt.cli.progress import show_progress
@@ -144,12 +144,12 @@ def run_claims(spec: "ClaimsSpec", given: StudyOptions) -> None:
 
 
 def _beside(pipeline: Path, scene: str) -> Path:
-    """A scene folder that a pipeline file names."""
+    """A scene folder that a study's pipeline file names."""
     return Path(os.path.normpath(pipeline.parent / scene))
 
 
 def output_folder(out: Path | None, name: str, record: "Mapping[str, Any]") -> Path:
-    """Where the files go: `--out`, whose folder they may share with others, or `runs/<name>-<hash of the record>`.
+    """Where a study's files go: `--out`, shared with others, or `runs/<name>-<hash of the record>`.
 
     Raises
     ------
