@@ -17,7 +17,7 @@ from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.births import births
 from rislam_rt.slam.window.births.context import Context
 from rislam_rt.slam.window.births.feature_removal import condemned, release
-from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes
+from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes, score_again
 from rislam_rt.slam.window.divergence import divergence_monitor, recovery
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, empty_table, idents, image_ident
 from rislam_rt.slam.window.landmarks.landmark_update import learn, no_observations
@@ -177,9 +177,8 @@ def smoothed(state: WindowState) -> Floats:
 
 START = ((3, 0.5), (10, 1.0))
 """Steps that may have been livelier than thought, and standard deviation [m/s^2] of their accelerations then."""
-MISSED, STRAINED = 1.5, 1.5
-"""Standard deviations by which fewer returns show than should, and mean square of their innovations, from which on a
-manoeuvre is looked for."""
+MISSED = 1.5
+"""Standard deviations by which fewer returns show than should, from which on a jump is looked for."""
 
 
 def _notice(
@@ -195,17 +194,19 @@ def _notice(
             window, state.landmarks, state.visibility, heading, state.scene, code, observed, strangers
         )
 
-    best, window = view_of(state.window), state.window
-    learnt = state.config.motion == "learnt"
-    if learnt and (best.surprise > MISSED or best.strain > STRAINED) and len(state.window.step):
+    calm = best = view_of(state.window)
+    window = state.window
+    if state.config.motion == "learnt" and len(calm.groups.leader):
         for steps, liveliness in START:
             precision = state.window.precision.copy()
             lively = COLUMNS[: precision.shape[1]] != 1
             precision[-steps:, lively] = np.minimum(precision[-steps:, lively], liveliness**-2.0)
             trial = window_gaussian.solve(state.window._replace(precision=precision))
-            view = view_of(trial)
-            if view.score + CONSTANTS.log_rare > best.score:
-                best, window = view, trial
+            score = score_again(calm, trial, state.landmarks, observed, strangers)
+            if score + CONSTANTS.log_rare > best.score:
+                view = view_of(trial)
+                if view.score + CONSTANTS.log_rare > best.score:
+                    best, window = view, trial
     if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
         by = divergence_monitor.jump(best, observed)
         view = view_of(divergence_monitor.shifted(state.window, by)) if by.any() else best
