@@ -29,7 +29,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
 )
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.model_constants import CONSTANTS
-from rislam_rt.slam.window.numerics import DAMPING, REFRESH
+from rislam_rt.slam.window.numerics import DAMPING, LADDER, REFRESH
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.excess import grow, take_in
@@ -175,8 +175,8 @@ def smoothed(state: WindowState) -> Floats:
     return np.concatenate([state.passed, window_gaussian.poses(state.window)[:, :3]])
 
 
-START = ((3, 0.5), (10, 1.0))
-"""Steps that may have been livelier than thought, and standard deviation [m/s^2] of their accelerations then."""
+LATELY = 5
+"""Last steps that may all have been as lively as can be: what began within half a second."""
 MISSED = 1.5
 """Standard deviations by which fewer returns show than should, from which on a jump is looked for."""
 
@@ -197,16 +197,15 @@ def _notice(
     calm = best = view_of(state.window)
     window = state.window
     if state.config.motion == "learnt" and len(calm.groups.leader):
-        for steps, liveliness in START:
-            precision = state.window.precision.copy()
-            lively = COLUMNS[: precision.shape[1]] != 1
-            precision[-steps:, lively] = np.minimum(precision[-steps:, lively], liveliness**-2.0)
-            trial = window_gaussian.solve(state.window._replace(precision=precision))
-            score = score_again(calm, trial, state.landmarks, observed, strangers)
-            if score + CONSTANTS.log_rare > best.score:
-                view = view_of(trial)
-                if view.score + CONSTANTS.log_rare > best.score:
-                    best, window = view, trial
+        precision = state.window.precision.copy()
+        lively = COLUMNS[: precision.shape[1]] != 1
+        precision[-LATELY:, lively] = np.minimum(precision[-LATELY:, lively], LADDER[-1] ** -2.0)
+        trial = window_gaussian.solve(state.window._replace(precision=precision))
+        score = score_again(calm, trial, state.landmarks, observed, strangers)
+        if score + CONSTANTS.log_rare > calm.score:
+            view = view_of(trial)
+            if view.score + CONSTANTS.log_rare > calm.score:
+                best, window = view, trial
     if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
         by = divergence_monitor.jump(best, observed)
         view = view_of(divergence_monitor.shifted(state.window, by)) if by.any() else best
