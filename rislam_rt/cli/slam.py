@@ -152,6 +152,7 @@ def _summary(inputs: "Inputs", answers: "Answers", true: "Floats | None") -> dic
         "cycles": len(inputs.time),
         "components": sum(len(m) for m in inputs.measurements),
         "ended": outcomes[-1],
+        "cycles_diverged": outcomes.count("diverged"),
         "last_position_m": [round(float(value), 4) for value in last.position],
         "deviation_m": float(np.sqrt(np.trace(last.covariance[:2, :2]))),
         "landmarks": int(np.sum(last.map.parent < 0)),

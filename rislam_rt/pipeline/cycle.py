@@ -67,6 +67,29 @@ class Agent(NamedTuple):
     """What the receiver found in the cycle before."""
 
 
+class Receptions(dict[tuple[int, bytes, int], tuple[Measurement | None, Measurement, PathTruth, float]]):
+    """What the receiver made of cycles, kept for the schemes of one specification and room that heard the same.
+
+    A cycle's noise is the same for all schemes. What else its components depend on is the code that was applied, and
+    the cycle before, which the search begins with: the very same record of it means the same codes all along.
+    """
+
+    def measure(
+        self,
+        cycle: int,
+        code: bytes,
+        previous: Measurement | None,
+        receive: Callable[[], tuple[Measurement, PathTruth]],
+    ) -> tuple[Measurement, PathTruth, float]:
+        """Components of a cycle, which paths they were, and the seconds that finding them took the first time."""
+        key = cycle, code, id(previous)
+        if key not in self:
+            begin = perf_counter()
+            found = receive()
+            self[key] = previous, *found, perf_counter() - begin  # that holds `previous`, so that no other has its id
+        return self[key][1:]
+
+
 class RunContext(NamedTuple):
     """What leads a scheme through its cycles, the same in all of them."""
 
@@ -78,6 +101,8 @@ class RunContext(NamedTuple):
     """True ones: what the room and the receiver go by."""
     told: AssumedModel
     """What filter and design go by."""
+    receptions: Receptions | None = None
+    """Of the schemes before this one that may have heard the same; None to keep nothing."""
 
 
 class Cycle(NamedTuple):
@@ -131,9 +156,13 @@ def run_cycle(
     if link is not None:
         applied = link.applied if room.faults is None else room.faults.applied(link.applied)
         paths = rephase(paths, applied, 1.0 if room.faults is None else room.faults.weight)
-    measurement, truth = measure(
-        paths, 0, float(room.trajectory.heading[cycle]), context.settings.radio, context.settings.receiver, agent.heard,
-        room.doppler[cycle - room.first], room.front_end, room.clutter_at(cycle), rng=rng.noise,
+    kept = Receptions() if context.receptions is None else context.receptions
+    measurement, truth, acquired = kept.measure(
+        cycle, b"" if applied is None else applied.index.tobytes(), agent.heard,
+        lambda: measure(
+            paths, 0, float(room.trajectory.heading[cycle]), context.settings.radio, context.settings.receiver,
+            agent.heard, room.doppler[cycle - room.first], room.front_end, room.clutter_at(cycle), rng=rng.noise,
+        ),
     )  # fmt: skip
     clock.append(perf_counter())
 
@@ -144,10 +173,10 @@ def run_cycle(
     belief = estimator.estimate(state, config)
     clock.append(perf_counter())
 
-    optimise, communicate, acquire, localise = np.diff(clock)
+    optimise, communicate, _, localise = np.diff(clock)
     outcome = Cycle(
         belief, info, reported, truth, paths.gain[0], sent, applied,
-        (optimise, communicate + air, acquire, localise), believed,
+        (optimise, communicate + air, acquired, localise), believed,
     )  # fmt: skip
     return Agent(state, link, measurement), outcome
 

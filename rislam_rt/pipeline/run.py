@@ -15,7 +15,7 @@ from rislam_rt.errors import ConfigError, RislamError, expect
 from rislam_rt.model import Body, Paths, RadioConfig, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.assumed_model import tilted_motion
 from rislam_rt.pipeline.control import check_control
-from rislam_rt.pipeline.cycle import usual_step
+from rislam_rt.pipeline.cycle import Receptions, usual_step
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.own_methods import OwnChannel
 from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_diffuse_clutter
@@ -60,6 +60,8 @@ class RunSetup(NamedTuple):
     """Time [s] that the channel took."""
     extras: Paths | None = None
     """What is heard besides, without identities."""
+    receptions: Receptions | None = None
+    """Where schemes of one specification leave what they heard for each other; None if they do not."""
 
 
 def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> tuple[Scene, Body, Seeds]:
@@ -145,7 +147,7 @@ def run_slam(
     expect("rng", rng, np.random.Generator)
     done = {} if done is None else done
     progress("trace", 0, 1)
-    setup = prepare_setup(scene, spec, rng=rng)
+    setup = prepare_setup(scene, spec, rng=rng)._replace(receptions=Receptions())
     progress("trace", 1, 1)
     todo = [name for name in spec.schemes if name not in done]
     for name, scheme in run_side_by_side(run_scheme, todo, (setup, spec), jobs, progress):
@@ -176,7 +178,7 @@ def run_scheme(
     name: str, setup: RunSetup, spec: PipelineSpec, tell: Tell, estimator: Estimator | None = None
 ) -> SchemeResult:
     """One scheme over all cycles, with its own estimator unless another is given."""
-    walk = SchemeSimulation(name, setup.scene, setup.body, spec, setup.seeds, estimator)
+    walk = SchemeSimulation(name, setup.scene, setup.body, spec, setup.seeds, estimator, setup.receptions)
     return walk.lead(setup.paths, 0, len(setup.scene.agent), tell, setup.extras)
 
 

@@ -11,7 +11,15 @@ from rislam_rt.model import Body, PathKind, Paths, Scene, SchemeResult
 from rislam_rt.pipeline.assumed_model import perceived_paths, tell_belief
 from rislam_rt.pipeline.code_policies import build_designer
 from rislam_rt.pipeline.control import open_link
-from rislam_rt.pipeline.cycle import Agent, Cycle, CycleGenerators, GroundTruth, RunContext, run_cycle
+from rislam_rt.pipeline.cycle import (
+    Agent,
+    Cycle,
+    CycleGenerators,
+    GroundTruth,
+    Receptions,
+    RunContext,
+    run_cycle,
+)
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.record import gather, given_of
 from rislam_rt.pipeline.room.diffuse_clutter import received_clutter
@@ -30,8 +38,9 @@ class SchemeSimulation:
     """
 
     def __init__(
-        self, name: str, scene: Scene, body: Body, spec: PipelineSpec, seeds: Seeds, estimator: Estimator | None = None
-    ) -> None:
+        self, name: str, scene: Scene, body: Body, spec: PipelineSpec, seeds: Seeds, estimator: Estimator | None = None,
+        receptions: Receptions | None = None,
+    ) -> None:  # fmt: skip
         self.scheme, self.name, self.seeds = SCHEMES[name], name, seeds
         self.motion, self.body = scene.agent, body
         self.front_end: FrontEnd | None = None
@@ -45,7 +54,7 @@ class SchemeSimulation:
             self.faults = draw_panel(panel, spec.panel.tolerance, rng=np.random.default_rng(seeds.panel))
             designer = build_designer(self.scheme, panel, spec, settings, told)
         estimator = estimator or ESTIMATORS[self.scheme.estimator]
-        self.context = RunContext(panel, designer, estimator, spec, settings, told)
+        self.context = RunContext(panel, designer, estimator, spec, settings, told, receptions)
         self.filter_rng, self.design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
         config = estimator.config(told.settings)
         state = estimator.init(

@@ -38,14 +38,24 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     rows = [["agent", *(_metres(s["rmse_m"]) for s in schemes)]]
     for name in first["landmarks"]:
         rows.append([f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)])
-    for name in first["walls"]:
+    heard = [name for name in first["walls"] if any(_is_heard(s["walls"][name]) for s in schemes)]
+    for name in heard:
         rows.append([f"wall {name}", *(_wall(s["walls"][name]) for s in schemes)])
+    if len(first["walls"]) > len(heard):
+        rows.append([f"{len(first['walls']) - len(heard)} walls", *("not heard" for _ in schemes)])
     rows.append(["posterior bound of the agent", *(_metres(s["bound_m"]) for s in schemes)])
     rows.append(["GOSPA of the map", *(_metres(s["map"]["gospa_m"]) for s in schemes)])
     rows.append(["association right", *(f"{s['association']['accuracy']:.0%}" for s in schemes)])
     rows.append(["over budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)])
     rows.append(["diverged", *("yes" if s["diverged"] else "no" for s in schemes)])
+    rows.append(["held itself for lost", *(_said(s["outcomes"]) for s in schemes)])
     return rows
+
+
+def _said(outcomes: Mapping[str, int]) -> str:
+    """In how many cycles an estimator said, without the truth, that it had diverged."""
+    cycles = outcomes.get("diverged", 0)
+    return f"in {cycles} of {sum(outcomes.values())} cycles" if cycles else "never"
 
 
 def path_table(paths: Paths) -> list[dict[str, Any]]:
@@ -193,6 +203,11 @@ def _metres(value: float | None) -> str:
     if value is None:
         return "not found"
     return f"{100.0 * value:.1f} cm" if value < 1.0 else f"{value:.2f} m"
+
+
+def _is_heard(score: Mapping[str, Any]) -> bool:
+    """Whether the paths tell anything of a wall, or something was made of it."""
+    return score["bound_m"] is not None or score["rmse_m"] is not None
 
 
 def _wall(score: Mapping[str, Any]) -> str:

@@ -26,7 +26,7 @@ def places(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:
     return poses.rx + reach[..., None] * ray, reach
 
 
-def rays(seen: Floats, heading: Floats) -> Floats:
+def rays(seen: Floats, heading: Floats | float) -> Floats:
     """Unit vectors (..., 3) towards what arrives from above with lengths and cosines (..., 3), in the room's axes."""
     flat = seen[..., 1:] / np.maximum(1.0, np.linalg.norm(seen[..., 1:], axis=-1))[..., None]
     up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=-1), 0.0))

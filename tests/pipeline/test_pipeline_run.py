@@ -8,7 +8,7 @@ import pytest
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind
-from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline import cycle, load_spec
 from rislam_rt.pipeline.run import check_run
 from rislam_rt.pipeline.scheme_simulation import without_panel
 
@@ -31,6 +31,19 @@ def test_a_scheme_does_not_depend_on_the_others(short_result, run_short):
     alone = run_short('schemes=["random"]').schemes["random"]
     np.testing.assert_array_equal(alone.position, short_result.schemes["random"].position)
     np.testing.assert_array_equal(alone.applied, short_result.schemes["random"].applied)
+
+
+def test_what_schemes_hear_under_the_same_codes_is_found_once(run_short, monkeypatch):
+    calls, measure = [], cycle.measure
+    monkeypatch.setattr(cycle, "measure", lambda *given, **more: calls.append(1) or measure(*given, **more))
+    alone = run_short('schemes=["channel_slam"]').schemes["channel_slam"]
+    count = len(calls)
+    both = run_short('schemes=["random", "channel_slam"]').schemes
+    assert len(calls) == 2 * count
+    np.testing.assert_array_equal(both["channel_slam"].position, alone.position)
+    np.testing.assert_array_equal(both["channel_slam"].component_path, both["random"].component_path)
+    run_short('schemes=["random", "no_ris", "exact"]', "design.method=exact")
+    assert len(calls) == 5 * count
 
 
 def test_gains_are_those_of_the_applied_code(room, short_result):

@@ -119,20 +119,33 @@ def _associate(
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), float(np.log1p(-shows[missed]).sum())
     lead, mate = groups.leader, groups.partner
     share = groups.share[:, None]
-    gap = np.where(mate[:, None] >= 0, expected.seen[mate] - expected.seen[lead], 0.0)
-    seen = expected.seen[lead] + share * gap
+    seen = expected.seen[lead] + share * groups.gap
+    extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
+    extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(observed.std, axis=0) ** 2
+    most = np.abs(expected.jacobian) @ np.sqrt(np.diagonal(covariance))  # no correlation makes a deviation larger
+    near = _within_reach(seen, (most[lead] + share * (most[mate] - most[lead])) ** 2 + extra, observed)
+    lead, mate, share, seen, every, shows = lead[near], mate[near], share[near], seen[near], shows, shows[near]
     jacobian = expected.jacobian[lead] + share[..., None] * (expected.jacobian[mate] - expected.jacobian[lead])
     spread = (jacobian.reshape(-1, jacobian.shape[-1]) @ covariance).reshape(jacobian.shape)
     spread = spread @ np.swapaxes(jacobian, 1, 2)
-    extra = groups.disturbance + groups.share_variance[:, None] * gap**2
-    extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(observed.std, axis=0) ** 2
-    spread[:, [0, 1, 2], [0, 1, 2]] += extra
+    spread[:, [0, 1, 2], [0, 1, 2]] += extra[near]
     odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))
     side = np.full(len(lead), UNTOLD) if sides is None else sides[lead]
-    candidates = Candidates(seen, spread, groups.log_amplitude, np.hypot(groups.log_amplitude_std, 0.15), odds, side)
+    level, doubt = groups.log_amplitude[near], np.hypot(groups.log_amplitude_std[near], 0.15)
+    candidates = Candidates(seen, spread, level, doubt, odds, side)
     cost = pair_costs(candidates, observed, GATE, strangers)
     rows, columns = cheapest(cost)
     # the cost counts what is missed: seen against missed, both against strangers
     gain = -0.5 * float(cost[rows, columns].sum()) + float(np.log1p(-shows[rows]).sum())
+    rows = near[rows]
     missed[rows] = False
-    return rows, columns, gain + float(np.log1p(-shows[missed]).sum())
+    return rows, columns, gain + float(np.log1p(-every[missed]).sum())
+
+
+def _within_reach(seen: Floats, variance: Floats, observed: Observations) -> Integers:
+    """Rows of the clusters at (C, 3), each axis with at most that variance, that lie in the gate of any component."""
+    near = np.ones((len(seen), len(observed.seen)), dtype=np.bool_)
+    for axis in range(3):
+        gap = seen[:, axis, None] - observed.seen[:, axis]
+        near &= gap**2 <= GATE * (variance[:, axis, None] + observed.std[:, axis] ** 2)
+    return np.flatnonzero(near.any(axis=1))

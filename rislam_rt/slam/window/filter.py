@@ -15,7 +15,6 @@ from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.births import births
-from rislam_rt.slam.window.births.context import Context
 from rislam_rt.slam.window.births.feature_removal import condemned, release
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes, score_again
 from rislam_rt.slam.window.divergence import divergence_monitor, recovery
@@ -27,6 +26,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     UnresolvedClusters,
     conditioned_share,
 )
+from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, empty_log, renew
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import DAMPING, LADDER, REFRESH
@@ -132,22 +132,11 @@ def _grown(
     state: WindowState, left: Residuals, expected: ExpectedComponents, groups: UnresolvedClusters
 ) -> WindowState:
     """With what the evidence has turned against taken back, or else with what is born."""
-    context = Context(
-        state.window, state.landmarks, state.log, state.tracks, state.heading, state.scene, state.cycle,
-        state.visibility,
-        state.codes,
-    )  # fmt: skip
+    fresh = True
     if state.cycle % REFRESH == 0 and len(state.landmarks.ident):
-        gone = condemned(context.landmarks, left, context.log, expected, window_gaussian.now(context.window)[1])
-        context, fresh = release(context, ~gone), not gone.any()
-    else:
-        fresh = True
-    if fresh:
-        context = births(context, expected, groups)
-    return state._replace(
-        window=context.window, landmarks=context.landmarks, log=context.log, tracks=context.tracks,
-        visibility=context.visibility
-    )  # fmt: skip
+        gone = condemned(state.landmarks, left, state.log, expected, window_gaussian.now(state.window)[1])
+        state, fresh = release(state, ~gone), not gone.any()
+    return births(state, expected, groups) if fresh else state
 
 
 def _move(state: WindowState, dt: float, heading: float) -> WindowState:
@@ -196,7 +185,7 @@ def _notice(
 
     calm = best = view_of(state.window)
     window = state.window
-    if state.config.motion == "learnt" and len(calm.groups.leader):
+    if state.config.motion == "learnt" and len(calm.groups.leader) and len(state.window.step):
         precision = state.window.precision.copy()
         lively = COLUMNS[: precision.shape[1]] != 1
         precision[-LATELY:, lively] = np.minimum(precision[-LATELY:, lively], LADDER[-1] ** -2.0)
@@ -267,14 +256,11 @@ def _explain(
     at = len(log.cycle) - count + pick
     lead, mate = groups.leader[row], groups.partner[row]
     share, variance = conditioned_share(groups, expected, row, log.log_amplitude[at], log.log_amplitude_std[at])
-    form, shares, extra = log.form.copy(), log.share.copy(), log.extra.copy()
-    form[at, 0] = idents(landmarks, expected.forms[lead])
-    both = mate >= 0
-    form[at[both], 1] = idents(landmarks, expected.forms[mate[both]])
-    gap = np.where(both[:, None], expected.seen[mate] - expected.seen[lead], 0.0)
-    shares[at], extra[at] = np.where(both, share, 0.0), groups.disturbance[row] + variance[:, None] * gap**2
-    extra[at] += CONSTANTS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
-    return log._replace(form=form, share=shares, extra=extra)
+    both = (mate >= 0)[:, None]
+    forms = np.stack([expected.forms[lead], np.where(both, expected.forms[mate], UNKNOWN)], axis=1)
+    extra = groups.disturbance[row] + variance[:, None] * groups.gap[row] ** 2
+    extra += CONSTANTS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
+    return log.explain(at, idents(landmarks, forms), np.where(both[:, 0], share, 0.0), extra)
 
 
 def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:

@@ -45,6 +45,12 @@ class Log(NamedTuple):
         """Only some of the components."""
         return Log._make(field[rows] for field in self)
 
+    def explain(self, rows: Integers, forms: Integers, share: Floats | float, extra: Floats) -> "Log":
+        """With rows (A,) held to be forms (A, 2, 5) of idents, with the partners' shares (A,) and variances (A, 3)."""
+        form, shares, variance = self.form.copy(), self.share.copy(), self.extra.copy()
+        form[rows], shares[rows], variance[rows] = forms, share, extra
+        return self._replace(form=form, share=shares, extra=variance)
+
     @property
     def explained(self) -> Booleans:
         """(N,) whether it is held to be a form."""

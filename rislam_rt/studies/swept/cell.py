@@ -10,6 +10,7 @@ import numpy as np
 
 from rislam_rt.measurement import paper_snr_db
 from rislam_rt.model import SlamResult
+from rislam_rt.pipeline.cycle import Receptions
 from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, result_of, run_scheme
 from rislam_rt.pipeline.scores.summary import summarise_scheme
 from rislam_rt.pipeline.specification.read import Table, build_spec
@@ -29,7 +30,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     spec = cell_spec(settings)
     prepare_channel(spec.channel)
     scene = load_scene(Path(settings["beside"]) / str(settings["scene"]))
-    setup = prepare_setup(scene, spec, rng=np.random.default_rng(seed))
+    setup = prepare_setup(scene, spec, rng=np.random.default_rng(seed))._replace(receptions=Receptions())
     schemes: dict[str, Any] = {}
     timing: dict[str, Any] = {"trace_seconds": setup.seconds}
     for name in spec.schemes:

@@ -135,7 +135,6 @@ def test_a_turning_body_needs_no_compass():
     assert len(found[-1].map.wall_offset) >= 3
 
 
-@pytest.mark.slow
 def test_start_error_stays_in_the_covariance(run):
     found, *_ = run
     # nothing that is measured tells where the start was

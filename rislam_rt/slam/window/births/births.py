@@ -5,9 +5,9 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.returns import TX, linearise
+from rislam_rt.slam.ris_candidate import rays
 from rislam_rt.slam.window import tracks
-from rislam_rt.slam.window.births.context import Context, resolve
-from rislam_rt.slam.window.births.feature_removal import behind, release
+from rislam_rt.slam.window.births.feature_removal import behind, release, resolve
 from rislam_rt.slam.window.births.hypotheses import BESIDE, known_features
 from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, judge, wanted
 from rislam_rt.slam.window.births.track_summary import TrackSummary, summarise_tracks
@@ -19,9 +19,10 @@ from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER, STRIDE
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.state import WindowState
 
 
-def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClusters) -> Context:
+def births(context: WindowState, expected: ExpectedComponents, groups: UnresolvedClusters) -> WindowState:
     """Every track whose time has come is weighed; the shortest of those that are clear enters."""
     rows = tracks.due(context.tracks, context.cycle)
     if not len(rows) or (context.cycle % STRIDE and context.cycle > 12):
@@ -74,7 +75,7 @@ def births(context: Context, expected: ExpectedComponents, groups: UnresolvedClu
     return context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
 
 
-def _missing_legs(context: Context, histories: TrackSummary, mean: Floats) -> Floats:
+def _missing_legs(context: WindowState, histories: TrackSummary, mean: Floats) -> Floats:
     """(T,) log probability that of two walls that throw a track together so many single returns are not heard.
 
     Two walls shift the Tx by the sum of what each does: a single return of theirs comes along the same line (opposite
@@ -101,17 +102,13 @@ def _missing_legs(context: Context, histories: TrackSummary, mean: Floats) -> Fl
     return missing[np.minimum(found, 2)]
 
 
-def _bearings(context: Context, rows: Booleans, mean: Floats) -> tuple[Floats, Floats]:
+def _bearings(context: WindowState, rows: Booleans, mean: Floats) -> tuple[Floats, Floats]:
     """Directions (N, 3) in the room's axes and lengths (N,) of some of the tracks."""
-    heading = float(context.heading[-1] + mean[6])
-    flat = context.tracks.mean[rows, 1:, 0]
-    up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=1), 0.0))
-    cos, sin = np.cos(heading), np.sin(heading)
-    away = np.stack([cos * flat[:, 0] - sin * flat[:, 1], sin * flat[:, 0] + cos * flat[:, 1], up], axis=1)
-    return away, np.maximum(context.tracks.mean[rows, 0, 0], 0.1)
+    seen = context.tracks.mean[rows, :, 0]
+    return rays(seen, float(context.heading[-1] + mean[6])), np.maximum(seen[:, 0], 0.1)
 
 
-def _company(context: Context, ats: list[Integers], histories: TrackSummary, mean: Floats) -> Floats:
+def _company(context: WindowState, ats: list[Integers], histories: TrackSummary, mean: Floats) -> Floats:
     """(T,) log odds by which a direction speaks for a path over unknown walls, and against all else: a shorter one
     comes from there.
 
@@ -137,7 +134,7 @@ LEG = 0.04
 
 
 def explanations(
-    context: Context, rows: Integers, histories: TrackSummary, expected: ExpectedComponents,
+    context: WindowState, rows: Integers, histories: TrackSummary, expected: ExpectedComponents,
     groups: UnresolvedClusters, mean: Floats,
     covariance: Floats,
 ) -> list[tuple[int, float, Integers, int]]:  # fmt: skip
@@ -145,7 +142,6 @@ def explanations(
     if not len(groups.leader):
         return []
     lead, mate, share = groups.leader, groups.partner, groups.share[:, None]
-    gap = np.where(mate[:, None] >= 0, expected.seen[mate] - expected.seen[lead], 0.0)
     features = mean[HEAD:].reshape(-1, 3)
     size = features.size
     inside = covariance[HEAD:, HEAD:]
@@ -154,21 +150,20 @@ def explanations(
     )
     found: list[tuple[int, float, Integers, int]] = []
     for row, place in enumerate(rows):
-        off = np.abs(expected.seen[lead] + share * gap - context.tracks.mean[place, :, 0]) / NEAR
+        off = np.abs(expected.seen[lead] + share * groups.gap - context.tracks.mean[place, :, 0]) / NEAR
         near = (off < 1.0).all(axis=1).nonzero()[0]
         for column in near[np.argsort(off[near].sum(axis=1))][:MOST]:
             forms = np.full((2, 5), UNKNOWN)
             forms[0] = expected.forms[lead[column]]
             if mate[column] >= 0:
                 forms[1] = expected.forms[mate[column]]
-            value = _explain(context, histories, row, forms, groups, int(column), gap[column], features, root)
+            value = _explain(context, histories, row, forms, groups, int(column), features, root)
             found.append((row, value, forms, int(column)))
     return found
 
 
 def _explain(
-    context: Context, histories: TrackSummary, row: int, forms: Integers, groups: UnresolvedClusters, column: int,
-    gap: Floats,
+    context: WindowState, histories: TrackSummary, row: int, forms: Integers, groups: UnresolvedClusters, column: int,
     features: Floats, root: Floats,
 ) -> float:  # fmt: skip
     """Log evidence of one explanation."""
@@ -185,7 +180,7 @@ def _explain(
     by_pose = np.concatenate([by_pose, histories.twist[row, used]], axis=-1)
     wide = linear.by_feature.reshape(*linear.seen.shape, features.size)
     by_map = np.einsum("r,krij->kij", weight, wide) @ root
-    extra = groups.disturbance[column] + groups.share_variance[column] * gap**2
+    extra = groups.disturbance[column] + groups.share_variance[column] * groups.gap[column] ** 2
     reported = histories.weight[row, used] ** -1.0
     std = np.sqrt(reported**2 + extra)
     jacobian = np.concatenate([by_pose, by_map], axis=-1) / std[..., None]
@@ -205,26 +200,22 @@ def _explain(
     return float(evidence)
 
 
-def _taken(context: Context, at: Integers, form: Integers) -> bool:
+def _taken(context: WindowState, at: Integers, form: Integers) -> bool:
     """Whether, in most of the cycles of a track (rows of the log), another component is held to be that form (5,)."""
     log = context.log
     same = (log.form[:, 0] == form).all(axis=1) & log.explained
     return bool(np.isin(log.cycle[at], log.cycle[same]).mean() > 0.5)
 
 
-def _assign(context: Context, at: Integers, forms: Integers, scatter: Floats, part: float) -> Context:
+def _assign(context: WindowState, at: Integers, forms: Integers, scatter: Floats, part: float) -> WindowState:
     """Rows of the log held to be forms (2, 5) of idents; they err by as much more as they scatter."""
-    log = context.log
-    form, share, extra = log.form.copy(), log.share.copy(), log.extra.copy()
-    form[at] = forms
-    share[at] = part if forms[1, 0] != UNKNOWN else 0.0
-    extra[at] = CONSTANTS.memory * log.std[at] ** 2 * (scatter**2 - 1.0)
-    return context._replace(log=log._replace(form=form, share=share, extra=extra))
+    extra = CONSTANTS.memory * context.log.std[at] ** 2 * (scatter**2 - 1.0)
+    return context._replace(log=context.log.explain(at, forms, part if forms[1, 0] != UNKNOWN else 0.0, extra))
 
 
 def _enter(
-    context: Context, at: Integers, verdict: TrackDecision, histories: TrackSummary, row: int
-) -> tuple[Context, bool]:
+    context: WindowState, at: Integers, verdict: TrackDecision, histories: TrackSummary, row: int
+) -> tuple[WindowState, bool]:
     """The map with a new feature and its history, solved anew; as it was, if they do not agree."""
     new = len(context.landmarks.ident)
     holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))

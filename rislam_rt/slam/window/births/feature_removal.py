@@ -4,19 +4,28 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.slam.returns import NONE, TX
-from rislam_rt.slam.window.births.context import Context, resolve
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, remove_features
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
-from rislam_rt.slam.window.measurement_log import Log, Residuals
+from rislam_rt.slam.window.measurement_log import Log, Residuals, renew
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import FEWEST, RECENT
 from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
 
 
-def release(context: Context, keep: Booleans) -> Context:
+def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, Residuals]:
+    """Gauss-Newton over the whole window."""
+    window, every = context.window, np.arange(context.window.num_poses)
+    for _ in range(steps):
+        window, left = renew(window, context.log, context.landmarks, context.scene.body, context.heading, every)
+        window = window_gaussian.weigh_holds(window_gaussian.solve(window))
+    return window, left
+
+
+def release(context: WindowState, keep: Booleans) -> WindowState:
     """The map without some features; what they explained is unexplained, and goes on as tracks."""
     if keep.all():
         return context
@@ -100,7 +109,7 @@ def derived(landmarks: WindowTable, expected: ExpectedComponents, covariance: Fl
     return found
 
 
-def behind(context: Context, wall: int) -> Booleans:
+def behind(context: WindowState, wall: int) -> Booleans:
     """(F,) features that the newest wall stands before: what was held for them may be its doing."""
     landmarks, features = context.landmarks, context.window.features
     middle = window_gaussian.now(context.window)[0][:3]

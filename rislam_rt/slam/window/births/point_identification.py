@@ -7,7 +7,6 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.moments import even_draws, poses_of
 from rislam_rt.slam.observations import OTHER, UNTOLD
-from rislam_rt.slam.window.births.context import Context
 from rislam_rt.slam.window.births.hypotheses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -22,6 +21,7 @@ from rislam_rt.slam.window.landmarks.ris_identification import (
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import CERTAIN
 from rislam_rt.slam.window.smoother.window_gaussian import poses
+from rislam_rt.slam.window.state import WindowState
 
 ASIDE = 12.0
 """Log evidence behind a track's best point from which on another place is not asked whether it is the panel's."""
@@ -38,7 +38,7 @@ class Identified(NamedTuple):
     """(T, Q) log odds that a track runs over each panel by a way that is none of these, against none over it."""
 
 
-def identify(context: Context, ats: list[Integers], table: Hypotheses, fits: Fits, evidence: Floats) -> Identified:
+def identify(context: WindowState, ats: list[Integers], table: Hypotheses, fits: Fits, evidence: Floats) -> Identified:
     """The tracks whose components are the log's rows `ats`: what comes of its being a panel that throws them."""
     scene, landmarks, panels = context.scene, context.landmarks, context.scene.num_panels
     elsewhere = np.full((len(ats), panels), -CERTAIN)
@@ -67,7 +67,7 @@ def identify(context: Context, ats: list[Integers], table: Hypotheses, fits: Fit
     return found._replace(identity=found.identity.converged())
 
 
-def _history(context: Context, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> PanelIdentity:
+def _history(context: WindowState, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> PanelIdentity:
     """Identities of the hypotheses `rows` (R,) of a track whose components are the log's rows `at`.
 
     The last row stands for a panel anywhere else: amplitudes scatter as they do.

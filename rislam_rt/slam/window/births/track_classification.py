@@ -7,7 +7,6 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.returns import AXES, NONE, TX
-from rislam_rt.slam.window.births.context import Context
 from rislam_rt.slam.window.births.hypotheses import (
     BESIDE,
     IMAGE,
@@ -31,6 +30,7 @@ from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, un
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
 from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors, no_holds
+from rislam_rt.slam.window.state import WindowState
 
 LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 0.2]))
 """Log prior of each kind; over known walls, of all walls together; of known points in walls, of all points together."""
@@ -90,7 +90,7 @@ _TEMPLATES = (
 
 
 def judge(
-    context: Context, ats: list[Integers], digest: TrackSummary, known: KnownFeatures,
+    context: WindowState, ats: list[Integers], digest: TrackSummary, known: KnownFeatures,
     told: list[tuple[int, float, int]],
     lonely: Floats, beside: Floats,
 ) -> tuple[list[TrackDecision], Floats]:  # fmt: skip

@@ -12,6 +12,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import PANEL
+from rislam_rt.slam.ris_candidate import rays
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import POINTS
@@ -59,10 +60,7 @@ class TrackSummary(NamedTuple):
     @property
     def direction(self) -> Floats:
         """(T, 3) mean directions of arrival in the room's axes."""
-        flat = self.mean[0][:, 1:]
-        flat = flat / np.maximum(1.0, np.linalg.norm(flat, axis=1))[:, None]
-        up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=1), 0.0))
-        return np.concatenate([flat, up[:, None]], axis=1)
+        return rays(self.mean[0], 0.0)
 
 
 def summarise_tracks(

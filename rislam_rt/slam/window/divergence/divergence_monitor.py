@@ -58,11 +58,12 @@ def jump(view: CycleAssociation, observed: Observations) -> Floats:
     """(3,) [m] by which an agent that hears this is elsewhere than thought: on which most returns agree."""
     lead = view.groups.leader
     expected, heard = view.expected.seen[lead], observed.seen
-    off = np.abs(heard[:, 1:] - expected[:, None, 1:]).max(axis=-1)
-    level = np.abs(observed.log_amplitude - view.groups.log_amplitude[:, None])
-    off = off + np.where(level < 10.0 * ALIKE, 0.0, ALIKE)
-    near = np.argsort(off, axis=None, kind="stable")[:PAIRS]
-    row, column = np.unravel_index(near[off.ravel()[near] < ALIKE], off.shape)
+    off = np.maximum(*(np.abs(heard[:, axis] - expected[:, axis, None]) for axis in (1, 2)))
+    row, column = (off < ALIKE).nonzero()
+    alike = np.abs(observed.log_amplitude[column] - view.groups.log_amplitude[row]) < 10.0 * ALIKE
+    row, column = row[alike], column[alike]
+    near = np.argsort(off[row, column], kind="stable")[:PAIRS]
+    row, column = row[near], column[near]
     if len(row) < FEWEST:
         return np.zeros(3)
     gap = heard[column, 0] - expected[row, 0]

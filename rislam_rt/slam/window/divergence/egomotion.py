@@ -1,10 +1,11 @@
 """Does the picture move as the agent is told that it moves? Asked of the first tracks, before anything is born of them.
 
 Whatever throws it, a wall, a point, or two walls at right angles, a return grows shorter by twice the way that the
-agent goes towards it: `rate = -2 u . v`, with `u` the direction of arrival. What comes over a wall on one leg alone, or
-between opposite walls, does not. So a velocity is wanted that many tracks agree on, each of them with a probability of
-its own of being none of these. The told velocity is one such, with its own deviation; if it was told wrong, any other
-within walking speed is as good. Laplace evidences of both decide.
+agent goes towards it: `rate = -2 u . v`, with `u` the direction of arrival. What goes to and fro between opposite walls
+keeps its length, from both sides alike; what comes over a wall on one leg alone does neither. So a velocity is wanted
+that many tracks agree on, each of them with a probability of its own of being none of these. The told velocity is one
+such, with its own deviation; if it was told wrong, any other within walking speed is as good. Laplace evidences of both
+decide.
 """
 
 from typing import NamedTuple
@@ -19,7 +20,7 @@ from rislam_rt.slam.window.model_constants import CONSTANTS
 WALK = 1.0
 """Standard deviation [m/s] of a velocity of which nothing is known."""
 APART = 0.5
-"""Share of paths that do not shorten as the agent nears where they come from."""
+"""Share of paths that do not shorten as the agent nears where they come from; a quarter of them keep their length."""
 LOG_WRONG = np.log(0.01)
 """Log odds beforehand that a start was told wrong."""
 MEASURED = 6
@@ -97,17 +98,18 @@ def rates(log: Log, heading: Floats, step: float, baseline: float) -> Rates:
 
 def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
     """The velocity `told` (3,) within `std` (3,), against any other, and against the same one turned by any angle."""
-    every = _find_modes(found, _starts(found, told), told[2])
-    spread = every.covariance + np.diag(std[:2] ** 2)
-    wide = spread + WALK**2 * np.eye(2)
-    right = float(np.max(every.evidence + _log_normal(every.velocity - told[:2], spread)))
-    speed = every.evidence + _log_normal(every.velocity - told[:2], wide)
+    near, anywhere = np.diag(std[:2] ** 2), np.diag(std[:2] ** 2 + WALK**2)
+    # the told velocity has a maximum of its own near it, which others, if louder, would draw to themselves
+    starts = _starts(found, told)
+    right = float(_find_modes(found, starts, told, near).evidence.max())
+    every = _find_modes(found, starts, told, anywhere)
+    speed, spread = every.evidence, every.covariance + near
     length, aim = np.linalg.norm(every.velocity, axis=1), float(np.linalg.norm(told[:2]))
     # the speed agrees, and all directions are alike
     along = np.maximum(np.trace(spread, axis1=1, axis2=2) / 2.0, 1e-12)
     ring = -0.5 * (length - aim) ** 2 / along - 0.5 * np.log(2.0 * np.pi * along)
     ring -= np.log(2.0 * np.pi * np.hypot(length, np.sqrt(along)))
-    compass = every.evidence + ring
+    compass = every.evidence - _log_normal(every.velocity - told[:2], anywhere) + ring
     is_compass = bool(compass.max() > speed.max())
     best = int(np.argmax(compass if is_compass else speed))
     velocity = np.append(every.velocity[best], told[2])
@@ -121,14 +123,13 @@ def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
 
 def agreed(found: Rates) -> Floats:
     """(3,) level velocity, or way, that most agree on; near to nothing if it may be."""
-    every = _find_modes(found, _starts(found, np.zeros(3)), 0.0)
-    best = int(np.argmax(every.evidence + _log_normal(every.velocity, every.covariance + WALK**2 * np.eye(2))))
-    return np.append(every.velocity[best], 0.0)
+    every = _find_modes(found, _starts(found, np.zeros(3)), np.zeros(3), WALK**2 * np.eye(2))
+    return np.append(every.velocity[int(np.argmax(every.evidence))], 0.0)
 
 
 def _log_normal(off: Floats, spread: Floats) -> Floats:
-    """Log densities (S,) of offsets (S, 2) under covariances (S, 2, 2)."""
-    inside = np.vecdot(off, np.linalg.solve(spread, off[..., None])[..., 0])
+    """Log densities (S,) of offsets (S, 2) under a covariance (2, 2)."""
+    inside = np.vecdot(off, np.linalg.solve(spread, off.T).T)
     return -0.5 * inside - 0.5 * np.linalg.slogdet(spread)[1] - np.log(2.0 * np.pi)
 
 
@@ -163,19 +164,21 @@ def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Fl
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
     close = np.log1p(-APART) - 0.5 * left**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
-    either = np.logaddexp(close, np.log(APART) - np.log(4.0 * WALK))
+    kept = -0.5 * found.rate**2 / found.variance - 0.5 * np.log(2.0 * np.pi * found.variance)
+    either = np.logaddexp(close, np.log(APART / 4.0) + np.logaddexp(kept, np.log(3.0 / (4.0 * WALK))))
     return either, np.exp(close - either) / variance
 
 
-def _find_modes(found: Rates, start: Floats, climb: float) -> _Modes:
-    """From velocities (S, 2): the nearest that tracks agree on, and the evidence there, over a flat prior."""
-    flat, rate = found.toward[:, :2], found.rate - found.toward[:, 2] * climb
-    v, prior = start.copy(), np.eye(2) / (3.0 * WALK) ** 2
+def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:
+    """From velocities (S, 2): the nearest that tracks agree on, under a prior about `told` (3,) of covariance `spread`
+    (2, 2), and Laplace's evidence there."""
+    flat, rate = found.toward[:, :2], found.rate - found.toward[:, 2] * told[2]
+    v, prior = start.copy(), np.linalg.inv(spread)
     for last in (False,) * 6 + (True,):
-        either, weight = _agreement(found, v, climb)
+        either, weight = _agreement(found, v, told[2])
         normal = np.einsum("st,ti,tj->sij", weight, flat, flat) + prior
         if last:
             break
-        v = np.linalg.solve(normal, ((weight * rate) @ flat)[..., None])[..., 0]
+        v = np.linalg.solve(normal, ((weight * rate) @ flat + prior @ told[:2])[..., None])[..., 0]
     evidence = either.sum(axis=1) + np.log(2.0 * np.pi) - 0.5 * np.linalg.slogdet(normal)[1]
-    return _Modes(v, np.linalg.inv(normal), evidence)
+    return _Modes(v, np.linalg.inv(normal), evidence + _log_normal(v - told[:2], spread))

@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.slam.observations import UNTOLD, Observations
 from rislam_rt.slam.returns import NONE, TX, Poses
-from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, learn_ratio
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, learn_ratio
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,
     KnownEnvironment,
@@ -39,9 +39,8 @@ def no_observations() -> VisibilityObservations:
 
 def pack(forms: Integers, landmarks: WindowTable) -> Integers:
     """Forms (R, 5) of rows as one number each, by ident."""
-    known = np.where(forms >= 0, landmarks.ident[np.maximum(forms, 0)], forms) if len(landmarks.ident) else forms
     code = np.zeros(len(forms), dtype=np.int64)
-    for column in known.T:
+    for column in idents(landmarks, forms).T:
         code = code * 4096 + column + 1
     return code
 
@@ -55,10 +54,8 @@ def recall(
         code = pack(expected.forms, landmarks)
         place = np.minimum(np.searchsorted(visibility.code, code), len(visibility.code) - 1)
         known = visibility.code[place] == code
-        first, scatter = (
-            np.where(known, visibility.clear[place], first),
-            np.where(known, visibility.scatter[place], scatter),
-        )
+        first = np.where(known, visibility.clear[place], first)
+        scatter = np.where(known, visibility.scatter[place], scatter)
     return np.asarray(first * (1.0 - CONSTANTS.blocked) + (1.0 - first) * CONSTANTS.cleared), scatter
 
 
@@ -66,12 +63,14 @@ def seed(
     visibility: VisibilityObservations, forms: Integers, landmarks: WindowTable, scatter: float
 ) -> VisibilityObservations:
     """A form that a new feature was found by: nothing hides it, and it scatters so much."""
-    code = np.append(visibility.code, pack(forms, landmarks))
-    order = np.argsort(code, kind="stable")
-    return VisibilityObservations(
-        code[order], np.append(visibility.clear, np.full(len(forms), 0.99))[order],
-        np.append(visibility.scatter, np.full(len(forms), scatter))[order],
-    )  # fmt: skip
+    count = len(forms)
+    return _joined(visibility, (pack(forms, landmarks), np.full(count, 0.99), np.full(count, scatter)))
+
+
+def _joined(visibility: VisibilityObservations, fresh: tuple[Integers, Floats, Floats]) -> VisibilityObservations:
+    every = [np.concatenate(pair) for pair in zip(visibility, fresh, strict=True)]
+    order = np.argsort(every[0], kind="stable")
+    return VisibilityObservations._make(field[order] for field in every)
 
 
 def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Floats) -> Floats:
@@ -104,13 +103,8 @@ def learn(
     landmarks = _strengths(landmarks, window, expected, groups, row, pick, observed, poses, scene, code)
     fresh = pack(expected.forms, landmarks)
     keep = ~np.isin(visibility.code, fresh)
-    packed = np.concatenate([visibility.code[keep], fresh])
-    order = np.argsort(packed, kind="stable")
-    cleared, scattered = (
-        np.concatenate([visibility.clear[keep], after]),
-        np.concatenate([visibility.scatter[keep], scatter]),
-    )
-    return VisibilityObservations(packed[order], cleared[order], scattered[order]), landmarks
+    kept = VisibilityObservations._make(field[keep] for field in visibility)
+    return _joined(kept, (fresh, after, scatter)), landmarks
 
 
 def _existence(

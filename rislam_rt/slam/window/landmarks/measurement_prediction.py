@@ -3,8 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body, DataSheet, RadioConfig, RisCode, RisSpec
 from rislam_rt.model.sensor import SensorModel
 from rislam_rt.ris import leg_response, panel_gain
@@ -71,18 +72,18 @@ def predict_returns(
     returns, bounces = compact(returns, rows), bounces[rows]
     sight = observe(returns, features, landmarks.anchor, poses)
     level, spread = amplitudes(returns, features, landmarks, sight.tx_length, sight.rx_length, poses, scene, code)
-    detection = detection_probability(level, spread, scene.sensor)
     strong = scene.radio.integrated_snr(np.exp(level + spread)) > FAINT
     audible = ((sight.up > -LEVEL) & strong).nonzero()[0]
     returns = compact(returns, audible)
-    linear = linearise(returns, features, landmarks.anchor, poses)
+    linear, level, spread = linearise(returns, features, landmarks.anchor, poses), level[audible], spread[audible]
     count = len(audible)
     jacobian = np.zeros((count, 3, HEAD + 3 * len(features)))
     jacobian[..., :3], jacobian[..., 6] = linear.by_pose, linear.by_heading(poses, position)
     jacobian[..., HEAD:] = linear.by_feature.reshape(count, 3, features.size)
     return ExpectedComponents(
-        forms_of(returns), linear.seen, jacobian, level[audible], spread[audible], bounces[audible], detection[audible]
-    )
+        forms_of(returns), linear.seen, jacobian, level, spread, bounces[audible],
+        detection_probability(level, spread, scene.sensor),
+    )  # fmt: skip
 
 
 def amplitudes(
@@ -164,39 +165,21 @@ class UnresolvedClusters(NamedTuple):
     """(C,)."""
     by_itself: Floats
     """(C,) probability that it comes out by itself: 1 for leaders, less for what a leader should take in."""
+    gap: Floats
+    """(C, 3) from the leader to its partner, in what is seen of them; 0 without one."""
 
 
 def cluster(
     expected: ExpectedComponents, cell: Floats, clear: Floats, sides: Integers | None = None
 ) -> UnresolvedClusters:
     """From the strongest down, each return takes in all that is in its cell; neighbours on the cell's edge disturb."""
-    count = len(expected.seen)
-    place, strength = expected.seen / cell, expected.log_amplitude
-    gap = np.zeros((count, count))
-    for axis in place.T:
-        np.maximum(gap, np.abs(axis - axis[:, None]), out=gap)
-    np.fill_diagonal(gap, np.inf)
-    if sides is not None:
-        gap[sides[:, None] != sides] = np.inf
-    weaker = strength <= strength[:, None]
-    inside, around = weaker & (gap < 1.0), weaker & (gap < EDGE)
-    taken, partner, by_itself = np.zeros(count, dtype=np.bool_), np.full(count, -1), np.ones(count)
-    crowded = np.flatnonzero(inside.any(axis=1))
-    power = np.exp(2.0 * strength)
-    total = power.copy()
-    for leader in crowded[np.argsort(-strength[crowded], kind="stable")]:
-        members = (inside[leader] & ~taken).nonzero()[0]
-        if taken[leader] or not len(members):
-            continue
-        taken[members] = True
-        by_itself[members] = np.maximum(1.0 - clear[leader], CONSTANTS.rare)
-        partner[leader] = members[np.argmax(strength[members])]
-        total[leader] += power[members].sum()
-    paired = (partner >= 0).nonzero()[0]
-    around[paired, partner[paired]] = False
-    first, second = (around & ~taken[:, None]).nonzero()
+    strength, power = expected.log_amplitude, np.exp(2.0 * expected.log_amplitude)
+    first, second, gap = _neighbours(expected.seen / cell, strength, sides)
+    taken, partner, by_itself, total = _taken_in(first[gap < 1.0], second[gap < 1.0], strength, power, clear)
+    around = ~taken[first] & (partner[first] != second)
+    first, second = first[around], second[around]
     ratio = 0.5 * power[second] / power[first] * clear[second]
-    disturbance = np.zeros((count, 3))
+    disturbance = np.zeros(expected.seen.shape)
     np.add.at(disturbance, first, ratio[:, None] * (expected.seen[second] - expected.seen[first]) ** 2)
     leader = np.concatenate([(~taken).nonzero()[0], taken.nonzero()[0]])
     mate = np.where(taken[leader], -1, partner[leader])
@@ -224,7 +207,50 @@ def cluster(
         np.where(taken[leader], strength[leader], 0.5 * np.log(total[leader])),
         np.hypot(expected.log_amplitude_std[leader], fade),
         by_itself[leader],
+        np.where(both[:, None], expected.seen[mate] - expected.seen[leader], 0.0),
     )
+
+
+def _neighbours(place: Floats, strength: Floats, sides: Integers | None) -> tuple[Integers, Integers, Floats]:
+    """Pairs (P,) of returns at places (R, 3) [cells], each with a weaker one on its cell or its edge, and their gaps.
+
+    Row by row.
+    """
+    pairs = scipy.spatial.cKDTree(place).query_pairs(EDGE, p=np.inf, output_type="ndarray")
+    first, second = pairs.T if sides is None else pairs[sides[pairs[:, 0]] == sides[pairs[:, 1]]].T
+    first, second = np.concatenate([first, second]), np.concatenate([second, first])
+    weaker = strength[second] <= strength[first]
+    first, second = first[weaker], second[weaker]
+    gap = np.abs(place[first, 0] - place[second, 0])
+    for axis in place.T[1:]:
+        np.maximum(gap, np.abs(axis[first] - axis[second]), out=gap)
+    rows = (gap < EDGE).nonzero()[0]
+    rows = rows[np.argsort(first[rows] * len(place) + second[rows])]
+    return first[rows], second[rows], gap[rows]
+
+
+def _taken_in(
+    first: Integers, second: Integers, strength: Floats, power: Floats, clear: Floats
+) -> tuple[Booleans, Integers, Floats, Floats]:
+    """Which of R returns are taken in, the strongest that each took in, the probability that each comes out by itself,
+    and its power with what it took in; `second` lies in the cell of `first` and is weaker.
+    """
+    count = len(strength)
+    taken, partner, by_itself, total = np.zeros(count, np.bool_), np.full(count, -1), np.ones(count), power.copy()
+    crowded = np.unique(first)
+    crowded = crowded[np.argsort(-strength[crowded], kind="stable")]
+    begin, end = (np.searchsorted(first, crowded, side=side) for side in ("left", "right"))
+    for leader, low, high in zip(crowded.tolist(), begin.tolist(), end.tolist(), strict=True):
+        if taken[leader]:
+            continue
+        members = second[low:high]
+        members = members[~taken[members]]
+        if len(members):
+            taken[members] = True
+            by_itself[members] = max(1.0 - clear[leader], CONSTANTS.rare)
+            partner[leader] = members[strength[members].argmax()]
+            total[leader] += power[members].sum()
+    return taken, partner, by_itself, total
 
 
 TWIN_STD = 0.03

@@ -41,6 +41,21 @@ def test_a_speed_told_wrong_is_found_and_mended():
         assert np.linalg.norm(told.velocity - true) < 5.0 * 0.01 * np.sqrt(2.0 / (8 * 4 / 3))
 
 
+def test_what_goes_to_and_fro_between_opposite_walls_speaks_against_no_start():
+    """Two such tracks, from either side, keep their length: with one more stray they agree on another velocity."""
+    toward = -2.0 * np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [-0.3, -0.95, 0.0], [0.0, 0.0, 1.0], [0.5, 0.8, 0.33]])
+    rate = toward @ TOLD
+    rate[:2], rate[4] = 0.0, 1.0
+    one = egomotion.weigh(Rates(toward, rate, np.full(5, 0.03**2), np.zeros(5)), TOLD, STD)
+    assert one.log_odds < 0.0
+
+
+def test_an_agent_that_stands_still_and_is_told_to_move_is_found():
+    still = egomotion.weigh(_rates(np.zeros(3), np.random.default_rng(4), tracks=16), TOLD, STD)
+    assert still.log_odds > 0.0
+    assert np.linalg.norm(still.velocity) < 5.0 * 0.01
+
+
 def test_a_turned_compass_is_told_from_a_wrong_speed():
     rng, turn = np.random.default_rng(3), 0.7
     cos, sin = np.cos(turn), np.sin(turn)

@@ -1,0 +1,58 @@
+"""Which expected returns come out as one: against the definition, pair by pair."""
+
+import numpy as np
+import pytest
+
+from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, cluster
+from rislam_rt.slam.window.model_constants import CONSTANTS
+from rislam_rt.slam.window.numerics import EDGE
+
+CELL = np.array([0.3, 0.5, 0.5])
+
+
+def returns(count, *, rng):
+    forms = np.column_stack([np.arange(count), np.full((count, 4), -1)])
+    seen = rng.uniform([0.0, -1.0, -1.0], [4.0, 1.0, 1.0], (count, 3))
+    level = np.round(rng.uniform(-12.0, -9.0, count), 1)  # some are equally strong
+    return ExpectedComponents(
+        forms, seen, np.zeros((count, 3, 7)), level, np.full(count, 0.2), np.zeros(count), np.ones(count)
+    )
+
+
+@pytest.mark.parametrize("told", [False, True])
+def test_the_strongest_of_a_cell_takes_in_the_others(told):
+    count = 60
+    rng = np.random.default_rng(3)
+    expected, clear = returns(count, rng=rng), rng.uniform(0.2, 1.0, count)
+    sides = rng.integers(2, size=count) if told else None
+    groups = cluster(expected, CELL, clear, sides)
+    strength, power = expected.log_amplitude, np.exp(2.0 * expected.log_amplitude)
+
+    def reach(one, other, cells):
+        apart = np.abs(expected.seen[one] - expected.seen[other]) / CELL
+        alike = sides is None or sides[one] == sides[other]
+        return one != other and alike and (apart < cells).all() and strength[other] <= strength[one]
+
+    taken, partner, alone, total = set(), np.full(count, -1), np.ones(count), power.copy()
+    for leader in np.argsort(-strength, kind="stable"):
+        members = [i for i in range(count) if i not in taken and reach(leader, i, 1.0)]
+        if leader not in taken and members:
+            taken |= set(members)
+            partner[leader] = max(members, key=lambda i: strength[i])
+            alone[members] = max(1.0 - clear[leader], CONSTANTS.rare)
+            total[leader] += power[members].sum()
+    disturbance = np.zeros((count, 3))
+    for one in set(range(count)) - taken:
+        for other in range(count):
+            if reach(one, other, EDGE) and other != partner[one]:
+                ratio = 0.5 * power[other] / power[one] * clear[other]
+                disturbance[one] += ratio * (expected.seen[other] - expected.seen[one]) ** 2
+    led = np.array([i for i in range(count) if i not in taken] + sorted(taken))
+    assert 10 < len(taken) < count - 10
+    assert (disturbance > 0.0).any()
+    np.testing.assert_array_equal(groups.leader, led)
+    np.testing.assert_array_equal(groups.partner, np.where(np.isin(led, list(taken)), -1, partner[led]))
+    np.testing.assert_array_equal(groups.by_itself, alone[led])
+    np.testing.assert_allclose(groups.disturbance, disturbance[led], rtol=1e-12)
+    whole = np.where(np.isin(led, list(taken)), strength[led], 0.5 * np.log(total[led]))
+    np.testing.assert_allclose(groups.log_amplitude, whole, rtol=1e-12)

@@ -1,0 +1,43 @@
+"""The cycle's assignment: looking only at what is within reach changes nothing."""
+
+import numpy as np
+
+from rislam_rt.slam.observations import Observations
+from rislam_rt.slam.window import cycle_association
+from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, cluster
+
+CELL = np.array([0.3, 0.5, 0.5])
+
+
+def test_returns_out_of_reach_change_nothing(monkeypatch):
+    count, heard = 80, 40
+    rng = np.random.default_rng(5)
+    seen = rng.uniform([1.0, -1.0, -1.0], [12.0, 1.0, 1.0], (count, 3))
+    root = 0.002 * rng.standard_normal((10, 10))
+    expected = ExpectedComponents(
+        np.column_stack([np.arange(count), np.full((count, 4), -1)]), seen, rng.standard_normal((count, 3, 10)),
+        rng.uniform(-12.0, -9.0, count), np.full(count, 0.2), np.zeros(count), np.ones(count),
+    )  # fmt: skip
+    std, own = np.full((heard, 3), 0.01), np.arange(heard)
+    level = expected.log_amplitude[own] + 0.1 * rng.standard_normal(heard)
+    place, one = seen[own] + 0.02 * rng.standard_normal((heard, 3)), np.ones(heard)
+    observed = Observations(place, std, level, 0.1 * one, one, one)
+    groups = cluster(expected, CELL, np.ones(count))
+    given = (
+        expected, groups, np.full(len(groups.leader), 0.9), np.ones(count), root @ root.T, observed, None,
+        np.full(heard, 1e-3),
+    )  # fmt: skip
+    near = cycle_association._associate(*given)
+    looked, within = [], cycle_association._within_reach
+
+    def look(seen, *more):
+        looked.append(within(seen, *more))
+        return np.arange(len(seen))
+
+    monkeypatch.setattr(cycle_association, "_within_reach", look)
+    every = cycle_association._associate(*given)
+    assert len(looked[0]) < 0.8 * len(groups.leader)
+    assert len(near[0]) > heard // 2
+    np.testing.assert_array_equal(near[0], every[0])
+    np.testing.assert_array_equal(near[1], every[1])
+    np.testing.assert_allclose(near[2:], every[2:], rtol=1e-12)
