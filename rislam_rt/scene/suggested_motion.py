@@ -6,9 +6,9 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.triangles import distance_to_triangles
-from rislam_rt.scene.built_in_rooms.room import BASELINE
 from rislam_rt.scene.check.mesh_queries import ray_hits, sphere_directions
 from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.room_files import BASELINE
 
 NUM_PLACES, NUM_RAYS, NUM_WAYS = 120, 64, 24
 """Places looked at (a fifth of them in rooms of many faces), rays cast from each, directions of the motion."""

@@ -94,7 +94,7 @@ def inner_of(sounding: Sounding, waves: PathSignals) -> InnerProducts:
 
 
 def _axis_products(wave: Complexes, place: Floats) -> tuple[Floats, Floats, Floats]:
-    """(P, P) along one axis of the signals (n, P), of signals and derivatives, and of derivatives."""
+    """Inner products (P, P) along one axis of the signals (n, P): of signals with derivatives, and of derivatives."""
     count, size = wave.shape
     half = wave[: count // 2] if count % 2 == 0 else wave
     flat = np.concatenate([half, (2j * np.pi * place[: len(half)])[:, None] * half], axis=1)

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.scene.built_in_rooms.shapes import joined, quad
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.floor_plan import FloorPlan, Opening
 from rislam_rt.scene.importing.materials import MaterialAssignment
@@ -17,6 +16,7 @@ from rislam_rt.scene.importing.regions.region_groups import numbered, plain_name
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.wall_lines import SAME_LINE, Line, Spans, wall_lines, without_span
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.shapes import joined, quad
 
 THICKEST = 0.6
 """[m] An opening goes through all walls this near it that run along it: both faces of a thick wall."""

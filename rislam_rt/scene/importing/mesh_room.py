@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.scene.built_in_rooms.shapes import joined
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.free_space import find_free, is_seen
 from rislam_rt.scene.importing.import_report import summarise_import
@@ -29,6 +28,7 @@ from rislam_rt.scene.importing.regions.welded_mesh import weld
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.scans.scan_room import looks_scanned, sort_scan
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.shapes import joined
 
 
 def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:

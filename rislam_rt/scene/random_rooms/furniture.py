@@ -6,10 +6,10 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.scene.built_in_rooms.shapes import block
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.random_rooms.plan import depth_inside
 from rislam_rt.scene.random_rooms.shell import Roof
+from rislam_rt.scene.shapes import block
 
 KINDS = {
     "cabinet": ((0.5, 1.6), (0.35, 0.7), (0.6, 2.2)),

@@ -30,7 +30,7 @@ class Echo(NamedTuple):
 
 
 def echo_misfit(seen: Floats, std: Floats, strength: Floats, offset: Floats) -> Echo:
-    """How near each track is to the return over two others taken for walls.
+    """How far each track is from an echo: the return over two others taken for walls.
 
     `seen` (T, 3): length [m] and two cosines in the room's axes; `strength` (T,): log amplitude over that of free
     space of the same length; `offset` (3,) [m]: from Rx to Tx, in the room's axes.

@@ -21,7 +21,7 @@ PARALLEL = 4.0
 
 
 def due_tracks(tracks: LandmarkTracks, predicted: PredictedMeasurements, cycle: int, config: SlamConfig) -> Integers:
-    """Tracks to examine now, the shortest first: an image lies behind its point, and is weaker.
+    """Tracks whose birth is due to be examined, the shortest first: an image lies behind its point, and is weaker.
 
     So a track has to wait while another that is shorter and stronger is still unexplained.
     """
@@ -46,7 +46,7 @@ def due_tracks(tracks: LandmarkTracks, predicted: PredictedMeasurements, cycle: 
 
 
 def _aligned(tracks: LandmarkTracks) -> Booleans:
-    """(T, T) whether two tracks come from one direction: the longer is likely the shorter over a wall on the Tx leg."""
+    """(T, T) whether two tracks come from one direction, so that births of the shorter come first."""
     gap = np.abs(tracks.mean[None, :, 1:, 0] - tracks.mean[:, None, 1:, 0])
     variance = tracks.covariance[..., 1:, 0, 0]
     return np.asarray((gap < PARALLEL * np.sqrt(variance[None] + variance[:, None] + 0.02**2)).all(axis=-1))

@@ -34,7 +34,7 @@ class DivergenceMonitor(NamedTuple):
 
 
 def check(monitor: DivergenceMonitor, nis: float, dof: int, seen: float, due: float) -> DivergenceMonitor:
-    """After a cycle with a NIS of `dof` degrees of freedom, in which `seen` of `due` certain returns showed.
+    """Whether the filter has diverged, after a cycle whose NIS has `dof` degrees, `seen` of `due` sure returns showed.
 
     Both count a return by the share of the cycles in which it showed lately: what has long been silent is blocked, or
     was never there, and says nothing of the agent.

@@ -127,7 +127,7 @@ def remove(table: LandmarkTable, keep: Booleans) -> LandmarkTable:
 
 
 def image_idents(table: LandmarkTable, points: Integers, walls: Integers) -> tuple[LandmarkTable, Integers]:
-    """The numbers (Q,) of the images of point rows (Q,) in wall rows (Q,), entered if new; their hits are counted."""
+    """Numbers (Q,) of images in the landmark table: of point rows (Q,) in wall rows (Q,), entered if new."""
     row_of = {(point, wall): row for row, (point, wall, _) in enumerate(table.images.tolist())}
     pairs = zip(table.ident[points].tolist(), table.ident[walls].tolist(), strict=True)
     rows = np.array([row_of.setdefault(pair, len(row_of)) for pair in pairs], dtype=np.int64)
@@ -139,7 +139,7 @@ def image_idents(table: LandmarkTable, points: Integers, walls: Integers) -> tup
 
 
 def learn_ratio(table: LandmarkTable, wall: int, log_ratio: float) -> LandmarkTable:
-    """A wall's log amplitude ratio after one more return."""
+    """A wall's log amplitude ratio in the landmark table after one more return."""
     gain = table.ratio_variance[wall] / (table.ratio_variance[wall] + RATIO_NOISE**2)
     ratio, variance = table.ratio.copy(), table.ratio_variance.copy()
     ratio[wall] += gain * (np.clip(log_ratio, -3.0, 0.5) - ratio[wall])

@@ -59,10 +59,3 @@ def normalised(log_weight: Floats) -> tuple[Floats, float]:
         return np.full(len(log_weight), -np.log(len(log_weight))), -np.inf
     total = top + float(np.log(np.sum(np.exp(log_weight - top))))
     return log_weight - total, total
-
-
-def systematic_ancestors(log_weight: Floats, count: int, *, rng: np.random.Generator) -> Integers:
-    """Ancestors (count,) by systematic resampling: particle i is drawn `count w_i` times on average, unbiased."""
-    edges = np.cumsum(np.exp(log_weight))
-    comb = (np.arange(count) + rng.random()) / count * edges[-1]
-    return np.minimum(np.searchsorted(edges, comb, side="right"), len(log_weight) - 1)

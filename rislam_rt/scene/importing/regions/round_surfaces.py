@@ -6,9 +6,9 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import unit
-from rislam_rt.scene.built_in_rooms.shapes import joined, quad
 from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions, crease_groups
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.shapes import joined, quad
 
 CREASE = np.radians(35.0)
 """Facets that meet at more than this are an edge: a round thing is drawn with eleven sides or more."""

@@ -7,12 +7,12 @@ from scipy.ndimage import binary_closing, binary_fill_holes, label
 from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Booleans, Floats
-from rislam_rt.scene.built_in_rooms.shapes import joined
 from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
 from rislam_rt.scene.importing.regions.round_surfaces import across
 from rislam_rt.scene.importing.scans.point_cloud import PointCloud
 from rislam_rt.scene.importing.scans.scan_planes import ScanPlane
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.shapes import joined
 
 CELL = 0.1
 """[m] Of the grid in which a plane's points are counted."""

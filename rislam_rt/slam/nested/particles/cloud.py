@@ -111,7 +111,7 @@ def combine(lanes: Floats) -> CloudSums:
 
 
 def restoring_map(wanted: Floats, found: Floats) -> Floats:
-    """Linear maps (N, 3, 3) that give offsets of covariance `found` the covariance `wanted`.
+    """Linear maps (N, 3, 3) that give clouds' offsets of covariance `found` the covariance `wanted`.
 
     Of all such maps that which moves particles least, if the two covariances are alike. A cloud that has collapsed is
     opened to `LEAST_STD`.
@@ -127,6 +127,6 @@ def restoring_map(wanted: Floats, found: Floats) -> Floats:
 
 
 def kernel_width(size: int, dims: int) -> float:
-    """Silverman's kernel width for `size` Gaussian samples in `dims` dimensions, in standard deviations."""
+    """Silverman's kernel width for a cloud of `size` Gaussian samples in `dims` dimensions, in deviations."""
     width = (4.0 / (dims + 2.0)) ** (1.0 / (dims + 4.0)) * size ** (-1.0 / (dims + 4.0))
     return float(min(width, LARGEST_WIDTH))

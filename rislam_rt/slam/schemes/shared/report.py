@@ -19,7 +19,7 @@ NIS_LIMIT = 3.0
 
 
 def outcome_of(num_measurements: int, num_features: int, strain: float) -> StepOutcome:
-    """How a cycle went; `strain` is the running mean of the NIS per degree of freedom."""
+    """Reported outcome of a cycle; `strain` is the running mean of the NIS per degree of freedom."""
     if num_measurements == 0:
         return StepOutcome.NO_MEASUREMENTS
     if num_features == 0:
@@ -49,7 +49,7 @@ def lift(known: Floats, height: Floats) -> Floats:
 
 
 def ahead_of(now: SlamEstimate, dt: float) -> SlamEstimate:
-    """The belief carried over `dt` [s] without noise."""
+    """An estimate carried over `dt` [s] without noise, as it is reported to the designer."""
     move, way = np.eye(6), dt * now.velocity
     move[:3, 3:] = dt * np.eye(3)
     covariance = move @ now.covariance @ move.T
@@ -57,7 +57,7 @@ def ahead_of(now: SlamEstimate, dt: float) -> SlamEstimate:
 
 
 def known_points(sums: Sums, threshold: float) -> Points:
-    """Features that exist and are rather points than walls or wanderers, with the moments of their sums."""
+    """Features to report as points of the map: those that exist and are rather points than walls or wanderers."""
     count, point = len(sums.ident), sums.kind == POINT
     held = np.bincount(sums.owner[point], sums.share[point], minlength=count)
     shown = np.flatnonzero((sums.existence > threshold) & (held > 0.5))
