@@ -1,4 +1,4 @@
-"""The machine behind the tracer: which libLLVM, which Dr.Jit variant, how many threads. Chosen once, here.
+"""The tracer's backend on this machine: which libLLVM, which Dr.Jit variant, how many threads. Chosen once, here.
 
 Dr.Jit takes the first libLLVM it finds and only looks when it is imported. Versions 15 and 16 pass its own check and
 then abort the process inside the path solver, where Python cannot catch it. So the library is chosen and its version

@@ -1,4 +1,4 @@
-"""What can go wrong, each with the exit code that the command line ends with.
+"""Errors, each with the exit code that the command line ends with.
 
 A message is one line: what was wrong, the value received, and what to do about it. An error may hold several, one for
 each fault.

@@ -1,4 +1,4 @@
-"""The pipelines and rooms that come with the package, by name."""
+"""The shipped pipelines and rooms, which come with the package, by name."""
 
 import re
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""What somebody may have meant by a word that is not known."""
+"""Spelling: what somebody may have meant by a word that is not known."""
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches

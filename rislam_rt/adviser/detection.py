@@ -1,4 +1,4 @@
-"""What the receiver would make of the paths at one place: the chance that it reports each landmark, without noise."""
+"""Detection at one place: the chance that the receiver reports each landmark, without noise being drawn."""
 
 from typing import NamedTuple
 
@@ -52,7 +52,8 @@ def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Setti
 
 
 def _cover(loud: Received, path: int, parts: NoiselessComponents, sensor: SensorModel) -> int:
-    """The strongest path that a path is joined to and that leads its component; -1 if it leads one, or is not loud."""
+    """The strongest path that leads a path's component and so hides it from detection; -1 if it leads one, or is not
+    loud."""
     row = np.flatnonzero(loud.path == path)
     if path in parts.path or not len(row):
         return -1

@@ -1,4 +1,4 @@
-"""Why a landmark is not heard at a place."""
+"""Reasons why a landmark is not heard at a place."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What a channel is."""
+"""The protocol of a channel: what every one offers."""
 
 from typing import Protocol
 

@@ -106,7 +106,7 @@ def command(
 
 
 def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, template: str) -> None:
-    """A room comes from one thing.
+    """Refuse `new` for a room from more than one thing.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overw
 
 
 def _point(text: str) -> tuple[float, float, float]:
-    """Three numbers `x,y,z`.
+    """Three numbers `x,y,z` of an option of `new`.
 
     Raises
     ------

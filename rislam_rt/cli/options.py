@@ -1,4 +1,4 @@
-"""Arguments that several commands share, and the machine-readable copy of what they print."""
+"""Options that several commands share, and the machine-readable copy of what they print."""
 
 import os
 import sys

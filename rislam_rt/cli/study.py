@@ -1,4 +1,4 @@
-"""What `rislam-rt run` does with a pipeline that is not the main job."""
+"""Studies: what `rislam-rt run` does with a pipeline that is not the main job."""
 
 import os
 from pathlib import Path
@@ -144,12 +144,12 @@ def run_claims(spec: "ClaimsSpec", given: StudyOptions) -> None:
 
 
 def _beside(pipeline: Path, scene: str) -> Path:
-    """A scene folder that a pipeline file names."""
+    """A scene folder that a study's pipeline file names."""
     return Path(os.path.normpath(pipeline.parent / scene))
 
 
 def output_folder(out: Path | None, name: str, record: "Mapping[str, Any]") -> Path:
-    """Where the files go: `--out`, whose folder they may share with others, or `runs/<name>-<hash of the record>`.
+    """Where a study's files go: `--out`, shared with others, or `runs/<name>-<hash of the record>`.
 
     Raises
     ------

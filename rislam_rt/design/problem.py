@@ -1,4 +1,4 @@
-"""What a designer is given: the paths that meet the panel, the others, and what is known of the agent beforehand."""
+"""The design problem: paths that meet the panel, the others, and what is known of the agent beforehand."""
 
 from dataclasses import dataclass
 from typing import Any

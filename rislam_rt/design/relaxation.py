@@ -1,4 +1,4 @@
-"""Lower bound of the multi-path objective: every path at its own best, all at once."""
+"""Lower bound of the multi-path objective by relaxation: every path at its own best, all at once."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Whether a filter knows how wrong it is: normalised squared errors against their chi-square bounds."""
+"""Consistency, whether a filter knows how wrong it is: normalised squared errors against chi-square bounds."""
 
 from typing import NamedTuple
 

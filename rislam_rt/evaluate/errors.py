@@ -84,7 +84,8 @@ def trajectory_error(
 
 
 def align(estimate: Floats, truth: Floats) -> Floats:
-    """Estimated positions (K, 3), turned about z and shifted so that they fit the true ones best (least squares)."""
+    """Estimated positions (K, 3) aligned: turned about z and shifted so that they fit the true ones best (least
+    squares)."""
     centred, target = estimate - estimate.mean(axis=0), truth - truth.mean(axis=0)
     # The angle that maximises sum target . R centred, with complex numbers for the plane.
     overlap = np.sum(np.conj(centred[:, 0] + 1j * centred[:, 1]) * (target[:, 0] + 1j * target[:, 1]))

@@ -186,7 +186,7 @@ def build_landmark_model(
     *,
     walls: Unknown = "planes",
 ) -> LandmarkModel:
-    """Set up the unknowns of a trajectory's paths.
+    """Set up the landmarks and walls that are unknown on a trajectory's paths.
 
     Parameters
     ----------

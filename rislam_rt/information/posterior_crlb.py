@@ -70,7 +70,7 @@ def posterior_bound(
 
 
 def _advance(spread: Floats, dt: float, motion: MotionPrior) -> Floats:
-    """Root (N, N) of the covariance after one time step, (N, N + D): `F = [I dt; 0 I]`, discrete white noise."""
+    """Root (N, N) of the posterior bound after one time step, (N, N + D): `F = [I dt; 0 I]`, discrete white noise."""
     axes = motion.axes
     moved = spread.copy()
     moved[:axes] += dt * spread[axes : 2 * axes]
@@ -80,7 +80,8 @@ def _advance(spread: Floats, dt: float, motion: MotionPrior) -> Floats:
 
 
 def _update(spread: Floats, slope: Floats) -> Floats:
-    """Triangular root (N, N) after measurements with derivatives (M, N) of unit variance, of a root (N, N or more)."""
+    """Triangular root (N, N) of the posterior bound after measurements with derivatives (M, N) of unit variance, of a
+    root (N, N or more)."""
     count, size = slope.shape
     stacked = np.zeros((count + size, count + spread.shape[1]))
     stacked[:count, :count] = np.eye(count)

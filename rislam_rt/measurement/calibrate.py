@@ -105,7 +105,7 @@ def _chains(mean: Complexes, direct: Complexes) -> Complexes:
 
 
 def _as_drawn(samples: Complexes, known: CalibrationReference, faintest: float) -> Complexes:
-    """What a calibrated array as drawn would hear (L, M) of the strong paths in samples, ghosts left out."""
+    """What an array as drawn would hear (L, M) of the strong paths in samples of a calibrated one, ghosts left out."""
     scaled = samples / np.sqrt(known.noise)
     found = estimate_paths(known.sounding, known.grid, scaled, LOUD, known.window, MOST).fit
     kept = found.parameters[_paths(found.parameters[:, 0], np.abs(found.amplitude), faintest)]

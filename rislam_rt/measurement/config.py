@@ -1,4 +1,4 @@
-"""Settings of the receiver."""
+"""Configuration of the receiver."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What a real front end does to the signal: an array that is not as drawn, leakage left over, converters, oscillators.
+"""Hardware faults of a real front end: an array not as drawn, leakage left over, converters, oscillator, gain.
 
 The chain of one capture, from the paths to the samples that the estimator gets: elements at other places than drawn;
 coupling between them; gain and phase of each receive chain; what is left of the leakage after its cancellation, random
@@ -226,7 +226,8 @@ def _distortion(config: HardwareConfig, radio: RadioConfig, left: float | None) 
 
 
 def _clipped(level: float) -> float:
-    """Share of the power of a normal signal that the hardware clips above `level` deviations; 0 for none."""
+    """Share of the power of a normal signal that hardware clips above `level` deviations, what is cut off squared; 0
+    for none."""
     if not level:
         return 0.0
     tail = 0.5 * scipy.special.erfc(level / np.sqrt(2.0))

@@ -81,7 +81,8 @@ def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: 
 
 
 def _leak_odds(found: ComponentSides, sources: ComponentSides, factors: Complexes, radio: RadioConfig) -> Floats:
-    """(A,) odds that a component which looks like a panel's is a leak of one of the sources."""
+    """(A,) odds of each component for being a leak of one of the sources and no panel's, against a path of its own
+    kind."""
     cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * radio.array.spacing) for n in _shape(radio))])
     gap = found.points[:, None] - sources.points
     variance = found.deviation[:, None] ** 2 + sources.deviation**2 + (BLUR * cell) ** 2

@@ -1,4 +1,4 @@
-"""What the agent believes: its pose, and a map of landmarks and walls. Filters write it, phase design reads it."""
+"""The agent's estimate: its pose, and a map of landmarks and walls. Filters write it, phase design reads it."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple

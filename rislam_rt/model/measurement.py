@@ -1,4 +1,4 @@
-"""What the receiver reports in one cycle, and, kept apart, what it was."""
+"""The measurement of one cycle that the receiver reports, and, kept apart, what it was."""
 
 from dataclasses import dataclass
 

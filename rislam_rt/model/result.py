@@ -1,4 +1,4 @@
-"""What a run leaves behind: for each scheme, everything cycle by cycle, and all that is needed to repeat it."""
+"""The result of a run: for each scheme, everything cycle by cycle, and all that is needed to repeat it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

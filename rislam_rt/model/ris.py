@@ -1,4 +1,5 @@
-"""Reconfigurable surfaces: what their controller tells the agent, where they hang, and the code they are set to."""
+"""Reconfigurable surfaces (RIS): what their controller tells the agent, where they hang, and the code they are set
+to."""
 
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,4 +1,4 @@
-"""A room: reflecting meshes, point scatterers, panels, and the agent's true motion."""
+"""A scene: reflecting meshes, point scatterers, panels, and the agent's true motion."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -242,7 +242,7 @@ class Scene:
 
 
 def _freeze_mesh(mesh: Any, place: str) -> None:
-    """Check and freeze `vertices` and `faces`."""
+    """Check and freeze `vertices` and `faces` of a mesh in a scene."""
     freeze(mesh, "vertices", np.float64, (None, 3))
     freeze(mesh, "faces", np.int64, (None, 3))
     if len(mesh.faces) == 0:

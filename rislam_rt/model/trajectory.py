@@ -1,4 +1,4 @@
-"""The agent's body (where Tx and Rx sit on it) and a motion of it."""
+"""The agent's trajectory, and its body (where Tx and Rx sit on it)."""
 
 from dataclasses import dataclass, field
 

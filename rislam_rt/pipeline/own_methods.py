@@ -75,7 +75,7 @@ class OwnEstimator(Protocol):
 
 @cache
 def load_own(name: str) -> Any:
-    """What a name stands for; a class that is made without arguments is made.
+    """One's own method, channel or estimator that a name stands for; a class that takes no arguments is made.
 
     Raises
     ------
@@ -203,7 +203,7 @@ def _entry_point(name: str) -> Any:
 
 
 def _made(name: str, found: Any) -> Any:
-    """What a name stands for, ready for use: an estimator made, a function or a class of a channel as it is."""
+    """One's own method ready for use: an estimator made, a function or a class of a channel as it is."""
     if not hasattr(found, "step"):
         if hasattr(found, "init") and hasattr(found, "estimate"):
             raise ConfigError(f"'{name}': has 'init' and 'estimate' and no 'step'; a filter has all three")

@@ -1,4 +1,4 @@
-"""Where a run's random numbers come from: a child for each purpose, and for each cycle."""
+"""Seeds of a run's random numbers: a child for each purpose, and for each cycle."""
 
 from typing import NamedTuple
 
@@ -28,5 +28,5 @@ def spawn_seeds(*, rng: np.random.Generator) -> Seeds:
 
 
 def child(seed: np.random.SeedSequence, number: int) -> np.random.Generator:
-    """A generator by number, as of a cycle: the same one every time, however many numbers others draw."""
+    """Child seed by number, as of a cycle: the same generator every time, however many numbers others draw."""
     return np.random.default_rng(np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, number)))

@@ -1,4 +1,4 @@
-"""One look for all figures: colours that colour-blind readers can tell apart (Okabe and Ito), sizes, file writing."""
+"""One style for all figures: colours that colour-blind readers can tell apart (Okabe and Ito), sizes, file writing."""
 
 import io
 import warnings
@@ -77,7 +77,7 @@ def scheme_colour(name: str) -> str:
 
 
 def _save(figure: Figure, target: Any, **how: Any) -> None:
-    """A name in a script that the fonts lack is drawn as boxes; that is no warning's worth."""
+    """Save a figure; a name that the fonts lack is drawn as boxes, which is no warning's worth."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph \d+")
         figure.savefig(target, **how)

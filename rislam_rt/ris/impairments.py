@@ -1,4 +1,4 @@
-"""What a real panel does wrong: elements weak, dead, out of phase or stuck, and commands that arrive damaged."""
+"""Impairments of a real panel: elements weak, dead, out of phase or stuck, and commands that arrive damaged."""
 
 from dataclasses import dataclass
 from typing import Any

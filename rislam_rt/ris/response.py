@@ -1,4 +1,4 @@
-"""Gain of paths over the panel: element-wise (eq. `single`, the default) and far-field (eq. `a3`)."""
+"""Response of a panel, gain of paths over it: element-wise (eq. `single`, the default) and far-field (eq. `a3`)."""
 
 import numpy as np
 

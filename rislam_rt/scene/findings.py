@@ -1,4 +1,4 @@
-"""What is wrong with a scene: where, what, and how to mend it."""
+"""Findings on a scene: where, what is wrong, and how to mend it."""
 
 from dataclasses import dataclass
 

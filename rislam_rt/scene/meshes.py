@@ -168,7 +168,7 @@ def _own_ply(content: bytes) -> Mesh | None:
 
 @contextmanager
 def _one_answer(file_type: str) -> Iterator[None]:
-    """A damaged file makes trimesh raise nearly anything and numpy warn; here every cause has the same answer."""
+    """One error for a damaged mesh, which makes trimesh raise nearly anything and numpy warn."""
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"), _silence():
             warnings.simplefilter("ignore")

@@ -1,4 +1,4 @@
-"""Closed meshes of round objects, for their shadows: as large as the true shape, seen from all sides in the mean."""
+"""Closed meshes of round solids, for their shadows: as large as the true shape, seen from all sides in the mean."""
 
 import numpy as np
 

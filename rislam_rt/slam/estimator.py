@@ -1,4 +1,4 @@
-"""The front door of localisation and mapping: the same four functions for every filter that `slam.filter` names."""
+"""The estimator of pose and map: the same four functions for every filter that `slam.filter` names."""
 
 from typing import Any
 

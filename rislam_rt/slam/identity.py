@@ -1,4 +1,4 @@
-"""Which landmark is the panel? Bayes over landmarks, from amplitudes under the codes that were applied.
+"""Identity of landmarks, which one is the panel: Bayes from amplitudes under the codes that were applied.
 
 "Is the panel" predicts the amplitude with no free parameter (Rician about the panel's gain under the code, averaged
 over the belief); "is a scatterer" predicts one unknown cross-section for all cycles, integrated out on a grid. Cycles

@@ -1,4 +1,4 @@
-"""What a filter's step may be handed: checked, because a NaN would go through the whole belief without a word."""
+"""Inputs of a filter's step, checked, because a NaN would go through the whole belief without a word."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""One cycle's components in the units of the filters, and on which side of the panels they are."""
+"""Observations of one cycle in the units of the filters, and on which side of the panels they are."""
 
 from typing import NamedTuple
 

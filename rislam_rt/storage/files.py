@@ -100,7 +100,7 @@ def make_folders(folder: Path) -> list[Path]:
 
 
 def remove_empty(folders: Iterable[Path]) -> None:
-    """Take away those of the folders, the outermost first, that hold nothing."""
+    """Remove those of the folders, given with the outermost first, that hold no files."""
     for folder in reversed(list(folders)):
         with suppress(OSError):
             folder.rmdir()

@@ -1,4 +1,4 @@
-"""Both channels in many rooms, path by path, and one pose of one room to look at."""
+"""Comparison of both channels in many rooms, path by path, and one pose of one room to look at."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -49,7 +49,7 @@ def check_fig4a(scene: Scene, spec: Fig4aSpec) -> None:
 
 
 def lone_panel(scene: Scene) -> RisPanel:
-    """The room's one panel.
+    """The room's one panel, as Fig. 4(a) needs it.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def longer_side(panel: RisPanel) -> float:
 
 
 def _check_seen(paths: Paths, landmark: int, motion: Trajectory) -> int:
-    """The column of a landmark's direct path, which must be there at every place."""
+    """Column of a landmark's direct path, which must be there at every place of Fig. 4(a)."""
     column = int(np.flatnonzero(paths.landmark == landmark)[0])
     hidden = np.flatnonzero(~paths.valid[:, column])
     if len(hidden):
@@ -148,7 +148,7 @@ def _check_seen(paths: Paths, landmark: int, motion: Trajectory) -> int:
 
 
 def _joined(parts: list[GainCurves]) -> GainCurves:
-    """Curves of one place each, as curves over all places."""
+    """Curves of Fig. 4(a) of one place each, as curves over all places."""
     optimized, random = (
         GainInterval(*np.concatenate([getattr(part, name) for part in parts], axis=1))
         for name in ("optimized", "random")

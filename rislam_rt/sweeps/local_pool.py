@@ -1,4 +1,4 @@
-"""Cells by workers on this machine, and what a worker's end says of its cell."""
+"""A local pool: cells by workers on this machine, and what a worker's end says of its cell."""
 
 import signal
 from collections.abc import Callable, Iterable, Iterator

@@ -1,4 +1,4 @@
-"""A cell's result as plain data and as bytes: the same result gives the same bytes, on every machine, at every time."""
+"""The record of a cell: its result as plain data and as bytes, the same on every machine, at every time."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""The engine: what is there already is not done again, what fails is written down, and the rest goes on."""
+"""Running a sweep: what is there already is not done again, what fails is written down, and the rest goes on."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -131,7 +131,7 @@ def run_sweep(
 
 
 def _hire(stack: ExitStack, effort: SweepOptions) -> tuple[Run, int]:
-    """Who does the cells, and how many at a time."""
+    """Who runs a sweep's cells, and how many at a time."""
     if effort.dask is None:
         return stack.enter_context(local_pool(effort.jobs, effort.time_limit)), effort.jobs
     from rislam_rt.sweeps.cluster import cluster_pool
@@ -140,7 +140,7 @@ def _hire(stack: ExitStack, effort: SweepOptions) -> tuple[Run, int]:
 
 
 def _shares(board: "_Board") -> Iterator[list[tuple[str, Task]]]:
-    """All that is to be done; one cell first, if nothing else says what the rest will cost."""
+    """All of a sweep that is to be run; one cell first, if nothing else says what the rest will cost."""
     tasks = list(board.left.items())
     if board.cost().seconds is None:
         yield tasks[:1]

@@ -1,4 +1,4 @@
-"""A sweep's folder: one file a cell, what differs from run to run apart, and a table that grows.
+"""The store of a sweep: one file a cell, what differs from run to run apart, and a table that grows.
 
 sweep.json               what is swept
 cells/<ident>.json       what a cell gave, or how it failed, with a checksum; the same bytes from every run

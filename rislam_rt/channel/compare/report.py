@@ -1,4 +1,4 @@
-"""What a comparison of two path sets found."""
+"""The report of a comparison of two path sets: what was found."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -184,12 +184,12 @@ class PathReport:
 
 
 def _largest(errors: Floats) -> float:
-    """Largest error, 0 of none."""
+    """Largest error in the comparison's report, 0 of none."""
     return float(errors.max(initial=0.0))
 
 
 def _percentiles(errors: Floats) -> dict[str, float]:
-    """Median, 90th, 99th percentile and maximum; nothing of none."""
+    """Median, 90th, 99th percentile and maximum of errors for the comparison's report; nothing of none."""
     if len(errors) == 0:
         return {}
     p50, p90, p99, top = np.percentile(errors, [50.0, 90.0, 99.0, 100.0])

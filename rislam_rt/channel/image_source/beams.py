@@ -120,7 +120,7 @@ def _followed(
 
 
 def _blocks(count: int, width: int) -> Iterator[slice]:
-    """Slices of rows that each make `width` numbers, 256 at the least."""
+    """Slices of beams' rows that each make `width` numbers, 256 at the least."""
     step = max(256, _BLOCK // width)
     return (slice(i, i + step) for i in range(0, count, step))
 
@@ -173,7 +173,7 @@ def _through(rectangles: Rectangles, beams: Beams, wall: Integers, radius: Float
 def _half_spaces(
     rectangles: Rectangles, wall: Integers, front: Floats, image: Floats, height: Floats, radius: Floats
 ) -> tuple[Floats, Floats]:
-    """Normals (N, 5, 3) and offsets (N, 5): beyond the wall's plane, and inside its rectangle's four edges.
+    """Half-spaces that bound beams: normals (N, 5, 3), offsets (N, 5): wall's plane, its rectangle's four edges.
 
     Through each edge goes the plane that touches the image's ball, `height` (N,) behind the wall, such that ball and
     beam are on different sides of it. With the edge's inward normal q, and the ball's centre at (m, -height)

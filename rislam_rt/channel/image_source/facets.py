@@ -1,4 +1,4 @@
-"""Walls as the image method needs them: which part of a plane is solid, who stands on which side, who hides whom."""
+"""Facets of walls for the image method: which part of a plane is solid, who stands on which side, who hides whom."""
 
 from dataclasses import dataclass
 
@@ -156,7 +156,7 @@ class WallFacets:
 
 
 def build_facets(walls: Walls) -> WallFacets:
-    """Sort the triangles by wall."""
+    """Facets of the walls: triangles sorted by wall."""
     order = np.argsort(walls.wall_of_triangle, kind="stable")
     corners = walls.triangles[order]
     first = np.searchsorted(walls.wall_of_triangle[order], np.arange(len(walls) + 1))
@@ -185,6 +185,6 @@ def build_facets(walls: Walls) -> WallFacets:
 
 
 def row_blocks(count: int, width: int) -> list[slice]:
-    """Slices of `count` rows of `width` numbers, each of about `_BLOCK` numbers."""
+    """Slices of `count` rows of `width` numbers for tests against facets, each of about `_BLOCK` numbers."""
     step = max(1, _BLOCK // max(width, 1))
     return [slice(i, min(i + step, count)) for i in range(0, count, step)]

@@ -1,4 +1,4 @@
-"""Reflection on slabs of building materials: ITU-R P.2040 (permittivity, slab) and what it does to a polarised ray."""
+"""Fresnel reflection on slabs of building materials: ITU-R P.2040 (permittivity, slab), and a polarised ray."""
 
 from dataclasses import dataclass
 

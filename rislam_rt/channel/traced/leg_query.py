@@ -134,7 +134,7 @@ class QueryBatch(NamedTuple):
 
 
 def build_batch(problems: Sequence[LegQuery], tracer_scene: "TracerScene", sides: Integers, depth: int) -> QueryBatch:
-    """Enumerate the wall sequences of every problem up to `depth` bounces."""
+    """Queries for legs: the wall sequences of every problem up to `depth` bounces."""
     from rislam_rt.channel.traced.cones import build_cones
 
     walls, sequences, complete = tracer_scene.walls, [], True
@@ -160,7 +160,7 @@ def join_found(parts: list[FoundLegs]) -> FoundLegs:
 
 
 def _lifted(problem: LegQuery, walls: Walls) -> Floats:
-    """Far ends (F, 3), a panel's at least `LIFT` in front of its host wall."""
+    """Far ends (F, 3) of queried legs, a panel's at least `LIFT` in front of its host wall."""
     if problem.host < 0 or problem.front is None:
         return problem.far
     outward = np.copysign(1.0, walls.normal[problem.host] @ problem.front)

@@ -1,4 +1,4 @@
-"""A small box traced from end to end: the proof that this machine's tracer works."""
+"""Self-test of this machine's tracer: a small box traced from end to end."""
 
 from dataclasses import dataclass
 from time import perf_counter

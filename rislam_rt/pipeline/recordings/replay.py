@@ -1,4 +1,4 @@
-"""What an estimator was given, cycle by cycle, and what it answered: so that others can be given the same."""
+"""Replay of what an estimator was given, cycle by cycle, and what it answered."""
 
 from collections.abc import Mapping, Sequence
 from time import process_time
@@ -45,7 +45,7 @@ def answers_from_arrays(
     lost: Booleans | None = None,
     landmark: Sequence[Integers] | None = None,
 ) -> Answers:
-    """The answers of an estimator that is none of this package's, from plain arrays.
+    """Answers to a replayed recording by an estimator that is none of this package's, from plain arrays.
 
     Parameters
     ----------

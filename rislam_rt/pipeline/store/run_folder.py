@@ -273,12 +273,12 @@ def read_summary(folder: Path, about: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def scheme_file(folder: Path, name: str) -> Path:
-    """Where a scheme's data set lies."""
+    """Where a scheme's data set lies in the run folder."""
     return folder / f"scheme_{name}.nc"
 
 
 def given_file(folder: Path, name: str) -> Path:
-    """Where what a scheme's estimator was given lies."""
+    """Where the run folder holds what a scheme's estimator was given."""
     return folder / f"measurements_{name}.nc"
 
 

@@ -1,4 +1,4 @@
-"""One line a point and scheme of a swept study: numbers for tables, CSV and JSON, and how they are written."""
+"""Entries of a swept study, one a point and scheme: numbers for tables, CSV and JSON, and how they are written."""
 
 import csv
 import io
@@ -21,7 +21,7 @@ NOTHING = "-"
 
 
 def scheme_entry(group: Group, scheme: str) -> dict[str, Any]:
-    """Scores of one scheme at one point, over all repetitions. Errors are root mean squares over the repetitions."""
+    """Entry of one scheme at one point of a study, over all repetitions. Errors are RMS over the repetitions."""
     rmse, bound = group.column(scheme, "rmse_m"), group.column(scheme, "bound_m")
     overall, least = spread(rmse), spread(bound)
     known = rmse[~np.isnan(rmse)]
@@ -45,13 +45,14 @@ def scheme_entry(group: Group, scheme: str) -> dict[str, Any]:
 
 
 def interval_entry(name: str, interval: Interval | None, unit: str = "") -> dict[str, float | None]:
-    """Value and ends under three names; None where there is none."""
+    """Value and ends under three names of an entry; None where there is none."""
     value, low, high = interval or (None, None, None)
     return {f"{name}{unit}": value, f"{name}_low{unit}": _finite(low), f"{name}_high{unit}": _finite(high)}
 
 
 def what_limits(entry: Mapping[str, Any], over_bound: float | None = None) -> str:
-    """The first of bound, association and filter that explains an error: the agent's, or one so far over its bound."""
+    """What limits an entry's error, the agent's, or one so far over its bound: the first of bound, association and
+    filter that explains it."""
     over_bound = entry["over_bound"] if over_bound is None else over_bound
     if over_bound is None:
         return NOTHING
@@ -117,19 +118,20 @@ def failure_notes(groups: Sequence[Group]) -> list[str]:
 
 
 def panel_of(group: Group, scheme: str) -> str | None:
-    """Name of the landmark that is the panel, of several the first."""
+    """Name of the landmark in an entry that is the panel, of several the first."""
     known = _panels_of(group, scheme)
     return known[0] if known else None
 
 
 def _panels_of(group: Group, scheme: str) -> list[str]:
-    """Names of the landmarks that are panels."""
+    """Names of the landmarks in an entry that are panels."""
     names = group.parts(scheme, "landmarks")
     return [name for name in names if not np.isnan(group.column(scheme, "landmarks", name, "cycles_identified")).all()]
 
 
 def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
-    """Errors at the end of the run with their bounds, and the share of (landmark, run) pairs that were in the map then.
+    """Landmarks of an entry: errors at the end of the run with their bounds, and the share of (landmark, run) pairs
+    that were in the map then.
 
     None where there is nothing to be found.
     """
@@ -145,7 +147,8 @@ def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
 
 
 def _walls(group: Group, scheme: str) -> dict[str, float | None]:
-    """Angle and distance errors at the end of the run over all walls that were found, with bounds and own deviation.
+    """Walls of an entry: angle and distance errors at the end of the run over all that were found, with bounds and own
+    deviation.
 
     The share is that of those found among the walls that have a bound: no path meets the others.
     """
@@ -167,12 +170,13 @@ def _walls(group: Group, scheme: str) -> dict[str, float | None]:
 
 
 def _pooled(group: Group, scheme: str, name: str, members: Sequence[str], part: str) -> Floats:
-    """A score of all members, e.g. walls, in all repetitions, one after the other."""
+    """A score pooled for an entry over all members, e.g. walls, in all repetitions."""
     return np.concatenate([np.zeros(0), *(group.column(scheme, name, member, part) for member in members)])
 
 
 def bound_beside(bound: Floats, error: Floats) -> float | None:
-    """RMS of the bounds of those that were found, so that it compares with their error; of all, if none was."""
+    """Bound beside an entry's error: RMS over those that were found, so that it compares with their error; of all, if
+    none was."""
     found = ~np.isnan(error)
     return _rms(bound[found] if found.any() else bound)
 

@@ -51,6 +51,6 @@ def summarise_import(
 
 
 def _counted(cylinders: list[tuple[float, int, float]]) -> list[tuple[tuple[float, int, float], int]]:
-    """Cylinders of one size (to a millimetre) together, the most frequent first."""
+    """Cylinders of one size (to a millimetre) together in the report of an import, the most frequent first."""
     sizes = Counter((round(radius, 3), sides, round(error, 4)) for radius, sides, error in cylinders)
     return sizes.most_common()

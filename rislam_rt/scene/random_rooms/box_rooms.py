@@ -53,7 +53,7 @@ def random_room(name: str, *, rng: np.random.Generator) -> Scene:
 
 
 def _corners(size: Floats, tilt: float, rng: np.random.Generator) -> Floats:
-    """Corners (2, 2, 2, 3): each the common point of three planes, so that all faces are flat."""
+    """Corners of a random box room (2, 2, 2, 3): each the common point of three planes, so that faces are flat."""
     normal = np.concatenate([np.eye(3), np.eye(3)]).reshape(2, 3, 3)
     normal = unit(normal + tilt * rng.standard_normal((2, 3, 3)))
     point = np.stack([0.5 * size * (1.0 - np.eye(3)), 0.5 * size * (1.0 + np.eye(3))])

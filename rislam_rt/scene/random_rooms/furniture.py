@@ -103,7 +103,7 @@ def draw_piece(kind: str, center: Floats, yaw: float, *, rng: np.random.Generato
 
 
 def fits(piece: FurniturePiece, ground: PlacementLimits, others: list[FurniturePiece]) -> bool:
-    """Whether a piece stands inside the plan, below the ceiling, off the way and off all others."""
+    """Whether a piece of furniture stands inside the plan, below the ceiling, off the way and off all others."""
     rim = piece.rim()
     if depth_inside(ground.outline, rim).min() < OFF_WALLS or ground.roof.height(rim).min() < piece.top + HEADROOM:
         return False

@@ -1,4 +1,4 @@
-"""XML from people who may mean harm: a tree without entities, declarations or anything that leads elsewhere."""
+"""Parsing XML from people who may mean harm: a tree without entities, declarations or anything that leads elsewhere."""
 
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element, TreeBuilder

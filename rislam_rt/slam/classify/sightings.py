@@ -1,4 +1,4 @@
-"""The filter's own tracks as the classifier wants them."""
+"""Sightings: the filter's own tracks as the classifier wants them."""
 
 import numpy as np
 

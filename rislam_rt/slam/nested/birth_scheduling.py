@@ -1,4 +1,4 @@
-"""Whose turn it is to be born: which tracks to examine in a cycle, and which have to wait for another."""
+"""Schedule of births: which tracks to examine in a cycle, and which have to wait for another."""
 
 import numpy as np
 
@@ -46,7 +46,8 @@ def due_tracks(tracks: LandmarkTracks, predicted: PredictedMeasurements, cycle: 
 
 
 def _aligned(tracks: LandmarkTracks) -> Booleans:
-    """(T, T) whether two tracks come from one direction, so that births of the shorter come first."""
+    """(T, T) whether the birth of one track waits for another's from the same direction: the longer is likely the
+    shorter over a wall on the Tx leg."""
     gap = np.abs(tracks.mean[None, :, 1:, 0] - tracks.mean[:, None, 1:, 0])
     variance = tracks.covariance[..., 1:, 0, 0]
     return np.asarray((gap < PARALLEL * np.sqrt(variance[None] + variance[:, None] + 0.02**2)).all(axis=-1))

@@ -1,4 +1,4 @@
-"""What this cycle's measurements may belong to: expected returns of the map first, tracks behind them."""
+"""Candidates for this cycle's measurements: expected returns of the map first, tracks behind them."""
 
 from typing import NamedTuple
 
@@ -170,7 +170,8 @@ def track_covariance(tracks: LandmarkTracks) -> Floats:
 
 
 def hidden_tracks(predicted: PredictedMeasurements, tracks: LandmarkTracks, gate: float) -> Booleans:
-    """(T,) whether a track is no candidate: it runs where the map expects a return of its strength.
+    """(T,) whether a track is no candidate: it runs where the map expects a return of its strength (wall returns: where
+    one is expected).
 
     Such a track would keep the measurements that prove the map right; it gives way to a return that fits at all.
     """
@@ -191,6 +192,7 @@ def hidden_tracks(predicted: PredictedMeasurements, tracks: LandmarkTracks, gate
 def explained(
     predicted: PredictedMeasurements, seen: Floats, covariance: Floats, gate: float, side: int = UNTOLD
 ) -> Integers:
-    """Candidate returns of a side within the gate of one prediction (3,) with covariance (3, 3)."""
+    """Candidate returns of a side within the gate of one prediction (3,) with covariance (3, 3), whatever their
+    strength."""
     distance, _ = squared_distance(seen - predicted.seen, predicted.covariance + covariance)
     return ((distance < gate) & same_side(np.array([side]), predicted.side)[0]).nonzero()[0]

@@ -1,4 +1,4 @@
-"""One cycle of localisation and mapping: predict, associate, update, learn who is who, grow and prune the map."""
+"""The nested filter, one cycle of it: predict, associate, update, learn who is who, grow and prune the map."""
 
 from typing import NamedTuple
 
@@ -84,7 +84,8 @@ def init(
 
 
 def revisit(state: NestedState, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> NestedState:
-    """The nested filter begun on the map of an earlier run: landmarks, walls and who they are stay known.
+    """The nested filter of another run, or another agent, on the map of an earlier one: landmarks, walls and who they
+    are stay known.
 
     The map keeps the covariance that it had; its frame is the earlier run's, and so must be the start's.
     """

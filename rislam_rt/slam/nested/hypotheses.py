@@ -1,4 +1,4 @@
-"""What could a track be? Least-squares fits of a static point, an image of a known point, a moving image, the floor."""
+"""Hypotheses of what a track could be: fits of a static point, an image of a known point, a moving image, the floor."""
 
 from typing import NamedTuple
 

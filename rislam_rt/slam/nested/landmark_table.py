@@ -127,7 +127,8 @@ def remove(table: LandmarkTable, keep: Booleans) -> LandmarkTable:
 
 
 def image_idents(table: LandmarkTable, points: Integers, walls: Integers) -> tuple[LandmarkTable, Integers]:
-    """Numbers (Q,) of images in the landmark table: of point rows (Q,) in wall rows (Q,), entered if new."""
+    """Numbers (Q,) in the landmark table of the images of point rows (Q,) in wall rows (Q,), entered if new; their hits
+    are counted."""
     row_of = {(point, wall): row for row, (point, wall, _) in enumerate(table.images.tolist())}
     pairs = zip(table.ident[points].tolist(), table.ident[walls].tolist(), strict=True)
     rows = np.array([row_of.setdefault(pair, len(row_of)) for pair in pairs], dtype=np.int64)

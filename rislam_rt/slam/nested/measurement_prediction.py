@@ -1,4 +1,4 @@
-"""Which returns of the believed map should show now, and how strong."""
+"""Prediction of measurements: which returns of the believed map should show now, and how strong."""
 
 from functools import lru_cache
 from itertools import product

@@ -1,4 +1,4 @@
-"""Mean and covariance of the nested filter's belief: all that its front end (association, births, map) asks of it."""
+"""Moments (mean, covariance) of the nested filter's belief: all that births, association and map ask of it."""
 
 from typing import NamedTuple
 

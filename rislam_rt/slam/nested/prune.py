@@ -1,4 +1,4 @@
-"""Death of landmarks: those that fail to show, contradict the measurements, double another, or follow from others."""
+"""Pruning of landmarks: those that fail to show, contradict the measurements, double another, or follow from others."""
 
 import numpy as np
 
@@ -86,7 +86,8 @@ def _derived(moments: Moments, predicted: PredictedMeasurements, belief: MapBeli
 
 
 def _images(moments: Moments, belief: MapBelief, legs: Integers) -> tuple[Floats, Floats]:
-    """Images (G, 3) of legs at the mean belief, for pruning what they explain, with covariance (G, 3, 3)."""
+    """Images (G, 3) of legs at the mean belief, for pruning what they explain, with a covariance (G, 3, 3) from their
+    features one by one."""
     image = belief.features[legs[:, 0]]
     spread = np.array([moments.block(int(row)) for row in legs[:, 0]])
     for column in (1, 2):

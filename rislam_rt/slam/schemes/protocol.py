@@ -1,4 +1,4 @@
-"""What every estimator of pose and map is: four functions, the same inputs and outputs for all of them.
+"""The protocol of every estimator of pose and map: four functions, the same inputs and outputs for all of them.
 
 The default filter (`slam`) and each folder of `slam.schemes` are such a set, as modules.
 """

@@ -1,4 +1,4 @@
-"""Labelled tracks from walks: what the receiver reports, tracked as the agent would, and what each truly was."""
+"""Gathering labelled tracks from walks: what the receiver reports, tracked as the agent would, and what each was."""
 
 from typing import NamedTuple
 
@@ -61,7 +61,7 @@ class Examples(NamedTuple):
 
 
 def join(parts: list[Examples]) -> Examples:
-    """Several sets as one."""
+    """Several sets of gathered examples as one."""
     return Examples._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
 
 
@@ -100,7 +100,7 @@ def gather_walk(
 
 
 def _classes(paths: Paths, column: Integers) -> tuple[Integers, Integers]:
-    """`Examples.kind` and `.legs` of components that are these columns of the paths, -1 for clutter."""
+    """`Examples.kind` and `.legs` of gathered components that are these columns of the paths, -1 for clutter."""
     over = OVER_RX * np.any(paths.rx_walls >= 0, axis=1) + OVER_TX * np.any(paths.tx_walls >= 0, axis=1)
     over = np.where(paths.kind >= PathKind.PS, over, 0)
     true = column >= 0

@@ -1,4 +1,4 @@
-"""Examples to learn from, to choose by and to test on: walks through random rooms and through named ones."""
+"""Sets of examples to learn from, to choose by and to test on: walks through random rooms and through named ones."""
 
 import zlib
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What the pipeline file of a classifier's training may say."""
+"""Specification of a classifier's training: what its pipeline file may say."""
 
 from typing import Annotated, Literal
 

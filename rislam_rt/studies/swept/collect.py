@@ -1,4 +1,4 @@
-"""From the cells of a swept study to numbers with intervals. Failures are counted, never dropped."""
+"""Collecting the cells of a swept study as numbers with intervals. Failures are counted, never dropped."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -59,7 +59,7 @@ class Group(NamedTuple):
 
 
 def group_rows(rows: Sequence[Row]) -> list[Group]:
-    """Rows by their point, both in their order."""
+    """Collect rows by their point, both in their order."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(repr(row.cell.point), []).append(row)
@@ -74,7 +74,7 @@ def group_rows(rows: Sequence[Row]) -> list[Group]:
 
 
 def spread(values: Floats) -> Interval | None:
-    """Root mean square over the runs that have a value, with its interval; None if none has."""
+    """RMS over the collected runs that have a value, with its interval; None if none has."""
     known = values[~np.isnan(values)]
     if not len(known):
         return None

@@ -1,4 +1,4 @@
-"""What the pipeline file of a study in unseen rooms may say."""
+"""Specification of a study in unseen rooms: what its pipeline file may say."""
 
 from typing import Annotated, Literal
 

@@ -1,4 +1,4 @@
-"""What a run's score is measured against: true motion, landmarks, walls, when each could be heard, and the bounds."""
+"""The truth that a run's score is measured against: motion, landmarks, walls, when each could be heard, the bounds."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -112,7 +112,7 @@ def audible_paths(paths: Paths, settings: Settings) -> Booleans:
 
 
 def coplanar(walls: Walls) -> Integers:
-    """(W,) number of the plane of each wall, in the order of the walls: what an agent can tell apart."""
+    """(W,) number of the true plane of each wall, in the order of the walls: what an agent can tell apart."""
     group = np.full(len(walls), -1)
     count = 0
     for wall in range(len(walls)):
@@ -128,7 +128,7 @@ def coplanar(walls: Walls) -> Integers:
 
 
 def _surfaces(walls: Walls, group: Integers) -> tuple[Floats, Floats, Floats]:
-    """Centroid, normal and covariance of the points of each plane's surface.
+    """True surface of each plane: centroid, normal and covariance of its points.
 
     Over a triangle the mean of x x^T is (sum of v v^T + s s^T) / 12, with its corners v and their sum s.
     """

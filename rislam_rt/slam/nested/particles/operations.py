@@ -1,4 +1,4 @@
-"""What the cycle asks of the belief: begin, move, update, one more landmark, fewer, resample. Pure functions."""
+"""Operations of the cycle on the belief: begin, move, update, one more landmark, fewer, resample. Pure functions."""
 
 from typing import NamedTuple
 

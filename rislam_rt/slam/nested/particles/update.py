@@ -102,7 +102,8 @@ def update(belief: Nested, seen: Seen, config: NestedConfig, engine: CloudEngine
 def _sightings(
     belief: Nested, owner: int, rows: Integers, seen: Seen, rho: Floats, config: NestedConfig
 ) -> list[Sighting]:
-    """Returns `rows` as the clouds of one landmark see them in the update, in the order of their kinds."""
+    """Returns `rows` as the clouds of one landmark see them in the update, in the order of their kinds, so that kernels
+    recur."""
     poses = poses_of(belief.position, belief.heading, seen.body)
     features = belief.mean.copy()
     features[:, owner] = belief.centre[:, owner]

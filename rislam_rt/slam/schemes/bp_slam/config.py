@@ -1,4 +1,4 @@
-"""Settings of BP-SLAM by delays, both ends moving."""
+"""Configuration of BP-SLAM by delays, both ends moving."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""BP-SLAM for an agent that carries both ends: ranges `|p_T - a| + |a - p_R|`, heading known.
+"""The filter of BP-SLAM for an agent that carries both ends: ranges `|p_T - a| + |a - p_R|`, heading known.
 
 Same functions, inputs and outputs as the package's own filter, so that a run can lead either. The panel and its code
 mean nothing to it, and angles of arrival are not used.
@@ -72,7 +72,7 @@ def predict(state: BpSlamState, dt: float, config: BpSlamConfig) -> SlamEstimate
 
 
 def _move(state: BpSlamState, dt: float, config: BpSlamConfig) -> BpSlamState:
-    """BP-SLAM's agent and features after `dt` [s] of motion."""
+    """BP-SLAM's agent and features after `dt` [s]; the past state of every `course_stride` cycles is kept."""
     if dt == 0.0:
         return state
     agent, step = move_agent(state.agent, dt, config.sigma_a, config.course_stride)
@@ -138,7 +138,8 @@ def estimate(state: BpSlamState, config: BpSlamConfig) -> SlamEstimate:
 def _claimed(
     state: BpSlamState, sight: PredictedRanges, scan: Scan, found: Association, config: BpSlamConfig
 ) -> tuple[Integers, float]:
-    """BP-SLAM's feature number of each range (`UNUSED` for none), and the NIS over those claimed."""
+    """BP-SLAM's feature number of each range (`UNUSED` for none), and the NIS over those claimed, of the features'
+    mixtures."""
     sums, numbers = state.sums, np.full(len(scan.length), UNUSED)
     feature, shown = np.nonzero((found.feature[:, :-1] > 0.5) & (sums.existence > config.detection_threshold)[:, None])
     numbers[shown] = sums.ident[feature]

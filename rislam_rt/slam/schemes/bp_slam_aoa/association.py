@@ -113,7 +113,8 @@ def spread_of(predicted: PredictedReturns, course: AgentTrajectory) -> Floats:
 
 
 def likelihoods(view: View, spread: Floats, scan: ComponentScan, more: Floats | None = None) -> Floats:
-    """Densities (N,) of the pairs to associate, times detection; `more` (3, 3) widens the agent's position."""
+    """Densities (N,) of the pairs to associate, times detection; `more` (3, 3) is added to the covariance of the
+    agent's position."""
     gaussian, component, noise, _, log_loudness = view.pairs
     total = (spread + view.disturbance)[gaussian]
     if more is not None:

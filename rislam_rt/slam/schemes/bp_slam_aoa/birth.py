@@ -1,4 +1,4 @@
-"""What a component may be the first sight of, how often, and where it would then be."""
+"""Births: what a component may be the first sight of, how often, and where it would then be."""
 
 from typing import NamedTuple
 

@@ -209,7 +209,8 @@ def _survive(features: GaussianFeatures, carried: Step, config: BpSlamAoaConfig)
 def _claimed(
     state: BpSlamAoaState, view: View, scan: ComponentScan, found: Association, config: BpSlamAoaConfig
 ) -> tuple[Integers, float]:
-    """BP-SLAM's feature number of each component (`UNUSED` for none), and the NIS of those claimed."""
+    """BP-SLAM's feature number of each component (`UNUSED` for none), and the NIS of those claimed, by the likeliest
+    Gaussian."""
     features, numbers, nis = state.features, np.full(len(scan.seen), UNUSED), 0.0
     sure = (features.existence > config.detection_threshold)[:, None]
     for row, shown in zip(*np.nonzero((found.feature[:, :-1] > 0.5) & sure), strict=True):

@@ -1,4 +1,4 @@
-"""Settings of BP-SLAM as published: anchors in known places."""
+"""Configuration of BP-SLAM as published: anchors in known places."""
 
 from dataclasses import dataclass
 

@@ -98,7 +98,8 @@ def update_belief(
     *,
     rng: np.random.Generator,
 ) -> tuple[FactorGraphBelief, UpdateInfo]:
-    """Update static BP-SLAM's belief by one scan of every anchor; messages to features are as published."""
+    """Update static BP-SLAM's belief by one scan of every anchor; the agent's message to features is its prediction, as
+    published."""
     state, features = rng.permutation(belief.state), belief.features
     dims = belief.position.shape[1]
     shifts = (np.arange(config.num_pairings) * len(state)) // config.num_pairings

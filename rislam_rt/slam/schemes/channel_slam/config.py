@@ -1,4 +1,4 @@
-"""Settings of Channel-SLAM."""
+"""Configuration of Channel-SLAM."""
 
 from dataclasses import dataclass
 

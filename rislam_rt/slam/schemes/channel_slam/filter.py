@@ -1,4 +1,4 @@
-"""Channel-SLAM, delay only: a tracker's labels, and a virtual transmitter a path.
+"""The filter of Channel-SLAM, delay only: a tracker's labels, and a virtual transmitter a path.
 
 Source: Gentner et al., "Multipath assisted positioning with simultaneous localization and mapping", IEEE TWC 2016. As
 there, labels are taken as known, there is no model of detection, and a path that ends takes its virtual transmitter
@@ -105,7 +105,8 @@ def estimate(state: ChannelSlamState, config: ChannelSlamConfig) -> SlamEstimate
 
 
 def _move(state: ChannelSlamState, dt: float, config: ChannelSlamConfig) -> ChannelSlamState:
-    """Channel-SLAM's agent and virtual transmitters after `dt` [s] of motion."""
+    """Channel-SLAM's agent and virtual transmitters after `dt` [s]; the past state of every `course_stride` cycles is
+    kept."""
     if dt == 0.0:
         return state
     agent, step = move_agent(state.agent, dt, config.sigma_a, config.course_stride)

@@ -1,4 +1,4 @@
-"""Loopy association of ranges to Gaussian sums, and the messages between the features and the agent's course.
+"""Correction by loopy association of ranges to Gaussian sums, and messages between features and the agent's course.
 
 Source: Leitinger et al., arXiv 1801.04463, section V, with messages as Gaussian sums. A feature's message to the agent
 is a mixture over its Gaussians, over the ranges that it may have made, over "missed" and "does not exist"; it is

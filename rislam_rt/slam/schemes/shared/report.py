@@ -1,4 +1,4 @@
-"""What both rivals hand on: the pose over all turns and mirror images, and their features as points of a map."""
+"""What both rivals report: the pose over all turns and mirror images, and their features as points of a map."""
 
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Ranges of one step, and how likely each is the first of a feature never seen."""
+"""A scan, the ranges of one step, and how likely each is the first of a feature never seen."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What becomes of the belief once it may be lost: another start, another place, or a new beginning."""
+"""Recovery of a belief that may be lost: another start, another place, or a new beginning."""
 
 import numpy as np
 
