@@ -40,7 +40,7 @@ class Coverage(NamedTuple):
 
 
 def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
-    """A map of each of a scene's panels."""
+    """Maps of coverage, one for each of a scene's panels."""
     if scene.ris is None:
         return []
     low, high = scene.bounds

@@ -24,7 +24,7 @@ GROWTH = 1.05
 
 
 def detection_label(link: LandmarkLink) -> str:
-    """`heard`, `heard at times` or `not heard`."""
+    """Label of a link in need of a remedy or not: `heard`, `heard at times` or `not heard`."""
     return "heard" if link.share >= HEARD else "heard at times" if link.share >= SELDOM else "not heard"
 
 

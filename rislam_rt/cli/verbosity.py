@@ -41,7 +41,7 @@ def warn(line: str) -> None:
 
 
 def with_verbosity(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The command with `-q` and `-v` behind its own options."""
+    """A command with the options of verbosity, `-q` and `-v`, behind its own."""
 
     @wraps(command)
     def wrapped(*arguments: Any, quiet: bool = False, verbose: bool = False, **options: Any) -> Any:

@@ -63,7 +63,7 @@ class HardwareConfig:
 
     @property
     def ideal(self) -> bool:
-        """Whether nothing of all this is there."""
+        """Whether the hardware has no fault."""
         return self == HardwareConfig(told=self.told, calibration_cycles=self.calibration_cycles)
 
 
@@ -161,7 +161,7 @@ def correct(samples: Complexes, unit: float, correction: Correction) -> Complexe
 
 
 def draw_gain_variation(config: HardwareConfig, *, rng: np.random.Generator) -> float:
-    """Gain of the gain control in one cycle, an amplitude ratio."""
+    """Gain of the hardware's gain control in one cycle, an amplitude ratio."""
     return float(10.0 ** (config.agc_std_db * rng.standard_normal() / 20.0)) if config.agc_std_db else 1.0
 
 

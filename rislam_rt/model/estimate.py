@@ -125,7 +125,7 @@ def pose_estimate(
 
 
 def empty_map() -> MapEstimate:
-    """A map of nothing."""
+    """An estimated map of nothing."""
     none: list[Any] = []
     return MapEstimate(
         np.array(none), np.zeros((0, 3)), np.zeros((0, 3, 3)), np.array(none), np.array(none), np.array(none),

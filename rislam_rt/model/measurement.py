@@ -66,7 +66,7 @@ class Measurement:
 
     @property
     def aoa(self) -> tuple[Floats, Floats]:
-        """theta_r, phi_r (M,) [rad] in the body frame."""
+        """Measured angles of arrival theta_r, phi_r (M,) [rad] in the body frame."""
         return angles_from_direction(self.arrival)
 
 

@@ -102,7 +102,7 @@ class SchemeResult:
             freeze(self, "smoothed", np.float64, (cycles, 3))
 
     def named(self, panel: int) -> Booleans:
-        """(K, I) whether the landmark was held for a panel."""
+        """(K, I) whether a scheme's landmark was held for a panel."""
         return (self.ris_probability > 0.5) & (panel == (0 if self.panel is None else self.panel))
 
     def __repr__(self) -> str:

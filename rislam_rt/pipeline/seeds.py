@@ -23,7 +23,7 @@ class Seeds(NamedTuple):
 
 
 def spawn_seeds(*, rng: np.random.Generator) -> Seeds:
-    """The children of a run's generator."""
+    """Seeds of a run: the children of its generator."""
     return Seeds(*rng.bit_generator.seed_seq.spawn(len(Seeds._fields)))  # type: ignore[attr-defined]
 
 

@@ -53,7 +53,7 @@ def far_field_response(
 
 
 def zero_code(spec: DataSheet) -> RisCode:
-    """The code with every element at level 0."""
+    """The code to which a panel responds at rest: every element at level 0."""
     return RisCode(np.zeros((spec.rows, spec.cols), dtype=np.int64), spec.levels)
 
 

@@ -60,7 +60,7 @@ def one_line(text: str) -> str:
 
 
 def raise_errors(findings: list[Finding]) -> None:
-    """Raise the errors, each a line of one exception.
+    """Raise the findings that are errors, each a line of one exception.
 
     Raises
     ------

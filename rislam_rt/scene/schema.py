@@ -288,7 +288,7 @@ def parse_spec(content: bytes) -> SceneSpec:
 
 
 def validate_spec(table: dict[str, Any]) -> SceneSpec:
-    """The same from a table already read.
+    """A scene's table that was already read, against the schema.
 
     Raises
     ------

@@ -24,7 +24,7 @@ def check_sides(measurement: Measurement, ris: DataSheet | None) -> None:
 
 
 def check_step(dt: float, heading: float, code: RisCode | None = None, ris: DataSheet | None = None) -> None:
-    """Check time step [s], heading [rad] and code before a cycle.
+    """Check a step's inputs before a cycle: time step [s], heading [rad] and code.
 
     Raises
     ------

@@ -19,7 +19,7 @@ LOCK_FILE = ".rislam-rt-lock"
 
 @contextmanager
 def hold(folder: Path, what: str) -> Iterator[None]:
-    """Keep other processes out of a folder that exists; `what` is at work in it.
+    """Lock a folder that exists: keep other processes out; `what` is at work in it.
 
     Raises
     ------

@@ -32,7 +32,7 @@ def local_pool(jobs: int, limit: float | None) -> Iterator[Run]:
 
 
 def outcome_of(found: Any, limit: float | None) -> CellOutcome:
-    """What a worker gave, or how it ended."""
+    """Outcome of a worker of the local pool: what it gave, or how it ended."""
     if isinstance(found, CellOutcome):
         return found
     assert isinstance(found, Lost)

@@ -236,7 +236,7 @@ def _landmark_directions(
 
 
 def _ratio(a: Floats, b: Floats) -> Floats:
-    """a / b, 0 where both are nothing."""
+    """a / b for an error limit, 0 where both are nothing."""
     return np.where(a > 0.0, a / np.where(b > 0.0, b, np.finfo(np.float64).tiny), 0.0)
 
 

@@ -40,7 +40,7 @@ class SequenceSearch(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What is searched, for people."""
+        """What candidates are searched, for people."""
         return "all wall sequences" if self.exhaustive else "mirrored beams"
 
 

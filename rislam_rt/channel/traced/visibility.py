@@ -82,7 +82,7 @@ def visible_rows(
 def _clear_of_occluder(
     tracer_scene: TracerScene, spared: int, sequences: Integers, device: Floats, vertices: Floats
 ) -> Integers:
-    """Legs whose segments up to the last bounce miss a scatterer's shade."""
+    """Visible legs whose segments up to the last bounce miss a scatterer's shade."""
     clear = np.ones(len(device), dtype=np.bool_)
     last = device
     for bounce, wall in enumerate(sequences.T):

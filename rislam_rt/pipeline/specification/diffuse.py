@@ -21,5 +21,5 @@ class DiffuseSection(Section):
 
     @property
     def wanted(self) -> bool:
-        """Whether there are any."""
+        """Whether diffuse or diffracted paths are wanted."""
         return self.diffuse or self.diffraction

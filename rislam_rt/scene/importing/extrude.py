@@ -28,7 +28,7 @@ Entry = tuple[str, Mesh, dict[str, Any] | None]
 
 
 def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft:
-    """The room of a plan.
+    """Extrude a plan to a room.
 
     Raises
     ------

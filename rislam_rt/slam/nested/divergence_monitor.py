@@ -29,7 +29,7 @@ class DivergenceMonitor(NamedTuple):
 
     @property
     def diverged(self) -> bool:
-        """Whether measurements contradict the belief, or have lost touch with it."""
+        """Whether the filter has diverged: measurements contradict the belief, or have lost touch with it."""
         return self.strain > MAX_STRAIN or self.found < 0.2
 
 

@@ -64,7 +64,7 @@ class MapBelief(NamedTuple):
 
     @property
     def threshold(self) -> float:
-        """Amplitude at the detection threshold."""
+        """Predicted amplitude at the detection threshold."""
         return float(amplitude_std(self.radio) * np.sqrt(2.0 * self.sensor.threshold))
 
 

@@ -33,5 +33,5 @@ class SlamEstimator(Protocol):
         ...
 
     def estimate(self, state: Any, config: Any) -> SlamEstimate:
-        """Mean and covariance of the pose, equally likely samples of it, and the map."""
+        """What every estimator gives: mean and covariance of the pose, equally likely samples of it, and the map."""
         ...

@@ -39,7 +39,7 @@ class UnseenSpec(SweptSpec):
 
     @property
     def is_test(self) -> bool:
-        """Whether the rooms are those for tests."""
+        """Whether the unseen rooms are those for tests."""
         return self.first >= TEST
 
     @model_validator(mode="after")

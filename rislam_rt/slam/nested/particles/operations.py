@@ -34,7 +34,7 @@ class PointParticles(NamedTuple):
 
     @property
     def engine(self) -> CloudEngine:
-        """Where the heavy passes run."""
+        """The backend on which the cycle's heavy operations run."""
         return pick_engine(self.config.engine)
 
     @property

@@ -222,7 +222,7 @@ def _mirror(axes: Floats, normal: Floats) -> Floats:
 
 
 def linear_sightline(centre: Floats, agent: Floats) -> Sightline:
-    """The offset (N, 3) from agent to landmark itself, for checks against theory."""
+    """Sightline of the offset (N, 3) from agent to landmark itself, for checks against theory."""
     return Sightline(
         Kind(Leg.LINEAR, Leg.LINEAR), np.zeros((len(centre), 0)), centre - agent, np.zeros((len(centre), 6))
     )

@@ -74,5 +74,5 @@ class BpSlamConfig:
 
     @property
     def axes(self) -> Floats:
-        """(3,) ones for the axes that are filtered."""
+        """(3,) ones for the axes that BP-SLAM filters."""
         return axes_filtered(self.height)

@@ -72,7 +72,7 @@ class ChannelSlamConfig:
 
     @property
     def axes(self) -> Floats:
-        """(3,) ones for the axes that are filtered."""
+        """(3,) ones for the axes that Channel-SLAM filters."""
         return axes_filtered(self.height)
 
     @property

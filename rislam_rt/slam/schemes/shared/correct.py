@@ -129,5 +129,5 @@ def newborn(found: Association, fresh: Floats, birth_threshold: float) -> tuple[
 
 
 def is_strong(ratio: Floats, specular_ratio: float | None) -> Booleans:
-    """(M,) whether a component is as strong as only a wall return is."""
+    """(M,) whether a range is of a component as strong as only a wall return is."""
     return ratio > (np.inf if specular_ratio is None else specular_ratio)

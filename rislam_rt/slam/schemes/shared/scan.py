@@ -17,7 +17,7 @@ class Scan(NamedTuple):
     """(M,) standard deviations [m]."""
 
     def take(self, rows: Integers) -> "Scan":
-        """Some of the ranges."""
+        """Some of the ranges of a scan."""
         return Scan(self.length[rows], self.std[rows])
 
 
