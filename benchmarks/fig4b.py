@@ -1,8 +1,9 @@
 """What does a cell of Fig. 4(b) cost, stage by stage, and how long does the whole figure take?
 
-One seed at every SNR (or of Fig. 4(c), at every size of the panel), as the study does it: traced once, all schemes under
-the same noise. Prints processor seconds, so that other programs on the machine count little, and the minutes of all
-cells on two idle cores. Run: `OPENBLAS_NUM_THREADS=1 RISLAM_RT_THREADS=1 python benchmarks/fig4b.py [fig4c] [--seed 7] [--at 0 30]`.
+One seed at every SNR (or of Fig. 4(c), at every size of the panel), as the study does it: traced once, all schemes
+under the same noise. Prints processor seconds, so that other programs on the machine count little, and the minutes of
+all cells on two idle cores.
+Run: `OPENBLAS_NUM_THREADS=1 RISLAM_RT_THREADS=1 python benchmarks/fig4b.py [fig4c] [--seed 7] [--at 0 30]`.
 """
 
 import argparse
