@@ -21,7 +21,7 @@ class Advice(NamedTuple):
     """Of detection: SNR over all antennas."""
 
     def as_dict(self) -> dict[str, Any]:
-        """For a machine to read; None stands for no path."""
+        """Advice for a machine to read; None stands for no path."""
         links = []
         for link in self.links:
             places = [

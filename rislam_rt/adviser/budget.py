@@ -38,12 +38,12 @@ class LandmarkLink(NamedTuple):
 
     @property
     def share(self) -> float:
-        """Share of the way on which it is heard."""
+        """Share of the way on which a landmark's link is heard, by its budget."""
         return float(np.mean(self.probability))
 
     @property
     def three(self) -> tuple[int, int, int]:
-        """Start, middle and end among the places."""
+        """Start, middle and end among the places of a link budget."""
         last = len(self.margin_db) - 1
         return 0, last // 2, last
 

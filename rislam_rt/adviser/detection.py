@@ -1,4 +1,4 @@
-"""What the receiver would make of the paths at one place: the chance that it reports each landmark, without noise."""
+"""Detection at one place: the chance that the receiver reports each landmark, without noise being drawn."""
 
 from typing import NamedTuple
 
@@ -25,7 +25,7 @@ class DetectionForecast(NamedTuple):
 
 
 def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Settings) -> DetectionForecast:
-    """The landmarks of one cycle as the receiver of these settings reports them.
+    """Forecast of detection: the landmarks of one cycle as the receiver of these settings reports them.
 
     The same steps as a run's receiver: what the array hears, the two captures of alternated codes, paths that cannot be
     resolved joined, detection by Marcum's function; errors and false components left out, motion within the slot too.

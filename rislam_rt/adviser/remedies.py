@@ -1,4 +1,4 @@
-"""What would help a landmark that is not heard: a larger panel or scatterer, less noise, a nearer way."""
+"""Remedies for a landmark that is not heard: a larger panel or scatterer, less noise, a nearer way."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -24,7 +24,7 @@ GROWTH = 1.05
 
 
 def detection_label(link: LandmarkLink) -> str:
-    """`heard`, `heard at times` or `not heard`."""
+    """Label of a link in need of a remedy or not: `heard`, `heard at times` or `not heard`."""
     return "heard" if link.share >= HEARD else "heard at times" if link.share >= SELDOM else "not heard"
 
 

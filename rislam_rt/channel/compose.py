@@ -1,4 +1,5 @@
-"""From legs to paths: LOS and VT are single legs; PS, VS, RIS and VRIS join a Tx leg and an Rx leg at a landmark."""
+"""Legs composed to paths: LOS and VT are single legs; PS, VS, RIS and VRIS join a Tx leg and an Rx leg at a
+landmark."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -161,7 +162,7 @@ def _padded_vertices(vertices: Floats, count: int) -> Floats:
 
 
 def _reversed_rows(walls: Integers, bounces: Integers) -> Integers:
-    """Each row's first `bounces` entries in reverse order."""
+    """Wall sequences of composed paths: each row's first `bounces` entries in reverse order."""
     index = bounces[:, None] - 1 - np.arange(walls.shape[1])
     return np.where(index >= 0, np.take_along_axis(walls, np.maximum(index, 0), axis=1), -1)
 

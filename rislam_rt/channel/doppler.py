@@ -47,7 +47,7 @@ def turn_rate(trajectory: Trajectory) -> Floats:
 
 
 def advance_trajectory(trajectory: Trajectory, elapsed: float) -> Trajectory:
-    """Every pose `elapsed` [s] later, at the cycle's velocity and turn rate."""
+    """Moved trajectory: every pose `elapsed` [s] later, at the cycle's velocity and turn rate."""
     return replace(
         trajectory,
         time=trajectory.time + elapsed,

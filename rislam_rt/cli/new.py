@@ -122,7 +122,7 @@ def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, te
 
 
 def is_xml(source: Path) -> bool:
-    """Whether a room comes from a scene file of Mitsuba or Sionna RT."""
+    """Whether `new` makes a room from a scene file of Mitsuba or Sionna RT."""
     return source.suffix.lower() == ".xml" or str(source).startswith("sionna:")
 
 

@@ -22,7 +22,7 @@ def _bars(*columns: "ProgressColumn") -> "Progress":
 
 @contextmanager
 def show_progress() -> Iterator[Tell]:
-    """Show a bar for every stage that news comes of."""
+    """Show progress as a bar for every stage that news comes of."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     columns = (

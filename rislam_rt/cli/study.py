@@ -1,4 +1,4 @@
-"""What `rislam-rt run` does with a pipeline that is not the main job."""
+"""Studies: what `rislam-rt run` does with a pipeline that is not the main job."""
 
 import os
 from pathlib import Path
@@ -60,7 +60,7 @@ def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
 
 
 def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
-    """Fig. 4(a): gain against distance."""
+    """Run the study of Fig. 4(a): gain against distance."""
     import numpy as np
 
     from rislam_rt.cli.progress import show_progress

@@ -1,4 +1,4 @@
-"""How much a command says beside its result: `-q` no bars and no warnings, `-v` what it used, and where it failed."""
+"""Verbosity, what a command says beside its result: `-q` no bars and warnings, `-v` what it used, where it failed."""
 
 import inspect
 from collections.abc import Callable
@@ -41,7 +41,7 @@ def warn(line: str) -> None:
 
 
 def with_verbosity(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The command with `-q` and `-v` behind its own options."""
+    """A command with the options of verbosity, `-q` and `-v`, behind its own."""
 
     @wraps(command)
     def wrapped(*arguments: Any, quiet: bool = False, verbose: bool = False, **options: Any) -> Any:

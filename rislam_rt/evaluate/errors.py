@@ -10,12 +10,12 @@ from rislam_rt.geometry.angles import wrap
 
 
 def position_errors(estimate: Floats, truth: Floats) -> Floats:
-    """Distances (...,) [m] between positions (..., D)."""
+    """Position errors (...,) [m], distances between positions (..., D)."""
     return np.asarray(np.linalg.norm(np.asarray(estimate) - np.asarray(truth), axis=-1))
 
 
 def rmse(estimate: Floats, truth: Floats) -> float:
-    """Root of the mean squared distance [m] over all positions (..., D)."""
+    """Root mean squared error [m] over all positions (..., D)."""
     return root_mean_square(position_errors(estimate, truth))
 
 

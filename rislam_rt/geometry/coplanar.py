@@ -1,4 +1,4 @@
-"""Surfaces in one plane: which walls lie on which, within what a tracer in float32 can tell apart."""
+"""Coplanar surfaces: which walls lie on which, within what a tracer in float32 can tell apart."""
 
 from typing import NamedTuple
 

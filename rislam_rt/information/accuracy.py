@@ -1,4 +1,4 @@
-"""What a resolved path can be measured to: delay, direction cosines of the planar array, amplitude."""
+"""Accuracy of a resolved path's measurement: delay, direction cosines of the planar array, amplitude."""
 
 from functools import lru_cache
 from typing import NamedTuple

@@ -28,7 +28,7 @@ class PosteriorBound:
 
     @property
     def rms(self) -> Floats:
-        """(K,) position error [m] over the axes that are filtered."""
+        """(K,) posterior bound on the position [m] over the axes that are filtered."""
         axes = self.agent.shape[1] // 2
         return np.asarray(np.sqrt(np.einsum("kii->k", self.agent[:, :axes, :axes])))
 
@@ -36,7 +36,7 @@ class PosteriorBound:
 def posterior_bound(
     rows: Iterable[LinearMeasurements], time: Floats, motion: MotionPrior, unknown_std: Floats
 ) -> PosteriorBound:  # fmt: skip
-    """Run the recursion along a trajectory, linearised at the truth.
+    """The posterior CRLB by its recursion along a trajectory, linearised at the truth.
 
     Parameters
     ----------

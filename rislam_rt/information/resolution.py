@@ -1,4 +1,4 @@
-"""When two paths come out as two: what the second one's amplitude can be told by, with all else unknown."""
+"""Resolution of two paths: what the second one's amplitude can be told by, with all else unknown."""
 
 from typing import Any
 

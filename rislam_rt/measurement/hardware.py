@@ -1,4 +1,4 @@
-"""What a real front end does to the signal: an array that is not as drawn, leakage left over, converters, oscillators.
+"""Hardware faults of a real front end: an array not as drawn, leakage left over, converters, oscillator, gain.
 
 The chain of one capture, from the paths to the samples that the estimator gets: elements at other places than drawn;
 coupling between them; gain and phase of each receive chain; what is left of the leakage after its cancellation, random
@@ -63,7 +63,7 @@ class HardwareConfig:
 
     @property
     def ideal(self) -> bool:
-        """Whether nothing of all this is there."""
+        """Whether the hardware has no fault."""
         return self == HardwareConfig(told=self.told, calibration_cycles=self.calibration_cycles)
 
 
@@ -161,7 +161,7 @@ def correct(samples: Complexes, unit: float, correction: Correction) -> Complexe
 
 
 def draw_gain_variation(config: HardwareConfig, *, rng: np.random.Generator) -> float:
-    """Gain of the gain control in one cycle, an amplitude ratio."""
+    """Gain of the hardware's gain control in one cycle, an amplitude ratio."""
     return float(10.0 ** (config.agc_std_db * rng.standard_normal() / 20.0)) if config.agc_std_db else 1.0
 
 

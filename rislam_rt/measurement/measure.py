@@ -1,4 +1,4 @@
-"""From the channel of a cycle to what the receiver reports."""
+"""Measuring a cycle: from its channel to what the receiver reports."""
 
 import numpy as np
 

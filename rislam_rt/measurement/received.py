@@ -74,7 +74,7 @@ class Clutter(NamedTuple):
     """(K, P) [Hz]."""
 
     def of_cycle(self, cycle: int) -> "Clutter":
-        """That of one cycle alone."""
+        """Received clutter of one cycle alone."""
         return Clutter(self.paths.of_cycle(cycle), self.doppler[[cycle]])
 
     def beside(

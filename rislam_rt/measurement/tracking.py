@@ -1,4 +1,4 @@
-"""Labels for components across cycles: a component keeps its label while its path lives, also through a crossing.
+"""Tracking of components across cycles: one keeps its label while its path lives, also through a crossing.
 
 One small Kalman filter a track over path length and both cosines with their rates; optimal assignment of predicted
 tracks to components within a gate. The amplitude takes part, so that a strong and a weak path keep their labels where

@@ -1,4 +1,4 @@
-"""Which path a component was: for scoring only, never shown to the agent."""
+"""True identity of components: which path each was, for scoring only, never shown to the agent."""
 
 import numpy as np
 import scipy

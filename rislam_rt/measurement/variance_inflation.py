@@ -1,4 +1,4 @@
-"""What the bound at an estimate leaves out: the bias of a peak, neighbours too faint to be found, mirrored directions.
+"""Inflation of variances by what the bound leaves out: a peak's bias, faint neighbours, mirrored directions.
 
 A bound knows the paths that were found and takes their amplitudes for true. The errors are larger, and a filter that
 believes the bound alone is sure of what is wrong.

@@ -1,4 +1,4 @@
-"""What is known of the receiver: which paths it reports, what else it reports, what it cannot tell apart.
+"""The sensor model, what is known of the receiver: which paths it reports, what else, what it cannot tell apart.
 
 One object says it all. The simulation draws from the one that its settings make; filter, bound and rivals reckon with
 the one that they are told, which may be wrong.

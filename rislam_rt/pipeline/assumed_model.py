@@ -1,4 +1,4 @@
-"""What the belief is told: the one place where anything crosses from the truth to filter, association and design.
+"""The assumed model: the one place where anything crosses from the truth to filter, association and design.
 
 `tell_belief` makes the filter's and the design's inputs from the truth and the errors of `[told]`; `perceived_paths`
 turns the true signals as an undeclared tilt or clock does. The quantities stand one by one in `docs/told.md`.

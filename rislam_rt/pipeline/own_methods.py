@@ -55,7 +55,7 @@ class OwnEstimator(Protocol):
     def init(
         self, start: StartPrior, body: Body, panel: DataSheet | None, sensor: SensorModel, *, rng: np.random.Generator
     ) -> Any:
-        """The first state, whatever it is; states are not changed afterwards."""
+        """First state of one's own estimator, whatever it is; states are not changed afterwards."""
 
     def step(
         self,
@@ -70,7 +70,7 @@ class OwnEstimator(Protocol):
         """The state after a cycle: `dt` [s] since the last, `heading` [rad] of the compass, `code` in force."""
 
     def estimate(self, state: Any) -> SlamEstimate:
-        """Pose and map (`rislam_rt.model.pose_estimate` makes one of a pose alone)."""
+        """Pose and map of one's own estimator (`rislam_rt.model.pose_estimate` makes one of a pose alone)."""
 
 
 @cache
@@ -166,7 +166,7 @@ class OwnChannel:
             self.inner = load_own(name)(scene, radio, depth)
 
     def paths(self, trajectory: Trajectory) -> Paths:
-        """Every path of every cycle, with the panel at level 0.
+        """What one's own channel gives: every path of every cycle, with the panel at level 0.
 
         Raises
         ------
@@ -181,7 +181,7 @@ class OwnChannel:
         return found
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """The same paths under another code."""
+        """What one's own channel gives: the same paths under another code."""
         with own_method_errors(self.name):
             return self.inner.respond(paths, code)
 

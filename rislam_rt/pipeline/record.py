@@ -1,4 +1,4 @@
-"""From a list of cycles to arrays over all cycles."""
+"""The record of a run: a list of cycles as arrays over all cycles."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple

@@ -1,4 +1,4 @@
-"""Where a run's random numbers come from: a child for each purpose, and for each cycle."""
+"""Seeds of a run's random numbers: a child for each purpose, and for each cycle."""
 
 from typing import NamedTuple
 
@@ -23,7 +23,7 @@ class Seeds(NamedTuple):
 
 
 def spawn_seeds(*, rng: np.random.Generator) -> Seeds:
-    """The children of a run's generator."""
+    """Seeds of a run: the children of its generator."""
     return Seeds(*rng.bit_generator.seed_seq.spawn(len(Seeds._fields)))  # type: ignore[attr-defined]
 
 

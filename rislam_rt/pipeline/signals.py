@@ -46,7 +46,7 @@ class SignalsSize(NamedTuple):
 
     @property
     def num_bytes(self) -> int:
-        """Of the samples alone."""
+        """Bytes of the signals' samples alone."""
         return self.cycles * self.captures * self.antennas * self.tones * BYTES_PER_SAMPLE
 
     def __str__(self) -> str:
@@ -83,7 +83,7 @@ def signal_settings(spec: SignalsSpec, scene: Scene | None = None) -> tuple[Radi
 
 
 def signals_size(scene: Scene, spec: SignalsSpec) -> SignalsSize:
-    """How large the samples will be."""
+    """How large the samples of a data set of signals will be."""
     radio, receiver = signal_settings(spec, scene)
     return SignalsSize(len(scene.agent), receiver.num_captures, radio.array.num_antennas, num_tones(radio, receiver))
 

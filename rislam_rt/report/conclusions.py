@@ -1,4 +1,4 @@
-"""What a run comes to, in sentences: the first thing that a reader of its page sees."""
+"""Conclusions on a run, in sentences: the first thing that a reader of its page sees."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""One look for all figures: colours that colour-blind readers can tell apart (Okabe and Ito), sizes, file writing."""
+"""One style for all figures: colours that colour-blind readers can tell apart (Okabe and Ito), sizes, file writing."""
 
 import io
 import warnings
@@ -66,13 +66,13 @@ SETTINGS: dict[Any, Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw in the common look."""
+    """Draw in the style of all figures."""
     with mpl.rc_context(SETTINGS):
         yield
 
 
 def scheme_colour(name: str) -> str:
-    """Colour of a scheme."""
+    """Colour of a scheme in the figures' style."""
     return SCHEME.get(name, "#0072B2")
 
 
@@ -84,7 +84,7 @@ def _save(figure: Figure, target: Any, **how: Any) -> None:
 
 
 def to_png(figure: Figure) -> bytes:
-    """A figure as PNG."""
+    """A figure in the common style as PNG."""
     buffer = io.BytesIO()
     _save(figure, buffer, format="png", dpi=DPI, metadata={"Software": ""})
     return buffer.getvalue()

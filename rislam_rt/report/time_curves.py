@@ -36,7 +36,7 @@ def draw_agent_error(result: SlamResult) -> Figure:
 
 
 def draw_landmark_errors(result: SlamResult) -> Figure:
-    """Distance between each true landmark and the estimate that stands for it."""
+    """Draw landmark errors against time: distance of each true one from the estimate that stands for it."""
     scene, time = result.scene, result.scene.agent.elapsed
     tracks = {name: landmark_track(scene, scheme).error for name, scheme in result.schemes.items()}
     with styled():

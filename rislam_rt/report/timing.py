@@ -1,4 +1,4 @@
-"""Time of the cycle's four steps against their budgets."""
+"""Timing of the cycle's four steps against their budgets."""
 
 from collections.abc import Sequence
 

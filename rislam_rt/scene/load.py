@@ -1,4 +1,4 @@
-"""From a scene folder to a `Scene`."""
+"""Loading a scene folder as a `Scene`."""
 
 import hashlib
 from collections.abc import Sequence

@@ -27,14 +27,14 @@ class RoomFiles:
 
 
 def reflector(name: str, material: dict[str, Any] | None = None) -> dict[str, Any]:
-    """The table of a reflector with a PLY mesh of its own."""
+    """Table in a room's file of a reflector with a PLY mesh of its own."""
     return {"name": name, "mesh": f"meshes/{name}.ply", "material": material or PAPER_MATERIAL}
 
 
 def panel(
     center: list[float], normal: list[float], up: list[float], host: str = "ceiling", size: int = 6
 ) -> dict[str, Any]:
-    """The table of a panel like the paper's, anywhere."""
+    """Table in a room's file of a panel like the paper's, anywhere."""
     return {
         "center": center,
         "normal": normal,

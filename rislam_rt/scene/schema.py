@@ -1,4 +1,4 @@
-"""`scene.toml`: the keys, their types and ranges. Unknown keys are refused; all bad fields are found at once."""
+"""Schema of `scene.toml`: keys, types and ranges. Unknown keys are refused; all bad fields are found at once."""
 
 import unicodedata
 from pathlib import Path
@@ -288,7 +288,7 @@ def parse_spec(content: bytes) -> SceneSpec:
 
 
 def validate_spec(table: dict[str, Any]) -> SceneSpec:
-    """The same from a table already read.
+    """A scene's table that was already read, against the schema.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Meshes of simple solids and surfaces. Corners that two faces share are the same numbers in both."""
+"""Meshes of simple shapes, solids and surfaces. Corners that two faces share are the same numbers in both."""
 
 from collections.abc import Sequence
 

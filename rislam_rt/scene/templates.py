@@ -1,4 +1,4 @@
-"""New scene folders from the rooms that come with the package."""
+"""Templates: new scene folders from the rooms that come with the package."""
 
 import re
 from pathlib import Path

@@ -29,7 +29,7 @@ class RoundedPath(NamedTuple):
 
     @property
     def total(self) -> float:
-        """[m]."""
+        """Length of a path through waypoints [m]."""
         return float(np.sum(self.length))
 
     def at(self, travelled: Floats) -> tuple[Floats, Floats]:

@@ -1,4 +1,4 @@
-"""From a `Scene` to a scene folder, whole or not at all."""
+"""Writing a `Scene` as a scene folder, whole or not at all."""
 
 import os
 import shutil
@@ -149,7 +149,7 @@ def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
 
 
 def _has_own_shadow(scatterer: Scatterer) -> bool:
-    """Whether the shade is the one that `shadow = true` makes."""
+    """Whether to write a shade as `shadow = true`, which makes the same."""
     if scatterer.shade is None or scatterer.radius is None:
         return False
     mesh = solid_mesh(scatterer.position, scatterer.radius, scatterer.height, scatterer.axis)

@@ -1,4 +1,4 @@
-"""Ends of the agent at its poses; samples of Gaussians without a random number."""
+"""Draws with given moments (Gaussians without a random number), and the ends of the agent at its poses."""
 
 from functools import lru_cache
 

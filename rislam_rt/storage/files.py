@@ -107,5 +107,5 @@ def remove_empty(folders: Iterable[Path]) -> None:
 
 
 def refused(path: Path, error: OSError) -> StoreError:
-    """The disk's refusal as one line."""
+    """The disk's refusal to write a file, as one line."""
     return StoreError(f"{path}: cannot be written ({error.strerror}); check permissions and free space")

@@ -1,4 +1,4 @@
-"""Plain data with a schema version and a checksum, so that a value changed on the disk is noticed when it is read."""
+"""Seals on plain data, a schema version and a checksum, so that a change on the disk is noticed when it is read."""
 
 import hashlib
 import json

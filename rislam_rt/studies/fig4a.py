@@ -36,7 +36,7 @@ class Fig4a(NamedTuple):
 
 
 def check_fig4a(scene: Scene, spec: Fig4aSpec) -> None:
-    """Check that scene and specification fit.
+    """Check that scene and specification of Fig. 4(a) fit.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def lone_panel(scene: Scene) -> RisPanel:
 
 
 def run_fig4a(scene: Scene, spec: Fig4aSpec, *, rng: np.random.Generator, progress: Tell = tell_nobody) -> Fig4a:
-    """Trace the places and design, draw and bound the panel's gain at each of them.
+    """Run Fig. 4(a): trace the places and design, draw and bound the panel's gain at each of them.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def sphere_gain(scene: Scene, motion: Trajectory, radio: RadioConfig, radius: fl
 
 
 def longer_side(panel: RisPanel) -> float:
-    """Longer side [m] of a panel, an element's own width included."""
+    """Longer side [m] of the panel in Fig. 4(a), an element's own width included."""
     spec = panel.spec
     return max(spec.rows * float(spec.spacing[1]), spec.cols * float(spec.spacing[0]))
 

@@ -10,7 +10,7 @@ SILENT = {"rmse_m": None, "angle_deg": None, "bound_m": None}
 def _scheme(**walls):
     return {
         "rmse_m": 0.02, "bound_m": 0.01, "landmarks": {}, "walls": walls, "map": {"gospa_m": 0.1},
-        "association": {"accuracy": 0.9}, "over_budget": [], "diverged": False,
+        "association": {"accuracy": 0.9}, "over_budget": [], "diverged": False, "outcomes": {"ok": 10},
     }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""How far apart two right answers may be, path by path: rounding, the room's size, the lengths of paths.
+"""Error limits, path by path, between two right answers: rounding, the room's size, the lengths of paths.
 
 Rounding is half a unit in the last place, `u = 2^-24` in float32, of the numbers rounded: coordinates up to the room's
 extent E about the tracer's zero, and up to E + L for the images of a leg of length L. With b bounces one end of the
@@ -236,7 +236,7 @@ def _landmark_directions(
 
 
 def _ratio(a: Floats, b: Floats) -> Floats:
-    """a / b, 0 where both are nothing."""
+    """a / b for an error limit, 0 where both are nothing."""
     return np.where(a > 0.0, a / np.where(b > 0.0, b, np.finfo(np.float64).tiny), 0.0)
 
 

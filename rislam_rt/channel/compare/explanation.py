@@ -1,4 +1,4 @@
-"""Proofs: why one side lacks a path, recomputed from mirror images in float64 without either channel's own tests."""
+"""Explanations why one side lacks a path: proofs from mirror images in float64 without either channel's own tests."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""The validation page: one row a room, from the reports of one run."""
+"""The table of the validation page: one row a room, from the reports of one run."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""Which pairs of a cycle and a wall sequence are worth an exact look: all of them, or what mirrored beams leave."""
+"""Candidate pairs of a cycle and a wall sequence that are worth an exact look: all, or what mirrored beams leave."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -40,7 +40,7 @@ class SequenceSearch(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What is searched, for people."""
+        """What candidates are searched, for people."""
         return "all wall sequences" if self.exhaustive else "mirrored beams"
 
 

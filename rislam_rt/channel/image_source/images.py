@@ -1,4 +1,4 @@
-"""From wall sequences to legs: mirror the far end, walk back from the device, test facets and occlusion."""
+"""Legs from wall sequences by images: mirror the far end, walk back from the device, test facets and occlusion."""
 
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ class ImageRays(NamedTuple):
     image: Floats
 
     def only(self, keep: Booleans) -> "ImageRays":
-        """The rows where `keep` (N,) holds."""
+        """Image-source rays of the rows where `keep` (N,) holds."""
         return ImageRays(self.cycle[keep], self.walls[keep], self.bounces[keep], self.image[keep])
 
 
@@ -174,7 +174,7 @@ def _legs(
 
 
 def _followed(direction: Floats, normals: Floats) -> Floats:
-    """Directions (N, 3) after the bounces on walls with normals (N, d, 3)."""
+    """Directions (N, 3) of image-source rays after the bounces on walls with normals (N, d, 3)."""
     for normal in normals.swapaxes(0, 1):
         direction = mirror_direction(direction, normal)
     return direction

@@ -16,7 +16,7 @@ class CandidateIndices(NamedTuple):
     sequence: Integers
 
     def only(self, keep: Integers | slice) -> "CandidateIndices":
-        """The rows chosen."""
+        """Candidate indices of the rows chosen."""
         return CandidateIndices(self.far[keep], self.device[keep], self.sequence[keep])
 
 

@@ -1,4 +1,4 @@
-"""Candidates worth a ray: those whose bounces on the unbounded planes come near their walls.
+"""Culling of candidates: worth a ray are those whose bounces on the unbounded planes come near their walls.
 
 A lossless test in front of the tracer. In a furnished room one candidate in a hundred survives it, and asking the
 tracer costs twenty times as much as sifting.

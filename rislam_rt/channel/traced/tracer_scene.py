@@ -1,4 +1,4 @@
-"""The room as Sionna RT sees it: one mesh a material, triangle numbers kept, so that every hit names its wall."""
+"""The tracer's scene, as Sionna RT sees the room: one mesh a material, so that every hit names its wall."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ class TracerScene:
         return float(self.scene.wavelength[0])
 
     def wall_hit(self, shape: Integers, primitive: Integers) -> Integers:
-        """Walls (...,) of hits, `NO_WALL` where nothing was hit."""
+        """Walls (...,) of the tracer's hits, `NO_WALL` where nothing was hit."""
         place = np.searchsorted(self.shapes, shape)
         known = (place < len(self.shapes)) & np.isin(shape, self.shapes)
         index = np.where(known, self.first[np.where(known, place, 0)] + primitive, 0)

@@ -1,4 +1,4 @@
-"""Sionna's image method on chosen wall sequences: which candidates the meshes really admit, and where they bounce.
+"""Visibility by Sionna's image method: which candidates the meshes really admit, and where they bounce.
 
 `PathSolver` finds its candidates by shooting rays, for all pairs of sources and targets. Here the candidates are
 given (`sequences.py`), each row naming one far end, one device and one wall sequence, so that a whole trajectory is
@@ -82,7 +82,7 @@ def visible_rows(
 def _clear_of_occluder(
     tracer_scene: TracerScene, spared: int, sequences: Integers, device: Floats, vertices: Floats
 ) -> Integers:
-    """Legs whose segments up to the last bounce miss a scatterer's shade."""
+    """Visible legs whose segments up to the last bounce miss a scatterer's shade."""
     clear = np.ones(len(device), dtype=np.bool_)
     last = device
     for bounce, wall in enumerate(sequences.T):

@@ -1,4 +1,4 @@
-"""Search for new paths in a residual: peaks of the matched filter on a grid, interpolated and taken off one by one."""
+"""Detection of new paths in a residual: peaks of the matched filter on a grid, interpolated, taken off one by one."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Slices of a run as one record: path and landmark columns by identity, cycles one after the other."""
+"""Joining the slices of a long run: path and landmark columns by identity, cycles one after the other."""
 
 from collections.abc import Sequence
 from dataclasses import replace

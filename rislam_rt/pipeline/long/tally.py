@@ -1,4 +1,4 @@
-"""The scores of a run in slices, counted slice by slice: the same as of the whole run, but for the posterior bound.
+"""Tally of a run's scores, slice by slice: the same as of the whole run, but for the posterior bound.
 
 The bound is a recursion over all cycles with every path that is ever heard among its unknowns; it is left out (None).
 """

@@ -1,4 +1,4 @@
-"""What an estimator is given, cycle by cycle, as arrays and as a NetCDF file: so that others can be given the same."""
+"""Inputs of an estimator, cycle by cycle, as arrays and as a NetCDF file: so that others can be given the same."""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 

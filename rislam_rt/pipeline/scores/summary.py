@@ -1,4 +1,4 @@
-"""The scores of a run: agent, each landmark, each wall, for every scheme."""
+"""Summary of a run's scores: agent, each landmark, each wall, for every scheme."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -219,7 +219,7 @@ def match_walls(walls: Walls, estimate: MapEstimate, heard: Booleans | None = No
 
 
 def surface_rms(walls: Walls, number: int, normal: Floats, offset: float) -> float:
-    """RMS distance [m] of a plane from a wall, over the wall's surface.
+    """Score of a wall: RMS distance [m] of a plane from it, over its surface.
 
     The distance is linear in the point: over a triangle its mean square is (sum of squares + square of the sum) / 12.
     """

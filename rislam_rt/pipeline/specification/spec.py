@@ -118,7 +118,7 @@ class DesignSection(DesignerSection):
 
     @property
     def least_snr(self) -> float:
-        """Linear; 0 if there is none."""
+        """Least SNR of the design's section, linear; 0 if there is none."""
         return 0.0 if self.least_snr_db is None else linear(self.least_snr_db)
 
 
@@ -183,7 +183,7 @@ class PanelSection(Section):
 
     @property
     def tolerance(self) -> PanelTolerance:
-        """In radians."""
+        """Tolerances of the panel's section in radians."""
         return PanelTolerance(self.amplitude_std, float(np.radians(self.phase_std_deg)), self.dead, self.stuck)
 
 

@@ -1,4 +1,4 @@
-"""A run in forms that others read: trajectories, maps, configuration, scores, and its room."""
+"""Exports of a run, in forms that others read: trajectories, maps, configuration, scores, and its room."""
 
 import json
 from collections.abc import Mapping

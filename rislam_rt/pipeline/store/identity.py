@@ -1,4 +1,4 @@
-"""What decides a run's numbers, and the name that its folder has from it."""
+"""Identity of a run: what decides its numbers, and the name that its folder has from it."""
 
 import hashlib
 import os

@@ -133,14 +133,14 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         self.mark(RUNNING)
 
     def holds(self, names: Iterable[str]) -> bool:
-        """Whether files are there as they were written."""
+        """Whether files of a run are there as they were written."""
         try:
             return all(name in self.files and file_digest(self.folder / name) == self.files[name] for name in names)
         except ResultError:
             return False
 
     def abandon(self) -> None:
-        """Take the marker away if no scheme was completed."""
+        """Take the run's marker away if no scheme was completed."""
         if not self.files:
             (self.folder / RUN_FILE).unlink(missing_ok=True)
 

@@ -1,4 +1,4 @@
-"""A run as a moving picture: the room from above, and beside it the agent in close-up, moment by moment."""
+"""Animation of a run as a GIF: the room from above, and beside it the agent in close-up, moment by moment."""
 
 import io
 from typing import TYPE_CHECKING, Any

@@ -1,4 +1,4 @@
-"""One setting changed at a time: what each is worth, as table, figure and page."""
+"""Ablations, one setting changed at a time: what each is worth, as table, figure and page."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

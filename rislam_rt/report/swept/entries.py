@@ -1,4 +1,4 @@
-"""One line a point and scheme of a swept study: numbers for tables, CSV and JSON, and how they are written."""
+"""Entries of a swept study, one a point and scheme: numbers for tables, CSV and JSON, and how they are written."""
 
 import csv
 import io
@@ -72,12 +72,12 @@ def csv_text(entries: Sequence[Mapping[str, Any]]) -> str:
 
 
 def metres(value: float | None) -> str:
-    """Three decimals."""
+    """Entry in metres, three decimals."""
     return NOTHING if value is None or np.isnan(value) else f"{value:.3f}"
 
 
 def metres_between(entry: Mapping[str, Any], name: str = "rmse") -> str:
-    """An error with its interval."""
+    """Entry in metres: an error with its interval."""
     value, low, high = (entry[f"{name}{end}_m"] for end in ("", "_low", "_high"))
     if value is None or low is None:
         return metres(value)
@@ -85,19 +85,19 @@ def metres_between(entry: Mapping[str, Any], name: str = "rmse") -> str:
 
 
 def ratio(value: float | None) -> str:
-    """Two decimals."""
+    """Entry as a ratio, two decimals."""
     return NOTHING if value is None else f"{value:.2f}"
 
 
 def percent_between(interval: Interval | None) -> str:
-    """A share with its interval, in percent."""
+    """Entry in percent: a share with its interval."""
     if interval is None:
         return NOTHING
     return f"{100 * interval.value:.0f} % ({100 * interval.lower:.0f} to {100 * interval.upper:.0f})"
 
 
 def table_lines(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """A markdown table."""
+    """Entries as a markdown table."""
     return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
 
 
@@ -107,7 +107,7 @@ def paragraph(text: str) -> list[str]:
 
 
 def failure_notes(groups: Sequence[Group]) -> list[str]:
-    """Markdown: how many runs failed or diverged, and why they failed."""
+    """Notes in markdown beside entries: how many runs failed or diverged, and why they failed."""
     runs = sum((len(group.results) - group.missing) * len(group.schemes) for group in groups)
     failed = sum(group.failed(scheme) for group in groups for scheme in group.schemes)
     diverged = sum(group.diverged(scheme) for group in groups for scheme in group.schemes)

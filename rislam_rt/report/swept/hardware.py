@@ -1,4 +1,4 @@
-"""What faults of the front end do to the receiver, before and after calibration, as table, figure and page."""
+"""What faults of the hardware do to the receiver, before and after calibration, as table, figure and page."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

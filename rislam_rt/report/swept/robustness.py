@@ -1,4 +1,4 @@
-"""What happens when the belief is told wrong: the agent's error against each mismatch, as table, figure and page."""
+"""Robustness against a belief that is told wrong: the agent's error by mismatch, as table, figure and page."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

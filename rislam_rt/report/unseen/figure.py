@@ -1,4 +1,4 @@
-"""Errors of every run in unseen rooms: by class of motion and of plan, one mark a room."""
+"""Figure of the errors of every run in unseen rooms: by class of motion and of plan, one mark a room."""
 
 from collections.abc import Mapping, Sequence
 

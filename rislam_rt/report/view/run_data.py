@@ -18,7 +18,7 @@ KNOWN = 0.5
 
 
 def run_data(result: SlamResult) -> dict[str, Any]:
-    """Room, truth, and every scheme, at up to `FRAMES` cycles spread evenly."""
+    """Data of a run's view: room, truth, and every scheme, at up to `FRAMES` cycles spread evenly."""
     rows = spread(len(result.scene.agent), FRAMES)
     return room_data(result.scene) | {
         "kind": "run",

@@ -1,4 +1,4 @@
-"""Questions to a triangle array: what is near, what is crossed, what does a ray hit, what encloses a point."""
+"""Queries to a mesh's triangle array: what is near, what is crossed, what does a ray hit, what encloses a point."""
 
 from collections.abc import Iterator
 

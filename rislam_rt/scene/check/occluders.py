@@ -1,4 +1,4 @@
-"""Scene check, the part of scatterers that hide things: sound meshes, nothing inside but their own centre."""
+"""Scene check of occluders, scatterers that hide things: sound meshes, nothing inside but their own centre."""
 
 from collections.abc import Iterator
 

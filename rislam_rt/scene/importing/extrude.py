@@ -1,4 +1,4 @@
-"""From a floor plan to walls, floor and ceiling: doors and windows are cut out, and closed where they are."""
+"""A floor plan extruded to walls, floor and ceiling: doors and windows are cut out, and closed where they are."""
 
 from itertools import pairwise
 from typing import Any
@@ -28,7 +28,7 @@ Entry = tuple[str, Mesh, dict[str, Any] | None]
 
 
 def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft:
-    """The room of a plan.
+    """Extrude a plan to a room.
 
     Raises
     ------

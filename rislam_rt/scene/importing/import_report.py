@@ -15,7 +15,7 @@ def summarise_import(
     facets: FlatRegions, found: SortedSurfaces, surfaces: list[Surface], unseen: float, reflectors: dict[str, Any],
     occluders: dict[str, Mesh], options: ImportOptions, *, scanned: bool,
 ) -> list[str]:  # fmt: skip
-    """What became of the mesh, in numbers."""
+    """Report of an import: what became of the mesh, in numbers."""
     walls = sum(
         len(planar_regions(mesh.vertices[mesh.faces], COPLANAR_ANGLE, COPLANAR_OFFSET).offset)
         for mesh, _ in reflectors.values()

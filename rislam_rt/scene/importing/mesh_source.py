@@ -1,4 +1,4 @@
-"""What a drawing program wrote, as triangles with the names of their node and material: GLB, glTF, OBJ, PLY, STL."""
+"""Source of meshes, triangles with the names of their node and material: GLB, glTF, OBJ, PLY, STL."""
 
 import json
 import struct

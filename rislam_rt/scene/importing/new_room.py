@@ -1,4 +1,4 @@
-"""From a file to a scene folder, checked before it appears."""
+"""A new room from a file: a scene folder, checked before it appears."""
 
 import tempfile
 from pathlib import Path

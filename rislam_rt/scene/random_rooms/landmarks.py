@@ -1,4 +1,5 @@
-"""Scatterers and panel drawn at random: open, below the agent, or behind a screen; on any wall or in the ceiling."""
+"""Landmarks drawn at random, scatterers and panel: open, below the agent, behind a screen; on any wall or in the
+ceiling."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Floor, walls and ceiling over a plan."""
+"""Shell of a random room: floor, walls and ceiling over a plan."""
 
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ class Roof(NamedTuple):
     highest: float
 
     def height(self, points: Floats) -> Floats:
-        """(...,) [m] over points (..., 2)."""
+        """(...,) [m] height of the shell's roof over points (..., 2)."""
         along = (points - self.point) @ self.axis
         if self.form == "gable":
             return np.asarray(self.highest - self.slope * np.abs(along))

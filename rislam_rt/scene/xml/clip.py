@@ -1,4 +1,4 @@
-"""Triangles cut to a window of the plan."""
+"""Clipping triangles to a window of the plan."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""A Mitsuba or Sionna RT scene file as meshes with names and materials."""
+"""Reading a Mitsuba or Sionna RT scene file as meshes with names and materials."""
 
 import importlib.util
 import re
@@ -123,7 +123,7 @@ class _Coats:
         self.notes: list[str] = []
 
     def of(self, shape: Element) -> Material | None:
-        """The material of a shape: its own, or the one it refers to."""
+        """Material of a shape that was read from XML: its own, or the one it refers to."""
         for own in children(shape, "bsdf"):
             return self._noted(read_material(own)).material
         for reference in children(shape, "ref"):

@@ -1,4 +1,4 @@
-"""A scene as a folder that Sionna RT opens: `scene.xml` beside the scene's own files."""
+"""Writing a scene as a folder that Sionna RT opens: `scene.xml` beside the scene's own files."""
 
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring

@@ -1,4 +1,4 @@
-"""Could a track be the return of two walls whose own returns are there too?
+"""Echoes: could a track be the return of two walls whose own returns are there too?
 
 A wall's return says where its image of the Tx is, hence where the wall is: halfway. The image over two walls is then
 known, in place and in strength, without any map.

@@ -1,4 +1,4 @@
-"""What a track shows of its path: strength, fading, direction, and how it answers to the agent's own motion.
+"""Features of a track, what it shows of its path: strength, fading, direction, answer to the agent's own motion.
 
 To first order, over a displacement d of the agent, the direction cosines h of a path that comes from a fixed point at
 distance 1/q turn by `-q P d`, P the projection across h; its length changes by `-a h . d`. For a scatterer

@@ -1,4 +1,4 @@
-"""Which of two geometries explains a motion, a static point or an image that moves with the agent?"""
+"""Still or moving: which explains a motion, a static point or an image that moves with the agent?"""
 
 import numpy as np
 

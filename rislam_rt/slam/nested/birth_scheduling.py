@@ -1,4 +1,4 @@
-"""Whose turn it is to be born: which tracks to examine in a cycle, and which have to wait for another."""
+"""Schedule of births: which tracks to examine in a cycle, and which have to wait for another."""
 
 import numpy as np
 

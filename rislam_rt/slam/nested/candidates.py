@@ -1,4 +1,4 @@
-"""What this cycle's measurements may belong to: expected returns of the map first, tracks behind them."""
+"""Candidates for this cycle's measurements: expected returns of the map first, tracks behind them."""
 
 from typing import NamedTuple
 
@@ -146,7 +146,7 @@ def merge_returns(
 
 
 def candidates(predicted: PredictedMeasurements, tracks: LandmarkTracks, hidden: Booleans) -> Candidates:
-    """Expected returns, then the tracks that are not `hidden` (T,) behind one."""
+    """Candidates of association: expected returns, then the tracks that are not `hidden` (T,) behind one."""
     spread = predicted.covariance.copy()
     spread[:, DIAGONAL, DIAGONAL] += predicted.groups.disturbance**2
     follow = track_covariance(tracks)

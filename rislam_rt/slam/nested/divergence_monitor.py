@@ -1,4 +1,4 @@
-"""Does the filter still follow the room? Values that say so, and what the motion model makes of them.
+"""Monitor of divergence: does the filter still follow the room, and what does the motion model make of it?
 
 An agent that turns harder than its motion model allows shows first in the innovations, then its landmarks stop showing
 where they are expected. Either makes the model livelier until measurements fit again.
@@ -29,7 +29,7 @@ class DivergenceMonitor(NamedTuple):
 
     @property
     def diverged(self) -> bool:
-        """Whether measurements contradict the belief, or have lost touch with it."""
+        """Whether the filter has diverged: measurements contradict the belief, or have lost touch with it."""
         return self.strain > MAX_STRAIN or self.found < 0.2
 
 

@@ -1,4 +1,4 @@
-"""One cycle of localisation and mapping: predict, associate, update, learn who is who, grow and prune the map."""
+"""The nested filter, one cycle of it: predict, associate, update, learn who is who, grow and prune the map."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What could a track be? Least-squares fits of a static point, an image of a known point, a moving image, the floor."""
+"""Hypotheses of what a track could be: fits of a static point, an image of a known point, a moving image, the floor."""
 
 from typing import NamedTuple
 
@@ -286,7 +286,7 @@ def floor_height(parent: Floats, history: History) -> tuple[Floats, Floats]:
 
 
 def floor_image(height: Floats, anchor: Floats) -> Floats:
-    """The level mirror at heights (...,) as images (..., 3) of the anchor."""
+    """Hypothesis of a level mirror at heights (...,) as images (..., 3) of the anchor."""
     height = np.asarray(height)
     return np.stack(
         [np.full(height.shape, anchor[0]), np.full(height.shape, anchor[1]), 2.0 * height - anchor[2]], axis=-1

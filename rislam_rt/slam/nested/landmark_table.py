@@ -52,17 +52,17 @@ class LandmarkTable(NamedTuple):
 
     @property
     def points(self) -> Integers:
-        """Rows of the points."""
+        """Rows of the table that are points."""
         return (~self.is_wall).nonzero()[0]
 
     @property
     def walls(self) -> Integers:
-        """Rows of the walls."""
+        """Rows of the table that are walls."""
         return self.is_wall.nonzero()[0]
 
     @property
     def ris_probability(self) -> Floats:
-        """(F, Q) of being each panel; 0 for walls."""
+        """(F, Q) of each landmark in the table being each panel; 0 for walls."""
         return ris_probabilities(self.log_ris, self.points)
 
     @property
@@ -72,7 +72,7 @@ class LandmarkTable(NamedTuple):
 
     @property
     def log_strength(self) -> tuple[Floats, Floats]:
-        """Mean and standard deviation (F,) of the log strength."""
+        """Mean and standard deviation (F,) of the log strength of each landmark in the table."""
         return strength_moments(self.log_grid)
 
 

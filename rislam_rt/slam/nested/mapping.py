@@ -1,4 +1,4 @@
-"""From moments to the estimate that others read: pose, landmarks, images, walls."""
+"""The map and pose that others read, from moments: landmarks, images, walls."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""Which returns of the believed map should show now, and how strong."""
+"""Prediction of measurements: which returns of the believed map should show now, and how strong."""
 
 from functools import lru_cache
 from itertools import product
@@ -64,7 +64,7 @@ class MapBelief(NamedTuple):
 
     @property
     def threshold(self) -> float:
-        """Amplitude at the detection threshold."""
+        """Predicted amplitude at the detection threshold."""
         return float(amplitude_std(self.radio) * np.sqrt(2.0 * self.sensor.threshold))
 
 

@@ -1,4 +1,4 @@
-"""Death of landmarks: those that fail to show, contradict the measurements, double another, or follow from others."""
+"""Pruning of landmarks: those that fail to show, contradict the measurements, double another, or follow from others."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Where may the panel hang, while no landmark is held for it? Its identity, weighed for tracks as for landmarks.
+"""The RIS candidate, where the panel may hang while no landmark is held for it: tracks weighed as landmarks are.
 
 A track is taken for the point that its delay and direction tell. What its amplitudes say under the codes applied, and
 the cycles in which it was silent, is counted as in `identity`; the design then aims at whatever may yet be the panel.

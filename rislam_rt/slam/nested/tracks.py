@@ -64,11 +64,11 @@ class LandmarkTracks(NamedTuple):
 
     @property
     def length(self) -> Integers:
-        """(T,) measurements held."""
+        """(T,) measurements held of each track."""
         return np.sum(self.cycle >= 0, axis=1)
 
     def age(self, cycle: int) -> Integers:
-        """(T,) cycles since the oldest measurement that is held."""
+        """(T,) cycles since the oldest measurement that is held of a track."""
         return np.asarray(cycle - np.min(np.where(self.cycle >= 0, self.cycle, cycle), axis=1))
 
     def earlier_misses(self, cycle: int) -> Integers:

@@ -1,4 +1,4 @@
-"""Steps of the solver and limits of what is worth a look.
+"""Numerics: steps of the solver and limits of what is worth a look.
 
 Some belong to the model and are not in its table: `LADDER`, `SHORTER`, `BEARING`, `ALIGNED`.
 """

@@ -1,4 +1,4 @@
-"""Labelled tracks from walks: what the receiver reports, tracked as the agent would, and what each truly was."""
+"""Gathering labelled tracks from walks: what the receiver reports, tracked as the agent would, and what each was."""
 
 from typing import NamedTuple
 
@@ -47,16 +47,16 @@ class Examples(NamedTuple):
 
     @property
     def keep(self) -> Booleans:
-        """(N,) whether it came over a landmark."""
+        """(N,) whether a gathered example came over a landmark."""
         return self.kind >= PathKind.PS
 
     @property
     def labelled(self) -> Booleans:
-        """(N,) whether it was a path, and not clutter."""
+        """(N,) whether a gathered example was a path, and not clutter."""
         return self.kind != CLUTTER
 
     def pick(self, rows: Booleans | Integers) -> "Examples":
-        """Some of them."""
+        """Some of the gathered examples."""
         return Examples._make(field[rows] for field in self)
 
 
@@ -122,7 +122,7 @@ class _Memory:
         self.rows = {label: held for label, held in self.rows.items() if label in alive}
 
     def sightings(self, labels: Integers, cycle: int, position: Floats, heading: Floats) -> Sightings:
-        """What the labels have shown in the window that ends at a cycle."""
+        """What the labels of gathered tracks have shown in the window that ends at a cycle."""
         first = max(0, cycle - WINDOW + 1)
         table = np.zeros((len(labels), cycle - first + 1, 7))
         table[..., 3:6] = 1.0

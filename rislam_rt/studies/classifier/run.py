@@ -1,4 +1,4 @@
-"""Gather examples in random rooms, train and choose on them, and score once on the named rooms."""
+"""A run of the training: gather examples in random rooms, train and choose on them, score once on the named rooms."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""How good a classifier is: F1 of "keep", intervals over walks, what each feature is worth."""
+"""Scores of a classifier: F1 of "keep", intervals over walks, what each feature is worth."""
 
 from collections.abc import Callable
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""What the pipeline file of a swept study may say."""
+"""Specification of a swept study: what its pipeline file may say."""
 
 from typing import Annotated, Any, Literal
 
@@ -105,7 +105,7 @@ class MismatchSection(Section):
         return self
 
     def variant(self, level: float | int | str) -> "VariantSection":
-        """Its settings at a level."""
+        """Settings of a mismatch in a study's specification at a level."""
         values = {**self.set, self.key: level}
         return VariantSection(name=f"{self.name}_{level}", group=self.name, note=self.note, set=values)
 
@@ -215,7 +215,7 @@ SWEPT: dict[str, type[SweptSpec]] = {
 
 
 def check_names(variants: list[VariantSection]) -> None:
-    """Refuse variants of one name."""
+    """Refuse a study's specification with variants of one name."""
     names = [variant.name for variant in variants]
     if len(set(names)) < len(names):
         raise ValueError("a name comes twice; give each once")

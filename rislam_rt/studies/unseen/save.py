@@ -1,4 +1,4 @@
-"""What a cell leaves beside its scores: recorded runs, rooms, samples."""
+"""Files to save beside a cell's scores: recorded runs, rooms, samples."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +18,7 @@ from rislam_rt.studies.unseen.file import Recording, write_recording
 
 
 def save_run(recording: Recording, folder: Path, label: str) -> Path:
-    """The recorded run as `<room>/<label>.nc`; returns the file.
+    """Save the recorded run as `<room>/<label>.nc`; returns the file.
 
     Raises
     ------

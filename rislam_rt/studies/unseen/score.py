@@ -164,7 +164,7 @@ def kind_scores(truth: Truth, maps: list[MapEstimate], answers: Answers) -> dict
 
 
 def heard_long(audible: Booleans, time: Floats) -> Booleans:
-    """Which columns of (K, N) are audible for `HEARD` seconds in all."""
+    """Which columns of (K, N) count in a score: audible for `HEARD` seconds in all."""
     step = float(np.median(np.diff(time))) if len(time) > 1 else HEARD
     return np.asarray(audible.sum(axis=0) * step >= HEARD - 1e-9)
 

@@ -1,4 +1,4 @@
-"""What a run's score is measured against: true motion, landmarks, walls, when each could be heard, and the bounds."""
+"""The truth that a run's score is measured against: motion, landmarks, walls, when each could be heard, the bounds."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -77,7 +77,7 @@ def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: Pipeline
 
 
 def run_bounds(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineSpec) -> tuple[Floats, Floats]:
-    """Least RMS position errors (K,) [m], absolute, and relative to the start.
+    """Bounds to hold a run against: least RMS position errors (K,) [m], absolute, and relative to the start.
 
     The motion's law is white acceleration of the root mean square that this motion truly has, so that a lively one has
     a looser bound; what a filter is told of it does not count. No measurement of an unknown room tells where it lies:

@@ -1,4 +1,4 @@
-"""Which engine runs: Dr.Jit where the machine has what it needs, else numpy."""
+"""The backend of the particles: Dr.Jit where the machine has what it needs, else numpy."""
 
 from functools import cache
 

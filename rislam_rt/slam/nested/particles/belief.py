@@ -1,4 +1,4 @@
-"""Agent particles, each with a cloud of landmark particles for every landmark (eqs. `landmarkRenew`, `agentRenew`)."""
+"""The belief: agent particles, each with a cloud of landmark particles (eqs. `landmarkRenew`, `agentRenew`)."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Landmark particles of one landmark for all agent particles: M points about a centre, shared through indices.
+"""The cloud of one landmark's particles for all agent particles: M points about a centre, shared through indices.
 
 Points are stored as offsets from a centre in float64, in single precision (numpy) or as numbers of 21 bits (Dr.Jit,
 `grid.py`), which costs nothing: an offset of 0.1 m is exact to 1e-7 m. An agent particle finds its points in block

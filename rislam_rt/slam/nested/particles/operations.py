@@ -1,4 +1,4 @@
-"""What the cycle asks of the belief: begin, move, update, one more landmark, fewer, resample. Pure functions."""
+"""Operations of the cycle on the belief: begin, move, update, one more landmark, fewer, resample. Pure functions."""
 
 from typing import NamedTuple
 
@@ -34,7 +34,7 @@ class PointParticles(NamedTuple):
 
     @property
     def engine(self) -> CloudEngine:
-        """Where the heavy passes run."""
+        """The backend on which the cycle's heavy operations run."""
         return pick_engine(self.config.engine)
 
     @property

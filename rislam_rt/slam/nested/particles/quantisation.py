@@ -1,4 +1,4 @@
-"""Points as 21-bit numbers, three of them in 8 bytes: the passes over particles wait for memory, not for arithmetic.
+"""Quantisation of points as 21-bit numbers, three in 8 bytes: passes over particles wait for memory, not arithmetic.
 
 A step is one millionth of a block's largest offset, as fine as single precision is there: x in the upper 21 bits of the
 first word, y in those of the second, and z in what both have left, its upper 11 bits in the first word.

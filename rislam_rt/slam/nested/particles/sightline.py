@@ -1,4 +1,4 @@
-"""One return as the particles of one landmark see it: the formula that both engines share.
+"""Sightline of one return as the particles of one landmark see it: the formula that both engines share.
 
 An agent particle sees a return over a Tx leg and an Rx leg. Of all features on these legs one, the owner, is a cloud;
 the others stand at the agent particle's own mean. Whatever lies before the owner on a leg is a fixed base, and whatever
@@ -222,7 +222,7 @@ def _mirror(axes: Floats, normal: Floats) -> Floats:
 
 
 def linear_sightline(centre: Floats, agent: Floats) -> Sightline:
-    """The offset (N, 3) from agent to landmark itself, for checks against theory."""
+    """Sightline of the offset (N, 3) from agent to landmark itself, for checks against theory."""
     return Sightline(
         Kind(Leg.LINEAR, Leg.LINEAR), np.zeros((len(centre), 0)), centre - agent, np.zeros((len(centre), 6))
     )

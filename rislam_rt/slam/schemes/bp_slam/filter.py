@@ -1,4 +1,4 @@
-"""BP-SLAM for an agent that carries both ends: ranges `|p_T - a| + |a - p_R|`, heading known.
+"""The filter of BP-SLAM for an agent that carries both ends: ranges `|p_T - a| + |a - p_R|`, heading known.
 
 Same functions, inputs and outputs as the package's own filter, so that a run can lead either. The panel and its code
 mean nothing to it, and angles of arrival are not used.

@@ -1,4 +1,4 @@
-"""What a component may be the first sight of, how often, and where it would then be."""
+"""Births: what a component may be the first sight of, how often, and where it would then be."""
 
 from typing import NamedTuple
 
@@ -54,7 +54,7 @@ class BirthHypotheses(NamedTuple):
 
 
 def log_normal(miss: Floats, variance: Floats) -> Floats:
-    """Logarithm of a scalar normal density."""
+    """Logarithm of a scalar normal density, by which births are weighed."""
     return -0.5 * (miss**2 / variance + np.log(2.0 * np.pi * variance))
 
 

@@ -145,7 +145,7 @@ def through(rows: Floats, matrix: Floats) -> Floats:
 
 
 def spread_over(rows: Floats, course: AgentTrajectory) -> Floats:
-    """Covariance (C, 3, 3) that rows (C, 3, n) make of the course's."""
+    """Covariance (C, 3, 3) that features' rows (C, 3, n) make of the course's."""
     return through(rows, course.covariance) @ rows.swapaxes(1, 2)
 
 

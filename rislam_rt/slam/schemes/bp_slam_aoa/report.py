@@ -1,4 +1,4 @@
-"""What is handed on: the pose with the start's error back in it, points and walls of the map."""
+"""Reported pose with the start's error back in it, points and walls of the map."""
 
 import numpy as np
 

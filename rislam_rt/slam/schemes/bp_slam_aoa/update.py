@@ -1,4 +1,4 @@
-"""Loopy association of components to Gaussian sums, and the messages between features and the agent's course.
+"""Update of Gaussian sums by components: messages between features and the agent's course.
 
 Source: Leitinger, Grebien and Witrisal, "Multipath-based SLAM exploiting AoA and amplitude information" (2019), on the
 factor graph of Leitinger et al., arXiv 1801.04463: delays, angles and amplitudes in the likelihood, a detection

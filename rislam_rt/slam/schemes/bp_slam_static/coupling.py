@@ -1,4 +1,4 @@
-"""What an agent and a feature that it has seen have in common.
+"""Coupling: what an agent and a feature that it has seen have in common.
 
 Belief propagation keeps one belief a variable. But the error of a feature is, to a large part, the agent's error when
 it was seen; a filter that forgets so takes the feature for independent evidence of where the agent is, again and again,

@@ -1,4 +1,4 @@
-"""BP-SLAM in its published setting: static anchors of known position, one set of ranges per anchor and step."""
+"""A run of BP-SLAM in its published setting: static anchors of known position, ranges per anchor and step."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

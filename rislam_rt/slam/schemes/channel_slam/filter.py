@@ -1,4 +1,4 @@
-"""Channel-SLAM, delay only: a tracker's labels, and a virtual transmitter a path.
+"""The filter of Channel-SLAM, delay only: a tracker's labels, and a virtual transmitter a path.
 
 Source: Gentner et al., "Multipath assisted positioning with simultaneous localization and mapping", IEEE TWC 2016. As
 there, labels are taken as known, there is no model of detection, and a path that ends takes its virtual transmitter

@@ -1,4 +1,4 @@
-"""Loopy association of ranges to Gaussian sums, and the messages between the features and the agent's course.
+"""Correction by loopy association of ranges to Gaussian sums, and messages between features and the agent's course.
 
 Source: Leitinger et al., arXiv 1801.04463, section V, with messages as Gaussian sums. A feature's message to the agent
 is a mixture over its Gaussians, over the ranges that it may have made, over "missed" and "does not exist"; it is
@@ -129,5 +129,5 @@ def newborn(found: Association, fresh: Floats, birth_threshold: float) -> tuple[
 
 
 def is_strong(ratio: Floats, specular_ratio: float | None) -> Booleans:
-    """(M,) whether a component is as strong as only a wall return is."""
+    """(M,) whether a range is of a component as strong as only a wall return is."""
     return ratio > (np.inf if specular_ratio is None else specular_ratio)

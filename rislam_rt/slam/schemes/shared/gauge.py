@@ -1,4 +1,4 @@
-"""What delays tell of the agent, and what they leave as it was told: the belief that is reported.
+"""The gauge, what delays cannot tell of the agent and leave as it was told: the belief that is reported.
 
 Ranges to places that nobody knows are the same for every course and map that are moved, turned about the vertical or
 mirrored in a vertical plane together. (With both ends at one point they are exactly so; a baseline b adds b^2 / 4r.)

@@ -1,4 +1,4 @@
-"""What both rivals hand on: the pose over all turns and mirror images, and their features as points of a map."""
+"""What both rivals report: the pose over all turns and mirror images, and their features as points of a map."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -38,12 +38,13 @@ class Points(NamedTuple):
     """(V, 3, 3) [m^2]."""
 
     def keep(self, rows: Booleans) -> "Points":
-        """Some of them."""
+        """Some of the points to report."""
         return Points._make(column[rows] for column in self)
 
 
 def lift(known: Floats, height: Floats) -> Floats:
-    """(2, 3) position and velocity of the numbers (4,) or (6,) that are filtered, and `height` (2,) if they lack it."""
+    """Pose to report, (2, 3) position and velocity, of the numbers (4,) or (6,) that are filtered, and `height` (2,) if
+    they lack it."""
     known = known.reshape(2, -1)
     return known if known.shape[1] == 3 else np.concatenate([known, height[:, None]], axis=1)
 

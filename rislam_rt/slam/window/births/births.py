@@ -1,4 +1,4 @@
-"""Tracks that are understood: their components are explained, by a new feature or by those that there are."""
+"""Births of features from tracks that are understood: by a new feature or by those that there are."""
 
 import numpy as np
 

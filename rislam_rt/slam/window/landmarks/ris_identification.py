@@ -1,4 +1,4 @@
-"""Which point is which panel? Bayes from amplitudes under the codes applied, and from silence; for features and tracks.
+"""Identification of the RIS, which point is which panel: Bayes from amplitudes under the codes, and from silence.
 
 "Is the panel" predicts the amplitude with no free parameter; "is a scatterer" has one unknown cross-section for all
 cycles, integrated out. Silence under a code that would have made it loud speaks against the panel; what is blocked is
