@@ -41,7 +41,7 @@ def _code(rng):
 
 def test_several_cycles_at_once_are_one_after_the_other():
     rng, cycles = np.random.default_rng(2), 7
-    places = np.repeat(PLACE, 2, axis=0) + [[0.0, 0.0, 0.0], [0.3, -0.2, 0.0]]
+    places = np.array([[3.0, 3.0, 3.0], [3.3, 2.8, 3.0]])
     spots = spread_places(places, np.tile(1e-8 * np.eye(3), (2, 1, 1)))
     codes, before = [_code(rng) for _ in range(cycles)], unknown(2)
     one_by_one, each = before, []
