@@ -43,6 +43,11 @@ class SweptSpec(Section):
         """Variants that the study goes through; none by default."""
         return []
 
+    @model_validator(mode="after")
+    def _each_once(self) -> "SweptSpec":
+        check_names(self.all_variants)
+        return self
+
 
 class _OneRoom(SweptSpec):
     scene: str | None = None
@@ -63,11 +68,6 @@ class Fig4bSpec(_OneRoom):
     def all_variants(self) -> list[VariantSection]:
         """The cases."""
         return self.cases
-
-    @model_validator(mode="after")
-    def _each_once(self) -> "Fig4bSpec":
-        check_names(self.cases)
-        return self
 
 
 class Fig4cSpec(_OneRoom):
@@ -124,11 +124,6 @@ class RobustnessSpec(_OneRoom):
         levels = [mismatch.variant(level) for mismatch in self.mismatches for level in mismatch.levels]
         return [VariantSection(name="reference"), *levels]
 
-    @model_validator(mode="after")
-    def _each_once(self) -> "RobustnessSpec":
-        check_names(self.all_variants)
-        return self
-
 
 class HardwareSpec(_OneRoom):
     """What faults of the front end do to the receiver, one at a time, before and after calibration."""
@@ -153,11 +148,6 @@ class HardwareSpec(_OneRoom):
                 variants += [one, VariantSection(name=f"{one.name}{CALIBRATED}", group=one.group, set=more)]
         return variants
 
-    @model_validator(mode="after")
-    def _each_once(self) -> "HardwareSpec":
-        check_names(self.all_variants)
-        return self
-
 
 CALIBRATED = "_calibrated"
 """End of the name of a variant with calibration."""
@@ -178,11 +168,6 @@ class RoomsSpec(SweptSpec):
         """The variants."""
         return self.variants
 
-    @model_validator(mode="after")
-    def _each_once(self) -> "RoomsSpec":
-        check_names(self.variants)
-        return self
-
 
 class AblationsSpec(_OneRoom):
     """One setting changed at a time."""
@@ -196,11 +181,6 @@ class AblationsSpec(_OneRoom):
     def all_variants(self) -> list[VariantSection]:
         """The variants."""
         return self.variants
-
-    @model_validator(mode="after")
-    def _each_once(self) -> "AblationsSpec":
-        check_names(self.variants)
-        return self
 
 
 SWEPT: dict[str, type[SweptSpec]] = {
