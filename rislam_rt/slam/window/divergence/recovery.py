@@ -28,7 +28,9 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
                 )
             )
         return state, False
-    told = None if state.asked else divergence_monitor.ask_tracks(state.window, state.log, state.heading, baseline)
+    if state.asked or len(state.heading) > divergence_monitor.PAST + 1:  # by then the speed may be another
+        return state, False
+    told = divergence_monitor.ask_tracks(state.window, state.log, state.heading, baseline)
     if told is None or told.log_odds <= 0.0:
         return state, False
     state = state._replace(asked=True)
