@@ -27,12 +27,19 @@ STRIDE = 3
 """Cycles between two examinations."""
 NEARBY = 2.0
 """Distance [m] beyond which two places are not compared."""
-MOST_SHARED = 4.0
-"""Log odds that one more track may add, so that no chance coincidence decides alone."""
+ASIDE = 10.0
+"""Log evidence behind a track's best from which on a hypothesis is not weighed for others, or as the panel."""
+MANOEUVRE = ((3, 0.5), (10, 1.0))
+"""Latest steps that are tried as lively ones, and standard deviation [m/s^2] of their accelerations then."""
+MISSED, STRAINED = 1.5, 1.5
+"""Standard deviations by which fewer returns show than should, and mean square of their innovations, from which on a
+manoeuvre is looked for."""
 DRAWS = 12
 """Places of the belief over which the panel's predicted gain is averaged."""
 CERTAIN = 30.0
 """Log odds beyond which an identity is no longer in question."""
+SETTLED = 12.0
+"""Log odds of existence that a feature gathers at most, so that it can be taken back."""
 FEWEST = 15
 """Measurements of a feature within the window from which on their residuals speak against it."""
 RECENT = 5
@@ -45,8 +52,8 @@ EDGE = 1.15
 """Distance in cells up to which a weaker path moves a stronger one: cells have no sharp edge."""
 IN_WALL = 0.05
 """Distance [m] from a wall below which a point is held to lie in it."""
-LADDER = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0])
-"""Standard deviations [m/s^2] of a step's acceleration: from a rail car to a person who turns on the spot."""
+MODES = 6
+"""Motion modes, half a decade apart."""
 SCATTER_RATE = 0.1
 """Share of the latest residual in its running mean square."""
 BEARING = 0.01

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.returns import TX, linearise
 from rislam_rt.slam.ris_candidate import rays
@@ -15,7 +16,6 @@ from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
 from rislam_rt.slam.window.landmarks.landmark_update import seed
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, UnresolvedClusters
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER, STRIDE
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.steps import HEAD
@@ -85,7 +85,7 @@ def _missing_legs(context: WindowState, histories: TrackSummary, mean: Floats) -
     length, shine = histories.mean[0][:, 0], histories.log_amplitude + np.log(histories.mean[0][:, 0])
     old = every.hits >= 3
     away, reach = _bearings(context, old, mean)
-    bright = (every.log_amplitude[old] + np.log(reach))[None] > shine[:, None] - 0.3
+    bright = (every.log_amplitude[old] + np.log(reach))[None] > shine[:, None] - CONSTANTS.fading
     walls = context.landmarks.walls
     if len(walls):
         place, anchor = mean[HEAD:].reshape(-1, 3)[walls], context.landmarks.anchor[walls]
@@ -220,7 +220,9 @@ def _enter(
     new = len(context.landmarks.ident)
     holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))
     window = window_gaussian.add_feature(context.window, verdict.place, holds)
-    landmarks = enter(context.landmarks, verdict.is_wall, histories.middle, len(at), 5.0, verdict.identity)
+    landmarks = enter(
+        context.landmarks, verdict.is_wall, histories.middle, len(at), CONSTANTS.log_born, verdict.identity
+    )
     forms = np.full((2, 5), UNKNOWN)
     forms[0] = [new if part == NEW else part for part in verdict.form]
     if verdict.kind == BESIDE:
@@ -232,7 +234,7 @@ def _enter(
     if not np.isfinite(window.head).all():
         return context, False
     fresh = np.isin(left.row, at)
-    if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > 3.0 * CONSTANTS.fit:
+    if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > CONSTANTS.against:
         return context, False
     square = float(np.mean(histories.scatter[row] ** 2))
     grown = grown._replace(window=window, visibility=seed(context.visibility, forms[:1], landmarks, square))

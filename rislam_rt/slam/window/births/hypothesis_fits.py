@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window.births.track_summary import TrackSummary
-from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import HOPELESS, RIDGE, STEPS
 
 
@@ -92,8 +92,6 @@ def try_all(trials: Trials, digest: TrackSummary) -> Fits:
             cost[lost] = np.inf
     evidence = -0.5 * cost - 0.5 * log_det + 1.5 * np.log(2.0 * np.pi)
     share = np.where(trials.mixed, CONSTANTS.weaker * (1.0 + error[:, -1]), 0.0)
-    # a component lies between the two that it is made of
-    evidence -= 20.0 * (np.maximum(-share, 0.0) + np.maximum(share - 1.0, 0.0))
     return Fits(place, covariance, held, cost, share, evidence)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.identity import STRENGTHS, panel_rows, ris_probabilities, strength_moments
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity
-from rislam_rt.slam.window.model_constants import CONSTANTS
 
 
 class WindowTable(NamedTuple):
@@ -122,5 +122,5 @@ def learn_ratio(landmarks: WindowTable, wall: int, log_ratio: float) -> WindowTa
     gain = landmarks.ratio_variance[wall] / (landmarks.ratio_variance[wall] + CONSTANTS.fading**2)
     ratio, variance = landmarks.ratio.copy(), landmarks.ratio_variance.copy()
     ratio[wall] += gain * (log_ratio - ratio[wall])
-    variance[wall] = max((1.0 - gain) * variance[wall], CONSTANTS.fading**2 / 10.0)
+    variance[wall] = (1.0 - gain) * variance[wall]
     return landmarks._replace(ratio=ratio, ratio_variance=variance)

@@ -16,7 +16,6 @@ from rislam_rt.information import amplitude_std
 from rislam_rt.model import DataSheet, RadioConfig, RisCode, SensorModel
 from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.identity import (
-    DOUBT,
     STRENGTHS,
     add_evidence,
     log_panel,
@@ -25,9 +24,9 @@ from rislam_rt.slam.identity import (
     log_scatterer_missed,
     weigh_silence,
 )
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import even_draws, square_root
 from rislam_rt.slam.observations import PANEL, UNTOLD
-from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import CERTAIN, DRAWS
 
 
@@ -134,7 +133,7 @@ def weigh(before: PanelIdentity, sight: PanelObservation, gain: Complexes | None
             panel = np.where(own | (sight.side[at, None] == UNTOLD), each, -np.inf)
         scatterer = log_scatterer(amplitude, std[at], first[at], second[at], radio)
         log_grid[at], log_ris[at] = add_evidence(log_grid[at], log_ris[at], scatterer, panel)
-        log_ris[at] += np.where(own, DOUBT, 0.0)
+        log_ris[at] += np.where(own, CONSTANTS.doubt, 0.0)
         hidden[at] = 0.0
     if len(silent) and gain is not None:
         each = log_scatterer_missed(std[silent], first[silent], second[silent], radio, threshold)
