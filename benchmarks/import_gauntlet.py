@@ -27,7 +27,7 @@ import numpy as np
 
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.built_in_rooms.shapes import block, box_walls, joined
+from rislam_rt.scene.shapes import block, box_corners, hexahedron, joined
 
 SIZE = (6.0, 4.5, 2.7)
 TABLE, CHAIRS = np.array([3.0, 2.2]), 6
@@ -87,7 +87,7 @@ def furnished() -> Any:
 
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.25)
     ball.apply_translation((1.2, 1.0, 0.25))
-    parts = [solid(joined(list(box_walls(*SIZE).values()))), ball]
+    parts = [solid(joined(list(hexahedron(box_corners([0.0, 0.0, 0.0], SIZE)).values()))), ball]
     parts += [cylinder(0.6, 0.03, [*TABLE, 0.735], 64), cylinder(0.05, 0.72, [*TABLE, 0.36], 32)]
     for k in range(CHAIRS):
         angle = 2.0 * np.pi * k / CHAIRS + 0.3
@@ -126,7 +126,7 @@ def scan(folder: Path) -> tuple[Path, list[str]]:
     """Writes the scan: walls, a table, a cabinet, a column; nothing under the noise is kept."""
     import trimesh
 
-    parts = [*box_walls(*SIZE).values(), block([2.2, 1.6, 0.7], [3.8, 2.8, 0.74])]
+    parts = [*hexahedron(box_corners([0.0, 0.0, 0.0], SIZE)).values(), block([2.2, 1.6, 0.7], [3.8, 2.8, 0.74])]
     parts.append(block([0.0, 3.2, 0.0], [0.5, 4.4, 1.9], without=("floor", "wall_x0")))
     whole = trimesh.util.concatenate([solid(joined(parts)), cylinder(0.2, 2.7, [5.0, 3.6, 1.35], 48)])
     vertices, faces = trimesh.remesh.subdivide_to_size(whole.vertices, whole.faces, CUT)

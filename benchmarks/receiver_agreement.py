@@ -239,8 +239,11 @@ def row_of(runs: list[dict[str, Any]], kind: int) -> Row:
     table, offered = (np.vstack([one[name] for one in runs]) for name in ("table", "offered"))
     mine, loud = table[table[:, 1] == kind], offered[(offered[:, 0] == kind) & (offered[:, 1] > 10.0)]
     error, deviation = np.abs(mine[:, 3:6]), mine[:, 6:9]
+    if not len(mine):  # nothing of this class was heard
+        none = np.full(3, np.nan)
+        return Row(float(np.mean(loud[:, 2])) if len(loud) else np.nan, 0.0, none, none, none, np.nan)
     return Row(
-        float(np.mean(loud[:, 2])),
+        float(np.mean(loud[:, 2])) if len(loud) else np.nan,
         len(mine) / sum(int(one["cycles"]) for one in runs),
         np.quantile(error / deviation, 0.683, axis=0),
         np.median(deviation, axis=0),

@@ -1,4 +1,4 @@
-"""The machine behind the tracer: which libLLVM, which Dr.Jit variant, how many threads. Chosen once, here.
+"""The tracer's backend on this machine: which libLLVM, which Dr.Jit variant, how many threads. Chosen once, here.
 
 Dr.Jit takes the first libLLVM it finds and only looks when it is imported. Versions 15 and 16 pass its own check and
 then abort the process inside the path solver, where Python cannot catch it. So the library is chosen and its version
@@ -153,7 +153,7 @@ def count_gpus() -> int:
 
 
 def _device() -> str:
-    """`llvm` or `cuda`, as the user wants."""
+    """Device of the backend, `llvm` or `cuda`, as the user wants."""
     device = os.environ.get("RISLAM_RT_DEVICE", "llvm").lower()
     if device not in ("llvm", "cuda"):
         raise SetupError(f"RISLAM_RT_DEVICE: '{device}' received; give 'llvm' or 'cuda'")
@@ -163,7 +163,7 @@ def _device() -> str:
 
 
 def _threads() -> int:
-    """Number of Dr.Jit threads."""
+    """Number of Dr.Jit threads of the backend."""
     text = os.environ.get("RISLAM_RT_THREADS", "1")
     if not text.isdecimal() or int(text) < 1:
         raise SetupError(f"RISLAM_RT_THREADS: '{text}' received; give a whole number from 1 on")
@@ -199,7 +199,7 @@ def _wheel_llvm() -> Iterator[str]:
 
 
 def _system_llvm() -> list[str]:
-    """The system's libraries, newest first by what their names say."""
+    """The system's libLLVM files for the backend, newest first by what their names say."""
     paths = {str(Path(p).resolve()) for pattern in _SYSTEM_LLVM for p in glob(pattern)}
     return sorted(paths, key=lambda p: (_named_version(p), p), reverse=True)
 

@@ -1,4 +1,4 @@
-"""What can go wrong, each with the exit code that the command line ends with.
+"""Errors, each with the exit code that the command line ends with.
 
 A message is one line: what was wrong, the value received, and what to do about it. An error may hold several, one for
 each fault.
@@ -22,7 +22,7 @@ class RislamError(Exception):
 
     @property
     def lines(self) -> list[str]:
-        """Every fault on one printable line."""
+        """The error, every fault on one printable line."""
         told = [_printable(str(text)) for text in self.args[:MOST_LINES]]
         more = len(self.args) - len(told)
         return [*told, f"{more} more of this kind"] if more else told
@@ -75,7 +75,7 @@ def _printable(text: str) -> str:
 
 
 def expect(name: str, value: object, kind: type | tuple[type, ...]) -> None:
-    """An argument of a public function must be of its kind.
+    """Raise an error unless an argument of a public function is of its kind.
 
     Raises
     ------

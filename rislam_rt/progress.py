@@ -1,4 +1,4 @@
-"""News of work that takes a while."""
+"""Progress of work that takes a while."""
 
 from collections.abc import Callable
 

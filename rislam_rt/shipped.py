@@ -1,4 +1,4 @@
-"""The pipelines and rooms that come with the package, by name."""
+"""The shipped pipelines and rooms, which come with the package, by name."""
 
 import re
 from collections.abc import Iterator
@@ -10,12 +10,12 @@ _ROOT = _PACKAGE / "shipped" if (_PACKAGE / "shipped").is_dir() else _PACKAGE.pa
 
 
 def shipped_pipelines() -> dict[str, Path]:
-    """Pipeline files by name."""
+    """Shipped pipeline files by name."""
     return {file.stem: file for file in sorted((_ROOT / "pipelines").glob("*.toml"))}
 
 
 def shipped_rooms() -> dict[str, Path]:
-    """Scene folders by name."""
+    """Shipped scene folders by name."""
     return {file.parent.name: file.parent for file in sorted((_ROOT / "scenes").glob("*/scene.toml"))}
 
 

@@ -1,4 +1,4 @@
-"""What somebody may have meant by a word that is not known."""
+"""Spelling: what somebody may have meant by a word that is not known."""
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -8,10 +8,10 @@ LEAST_LIKE = 0.75
 
 
 def nearest(word: str, known: Iterable[str], most: int = 1) -> list[str]:
-    """Of the known words those that are spelt nearly so, the nearest first."""
+    """Of the known words those with nearly that spelling, the nearest first."""
     return get_close_matches(word, list(known), n=most, cutoff=LEAST_LIKE)
 
 
 def did_you_mean(near: Sequence[str]) -> str:
-    """The question in an error's line; empty if nothing is near."""
+    """Question about a word's spelling in an error's line; empty if nothing is near."""
     return f"did you mean {' or '.join(repr(word) for word in near)}?" if near else ""

@@ -77,7 +77,7 @@ class Worker:
             return Lost(code, monotonic() - begin)
 
     def _hear(self, end: float | None) -> Any:
-        """The next message.
+        """The next message of a worker in the pool.
 
         Raises
         ------
@@ -94,14 +94,14 @@ class Worker:
         return self.channel.recv()
 
     def stop(self) -> None:
-        """End it at once."""
+        """End a worker of the pool at once."""
         self.process.kill()
         self.process.wait()
         self.channel.close()
 
     @property
     def alive(self) -> bool:
-        """Whether it can do another piece."""
+        """Whether a worker of the pool can do another piece."""
         return self.process.poll() is None
 
 

@@ -21,7 +21,7 @@ class Advice(NamedTuple):
     """Of detection: SNR over all antennas."""
 
     def as_dict(self) -> dict[str, Any]:
-        """For a machine to read; None stands for no path."""
+        """Advice for a machine to read; None stands for no path."""
         links = []
         for link in self.links:
             places = [
@@ -40,7 +40,7 @@ class Advice(NamedTuple):
 
 
 def advise(scene: Scene, settings: Settings, *, rng: np.random.Generator) -> Advice:
-    """Look at a room that passes the check. `rng` draws the random codes that a panel is tried under."""
+    """Advice on a room that passes the check. `rng` draws the random codes that a panel is tried under."""
     looked = survey(scene, settings)
     links = link_budget(looked, rng=rng)
     threshold = 10.0 * float(np.log10(settings.sensor.threshold))

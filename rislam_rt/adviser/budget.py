@@ -38,12 +38,12 @@ class LandmarkLink(NamedTuple):
 
     @property
     def share(self) -> float:
-        """Share of the way on which it is heard."""
+        """Share of the way on which a landmark's link is heard, by its budget."""
         return float(np.mean(self.probability))
 
     @property
     def three(self) -> tuple[int, int, int]:
-        """Start, middle and end among the places."""
+        """Start, middle and end among the places of a link budget."""
         last = len(self.margin_db) - 1
         return 0, last // 2, last
 
@@ -60,7 +60,7 @@ class Survey(NamedTuple):
 
 
 def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
-    """Find the paths at places along the way, by exact image sources."""
+    """Paths for the link budget at places along the way, by exact image sources."""
     rows = np.unique(np.linspace(0, len(scene.agent) - 1, places).round().astype(np.int64))
     scene = replace(scene, agent=trajectory_at(scene.agent, rows))
     faces = sum(len(reflector.faces) for reflector in scene.reflectors)
@@ -87,7 +87,7 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLin
 
 
 def trajectory_at(motion: Trajectory, rows: Integers) -> Trajectory:
-    """The cycles of these rows."""
+    """Cycles of these rows of a trajectory, at which the link budget is made."""
     return Trajectory(
         motion.time[rows], motion.position[rows], motion.velocity[rows], motion.heading[rows], motion.body
     )
@@ -101,7 +101,7 @@ def _all_places(paths: Paths, looked: Survey) -> list[DetectionForecast]:
 
 
 def _link(name: str, code: str, heard: list[list[DetectionForecast]], reasons: Reasons, number: int) -> LandmarkLink:
-    """Over C codes: the mean of the chance, and of the power, but of swept codes the best beam's."""
+    """Link budget over C codes: mean of the chance, and of the power, but of swept codes the best beam's."""
     snr = np.array([[place.snr[number] for place in places] for places in heard])
     chance = np.array([[place.probability[number] for place in places] for places in heard]).mean(axis=0)
     level = snr.max(axis=0) if code == "swept" else snr.mean(axis=0)

@@ -58,5 +58,5 @@ def aimed_codes(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Integers:
 
 
 def paths_under_codes(paths: Paths, spec: DataSheet, index: Integers) -> Paths:
-    """The paths under levels (K, N, M)."""
+    """Paths of a room under a panel's codes, levels (K, N, M)."""
     return rephase(paths, RisCode(index, spec.levels))

@@ -52,7 +52,7 @@ def trace_cost(scene: Scene, radio: RadioConfig, walls: int) -> list[TraceCost]:
 
 
 def cost_words(cost: TraceCost) -> str:
-    """`2 bounces: 173 wall sequences, 172 paths, 0.31 s`."""
+    """Cost of tracing in words: `2 bounces: 173 wall sequences, 172 paths, 0.31 s`."""
     bounces = f"{cost.depth} bounce{'s' if cost.depth > 1 else ''}"
     if cost.seconds is None:
         digits = int(np.ceil(np.log10(max(cost.sequences, 1))))
@@ -61,7 +61,8 @@ def cost_words(cost: TraceCost) -> str:
 
 
 def _asked(channel: ImageSourceChannel, depth: int) -> int:
-    """Sequences of all legs at the middle of the way that the walls' sides leave possible, the bare legs included."""
+    """Cost of a trace in wall sequences: of all legs at the middle of the way that the walls' sides leave possible,
+    bare legs included."""
     scene, facets, row = channel.scene, channel.looked.facets, len(channel.scene.agent) // 2
     tx, rx = (ends[row : row + 1] for ends in (scene.agent.tx, scene.agent.rx))
     legs = [(tx, rx, -1)]

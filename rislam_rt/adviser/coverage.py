@@ -1,4 +1,4 @@
-"""Where a panel can be heard: SNR of its direct path under the best code, over the floor at the agent's height."""
+"""Coverage of a panel, where it can be heard: SNR of its direct path under the best code, at the agent's height."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -40,7 +40,7 @@ class Coverage(NamedTuple):
 
 
 def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
-    """A map of each of a scene's panels."""
+    """Maps of coverage, one for each of a scene's panels."""
     if scene.ris is None:
         return []
     low, high = scene.bounds
@@ -61,7 +61,7 @@ def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
 
 
 def _direct_margins(scene: Scene, points: Floats, settings: Settings) -> Floats:
-    """(panels, N) [dB] at points (N, 3), the agent headed along x."""
+    """Coverage (panels, N) [dB] of direct paths at points (N, 3), the agent headed along x."""
     assert scene.ris is not None
     count = len(points)
     still = Trajectory(

@@ -1,4 +1,4 @@
-"""What the receiver would make of the paths at one place: the chance that it reports each landmark, without noise."""
+"""Detection at one place: the chance that the receiver reports each landmark, without noise being drawn."""
 
 from typing import NamedTuple
 
@@ -25,7 +25,7 @@ class DetectionForecast(NamedTuple):
 
 
 def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Settings) -> DetectionForecast:
-    """The landmarks of one cycle as the receiver of these settings reports them.
+    """Forecast of detection: the landmarks of one cycle as the receiver of these settings reports them.
 
     The same steps as a run's receiver: what the array hears, the two captures of alternated codes, paths that cannot be
     resolved joined, detection by Marcum's function; errors and false components left out, motion within the slot too.
@@ -52,7 +52,8 @@ def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Setti
 
 
 def _cover(loud: Received, path: int, parts: NoiselessComponents, sensor: SensorModel) -> int:
-    """The strongest path that a path is joined to and that leads its component; -1 if it leads one, or is not loud."""
+    """The strongest path that leads a path's component and so hides it from detection; -1 if it leads one, or is not
+    loud."""
     row = np.flatnonzero(loud.path == path)
     if path in parts.path or not len(row):
         return -1

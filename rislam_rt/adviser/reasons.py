@@ -1,4 +1,4 @@
-"""Why a landmark is not heard at a place."""
+"""Reasons why a landmark is not heard at a place."""
 
 from typing import NamedTuple
 
@@ -60,7 +60,7 @@ class Reasons(NamedTuple):
 
 
 def build_reasons(scene: Scene, paths: Paths, settings: Settings) -> Reasons:
-    """All that hides, walls and occluders."""
+    """All that may be a reason for not being heard: walls and occluders that hide."""
     meshes = [(r.name, r.triangles) for r in scene.reflectors]
     meshes += [(shade.name, shade.triangles) for shade in scene.occluders]
     meshes += [(s.name, s.shade.triangles) for s in scene.scatterers if s.shade is not None]
@@ -70,7 +70,7 @@ def build_reasons(scene: Scene, paths: Paths, settings: Settings) -> Reasons:
 
 
 def _occluder_name(scene: Scene, number: int) -> str:
-    """A scatterer's own shade does not hide its centre."""
+    """Occluder that is a reason for not being heard; a scatterer's own shade does not hide its centre."""
     if number < len(scene.scatterers) and scene.scatterers[number].shade is not None:
         return scene.scatterers[number].name
     return ""

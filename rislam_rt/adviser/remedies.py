@@ -1,4 +1,4 @@
-"""What would help a landmark that is not heard: a larger panel or scatterer, less noise, a nearer way."""
+"""Remedies for a landmark that is not heard: a larger panel or scatterer, less noise, a nearer way."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -24,7 +24,7 @@ GROWTH = 1.05
 
 
 def detection_label(link: LandmarkLink) -> str:
-    """`heard`, `heard at times` or `not heard`."""
+    """Label of a link in need of a remedy or not: `heard`, `heard at times` or `not heard`."""
     return "heard" if link.share >= HEARD else "heard at times" if link.share >= SELDOM else "not heard"
 
 
@@ -40,20 +40,21 @@ def remedies(looked: Survey, links: Sequence[LandmarkLink]) -> list[str]:
 
 
 def weak_places(link: LandmarkLink) -> Integers:
-    """Places at which a path comes in that is only too weak."""
+    """Places where more SNR is the remedy: a path comes in that is only too weak."""
     return np.array([place for place, reason in enumerate(link.reason) if reason == WEAK], dtype=np.int64)
 
 
 def lack_db(link: LandmarkLink) -> float:
-    """By how much SNR lacks [dB] at the median of the places where it is all that lacks; 0 if there are none."""
+    """SNR [dB] that would be the remedy, at the median of the places where it is all that lacks; 0 if there are
+    none."""
     weak = weak_places(link)
     return -float(np.median(link.margin_db[weak])) if len(weak) else 0.0
 
 
 def enough_elements(looked: Survey, panel: RisPanel, link: LandmarkLink) -> RisSpec | None:
-    """The smallest panel, grown alike along both sides, whose direct path under the best code is above the threshold at
-    the median of the places where it is too weak; None if none of up to `LARGEST` elements a side is.
-    """
+    """Remedy by size: the smallest panel, grown alike along both sides, whose direct path under the best code is above
+    the threshold at the median of the places where it is too weak; None if none of up to `LARGEST` elements a side
+    is."""
     spec, weak = panel.spec, weak_places(link)
     scale = 10.0 ** (lack_db(link) / 40.0) * 0.9  # the amplitude goes with the sides' product
     while True:
@@ -80,7 +81,8 @@ def _what_helps(looked: Survey, link: LandmarkLink) -> str:
 
 
 def _why_where(link: LandmarkLink) -> Iterator[str]:
-    """Each reason with the share of the way on which it holds, the commonest first, and the way round it."""
+    """Reasons to remedy, each with the share of the way on which it holds, the commonest first, and the way round
+    it."""
     for reason, count in Counter(reason for reason in link.reason if reason).most_common():
         share = f"{reason} on {count / len(link.reason):.0%} of it"
         yield share if reason == WEAK else f"{share} ({_way_round(reason)})"
@@ -102,7 +104,7 @@ def _larger(looked: Survey, link: LandmarkLink, lack: float) -> Iterator[str]:
 
 
 def _on_search(link: LandmarkLink, links: Sequence[LandmarkLink]) -> Iterator[str]:
-    """A panel that an aimed code makes heard, but the sweep hardly ever hits."""
+    """Remedy for a panel that an aimed code makes heard, but the sweep hardly ever hits."""
     aimed = next(one for one in links if one.landmark == link.landmark and one.code == "aimed")
     if aimed.share >= HEARD and link.share < SELDOM:
         yield (
@@ -124,7 +126,8 @@ def _way_round(why: str) -> str:
 
 
 def _margins(looked: Survey, panel: RisPanel, spec: RisSpec) -> Floats:
-    """(K,) SNR over the threshold [dB] of the direct path under the best code, as if nothing were in its way."""
+    """(K,) margin that tells the remedy: SNR over the threshold [dB] of the direct path under the best code, as if
+    nothing were in its way."""
     radio, agent = looked.settings.radio, looked.scene.agent
     ends, patterns = ((agent.tx, radio.tx_gain), (agent.rx, radio.rx_gain)), (radio.antennas.tx, radio.antennas.rx)
     tx, rx = (

@@ -1,4 +1,5 @@
-"""From legs to paths: LOS and VT are single legs; PS, VS, RIS and VRIS join a Tx leg and an Rx leg at a landmark."""
+"""Legs composed to paths: LOS and VT are single legs; PS, VS, RIS and VRIS join a Tx leg and an Rx leg at a
+landmark."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -24,7 +25,7 @@ def compose_paths(
     rx_legs: Sequence[SpecularLegs],
     source: str,
 ) -> Paths:
-    """All paths of up to `depth` wall bounces, both legs together; identities that no cycle has are left out.
+    """Compose legs to all paths of up to `depth` wall bounces; identities that no cycle has are left out.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ _PER_PATH = ("kind", "landmark", "tx_walls", "rx_walls", "num_vertices", "tx_leg
 
 
 def _direct_block(direct: SpecularLegs, radio: RadioConfig, depth: int) -> dict[str, Any]:
-    """LOS and VT columns."""
+    """LOS and VT columns of the composed paths."""
     keep = np.flatnonzero(direct.num_bounces <= depth)
     bounces = direct.num_bounces[keep]
     paths = len(keep)
@@ -107,7 +108,7 @@ def _direct_block(direct: SpecularLegs, radio: RadioConfig, depth: int) -> dict[
 def _join_block(
     tx: SpecularLegs, rx: SpecularLegs, point: Floats, landmark: int, is_ris: bool, depth: int
 ) -> dict[str, Any]:
-    """Columns of one landmark: every Tx leg with every Rx leg, up to `depth` bounces together."""
+    """Composed columns of one landmark: every Tx leg with every Rx leg, up to `depth` bounces together."""
     i, j = np.nonzero(tx.num_bounces[:, None] + rx.num_bounces[None, :] <= depth)
     ever = np.logical_or.reduce(tx.valid)[i] & np.logical_or.reduce(rx.valid)[j]
     i, j = i[ever], j[ever]
@@ -133,7 +134,7 @@ def _join_block(
 def _panel_responses(
     scene: Scene, radio: RadioConfig, number: int, tx: SpecularLegs, rx: SpecularLegs
 ) -> tuple[Complexes, Complexes]:
-    """Element responses (K, I, N, M) and (K, J, N, M) of the legs to a panel, from their mirrored devices."""
+    """Element responses (K, I, N, M) and (K, J, N, M) of a composed path's legs to a panel, from mirrored devices."""
     assert scene.ris is not None
     spec, center = scene.panels[number].spec, scene.panels[number].center
     responses = []
@@ -148,26 +149,26 @@ def _panel_responses(
 
 
 def _padded(walls: Integers, depth: int) -> Integers:
-    """Wall sequences brought to exactly `depth` columns."""
+    """Wall sequences of composed paths brought to exactly `depth` columns."""
     fill = np.full((len(walls), max(depth - walls.shape[1], 0)), -1)
     return np.concatenate([walls, fill], axis=1)[:, :depth]
 
 
 def _padded_vertices(vertices: Floats, count: int) -> Floats:
-    """Vertices (K, S, D, 3) brought to exactly `count` points."""
+    """Vertices (K, S, D, 3) of composed paths brought to exactly `count` points."""
     cycles, paths, depth, _ = vertices.shape
     fill = np.zeros((cycles, paths, max(count - depth, 0), 3))
     return np.concatenate([vertices, fill], axis=2)[:, :, :count]
 
 
 def _reversed_rows(walls: Integers, bounces: Integers) -> Integers:
-    """Each row's first `bounces` entries in reverse order."""
+    """Wall sequences of composed paths: each row's first `bounces` entries in reverse order."""
     index = bounces[:, None] - 1 - np.arange(walls.shape[1])
     return np.where(index >= 0, np.take_along_axis(walls, np.maximum(index, 0), axis=1), -1)
 
 
 def _joined_vertices(tx: SpecularLegs, rx: SpecularLegs, i: Integers, j: Integers, point: Floats, count: int) -> Floats:
-    """Tx leg's bounce points, the landmark, the Rx leg's bounce points in the order of travel: (K, P, count, 3)."""
+    """Composed path's points (K, P, count, 3) in the order of travel: Tx bounces, landmark, Rx bounces."""
     vertices = np.zeros((tx.valid.shape[0], len(i), count, 3))
     for path, (a, b) in enumerate(zip(i, j, strict=True)):
         first, last = int(tx.num_bounces[a]), int(rx.num_bounces[b])

@@ -1,4 +1,4 @@
-"""What a scatterer re-radiates from one direction into another, by the law that its scene gives it."""
+"""Cross-section of a scatterer: what it re-radiates from one direction into another, by the law of its scene."""
 
 import numpy as np
 

@@ -28,7 +28,7 @@ def doppler_shift(paths: Paths, trajectory: Trajectory, wavelength: float) -> Fl
 
 
 def end_velocities(trajectory: Trajectory) -> tuple[Floats, Floats]:
-    """Velocities (K, 3) [m/s] of Tx and Rx: the agent's own, and what its turning adds."""
+    """Velocities (K, 3) [m/s] of Tx and Rx, which make the Doppler shift: the agent's own, and its turning's."""
     quarter = rotation_z(trajectory.heading + np.pi / 2.0)
     horizontal = np.array([1.0, 1.0, 0.0])
     turn = turn_rate(trajectory)[:, None]
@@ -40,14 +40,14 @@ def end_velocities(trajectory: Trajectory) -> tuple[Floats, Floats]:
 
 
 def turn_rate(trajectory: Trajectory) -> Floats:
-    """Rate (K,) [rad/s] of the heading, from its differences between cycles."""
+    """Rate (K,) [rad/s] of the heading for the ends' Doppler, from its differences between cycles."""
     if len(trajectory) < 2:
         return np.zeros(len(trajectory))
     return np.gradient(np.unwrap(trajectory.heading), trajectory.time)
 
 
 def advance_trajectory(trajectory: Trajectory, elapsed: float) -> Trajectory:
-    """Every pose `elapsed` [s] later, at the cycle's velocity and turn rate."""
+    """Moved trajectory: every pose `elapsed` [s] later, at the cycle's velocity and turn rate."""
     return replace(
         trajectory,
         time=trajectory.time + elapsed,
@@ -112,7 +112,7 @@ class _Rays(NamedTuple):
 
 
 def _rays(paths: Paths, scene: Scene, walls: Walls, trajectory: Trajectory) -> _Rays:
-    """Lengths and directions for poses (K,)."""
+    """Lengths and directions of moved paths for poses (K,)."""
     direct = (paths.landmark < 0)[:, None]
     tx, rx = (np.broadcast_to(end[:, None], (*paths.valid.shape, 3)) for end in (trajectory.tx, trajectory.rx))
     landmark = _landmark_points(paths, scene)
@@ -130,7 +130,7 @@ def _rays(paths: Paths, scene: Scene, walls: Walls, trajectory: Trajectory) -> _
 def _strength(
     paths: Paths, scene: Scene, walls: Walls, trajectory: Trajectory, wavelength: float, *, over: Trajectory
 ) -> Floats:
-    """Factor (K, P) on the gain from cross-sections that depend on directions, against an earlier `over`."""
+    """Factor (K, P) on a moved path's gain from cross-sections that depend on directions, against an earlier `over`."""
     factor = np.ones(paths.valid.shape)
     for number, scatterer in enumerate(scene.scatterers):
         mine = np.flatnonzero(paths.landmark == number)
@@ -145,7 +145,7 @@ def _strength(
 
 
 def _vertices(paths: Paths, walls: Walls, trajectory: Trajectory, rays: _Rays) -> Floats:
-    """Interaction points (K, P, V, 3) [m] of paths whose ends have moved on, in the order of travel."""
+    """Interaction points (K, P, V, 3) [m] of moved paths, in the order of travel."""
     ahead = _bounces(trajectory.tx, rays.departure, walls, paths.tx_walls)
     back = _bounces(trajectory.rx, rays.arrival, walls, paths.rx_walls[:, ::-1])[:, :, ::-1]
     vertices = np.array(paths.vertices)
@@ -158,7 +158,7 @@ def _vertices(paths: Paths, walls: Walls, trajectory: Trajectory, rays: _Rays) -
 
 
 def _bounces(start: Floats, direction: Floats, walls: Walls, sequences: Integers) -> Floats:
-    """Where rays (K, P, 3) from devices (K, 3) meet their walls (P, D), one after the other: (K, P, D, 3)."""
+    """Where moved rays (K, P, 3) from devices (K, 3) meet walls (P, D), one after the other: (K, P, D, 3)."""
     point, found = np.broadcast_to(start[:, None], direction.shape), np.zeros((*direction.shape[:2], 0, 3))
     for column in sequences.T if len(walls) else []:
         normal = walls.normal[column]
@@ -172,7 +172,7 @@ def _bounces(start: Floats, direction: Floats, walls: Walls, sequences: Integers
 
 
 def _landmark_points(paths: Paths, scene: Scene) -> Floats:
-    """(P, 3) [m], the origin for paths without a landmark."""
+    """(P, 3) [m] landmarks of moved paths, the origin for paths without one."""
     return np.concatenate([scene.landmark_positions, np.zeros((1, 3))])[paths.landmark]
 
 
@@ -187,7 +187,7 @@ def _mirrored(points: Floats, walls: Walls, sequences: Integers) -> Floats:
 def _panel_legs(
     paths: Paths, scene: Scene, walls: Walls, radio: RadioConfig, before: Trajectory, after: Trajectory
 ) -> RisLegs | None:
-    """The element responses of the panel's legs at a later moment: each element's own change of distance and angle."""
+    """Element responses of a moved path's panel legs: each element's own change of distance and angle."""
     if paths.ris is None or scene.ris is None:
         return paths.ris
     responses = []
@@ -210,7 +210,7 @@ def _panel_legs(
 
 
 def _ratio(spec: RisSpec, center: Floats, before: Floats, after: Floats, wavelength: float) -> Complexes:
-    """Element responses (K, I, N, M) of devices `after` over those `before`, 1 where the panel's back is shown."""
+    """Element responses (K, I, N, M) of devices that moved over those before, 1 where the panel's back is shown."""
     one = np.ones(before.shape[:-1], dtype=np.complex128)
     old, new = (leg_response(spec, center, device, one, wavelength) for device in (before, after))
     return np.where(old == 0.0, 1.0, new / np.where(old == 0.0, 1.0, old))

@@ -45,11 +45,11 @@ class SpecularLegs:
 
     @property
     def num_bounces(self) -> Integers:
-        """(S,)."""
+        """(S,) bounces of specular legs."""
         return (self.walls >= 0).sum(axis=1)
 
     def gain(self, wavelength: float) -> Complexes:
-        """(K, S), 0 where not valid."""
+        """(K, S) gain of specular legs, 0 where not valid."""
         length = np.where(self.valid, self.length, 1.0)
         gain = self.coefficient * wavelength / (4.0 * np.pi * length) * np.exp(-2j * np.pi / wavelength * length)
         return np.where(self.valid, gain, 0.0)

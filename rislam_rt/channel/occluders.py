@@ -39,7 +39,7 @@ class Occluders:
         return len(self.landmark)
 
     def of(self, shade: int) -> Floats:
-        """Triangles (t, 3, 3) [m] of one shade."""
+        """Triangles (t, 3, 3) [m] of one occluder."""
         return self.triangles[self.first[shade] : self.first[shade + 1]]
 
     def hides(self, start: Floats, end: Floats, spared: int = -1) -> Booleans:
@@ -85,7 +85,7 @@ def build_occluders(scene: Scene) -> Occluders:
 
 
 def _crosses(start: Floats, end: Floats, triangles: Floats) -> Booleans:
-    """Which segments (N, 3) pass through any of the triangles (T, 3, 3).
+    """Which segments (N, 3) pass through any of an occluder's triangles (T, 3, 3).
 
     Side of a line against the three edges by Pluecker coordinates: the products of an edge that two triangles share
     differ in sign alone.
@@ -106,7 +106,7 @@ def _crosses(start: Floats, end: Floats, triangles: Floats) -> Booleans:
 
 
 def _distance_to_segments(point: Floats, start: Floats, end: Floats) -> Floats:
-    """Distance (N,) [m] of one point (3,) from segments (N, 3)."""
+    """Distance (N,) [m] of one point (3,) from an occluder's outline, segments (N, 3)."""
     along = end - start
     square = np.einsum("ni,ni->n", along, along)
     fraction = np.einsum("ni,ni->n", point - start, along) / np.where(square > 0.0, square, 1.0)

@@ -1,4 +1,4 @@
-"""What a channel is."""
+"""The protocol of a channel: what every one offers."""
 
 from typing import Protocol
 
@@ -10,12 +10,12 @@ class Channel(Protocol):
 
     @property
     def scene(self) -> Scene:
-        """The room."""
+        """The room of a channel."""
         ...
 
     @property
     def radio(self) -> RadioConfig:
-        """The agent's radio."""
+        """The agent's radio in a channel."""
         ...
 
     @property
@@ -24,9 +24,9 @@ class Channel(Protocol):
         ...
 
     def paths(self, trajectory: Trajectory) -> Paths:
-        """Every path of every cycle, with the panel at level 0."""
+        """What every channel gives: every path of every cycle, with the panel at level 0."""
         ...
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """The same paths under another code, without tracing again."""
+        """What every channel gives: the same paths under another code, without tracing again."""
         ...

@@ -30,7 +30,7 @@ def main() -> None:
 
 
 def _run(heard: list[int]) -> int:
-    """Run a command; its exit code. `heard`: signals that came."""
+    """Run a command of the command line; its exit code. `heard`: signals that came."""
     import typer
 
     from rislam_rt.cli.app import app
@@ -58,7 +58,7 @@ def _run(heard: list[int]) -> int:
 
 
 def _tell(error: "RislamError") -> int:
-    """Every fault on a line of its own; returns the exit code."""
+    """Every fault of a command on a line of its own; returns the exit code."""
     from rislam_rt.cli.verbosity import verbosity
 
     if verbosity().verbose:

@@ -1,4 +1,4 @@
-"""The list of commands."""
+"""The app: the list of commands."""
 
 import typer
 

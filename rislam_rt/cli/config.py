@@ -39,7 +39,7 @@ def command(
 
 
 def _print_file(settings: "list[Setting]", spec: Any) -> None:
-    """All settings as TOML, each under one line on its meaning; those without a value are commented out."""
+    """Print all settings of `config` as TOML, each under one line on its meaning; those without a value as comments."""
     from rislam_rt.toml import toml_value
 
     table = ""
@@ -74,7 +74,7 @@ def _value(spec: Any, key: str) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """A value of a specification as TOML and JSON know it."""
+    """A value for `config` as TOML and JSON know it."""
     from pydantic import BaseModel
 
     if isinstance(value, BaseModel):

@@ -1,4 +1,4 @@
-"""Ctrl-C, and SIGTERM as a queue sends it: the work ends in order, and says so in one line."""
+"""Interrupts, Ctrl-C and SIGTERM as a queue sends it: the work ends in order, and says so in one line."""
 
 import signal
 import sys

@@ -106,7 +106,7 @@ def command(
 
 
 def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, template: str) -> None:
-    """A room comes from one thing.
+    """Refuse `new` for a room from more than one thing.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, te
 
 
 def is_xml(source: Path) -> bool:
-    """Whether a room comes from a scene file of Mitsuba or Sionna RT."""
+    """Whether `new` makes a room from a scene file of Mitsuba or Sionna RT."""
     return source.suffix.lower() == ".xml" or str(source).startswith("sionna:")
 
 
@@ -146,7 +146,7 @@ def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overw
 
 
 def _point(text: str) -> tuple[float, float, float]:
-    """Three numbers `x,y,z`.
+    """Three numbers `x,y,z` of an option of `new`.
 
     Raises
     ------

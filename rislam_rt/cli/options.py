@@ -1,4 +1,4 @@
-"""Arguments that several commands share, and the machine-readable copy of what they print."""
+"""Options that several commands share, and the machine-readable copy of what they print."""
 
 import os
 import sys
@@ -61,7 +61,7 @@ ChannelName = Annotated[Literal["traced", "image_source"], typer.Option(help="Ra
 
 
 def parse_numbers(option: str, text: str) -> list[float]:
-    """Numbers parted by commas; none of an empty text.
+    """Numbers of an option, parted by commas; none of an empty text.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def parse_numbers(option: str, text: str) -> list[float]:
 
 
 def write_json(file: Path | None, content: dict[str, Any]) -> None:
-    """Write a JSON file whole or not at all; nothing if no file was asked for.
+    """Write the JSON file of the option `--json` whole or not at all; nothing if it was not asked for.
 
     Raises
     ------

@@ -22,7 +22,7 @@ def _bars(*columns: "ProgressColumn") -> "Progress":
 
 @contextmanager
 def show_progress() -> Iterator[Tell]:
-    """Show a bar for every stage that news comes of."""
+    """Show progress as a bar for every stage that news comes of."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     columns = (
@@ -69,7 +69,7 @@ def show_sweep() -> "Iterator[Callable[[SweepProgress], None]]":
 
 
 def describe_cost(told: "SweepProgress") -> str:
-    """How many cells there are, how many are there, and what the rest will cost."""
+    """Progress of a sweep: how many cells there are, how many are done, and what the rest will cost."""
     there = f"{told.total} cells, {told.done} done" + (f", {told.failed} failed" if told.failed else "")
     if not told.cost.cells:
         return f"{there}; nothing left to do"
@@ -77,7 +77,7 @@ def describe_cost(told: "SweepProgress") -> str:
 
 
 def clock(cost: "SweepCost") -> str:
-    """The time that is left as `h:mm:ss`."""
+    """Progress: the time that is left as `h:mm:ss`."""
     if cost.seconds is None:
         return "unknown time"
     whole = round(cost.seconds)

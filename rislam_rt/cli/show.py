@@ -66,7 +66,7 @@ def command(
 
 
 def _write_view(room: "Scene", settings: "Records", depth: int, file: Path) -> Path:
-    """Find the paths of some poses, and write the page."""
+    """Write the page of `show --html`, with the paths of some poses."""
     import numpy as np
 
     from rislam_rt.adviser.budget import trajectory_at

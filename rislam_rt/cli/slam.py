@@ -88,7 +88,7 @@ def _prior(start: str, velocity: str, stds: tuple[float, float, float]) -> "Star
 
 
 def _body(tx: str | None, rx: str | None) -> "Body | None":
-    """Where Tx and Rx sit on the agent, from the options; None if nothing is said."""
+    """Where Tx and Rx sit on the agent, from the options of `slam`; None if nothing is said."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.model import Body
 
@@ -152,6 +152,7 @@ def _summary(inputs: "Inputs", answers: "Answers", true: "Floats | None") -> dic
         "cycles": len(inputs.time),
         "components": sum(len(m) for m in inputs.measurements),
         "ended": outcomes[-1],
+        "cycles_diverged": outcomes.count("diverged"),
         "last_position_m": [round(float(value), 4) for value in last.position],
         "deviation_m": float(np.sqrt(np.trace(last.covariance[:2, :2]))),
         "landmarks": int(np.sum(last.map.parent < 0)),
@@ -166,7 +167,7 @@ def _summary(inputs: "Inputs", answers: "Answers", true: "Floats | None") -> dic
 
 
 def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
-    """The estimate as TUM and as CSV, and the last map."""
+    """Write what `slam` found: the estimate as TUM and as CSV, and the last map."""
     import json
 
     import numpy as np

@@ -1,4 +1,4 @@
-"""What `rislam-rt run` does with a pipeline that is not the main job."""
+"""Studies: what `rislam-rt run` does with a pipeline that is not the main job."""
 
 import os
 from pathlib import Path
@@ -9,10 +9,10 @@ import typer
 from rislam_rt.cli.options import write_json
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from rislam_rt.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec
-    from rislam_rt.sweeps import Row
+    from rislam_rt.sweeps import Row, Sweep
 
 
 class StudyOptions(NamedTuple):
@@ -60,7 +60,7 @@ def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
 
 
 def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
-    """Fig. 4(a): gain against distance."""
+    """Run the study of Fig. 4(a): gain against distance."""
     import numpy as np
 
     from rislam_rt.cli.progress import show_progress
@@ -91,13 +91,11 @@ def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
 
 def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
     """A study on the sweep engine; its page grows while it runs. Exit code 1 if a cell failed."""
-    from rislam_rt.cli.interrupts import Interrupted
-    from rislam_rt.cli.progress import show_sweep
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.report.swept import write_swept
     from rislam_rt.studies.swept import build_sweep
     from rislam_rt.studies.swept.record import swept_record
-    from rislam_rt.sweeps import SweepOptions, build_cells, run_sweep
+    from rislam_rt.sweeps import build_cells
     from rislam_rt.sweeps.store import check_folder
 
     sweep = build_sweep(spec, given.pipeline, given.scene)
@@ -108,16 +106,33 @@ def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
     for kind in {cell.depends["config"]["channel"] for cell in found}:
         prepare_channel(kind)
 
-    def grow(rows: "Sequence[Row]") -> None:
-        write_swept(rows, spec, record, folder, figures=given.page)
+    def write(rows: "Sequence[Row]") -> Path | None:
+        return write_swept(rows, spec, record, folder, figures=given.page)
 
-    effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, spec.time_limit_s)
+    run_cells(sweep, cells, spec.time_limit_s, given, record, write)
+
+
+def run_cells(
+    sweep: "Sweep", cells: Path, limit: float | None, given: StudyOptions, record: "Mapping[str, Any]",
+    write: "Callable[[Sequence[Row]], Path | None]", show: "Callable[[Sequence[Row]], None] | None" = None,
+) -> None:  # fmt: skip
+    """Run a study's cells, its page written anew as they end; `show` prints them at last. Exit code 1 if one failed."""
+    from rislam_rt.cli.interrupts import Interrupted
+    from rislam_rt.cli.progress import show_sweep
+    from rislam_rt.sweeps import SweepOptions, run_sweep
+
+    def grow(rows: "Sequence[Row]") -> None:
+        write(rows)
+
+    effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, limit)
     try:
         with show_sweep() as tell:
             report = run_sweep(sweep, cells, effort, tell=tell, grow=grow)
     except KeyboardInterrupt:
         raise Interrupted("interrupted: what is done is kept; the same command goes on from there") from None
-    typer.echo(f"page: {write_swept(report.rows, spec, record, folder, figures=given.page)}")
+    if show is not None:
+        show(report.rows)
+    typer.echo(f"page: {write(report.rows)}")
     typer.echo(f"cells: {cells}")
     write_json(given.json, {**record, "failed": len(report.failed)})
     if report.failed:
@@ -144,12 +159,12 @@ def run_claims(spec: "ClaimsSpec", given: StudyOptions) -> None:
 
 
 def _beside(pipeline: Path, scene: str) -> Path:
-    """A scene folder that a pipeline file names."""
+    """A scene folder that a study's pipeline file names."""
     return Path(os.path.normpath(pipeline.parent / scene))
 
 
 def output_folder(out: Path | None, name: str, record: "Mapping[str, Any]") -> Path:
-    """Where the files go: `--out`, whose folder they may share with others, or `runs/<name>-<hash of the record>`.
+    """Where a study's files go: `--out`, shared with others, or `runs/<name>-<hash of the record>`.
 
     Raises
     ------

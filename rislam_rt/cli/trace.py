@@ -116,7 +116,7 @@ def check_new(folder: Path) -> None:
 
 
 def part_of_motion(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
-    """The scene with a part of its trajectory's cycles.
+    """The scene to trace with a part of its trajectory's cycles.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def part_of_motion(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
 
 
 def trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, file: Path | None) -> TraceResult:
-    """All paths with the panel at level 0, written to a file if one is given."""
+    """Trace all paths with the panel at level 0, to a file if one is given."""
     from time import perf_counter
 
     from rislam_rt.pipeline.dataset import paths_to_dataset

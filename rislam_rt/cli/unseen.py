@@ -1,13 +1,9 @@
 """What `rislam-rt run` does with a study in unseen rooms."""
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
-from rislam_rt.cli.options import write_json
-from rislam_rt.cli.study import StudyOptions, output_folder
+from rislam_rt.cli.study import StudyOptions, output_folder, run_cells
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,15 +14,13 @@ if TYPE_CHECKING:
 
 def run_unseen(spec: "UnseenSpec", given: StudyOptions) -> None:
     """Draw the rooms, run what the file asks for in each, print and write the score card; exit code 1 if one failed."""
-    from rislam_rt.cli.interrupts import Interrupted
-    from rislam_rt.cli.progress import show_sweep
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.report.unseen import write_unseen
     from rislam_rt.report.unseen.terminal import print_cards
     from rislam_rt.studies.unseen import build_unseen, count_tests
     from rislam_rt.studies.unseen.record import unseen_record
-    from rislam_rt.sweeps import SweepOptions, build_cells, run_sweep
+    from rislam_rt.sweeps import build_cells
     from rislam_rt.sweeps.store import check_folder, read_timings
 
     if given.scene is not None:
@@ -44,18 +38,7 @@ def run_unseen(spec: "UnseenSpec", given: StudyOptions) -> None:
         timings = read_timings(cells)
         return write_unseen(rows, spec, record, folder, tests=tests, timings=timings, figures=given.page)
 
-    def grow(rows: "Sequence[Row]") -> None:
-        write(rows)
+    def show(rows: "Sequence[Row]") -> None:
+        print_cards(rows, read_timings(cells))
 
-    effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, spec.time_limit_s)
-    try:
-        with show_sweep() as tell:
-            report = run_sweep(sweep, cells, effort, tell=tell, grow=grow)
-    except KeyboardInterrupt:
-        raise Interrupted("interrupted: what is done is kept; the same command goes on from there") from None
-    print_cards(report.rows, read_timings(cells))
-    typer.echo(f"page: {write(report.rows)}")
-    typer.echo(f"cells: {cells}")
-    write_json(given.json, {**record, "failed": len(report.failed)})
-    if report.failed:
-        raise typer.Exit(1)
+    run_cells(sweep, cells, spec.time_limit_s, given, record, write, show)

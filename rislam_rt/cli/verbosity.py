@@ -1,4 +1,4 @@
-"""How much a command says beside its result: `-q` no bars and no warnings, `-v` what it used, and where it failed."""
+"""Verbosity, what a command says beside its result: `-q` no bars and warnings, `-v` what it used, where it failed."""
 
 import inspect
 from collections.abc import Callable
@@ -24,24 +24,24 @@ _now = Verbosity()
 
 
 def verbosity() -> Verbosity:
-    """That of the command that runs."""
+    """Verbosity of the command that runs."""
     return _now
 
 
 def reset() -> None:
-    """As before any command."""
+    """Verbosity as before any command."""
     global _now
     _now = Verbosity()
 
 
 def warn(line: str) -> None:
-    """A warning on the error stream, unless quiet was asked for."""
+    """Print a warning on the error stream, unless quiet was asked for by verbosity."""
     if not _now.quiet:
         typer.echo(f"warning: {line}", err=True)
 
 
 def with_verbosity(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The command with `-q` and `-v` behind its own options."""
+    """A command with the options of verbosity, `-q` and `-v`, behind its own."""
 
     @wraps(command)
     def wrapped(*arguments: Any, quiet: bool = False, verbose: bool = False, **options: Any) -> Any:
@@ -62,7 +62,7 @@ def with_verbosity(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _watched(command: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
-    """Say what the command used."""
+    """With verbosity `-v`, say what the command used."""
     from time import perf_counter, process_time
 
     from rislam_rt.pipeline.run import library_versions

@@ -140,7 +140,7 @@ def _believed_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_Believed,
 
 
 def _gradient(points: Floats, paths: _Believed, tx: Floats, rx: Floats, mode: GradientMode) -> Floats:
-    """(B, Q, 3) gradients of the path lengths by the agent's position.
+    """Gradients (B, Q, 3) of believed path lengths by the agent's position.
 
     The segment between landmark and wall is that between wall and device, mirrored in the wall between landmark and
     image: so the paper's sum over all segments needs no bounce points. A point that is its own image has no wall.
@@ -158,7 +158,7 @@ def _gradient(points: Floats, paths: _Believed, tx: Floats, rx: Floats, mode: Gr
 
 
 def _ratio(landmarks: MapEstimate, paths: _Believed) -> Floats:
-    """Amplitude (Q,) that the wall of an image leaves; 1 without a wall."""
+    """Amplitude (Q,) that the wall of a believed image leaves; 1 without a wall."""
     image = np.where(paths.tx_point != paths.source, paths.tx_point, paths.rx_point)
     return np.where(image != paths.source, landmarks.strength[image], 1.0)
 
@@ -167,7 +167,7 @@ def _panel_responses(
     landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, held: list[int], ris: DataSheet,
     radio: RadioConfig,
 ) -> Complexes:  # fmt: skip
-    """(B, Q, N, M) element responses of the paths of all panels, whose rows are `held`."""
+    """(B, Q, N, M) believed element responses of the paths of all panels, whose rows are `held`."""
     whole = np.zeros((len(tx), len(paths.source), ris.rows, ris.cols), dtype=np.complex128)
     for number, row in enumerate(held):
         mine = np.flatnonzero(paths.source == row)
@@ -179,7 +179,7 @@ def _panel_responses(
 def _responses_of(
     landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, row: int, ris: RisSpec, radio: RadioConfig
 ) -> Complexes:
-    """(B, Q, N, M) element responses of the paths of the panel in a row of the map."""
+    """(B, Q, N, M) believed element responses of the paths of the panel in a row of the map."""
     center, legs = landmarks.position[row], []
     for end, seen, antenna_gain in ((tx, paths.tx_point, radio.tx_gain), (rx, paths.rx_point, radio.rx_gain)):
         # a point that is the panel itself has no plane: its zero normal mirrors nothing
@@ -193,7 +193,7 @@ def _responses_of(
 
 
 def _point_gains(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, radio: RadioConfig) -> Complexes:
-    """(B, Q) gains by eq. `a2`, two legs joined by the landmark's strength (root of its cross-section)."""
+    """(B, Q) believed gains by eq. `a2`, two legs joined by the landmark's strength (root of its cross-section)."""
     nearest = radio.wavelength  # a believed landmark may lie on the agent; the law ends about there
     first = np.maximum(np.linalg.norm(landmarks.position[paths.tx_point] - tx, axis=-1), nearest)
     second = np.maximum(np.linalg.norm(landmarks.position[paths.rx_point] - rx, axis=-1), nearest)
@@ -203,7 +203,7 @@ def _point_gains(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Float
 
 
 def _length_variance(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats) -> Floats:
-    """(B, Q) variance [m^2] of the path lengths that comes with the landmarks' covariances."""
+    """(B, Q) variance [m^2] of believed path lengths that comes with the landmarks' covariances."""
     first = unit(landmarks.position[paths.tx_point] - tx)
     second = unit(landmarks.position[paths.rx_point] - rx)
     tx_spread, rx_spread = landmarks.covariance[paths.tx_point], landmarks.covariance[paths.rx_point]

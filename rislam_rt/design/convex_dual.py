@@ -59,7 +59,7 @@ def dual_bound(problem: DesignProblem, index: Integers, *, iterations: int = 300
 
 
 def _matrix(packed: Floats) -> Floats:
-    """Symmetric matrices (..., 2, 2) of xx, xy, yy (..., 3)."""
+    """Symmetric matrices (..., 2, 2) of the dual from xx, xy, yy (..., 3)."""
     return packed[..., [[0, 1], [1, 2]]]
 
 
@@ -74,7 +74,8 @@ class _Setting(NamedTuple):
 
 
 def _start(setting: _Setting, inverse: Floats, code: Complexes) -> Floats:
-    """Free parameters at a code: Y its inverse information, half of every path relaxed, d its share of the sum."""
+    """Start of the dual's search at a code: Y its inverse information, half of every path relaxed, d its share of the
+    sum."""
     weight = setting.scale * np.sum((setting.gradient @ inverse) ** 2, axis=-1).ravel()
     pull = (weight[:, None] * setting.response.conj()).T @ (setting.response @ code)
     spread = np.maximum(np.real(code.conj() * pull), 1e-3 * np.abs(pull).mean() + _TINY)
@@ -82,7 +83,7 @@ def _start(setting: _Setting, inverse: Floats, code: Complexes) -> Floats:
 
 
 def _negative_bound(free: Floats, setting: _Setting, sharpness: float) -> tuple[float, Floats]:
-    """Minus the bound and its slope in Y (3 a sample), logits of the relaxed shares, and log d."""
+    """Minus the dual bound and its slope in Y (3 a sample), logits of the relaxed shares, and log weights."""
     samples, paths = setting.gradient.shape[:2]
     packed, split, log_spread = np.split(free, [3 * samples, 3 * samples + samples * paths])
     half = _matrix(packed.reshape(samples, 3))
@@ -107,7 +108,7 @@ def _negative_bound(free: Floats, setting: _Setting, sharpness: float) -> tuple[
 def _relaxed_optimum(
     weight: Floats, spread: Floats, response: Complexes, sharpness: float
 ) -> tuple[float, Floats, Floats]:
-    """Bound of `sum_p c_p |r_p w|^2` over phases, and its slopes in c (Q,) and log d (N M,).
+    """Relaxed optimum in the dual of `sum_p c_p |r_p w|^2` over phases, and slopes in c (Q,), log d (N M,).
 
     lambda_max is smoothed from above: by a log-sum-exp whose width is its own value over `sharpness`.
     """

@@ -43,7 +43,8 @@ def coordinate_descent(objective: Objective, index: Integers, levels: int, max_s
 
 
 def _rank_by_value(objective: Objective, weight: Complexes, gain: Complexes, now: float) -> tuple[Integers, Integers]:
-    """Elements worth changing, best first, and for all elements the best step in level, less one; exact."""
+    """Elements that coordinate descent tries, best first, and for all elements the best step in level, less one;
+    exact."""
     shift = objective.table[1:] - 1.0
     value = objective.value(gain + (weight[:, None] * objective.matrix) * shift[:, None, None])
     change = np.argmin(value, axis=0)
@@ -53,7 +54,7 @@ def _rank_by_value(objective: Objective, weight: Complexes, gain: Complexes, now
 
 
 def _rank_by_slope(objective: Objective, weight: Complexes, gain: Complexes, now: float) -> tuple[Integers, Integers]:
-    """The same to first order in the powers: two products instead of a valuation of every change."""
+    """Elements that coordinate descent tries, to first order in the powers: two products for all changes."""
     size = 1e-6
     slope = (objective.value(gain * (1.0 + 0.5 * size * np.eye(len(gain)))) - now) / size
     shift = objective.table[1:] - 1.0
@@ -69,7 +70,7 @@ def _rank_by_slope(objective: Objective, weight: Complexes, gain: Complexes, now
 
 
 def _first_changes(index: Integers, order: Integers, change: Integers, levels: int) -> Integers:
-    """Codes (T, N M) with the best changes of the first 1, 2, 4, ... elements of `order` applied."""
+    """Codes (T, N M) of coordinate descent with the best changes of the first 1, 2, 4, ... elements of `order`."""
     trials = []
     count = 1
     while True:
@@ -83,7 +84,7 @@ def _first_changes(index: Integers, order: Integers, change: Integers, levels: i
 
 
 def exact_codes(problem: DesignProblem) -> Integers:
-    """(N M,) the elements of every panel at the optimum of its direct path."""
+    """(N M,) start of coordinate descent: every panel at the optimum of its direct path."""
     return np.concatenate([exact_code(target, problem.levels)[0] for target in problem.targets])
 
 

@@ -96,7 +96,7 @@ def _describe(
 
 
 def _db(magnitude: Floats) -> Floats:
-    """20 log10 (...,), a gain of zero as -400 dB."""
+    """20 log10 (...,) for a designer's result, a gain of zero as -400 dB."""
     return 20.0 * np.log10(np.maximum(magnitude, 1e-20))
 
 

@@ -126,5 +126,5 @@ def design_along(
 
 
 def _db(magnitude: Floats) -> Floats:
-    """20 log10 (...,)."""
+    """Gain in decibels, 20 log10 (...,)."""
     return 20.0 * np.log10(magnitude)

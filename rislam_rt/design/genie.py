@@ -11,13 +11,13 @@ from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode
 
 
 def panel_columns(paths: Paths, cycle: int) -> Integers:
-    """Panel paths (P,) of a cycle, the direct one first if it is there."""
+    """Panel paths (P,) of a cycle that the genie knows, the direct one first if it is there."""
     over_panel = np.flatnonzero(paths.valid[cycle] & np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS)))
     return over_panel[np.argsort(paths.kind[over_panel] != PathKind.RIS, kind="stable")]
 
 
 def focus_codes(paths: Paths, levels: int) -> RisCode:
-    """Codes (K, N, M), one a cycle: every panel at the optimum of its direct path, 0 where it is hidden.
+    """Codes (K, N, M) of the genie, one a cycle: every panel at the optimum of its direct path, 0 where hidden.
 
     Raises
     ------

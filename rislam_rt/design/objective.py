@@ -28,18 +28,18 @@ class Objective:
     """`UNOBSERVABLE` if no code makes the information regular: then the value is `1 / tr J`, the part that is seen."""
 
     def gains(self, weight: Complexes) -> Complexes:
-        """Gains (..., B P) under element weights (..., N M)."""
+        """Gains (..., B P) in the objective under element weights (..., N M)."""
         return weight @ self.matrix
 
     def value(self, gain: Complexes) -> Floats:
-        """Expected CRLB (...,) [m^2] of gains (..., B P)."""
+        """Objective, the expected CRLB (...,) [m^2], of gains (..., B P)."""
         power = detected_power(gain.real**2 + gain.imag**2, self.least_power)
         if self.spread is not None:
             power = power / (1.0 + power * self.spread)
         return self.value_of_power(power)
 
     def value_of_power(self, power: Floats) -> Floats:
-        """Expected CRLB (...,) of (discounted) powers (..., B P)."""
+        """Objective, the expected CRLB (...,), of (discounted) powers (..., B P)."""
         samples, paths, _ = self.outer.shape
         if samples == 1:
             information = power @ self.outer[0] + self.fixed[0]
@@ -48,11 +48,11 @@ class Objective:
         return self._inverse_trace(information + self.fixed).mean(axis=-1)
 
     def of_index(self, index: Integers) -> Floats:
-        """Expected CRLB (...,) of codes (..., N M)."""
+        """Objective, the expected CRLB (...,), of codes (..., N M)."""
         return self.value(self.gains(self.table[index]))
 
     def _inverse_trace(self, information: Floats) -> Floats:
-        """Trace (...,) of the inverse of 2 x 2 matrices (..., 3)."""
+        """Trace (...,) in the objective of the inverse of 2 x 2 matrices (..., 3)."""
         xx, xy, yy = information[..., 0], information[..., 1], information[..., 2]
         trace = xx + yy
         if self.outcome is Outcome.UNOBSERVABLE:
@@ -106,5 +106,5 @@ def detected_power(power: Floats, least: float) -> Floats:
 
 
 def level_table(levels: int) -> Complexes:
-    """exp(-j xi) (H,) of the levels 0..H-1."""
+    """Weights exp(-j xi) (H,) in the objective of the levels 0..H-1."""
     return np.exp(-2j * np.pi / levels * np.arange(levels))

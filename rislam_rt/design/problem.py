@@ -1,4 +1,4 @@
-"""What a designer is given: the paths that meet the panel, the others, and what is known of the agent beforehand."""
+"""The design problem: paths that meet the panel, the others, and what is known of the agent beforehand."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -60,7 +60,7 @@ class DesignProblem:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns of the panel."""
+        """Rows and columns of the panel that is designed for."""
         return self.response.shape[2], self.response.shape[3]
 
     @property
@@ -70,7 +70,7 @@ class DesignProblem:
 
     @property
     def targets(self) -> list[Complexes]:
-        """For each panel the same of its own direct path, at its own elements."""
+        """For each panel the design problem of its own direct path, at its own elements."""
         return [self.response[0, row].ravel()[span] for row, span in self.panels]
 
     def owner(self) -> Integers:

@@ -1,4 +1,4 @@
-"""Lower bound of the multi-path objective: every path at its own best, all at once."""
+"""Lower bound of the multi-path objective by relaxation: every path at its own best, all at once."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ def best_magnitudes(problem: DesignProblem) -> Floats:
 
 
 def relaxation_bound(objective: Objective, best: Floats) -> float:
-    """Bound [m^2] from the paths' own best gains (B, P).
+    """Bound [m^2] by relaxation, from the paths' own best gains (B, P).
 
     The information it is made of exceeds that of every code (as matrices), and the trace of the inverse falls with it.
     """

@@ -1,4 +1,4 @@
-"""What a designer returns, and how it is told what to do."""
+"""The result of a design, and the settings that a designer is given."""
 
 from dataclasses import dataclass
 from typing import Protocol

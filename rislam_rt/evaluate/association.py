@@ -1,4 +1,4 @@
-"""How well measurements were told apart: against the identities that only the scorer sees."""
+"""Scores of association: how well measurements were told apart, by identities that only the scorer sees."""
 
 from typing import NamedTuple
 

@@ -23,17 +23,17 @@ class Interval(NamedTuple):
 
 
 def mean_over_runs(samples: Floats) -> Floats:
-    """Mean over the first axis."""
+    """Mean over the first axis, as a statistic for confidence intervals."""
     return np.asarray(np.mean(samples, axis=0))
 
 
 def rms_over_runs(samples: Floats) -> Floats:
-    """Root mean square over the first axis: RMSE over seeds from the RMSE of each."""
+    """Root mean square over the first axis, as a statistic for confidence intervals: RMSE over seeds."""
     return np.asarray(np.sqrt(np.mean(np.asarray(samples) ** 2, axis=0)))
 
 
 def median_over_runs(samples: Floats) -> Floats:
-    """Median over the first axis."""
+    """Median over the first axis, as a statistic for confidence intervals."""
     return np.asarray(np.median(samples, axis=0))
 
 

@@ -1,4 +1,4 @@
-"""Whether a filter knows how wrong it is: normalised squared errors against their chi-square bounds."""
+"""Consistency, whether a filter knows how wrong it is: normalised squared errors against chi-square bounds."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from rislam_rt.errors import ConfigError
 
 
 def normalised_squares(errors: Floats, covariances: Floats) -> Floats:
-    """`e^T P^-1 e` (...,) of errors (..., D) with covariances (..., D, D).
+    """Squares for consistency (NEES, NIS): `e^T P^-1 e` (...,) of errors (..., D), covariances (..., D, D).
 
     NEES of state errors, NIS of innovations; chi-square with D degrees of freedom when the filter is consistent.
     Infinite where a covariance is not positive definite.

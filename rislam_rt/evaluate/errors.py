@@ -10,12 +10,12 @@ from rislam_rt.geometry.angles import wrap
 
 
 def position_errors(estimate: Floats, truth: Floats) -> Floats:
-    """Distances (...,) [m] between positions (..., D)."""
+    """Position errors (...,) [m], distances between positions (..., D)."""
     return np.asarray(np.linalg.norm(np.asarray(estimate) - np.asarray(truth), axis=-1))
 
 
 def rmse(estimate: Floats, truth: Floats) -> float:
-    """Root of the mean squared distance [m] over all positions (..., D)."""
+    """Root mean squared error [m] over all positions (..., D)."""
     return root_mean_square(position_errors(estimate, truth))
 
 
@@ -84,7 +84,8 @@ def trajectory_error(
 
 
 def align(estimate: Floats, truth: Floats) -> Floats:
-    """Estimated positions (K, 3), turned about z and shifted so that they fit the true ones best (least squares)."""
+    """Estimated positions (K, 3) aligned: turned about z and shifted so that they fit the true ones best (least
+    squares)."""
     centred, target = estimate - estimate.mean(axis=0), truth - truth.mean(axis=0)
     # The angle that maximises sum target . R centred, with complex numbers for the plane.
     overlap = np.sum(np.conj(centred[:, 0] + 1j * centred[:, 1]) * (target[:, 0] + 1j * target[:, 1]))

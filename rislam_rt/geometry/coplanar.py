@@ -1,4 +1,4 @@
-"""Surfaces in one plane: which walls lie on which, within what a tracer in float32 can tell apart."""
+"""Coplanar surfaces: which walls lie on which, within what a tracer in float32 can tell apart."""
 
 from typing import NamedTuple
 
@@ -101,7 +101,7 @@ def _any_overlap(a: Floats, b: Floats, depth: float) -> bool:
 
 
 def _parallel_pairs(normal: Floats, offset: Floats, corner: Floats, gap: float) -> list[tuple[int, int]]:
-    """Pairs of walls with nearly one normal, one corner (W, 3) of either near the other's plane.
+    """Pairs of walls that may be coplanar: nearly one normal, one corner (W, 3) near the other's plane.
 
     Walls sorted by their normal's component in a generic direction are compared with their neighbours in that order.
     """
@@ -127,7 +127,7 @@ def _lies_on(area: Floats, i: int, j: int) -> bool:
 
 
 def _areas(triangles: Floats, owner: Integers, count: int) -> Floats:
-    """(W,) [m^2]."""
+    """(W,) [m^2] of walls that may be coplanar."""
     sides = triangles[:, 1:] - triangles[:, :1]
     area = np.zeros(count)
     np.add.at(area, owner, 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=-1))
@@ -135,13 +135,13 @@ def _areas(triangles: Floats, owner: Integers, count: int) -> Floats:
 
 
 def _members(owner: Integers, count: int) -> list[Integers]:
-    """The triangles of each wall."""
+    """Triangles of each wall that may be coplanar."""
     order = np.argsort(owner, kind="stable")
     return np.split(order, np.searchsorted(owner[order], np.arange(1, count)))[:count]
 
 
 def _joint_planes(pairs: list[CoplanarPair], area: Floats) -> Integers:
-    """(W,) the largest wall of all that hang together with each."""
+    """(W,) the largest wall of all coplanar ones that hang together with each."""
     plane = np.arange(len(area))
     for _ in pairs:  # a chain of n pairs settles within n rounds
         before = plane.copy()

@@ -1,4 +1,4 @@
-"""What a resolved path can be measured to: delay, direction cosines of the planar array, amplitude."""
+"""Accuracy of a resolved path's measurement: delay, direction cosines of the planar array, amplitude."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -21,7 +21,7 @@ class MeasurementStd(NamedTuple):
 
 
 def measurement_std(snr_integrated: Floats, radio: RadioConfig) -> MeasurementStd:
-    """Bounds for SNRs (...,) after integration over signal and all antennas (`L E |alpha|^2 / N0`), linear.
+    """Accuracy at SNRs (...,) after integration over signal and all antennas (`L E |alpha|^2 / N0`), linear.
 
     `var tau = 1 / (8 pi^2 zeta^2 SNR)`; `cosine_information` for the angles. Infinite where the SNR is 0 and for a
     cosine along which the array has no extent.
@@ -45,7 +45,7 @@ def cosine_information(snr_per_antenna: Floats, radio: RadioConfig) -> Floats:
 
 @lru_cache(maxsize=64)
 def _aperture(array: RxArray, wavelength: float) -> Floats:
-    """(2,) [m^2] `sum_l x_l^2` along rows and columns, about the array's centre; read-only."""
+    """(2,) [m^2] `sum_l x_l^2` of the array, on which the accuracy of cosines rests; read-only."""
     positions = array.positions(wavelength)[:, :2]
     spread = np.sum((positions - positions.mean(axis=0)) ** 2, axis=0)
     spread.flags.writeable = False

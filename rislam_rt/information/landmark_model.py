@@ -77,7 +77,7 @@ class LandmarkModel:
 
     @property
     def num_unknowns(self) -> int:
-        """U."""
+        """U, the unknown coordinates of landmarks and walls."""
         return len(self.labels)
 
     def prior_std(self, length: float = 10.0, tilt: float = 0.5) -> Floats:
@@ -109,7 +109,7 @@ class LandmarkModel:
     def rows(
         self, least_snr: float = 10.0, *, angles: bool = True, use_vt: bool = False
     ) -> Iterator[LinearMeasurements]:
-        """Measurements of each cycle in turn.
+        """Measurements of landmarks and walls in each cycle in turn.
 
         Parameters
         ----------
@@ -186,7 +186,7 @@ def build_landmark_model(
     *,
     walls: Unknown = "planes",
 ) -> LandmarkModel:
-    """Set up the unknowns of a trajectory's paths.
+    """Set up the landmarks and walls that are unknown on a trajectory's paths.
 
     Parameters
     ----------

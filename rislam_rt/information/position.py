@@ -36,7 +36,7 @@ def range_information(snr: Floats, radio: RadioConfig) -> Floats:
 
 
 def position_information(gradient: Floats, snr: Floats, radio: RadioConfig) -> Floats:
-    """`J_p` (..., D, D) [1/m^2] of eq. `derived`, for paths that do not overlap.
+    """Information on the position, `J_p` (..., D, D) [1/m^2] of eq. `derived`, for paths that do not overlap.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ class PosteriorBound:
 
     @property
     def rms(self) -> Floats:
-        """(K,) position error [m] over the axes that are filtered."""
+        """(K,) posterior bound on the position [m] over the axes that are filtered."""
         axes = self.agent.shape[1] // 2
         return np.asarray(np.sqrt(np.einsum("kii->k", self.agent[:, :axes, :axes])))
 
@@ -36,7 +36,7 @@ class PosteriorBound:
 def posterior_bound(
     rows: Iterable[LinearMeasurements], time: Floats, motion: MotionPrior, unknown_std: Floats
 ) -> PosteriorBound:  # fmt: skip
-    """Run the recursion along a trajectory, linearised at the truth.
+    """The posterior CRLB by its recursion along a trajectory, linearised at the truth.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def posterior_bound(
 
 
 def _advance(spread: Floats, dt: float, motion: MotionPrior) -> Floats:
-    """Root (N, N) of the covariance after one time step, (N, N + D): `F = [I dt; 0 I]`, discrete white noise."""
+    """Root (N, N) of the posterior bound after one time step, (N, N + D): `F = [I dt; 0 I]`, discrete white noise."""
     axes = motion.axes
     moved = spread.copy()
     moved[:axes] += dt * spread[axes : 2 * axes]
@@ -80,7 +80,8 @@ def _advance(spread: Floats, dt: float, motion: MotionPrior) -> Floats:
 
 
 def _update(spread: Floats, slope: Floats) -> Floats:
-    """Triangular root (N, N) after measurements with derivatives (M, N) of unit variance, of a root (N, N or more)."""
+    """Triangular root (N, N) of the posterior bound after measurements with derivatives (M, N) of unit variance, of a
+    root (N, N or more)."""
     count, size = slope.shape
     stacked = np.zeros((count + size, count + spread.shape[1]))
     stacked[:count, :count] = np.eye(count)

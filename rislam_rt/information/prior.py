@@ -1,4 +1,4 @@
-"""What is known beforehand: the information in a covariance, and what a filter takes for granted of a room."""
+"""Prior information: what a covariance tells beforehand, and what a filter takes for granted of a room."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""When two paths come out as two: what the second one's amplitude can be told by, with all else unknown."""
+"""Resolution of two paths: what the second one's amplitude can be told by, with all else unknown."""
 
 from typing import Any
 
@@ -57,7 +57,7 @@ def certainty_share(gap: Floats, radio: RadioConfig) -> Floats:
 
 
 def _inner_products(gap: Floats, radio: RadioConfig) -> Complexes:
-    """(..., 8, 8) of the signals and their derivatives, of one path and of the other, all scaled to length one."""
+    """(..., 8, 8) of the signals of two paths to resolve and of their derivatives, all of length one."""
     array = radio.array
     nodes, weight = np.polynomial.legendre.leggauss(BAND_NODES)
     rows, cols = ((np.arange(count) - (count - 1) / 2.0) * array.spacing for count in (array.rows, array.cols))
@@ -75,7 +75,8 @@ def _inner_products(gap: Floats, radio: RadioConfig) -> Complexes:
 
 
 def _block(gap: Floats, axes: list[tuple[Any, Any]]) -> Complexes:
-    """(..., 4, 4) inner products of signal and derivatives at the origin with those a `gap` (..., 3) in cells away."""
+    """(..., 4, 4) inner products of a signal to resolve and its derivatives with those a `gap` (..., 3) in cells
+    away."""
     moments = []
     for axis, (place, weight) in enumerate(axes):
         wave = np.exp(2j * np.pi * np.multiply.outer(gap[..., axis], place)) * weight

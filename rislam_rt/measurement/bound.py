@@ -78,7 +78,7 @@ def measure_bound(
 def _capture(
     received: Received, draws: Floats, sensor: SensorModel, config: ReceiverConfig, *, rng: np.random.Generator
 ) -> ReportedComponents:
-    """What is reported of the paths in one capture, and what is false."""
+    """Components that the bound makes of the paths in one capture, and what is false among them."""
     radio, window = sensor.radio, sensor.window
     received = select_paths(received, radio.integrated_snr(received.gain) > NEGLIGIBLE * sensor.threshold)
     if config.resolution == "joint":

@@ -53,7 +53,7 @@ class CalibrationReference(NamedTuple):
 def calibrate(
     samples: Sequence[Complexes], body: Body, radio: RadioConfig, config: ReceiverConfig, *, swinging: bool = False
 ) -> Correction:
-    """What to take out, from the samples (L, M) of several cycles at full energy.
+    """What calibration takes out of the front end, from the samples (L, M) of several cycles at full energy.
 
     Parameters
     ----------
@@ -98,13 +98,14 @@ def _known(body: Body, radio: RadioConfig, config: ReceiverConfig) -> Calibratio
 
 
 def _chains(mean: Complexes, direct: Complexes) -> Complexes:
-    """(L,) gain and phase of each chain, from the direct path in the mean samples; of mean one."""
+    """(L,) gain and phase of each receiver chain by calibration, from the direct path in the mean samples; of mean
+    one."""
     chains = np.sum(mean * direct.conj(), axis=1)
     return np.asarray(chains / np.mean(chains))
 
 
 def _as_drawn(samples: Complexes, known: CalibrationReference, faintest: float) -> Complexes:
-    """What an array as drawn would hear (L, M) of the strong paths in samples of a corrected one, ghosts left out."""
+    """What an array as drawn would hear (L, M) of the strong paths in samples of a calibrated one, ghosts left out."""
     scaled = samples / np.sqrt(known.noise)
     found = estimate_paths(known.sounding, known.grid, scaled, LOUD, known.window, MOST).fit
     kept = found.parameters[_paths(found.parameters[:, 0], np.abs(found.amplitude), faintest)]
@@ -114,24 +115,25 @@ def _as_drawn(samples: Complexes, known: CalibrationReference, faintest: float) 
 
 
 def _paths(delay: Floats, strength: Floats, faintest: float) -> Booleans:
-    """(P,) whether a path is not so much weaker than one of its delay that it may be its ghost."""
+    """(P,) which paths calibration uses: those not so much weaker than one of their delay that they may be its
+    ghost."""
     near = np.abs(delay[:, None] - delay) < GHOST_CELLS
     return np.asarray(strength >= faintest * np.max(near * strength, axis=1, initial=0.0))
 
 
 def _antennas(sounding: Sounding, parameters: Floats) -> Complexes:
-    """(L, P) antenna vectors of paths (P, 3) as the array is drawn."""
+    """(L, P) antenna vectors of paths (P, 3) as the array to be calibrated is drawn."""
     x, y = (part.reshape(-1, 1) for part in np.meshgrid(sounding.row, sounding.col, indexing="ij"))
     return np.asarray(np.exp(2j * np.pi * (x * parameters[:, 1] + y * parameters[:, 2])))
 
 
 def _tones(sounding: Sounding, parameters: Floats) -> Complexes:
-    """(M, P) responses over the band."""
+    """(M, P) responses of the calibration's paths over the band."""
     return tone_response(sounding.frequency, parameters[:, 0])
 
 
 def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread: float, stray: float) -> Complexes:
-    """(L, L) that makes what the antennas heard of what they should have (T, L, M), by least squares.
+    """Calibration matrix (L, L) from what the antennas should have heard (T, L, M) to what they did, by least squares.
 
     It is held to the chains as known so far, and between elements to nothing with the deviation `stray`; `spread` is
     the variance of a tone's misfit.
@@ -143,7 +145,8 @@ def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread:
 
 
 def _standing(rest: Complexes) -> tuple[Complexes, float]:
-    """What of (T, L, M) stays (L, M), held to nothing as far as it may be chance, and the variance of what does not."""
+    """Residue (L, M) that calibration finds standing in (T, L, M) from cycle to cycle, and the variance of what does
+    not."""
     mean = rest.mean(axis=0)
     spread = float(np.mean(np.abs(rest - mean) ** 2)) * len(rest) / max(len(rest) - 1, 1)
     power = float(np.mean(np.abs(mean) ** 2))
@@ -155,7 +158,7 @@ def _inverse(matrix: Complexes) -> Complexes:
 
 
 def _image(rest: Complexes, heard: Complexes) -> Complexes:
-    """(L,) share of the mirrored band in what is left; the direct path, which stays, says nothing of it.
+    """(L,) the mixer's image by calibration: share of the mirrored band in what is left beside the direct path.
 
     At rest an image is the same as a chain's gain.
     """

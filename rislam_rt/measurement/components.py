@@ -54,7 +54,7 @@ class ReportedComponents(NamedTuple):
 
 
 def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:
-    """Bounds of a lone path: standard deviations of the delay (...,) [s] and the cosines (..., 2).
+    """Deviations of the component of a lone path: delay (...,) [s] and cosines (..., 2), by its bound.
 
     `information.measurement_std` at the linear SNR over all L antennas, but no cosine is less certain than `DISC_STD`.
     """
@@ -63,7 +63,8 @@ def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:
 
 
 def merge(received: Received, sensor: SensorModel) -> NoiselessComponents:
-    """Join paths of one capture closer than a resolution cell in delay and both cosines, from the strongest down."""
+    """Merge the paths of one capture that are closer than a resolution cell into components, from the strongest
+    down."""
     cell = np.ones((len(received.tau), len(received.tau)), dtype=bool)
     for value in in_resolution_cells(
         received, sensor.radio
@@ -91,7 +92,7 @@ def join(received: Received, leader: Integers) -> NoiselessComponents:
 
 
 def single(received: Received) -> NoiselessComponents:
-    """Every path on its own."""
+    """Components of which each is one path."""
     return NoiselessComponents(received.path, received.tau, received.direction[:, :2], received.gain)
 
 
@@ -104,7 +105,7 @@ def lone_errors(parts: NoiselessComponents, radio: RadioConfig, draws: Floats) -
 
 
 def select_paths(received: Received, keep: Booleans) -> Received:
-    """The paths marked (N,)."""
+    """The components' paths that are marked (N,)."""
     return Received._make(field[keep] for field in received)
 
 
@@ -133,7 +134,7 @@ def blind_axes(cosines: Floats, radio: RadioConfig) -> Floats:
 
 
 def _leaders(strength: Floats, cell: Booleans) -> Integers:
-    """(N,) for each path the strongest free path of its cell, taken from the strongest down."""
+    """(N,) for each path the strongest free path of its cell, with which it merges into one component."""
     crowded = np.count_nonzero(cell, axis=1) > 1
     leader = np.where(crowded, -1, np.arange(len(strength)))
     rows = crowded.nonzero()[0]

@@ -1,4 +1,4 @@
-"""Settings of the receiver."""
+"""Configuration of the receiver."""
 
 from dataclasses import dataclass
 
@@ -93,5 +93,5 @@ class ReceiverConfig:
 
     @property
     def num_captures(self) -> int:
-        """Sets of paths that the receiver looks into: with alternation the sum, and one difference a panel."""
+        """Captures of the receiver a cycle: with alternation the sum, and one difference a panel."""
         return 1 + self.panels if self.alternation else 1

@@ -53,7 +53,7 @@ def signals_dataset(
     rng: np.random.Generator,
     on_cycle: Callable[[], None] | None = None,
 ) -> "xr.Dataset":
-    """Samples of every cycle, the components found in them with their tracks, and the truth about each.
+    """Data set of signals: samples of every cycle, the components found in them with their tracks, and the truth.
 
     Variables as in `SCHEMA`; the radio and the receiver are in the attributes. `on_cycle` is called after each cycle.
     """
@@ -99,7 +99,7 @@ def signals_dataset(
 
 
 def load_signals(path: str | Path) -> "xr.Dataset":
-    """A data set of signals with its complex variables joined again.
+    """Read a data set of signals, its complex variables joined again.
 
     Raises
     ------

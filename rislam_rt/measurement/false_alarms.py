@@ -44,7 +44,7 @@ def expected_false_alarms(threshold: float, radio: RadioConfig, window: float) -
 
 
 def _intrinsic_volumes(radio: RadioConfig, window: float) -> tuple[float, float, float, float]:
-    """mu_0 .. mu_3 of the product of an ellipse and an interval."""
+    """Volume, surface and edges (mu_0 .. mu_3) of the region searched for false alarms: ellipse times interval."""
     length = 2.0 * np.pi * np.sqrt(radio.effective_bandwidth_squared) * window
     positions = 2.0 * np.pi * radio.array.positions(1.0)[:, :2]
     minor, major = np.sort(np.sqrt(np.mean(positions**2, axis=0)))
@@ -54,7 +54,7 @@ def _intrinsic_volumes(radio: RadioConfig, window: float) -> tuple[float, float,
 
 
 def _half_perimeter(major: float, minor: float) -> float:
-    """Of an ellipse with these half axes: Gauss' arithmetic-geometric mean (Abramowitz and Stegun 17.6).
+    """Half perimeter of the ellipse of false alarms: Gauss' arithmetic-geometric mean (Abramowitz and Stegun 17.6).
 
     `scipy.special.ellipe` would cost every command a tenth of a second to load.
     """
@@ -80,7 +80,8 @@ def _threshold_of_rate(rate: float, radio: RadioConfig, window: float) -> float:
 
 
 def draw_false_alarms(sensor: SensorModel, *, rng: np.random.Generator) -> ReportedComponents:
-    """Poisson many, even over the delay window and the disc of cosines; amplitudes as of noise above the threshold."""
+    """Draw false alarms: Poisson many, even over delay window and disc of cosines, amplitudes as of noise that
+    passes."""
     radio, count = sensor.radio, rng.poisson(sensor.false_alarms)
     tau = rng.uniform(*sensor.window, count)
     radius, azimuth = np.sqrt(rng.uniform(size=count)), rng.uniform(-np.pi, np.pi, count)

@@ -1,4 +1,4 @@
-"""What a real front end does to the signal: an array that is not as drawn, leakage left over, converters, oscillators.
+"""Hardware faults of a real front end: an array not as drawn, leakage left over, converters, oscillator, gain.
 
 The chain of one capture, from the paths to the samples that the estimator gets: elements at other places than drawn;
 coupling between them; gain and phase of each receive chain; what is left of the leakage after its cancellation, random
@@ -63,7 +63,7 @@ class HardwareConfig:
 
     @property
     def ideal(self) -> bool:
-        """Whether nothing of all this is there."""
+        """Whether the hardware has no fault."""
         return self == HardwareConfig(told=self.told, calibration_cycles=self.calibration_cycles)
 
 
@@ -113,7 +113,7 @@ class Sent(NamedTuple):
 def build_front_end(
     config: HardwareConfig, radio: RadioConfig, receiver: ReceiverConfig, *, rng: np.random.Generator
 ) -> FrontEnd:
-    """Draw a receiver. Every fault has draws of its own, so that one more leaves the others as they are."""
+    """Draw the faults of a receiver's hardware, each with draws of its own, so that one more leaves the others."""
     array, count = radio.array, radio.array.num_antennas
     offset = config.position_std_m / radio.wavelength * rng.standard_normal((count, 3))
     loud = 10.0 ** (config.gain_std_db * rng.standard_normal(count) / 20.0)
@@ -129,7 +129,8 @@ def digitise(
     clean: Complexes, sent: Sent, radio: RadioConfig, receiver: ReceiverConfig, front_end: FrontEnd | None,
     *, rng: np.random.Generator,
 ) -> tuple[Complexes, float]:  # fmt: skip
-    """Samples (L, M) as tones, and the variance a tone that the estimator reckons with, from noiseless tones."""
+    """Tones that the hardware makes of noiseless ones, and the noise variance a tone that the estimator reckons
+    with."""
     if front_end is None:
         samples, extra = convert(add_noise(clean, radio.noise_psd, rng=rng), receiver.converter_bits, radio)
         return samples, radio.noise_psd + extra
@@ -160,7 +161,7 @@ def correct(samples: Complexes, unit: float, correction: Correction) -> Complexe
 
 
 def draw_gain_variation(config: HardwareConfig, *, rng: np.random.Generator) -> float:
-    """Gain of the gain control in one cycle, an amplitude ratio."""
+    """Gain of the hardware's gain control in one cycle, an amplitude ratio."""
     return float(10.0 ** (config.agc_std_db * rng.standard_normal() / 20.0)) if config.agc_std_db else 1.0
 
 
@@ -175,7 +176,7 @@ def image_spectrum(spectrum: Complexes) -> Complexes:
 
 
 def _shaken(spectrum: Complexes, config: HardwareConfig, radio: RadioConfig, rng: np.random.Generator) -> Complexes:
-    """Tones after an oscillator whose phase trembles from sample to sample and steps from code to code."""
+    """Tones after a hardware oscillator whose phase trembles from sample to sample and steps from code to code."""
     if config.phase_step_deg:
         spectrum = spectrum * np.exp(1j * np.radians(config.phase_step_deg) * rng.standard_normal())
     if not config.phase_noise_deg:
@@ -185,7 +186,8 @@ def _shaken(spectrum: Complexes, config: HardwareConfig, radio: RadioConfig, rng
 
 
 def _neighbours(positions: Floats, spacing: float) -> Complexes:
-    """(L, L) coupling in units of that of the nearest neighbours: as one over the distance, with its phase."""
+    """(L, L) hardware coupling of antennas in units of that of the nearest: as one over the distance, with its
+    phase."""
     distance = np.linalg.norm(positions[:, None] - positions, axis=-1)
     apart = np.where(distance > 0.0, distance, np.inf)
     phase = np.exp(-2j * np.pi * (np.where(distance > 0.0, distance, spacing) - spacing))
@@ -195,7 +197,7 @@ def _neighbours(positions: Floats, spacing: float) -> Complexes:
 def expected_distortion(
     config: HardwareConfig, radio: RadioConfig, receiver: ReceiverConfig, power: Floats, direct: Floats
 ) -> Floats:
-    """Power a tone [J] (K,) that an estimator told of the faults counts as noise, by the tolerances alone.
+    """Power a tone [J] (K,) of hardware faults that an estimator told of their tolerances counts as noise.
 
     Of a calibrated front end what no calibration takes out, phase noise and clipping: at least that is left.
 
@@ -213,7 +215,7 @@ def expected_distortion(
 
 
 def _distortion(config: HardwareConfig, radio: RadioConfig, left: float | None) -> float:
-    """Power of multiplicative faults over that of the signal: as their tolerances say, or what calibration `left`."""
+    """Power of multiplicative hardware faults over the signal's: as tolerances say, or what calibration `left`."""
     trembling = np.radians(config.phase_noise_deg) ** 2 + _clipped(config.clip_rms)
     if left is not None:
         return float(trembling + left)
@@ -224,7 +226,8 @@ def _distortion(config: HardwareConfig, radio: RadioConfig, left: float | None) 
 
 
 def _clipped(level: float) -> float:
-    """Share of the power of a normal signal that lies above `level` deviations, what is cut off squared; 0 for none."""
+    """Share of the power of a normal signal that hardware clips above `level` deviations, what is cut off squared; 0
+    for none."""
     if not level:
         return 0.0
     tail = 0.5 * scipy.special.erfc(level / np.sqrt(2.0))

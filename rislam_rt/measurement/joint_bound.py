@@ -57,14 +57,15 @@ def _bound(parts: NoiselessComponents, sounding: Sounding, radio: RadioConfig, u
 
 
 def _absorbed(faint: Booleans, near: Floats) -> Integers:
-    """Leaders (N,) when each path too faint to stand alone joins the nearest that is not, within a cell."""
+    """Leaders (N,) for the joint bound when each path too faint to stand alone joins the nearest within a cell."""
     distance = np.where(~faint & (near < 1.0), near, np.inf)
     joins = faint & np.isfinite(distance).any(axis=1)
     return np.where(joins, np.argmin(distance, axis=1), np.arange(len(faint))) if len(faint) else np.arange(0)
 
 
 def _paired(leader: Integers, doubtful: Integers, strength: Floats, near: Floats) -> Integers:
-    """Leaders (N,) after doubtful ones, in their order, joined their nearest neighbours within a cell, each once."""
+    """Leaders (N,) for the joint bound after doubtful paths, in their order, joined their nearest neighbours, each
+    once."""
     merged = leader.copy()
     free = leader == np.arange(len(leader))
     for row in doubtful:
@@ -80,7 +81,7 @@ def _paired(leader: Integers, doubtful: Integers, strength: Floats, near: Floats
 def _draw(
     parts: NoiselessComponents, covariance: Floats, gain_std: Floats, draws: Floats, radio: RadioConfig
 ) -> ComponentErrors:
-    """Correlated errors of all components from independent draws."""
+    """Correlated errors of all components by their joint bound, from independent draws."""
     scale = np.sqrt(np.maximum(np.diagonal(covariance), np.finfo(np.float64).tiny))
     correlation = covariance / scale[:, None] / scale
     value, vector = np.linalg.eigh(correlation)

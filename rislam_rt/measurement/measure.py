@@ -1,4 +1,4 @@
-"""From the channel of a cycle to what the receiver reports."""
+"""Measuring a cycle: from its channel to what the receiver reports."""
 
 import numpy as np
 
@@ -24,7 +24,7 @@ def measure(
     *,
     rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
-    """Multipath components of one cycle, in the order of their delays, and which path each of them was.
+    """Measure one cycle: multipath components in the order of their delays, and which path each of them was.
 
     Parameters
     ----------

@@ -17,7 +17,8 @@ REFERENCE_DISTANCE = 3.0
 
 
 def reference_gain(radio: RadioConfig) -> float:
-    """|alpha| of the paper's sphere, 3 m from Tx and Rx: `lambda sqrt(Gt Gr sigma) / ((4 pi)^1.5 d^2)`, eq. `a2`."""
+    """|alpha| of the paper's sphere that sets the noise, 3 m from both ends: `lambda sqrt(Gt Gr sigma) / ((4 pi)^1.5
+    d^2)`."""
     rcs = np.pi * REFERENCE_RADIUS**2
     free_space = radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain * rcs)
     return float(free_space / ((4.0 * np.pi) ** 1.5 * REFERENCE_DISTANCE**2))
@@ -30,7 +31,8 @@ def with_reference_snr(radio: RadioConfig, snr_db: float) -> RadioConfig:
 
 
 def path_snr_db(paths: Paths, radio: RadioConfig) -> Floats:
-    """L E |alpha|^2 / N0 (K, P) [dB] of every path, over signal and all L antennas; -inf where there is none."""
+    """SNR over the noise of every path (K, P) [dB], L E |alpha|^2 / N0 over all L antennas; -inf where there is
+    none."""
     with np.errstate(divide="ignore"):
         return 10.0 * np.log10(radio.integrated_snr(paths.gain))
 

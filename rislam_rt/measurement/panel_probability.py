@@ -70,7 +70,8 @@ def panel_probability(
 
 
 def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: int = 0) -> Complexes:
-    """(`SHIFTS`,) amplitude of what a path leaves in another capture over what it has in its own, over its shifts.
+    """(`SHIFTS`,) how a path leaks between captures, which blurs whether a panel made it: amplitude there over that
+    here.
 
     Both ends ride on the agent, so that a path shortens by twice its speed at most.
     """
@@ -80,7 +81,8 @@ def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: 
 
 
 def _leak_odds(found: ComponentSides, sources: ComponentSides, factors: Complexes, radio: RadioConfig) -> Floats:
-    """(A,) odds of each component for being a leak of one of the sources, against a path of its own kind."""
+    """(A,) odds of each component for being a leak of one of the sources and no panel's, against a path of its own
+    kind."""
     cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * radio.array.spacing) for n in _shape(radio))])
     gap = found.points[:, None] - sources.points
     variance = found.deviation[:, None] ** 2 + sources.deviation**2 + (BLUR * cell) ** 2

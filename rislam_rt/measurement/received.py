@@ -42,7 +42,7 @@ def receive(
     config: ReceiverConfig,
     doppler: Floats | None = None,
 ) -> Received:
-    """The paths of a cycle that the array hears.
+    """Received paths of a cycle: those that the array hears.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Clutter(NamedTuple):
     """(K, P) [Hz]."""
 
     def of_cycle(self, cycle: int) -> "Clutter":
-        """That of one cycle alone."""
+        """Received clutter of one cycle alone."""
         return Clutter(self.paths.of_cycle(cycle), self.doppler[[cycle]])
 
     def beside(
@@ -87,12 +87,12 @@ class Clutter(NamedTuple):
 
 
 def direct_gain(paths: Paths, cycle: int) -> complex:
-    """Gain of the direct path from Tx to Rx, nothing cancelled; 0 where it is hidden."""
+    """Received gain of the direct path from Tx to Rx, nothing cancelled; 0 where it is hidden."""
     return complex(np.sum(paths.gain[cycle, paths.kind == PathKind.LOS]))
 
 
 def _tx_leg_length(paths: Paths, cycle: int, path: Integers) -> Floats:
-    """(N,) length [m] of the legs from Tx to landmark; 0 for leakage and wall returns, whose wave spreads from the Tx.
+    """(N,) [m] length of the Tx legs of received paths; 0 for leakage and wall returns, whose wave spreads from the Tx.
 
     The Tx is where the departing rays of all paths meet (least squares); half the path, if they are too few to tell.
     """
@@ -114,7 +114,7 @@ def _tx_leg_length(paths: Paths, cycle: int, path: Integers) -> Floats:
 
 
 def phase_reversed(code: RisCode) -> RisCode:
-    """The phase-reversed code: every path over the panel changes its sign, and nothing else does.
+    """Received paths under the phase-reversed code: those over the panel change sign, and nothing else does.
 
     Raises
     ------

@@ -12,7 +12,7 @@ GRID_SHARE = 0.83
 
 @lru_cache(maxsize=64)
 def build_sensor(radio: RadioConfig, config: ReceiverConfig) -> SensorModel:
-    """What these settings make of detection, false alarms and resolution.
+    """The sensor model of these settings: detection, false alarms, resolution.
 
     The bound-driven receiver invents its false components, as many as it is set to; the waveform's are the peaks of its
     noise.

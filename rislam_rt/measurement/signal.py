@@ -18,7 +18,8 @@ FEWEST_TONES = 16
 
 
 def num_tones(radio: RadioConfig, config: ReceiverConfig) -> int:
-    """M: as set, or the power of two whose period M / B leaves a quarter of room after the latest delay."""
+    """Tones M of the received signal: as set, or the power of two that leaves a quarter of its period after the last
+    delay."""
     if config.num_subcarriers:
         return config.num_subcarriers
     needed = max(1.25 * radio.bandwidth * config.max_delay, FEWEST_TONES)
@@ -26,7 +27,8 @@ def num_tones(radio: RadioConfig, config: ReceiverConfig) -> int:
 
 
 def tones(received: Received, radio: RadioConfig, config: ReceiverConfig, elements: Floats | None = None) -> Complexes:
-    """Noiseless tones (L, M) [sqrt(J)]; `elements` (L, 3) are the true places in wavelengths, if not as drawn."""
+    """Signal of all paths as noiseless tones (L, M) [sqrt(J)]; `elements` (L, 3) are true places in wavelengths, if
+    given."""
     count = num_tones(radio, config)
     frequencies = subcarrier_frequencies(count, radio.bandwidth)
     scale = np.sqrt(radio.energy / count)
@@ -38,7 +40,8 @@ def tones(received: Received, radio: RadioConfig, config: ReceiverConfig, elemen
 
 
 def pulse_samples(received: Received, radio: RadioConfig, config: ReceiverConfig) -> Complexes:
-    """Noiseless samples (L, U) [sqrt(W)] at times n / B, n = 0 .. U-1, after a single flat pulse; U is `num_tones`.
+    """Signal as noiseless samples (L, U) [sqrt(W)] at times n / B, n = 0 .. U-1, after a single flat pulse; U is
+    `num_tones`.
 
     Unlike the tones, which repeat, the pulse's tails are cut off at the window's ends.
     """
@@ -49,14 +52,16 @@ def pulse_samples(received: Received, radio: RadioConfig, config: ReceiverConfig
 
 
 def to_tones(samples: Complexes, radio: RadioConfig) -> Complexes:
-    """Tones (..., M) [sqrt(J)] of samples (..., M) [sqrt(W)] at rate B from time 0 on; noise N0 B becomes N0."""
+    """Signal as tones (..., M) [sqrt(J)] from samples (..., M) [sqrt(W)] at rate B from time 0; noise N0 B becomes
+    N0."""
     count = samples.shape[-1]
     advance = np.exp(1j * np.pi * (count - 1) / count * np.arange(count))
     return np.fft.fft(samples * advance, axis=-1, norm="ortho") / np.sqrt(radio.bandwidth)
 
 
 def to_samples(spectrum: Complexes, radio: RadioConfig) -> Complexes:
-    """Samples (..., M) [sqrt(W)] at rate B from time 0 on of tones (..., M) [sqrt(J)]: the inverse of `to_tones`."""
+    """Signal as samples (..., M) [sqrt(W)] at rate B from time 0 on, from tones (..., M) [sqrt(J)]; undoes
+    `to_tones`."""
     count = spectrum.shape[-1]
     delay = np.exp(-1j * np.pi * (count - 1) / count * np.arange(count))
     return np.fft.ifft(spectrum, axis=-1, norm="ortho") * delay * np.sqrt(radio.bandwidth)
@@ -69,7 +74,7 @@ def add_noise(signal: Complexes, variance: float, *, rng: np.random.Generator) -
 
 
 def convert(spectrum: Complexes, bits: int, radio: RadioConfig, clip_rms: float = 0.0) -> tuple[Complexes, float]:
-    """Tones (L, M) after converters of this many bits for each of real and imaginary part, 0 for steps without end.
+    """Signal's tones (L, M) after converters of so many bits for real and imaginary part each, 0 for steps without end.
 
     The converters see samples in time. Full scale is the largest sample of all, or `clip_rms` times the root mean
     square of a component; what lies above is cut off. Also returns the variance [J] that the steps add to a tone: a
@@ -87,7 +92,7 @@ def convert(spectrum: Complexes, bits: int, radio: RadioConfig, clip_rms: float 
 
 
 def _mid_rise(value: Floats, step: float, bits: int) -> Floats:
-    """Values on the steps of a converter; as they are without one."""
+    """Signal values on the steps of a mid-rise converter; as they are without one."""
     if not bits:
         return value
     level = np.clip(np.floor(value / step), -(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
@@ -95,7 +100,7 @@ def _mid_rise(value: Floats, step: float, bits: int) -> Floats:
 
 
 def _element_exact(received: Received, radio: RadioConfig, frequencies: Floats, elements: Floats) -> Complexes:
-    """Sum over paths of spherical waves, each element at its own distance from where the wave comes from.
+    """Signal as a sum of spherical waves, each element at its own distance from where the wave comes from.
 
     No plane-wave and no narrow-band approximation: the phase is `-2 pi (f_c + f) (delay at the element)`, and the part
     at the array's centre and the carrier is in the gain.

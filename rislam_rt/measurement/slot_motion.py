@@ -17,7 +17,7 @@ from rislam_rt.measurement.received import Received
 
 @lru_cache(maxsize=64)
 def code_signs(order: str, panels: int) -> Floats:
-    """Signs (1 + panels, S) of what meets no panel, and of each panel's paths, in the S looks of an `order`.
+    """Signs (1 + panels, S) over the looks of a slot in an `order`: of what meets no panel, and of each panel's paths.
 
     Rows of a Hadamard matrix, so that each sum over the looks with the signs of one panel holds its paths alone. `ABBA`
     goes through them and back: products of such rows are even about the middle as well, so that what moves evenly
@@ -30,7 +30,7 @@ def code_signs(order: str, panels: int) -> Floats:
 
 
 def codes_in_turn(panels: int) -> Floats:
-    """(C, C) Hadamard matrix of the C codes that so many panels need: code and twin for one, four codes for two."""
+    """(C, C) Hadamard matrix of the codes that a slot goes through: code and twin for one panel, four codes for two."""
     return scipy.linalg.hadamard(2 ** int(np.ceil(np.log2(1 + panels)))).astype(np.float64)
 
 
@@ -61,7 +61,7 @@ def slot_weights(doppler: Floats, config: ReceiverConfig) -> tuple[Complexes, ..
 
 
 def split_by_code(received: Received, config: ReceiverConfig) -> list[Received]:
-    """The paths as they are in the sum of the codes, and with alternation in each panel's difference."""
+    """Paths of a slot as they are in the sum of its codes, and with alternation in each panel's difference."""
     if not config.alternation:
         return [received._replace(gain=received.gain * slot_weights(received.doppler, config)[0])]
     signs = code_signs(config.order, config.panels)

@@ -1,4 +1,4 @@
-"""Labels for components across cycles: a component keeps its label while its path lives, also through a crossing.
+"""Tracking of components across cycles: one keeps its label while its path lives, also through a crossing.
 
 One small Kalman filter a track over path length and both cosines with their rates; optimal assignment of predicted
 tracks to components within a gate. The amplitude takes part, so that a strong and a weak path keep their labels where
@@ -126,7 +126,7 @@ def step_tracks(
 
 
 def _predict(state: TrackState, dt: float, config: TrackingConfig) -> TrackState:
-    """Discrete white-noise acceleration."""
+    """Tracked components one cycle on: discrete white-noise acceleration."""
     transition = np.array([[1.0, dt], [0.0, 1.0]])
     shape = np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
     strength = np.array([config.length_acceleration, config.cosine_acceleration, config.cosine_acceleration]) ** 2
@@ -152,7 +152,7 @@ def _assign(
 
 
 def _update(mean: Floats, covariance: Floats, seen: Floats, noise: Floats) -> tuple[Floats, Floats]:
-    """Kalman update of (N, 3) independent pairs of value and rate by measured values (N, 3)."""
+    """Tracked components after measurement: Kalman update of (N, 3) independent pairs of value and rate."""
     gain = covariance[..., :, 0] / (covariance[..., 0, 0] + noise)[..., None]
     mean = mean + gain * (seen - mean[..., 0])[..., None]
     return mean, covariance - gain[..., :, None] * covariance[..., None, 0, :]

@@ -1,4 +1,4 @@
-"""Which path a component was: for scoring only, never shown to the agent."""
+"""True identity of components: which path each was, for scoring only, never shown to the agent."""
 
 import numpy as np
 import scipy
@@ -18,7 +18,7 @@ FAINTEST = 1.0
 
 
 def identify(tau: Floats, cosines: Floats, gain: Complexes, received: Received, radio: RadioConfig) -> Integers:
-    """Column (N,) of the path that each component most likely is, -1 for none.
+    """True identity of components: column (N,) of the path that each most likely is, -1 for none.
 
     The assignment with the least sum of squared misfits in delay, cosines and amplitude. The scale is the resolution
     cell, not the bound: next to a stronger path a component errs by more than its bound, and is still that path. So it

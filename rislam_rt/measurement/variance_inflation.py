@@ -1,4 +1,4 @@
-"""What the bound at an estimate leaves out: the bias of a peak, neighbours too faint to be found, mirrored directions.
+"""Inflation of variances by what the bound leaves out: a peak's bias, faint neighbours, mirrored directions.
 
 A bound knows the paths that were found and takes their amplitudes for true. The errors are larger, and a filter that
 believes the bound alone is sure of what is wrong.
@@ -47,7 +47,8 @@ def crowding(parameters: Floats, threshold: float, radio: RadioConfig) -> Floats
 
 
 def unmirrored(cosines: Floats, radio: RadioConfig) -> Floats:
-    """Cosines (N, 2), those outside the sky moved by a period of the array to where they may lie in it."""
+    """Cosines (N, 2) for inflated variances, those outside the sky moved by a period of the array to where they may
+    lie."""
     period = 1.0 / radio.array.spacing
     outside = np.linalg.norm(cosines, axis=-1, keepdims=True) > 1.0
     return np.where(outside, cosines - period * np.round(cosines / period), cosines)

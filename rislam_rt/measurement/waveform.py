@@ -64,7 +64,8 @@ def capture(
     *,
     rng: np.random.Generator,
 ) -> list[Capture]:
-    """Sound the channel: one capture, or with alternation the sum and the difference of two at half the energy each.
+    """Sound the channel with the waveform: one capture, or with alternation the sum and difference of two at half
+    energy.
 
     Sum and difference of the two halves, over sqrt 2, hold the walls' and the panel's paths at the full energy and the
     noise of one sounding: splitting the slot costs nothing but a second code. What turns within the slot is in both.
@@ -98,7 +99,7 @@ def capture(
 
 
 def _signed_sum(parts: list[Complexes], signs: Floats) -> Complexes:
-    """Sum of parts, each with its sign."""
+    """Sum of captures, each with its sign."""
     total = signs[0] * parts[0]
     for part, sign in zip(parts[1:], signs[1:], strict=False):
         total = total + sign * part
@@ -108,12 +109,13 @@ def _signed_sum(parts: list[Complexes], signs: Floats) -> Complexes:
 def find_components(
     captures: list[Capture], radio: RadioConfig, config: ReceiverConfig, previous: Measurement | None = None
 ) -> DetectedComponents:
-    """All components in the captures of one cycle; the search begins with those of the previous one, if given."""
+    """Components in the waveform's captures of one cycle; the search begins with those of the previous one, if
+    given."""
     return by_delay([_find(one, radio, config, _known(one, radio, previous)) for one in captures])
 
 
 def by_delay(parts: list[DetectedComponents]) -> DetectedComponents:
-    """Components of several captures in the order of their delays."""
+    """Components of several captures of the waveform, in the order of their delays."""
     joined = [np.concatenate(fields) for fields in zip(*parts, strict=True)]
     order = np.argsort(joined[0])
     return DetectedComponents._make(field[order] for field in joined)
@@ -129,14 +131,14 @@ def measure_waveform(
     *,
     rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
-    """Components estimated from the cycle's signal, and the paths that they most likely are."""
+    """Components estimated from the cycle's waveform, and the paths that they most likely are."""
     captures = capture(received, radio, config, front_end, leakage, rng=rng)
     found = find_components(captures, radio, config, previous)
     return to_measurement(found, radio, config), PathTruth(true_paths(found, received, radio, config))
 
 
 def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
-    """Column (N,) of the path that each component most likely is, by what its capture holds; -1 for none."""
+    """Column (N,) of the true path behind each component of the waveform, by what its capture holds; -1 for none."""
     path = np.full(len(found.tau), -1)
     for number, heard in enumerate(split_by_code(received, config)):
         mine = found.capture == number
@@ -145,7 +147,7 @@ def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig
 
 
 def to_measurement(found: DetectedComponents, radio: RadioConfig, config: ReceiverConfig) -> Measurement:
-    """What the agent gets to see of the components."""
+    """Measurement that the agent gets to see of the waveform's components."""
     told: tuple[Any, ...] = ()
     if config.alternation:
         points, deviation = (
@@ -165,7 +167,7 @@ def to_measurement(found: DetectedComponents, radio: RadioConfig, config: Receiv
 
 
 def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Floats:
-    """Parameters (Q, 3) of the previous cycle's components of this kind of capture."""
+    """Parameters (Q, 3) of the previous cycle's components of this kind of capture, where the search begins."""
     if previous is None:
         return NOTHING
     mine = np.ones(len(previous), dtype=bool)
@@ -176,7 +178,7 @@ def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Fl
 
 
 def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Floats) -> DetectedComponents:
-    """Components of one capture: what is told apart, with deviations that count what cannot be seen."""
+    """Components found in one capture of the waveform, with deviations that count what cannot be seen."""
     window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
     sounding, grid = _searched(one.samples.shape[1], window, radio, config)
     threshold = detection_threshold(radio, config)
@@ -203,13 +205,14 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
 def _searched(
     count: int, window: tuple[float, float], radio: RadioConfig, config: ReceiverConfig
 ) -> tuple[Sounding, MatchedFilterGrid]:
-    """Sounding of so many tones, and the grid that is searched in a window of delays, in cells."""
+    """Sounding and grid of a waveform: so many tones, searched in a window of delays, in cells."""
     sounding = build_sounding(count, radio, element_exact=config.element_exact)
     return sounding, build_grid(sounding, window)
 
 
 def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats, Complexes, Floats, Floats]:
-    """Parameters (N, 3), gains (N,), deviations (N, 3) and amplitude deviations (N,) of what can be told apart.
+    """Components that a capture tells apart: parameters (N, 3), gains (N,), deviations (N, 3), amplitude deviations
+    (N,).
 
     Where the data ask for several paths but cannot share the amplitude out between them, they are reported as one, as
     wide as they lie apart.
@@ -233,7 +236,7 @@ def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats
 
 
 def _groups(parameters: Floats, doubtful: Booleans, radio: RadioConfig) -> Integers:
-    """(P,) group of each path: a doubtful one joins its nearest neighbour, if that lies within a cell."""
+    """(P,) component of each path found: a doubtful one joins its nearest neighbour, if that lies within a cell."""
     count = len(parameters)
     label = np.arange(count)
     if count < 2:

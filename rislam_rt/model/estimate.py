@@ -1,4 +1,4 @@
-"""What the agent believes: its pose, and a map of landmarks and walls. Filters write it, phase design reads it."""
+"""The agent's estimate: its pose, and a map of landmarks and walls. Filters write it, phase design reads it."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -125,7 +125,7 @@ def pose_estimate(
 
 
 def empty_map() -> MapEstimate:
-    """A map of nothing."""
+    """An estimated map of nothing."""
     none: list[Any] = []
     return MapEstimate(
         np.array(none), np.zeros((0, 3)), np.zeros((0, 3, 3)), np.array(none), np.array(none), np.array(none),

@@ -26,7 +26,7 @@ ITU_MATERIALS: dict[str, tuple[tuple[float, float, float, float, float, float], 
 
 
 def itu_parameters(name: str, carrier: float) -> tuple[float, float, float, float]:
-    """a, b, c, d of a material at the carrier [Hz].
+    """a, b, c, d of an ITU material at the carrier [Hz].
 
     Raises
     ------

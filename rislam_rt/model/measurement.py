@@ -1,4 +1,4 @@
-"""What the receiver reports in one cycle, and, kept apart, what it was."""
+"""The measurement of one cycle that the receiver reports, and, kept apart, what it was."""
 
 from dataclasses import dataclass
 
@@ -66,7 +66,7 @@ class Measurement:
 
     @property
     def aoa(self) -> tuple[Floats, Floats]:
-        """theta_r, phi_r (M,) [rad] in the body frame."""
+        """Measured angles of arrival theta_r, phi_r (M,) [rad] in the body frame."""
         return angles_from_direction(self.arrival)
 
 

@@ -112,22 +112,22 @@ class Paths:
 
     @property
     def num_cycles(self) -> int:
-        """K."""
+        """K, cycles of the paths."""
         return self.valid.shape[0]
 
     @property
     def num_paths(self) -> int:
-        """P."""
+        """P, columns of paths."""
         return self.valid.shape[1]
 
     @property
     def aod(self) -> tuple[Floats, Floats]:
-        """theta_t, phi_t (K, P) [rad]."""
+        """Angles of departure of paths, theta_t, phi_t (K, P) [rad]."""
         return angles_from_direction(self.departure)
 
     @property
     def aoa(self) -> tuple[Floats, Floats]:
-        """theta_r, phi_r (K, P) [rad]."""
+        """Angles of arrival of paths, theta_r, phi_r (K, P) [rad]."""
         return angles_from_direction(self.arrival)
 
     @property
@@ -138,7 +138,7 @@ class Paths:
         return np.where(over_panel, self.landmark - first, -1)
 
     def identity(self, path: int) -> tuple[int, int, tuple[int, ...], tuple[int, ...]]:
-        """(kind, landmark, tx_walls, rx_walls) of a column, without padding."""
+        """Identity of a path's column (kind, landmark, tx_walls, rx_walls), without padding."""
         tx = tuple(int(w) for w in self.tx_walls[path] if w >= 0)
         rx = tuple(int(w) for w in self.rx_walls[path] if w >= 0)
         return int(self.kind[path]), int(self.landmark[path]), tx, rx

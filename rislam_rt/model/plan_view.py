@@ -1,4 +1,4 @@
-"""A small picture of a room from above, as SVG text: what a notebook shows of a scene or a result."""
+"""Plan of a room as SVG text, a small view from above: what a notebook shows of a scene or a result."""
 
 from collections.abc import Iterable, Sequence
 from html import escape

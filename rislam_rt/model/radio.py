@@ -34,11 +34,11 @@ class RxArray:
 
     @property
     def num_antennas(self) -> int:
-        """L of the paper."""
+        """L of the paper, antennas of the radio's Rx array."""
         return self.rows * self.cols
 
     def positions(self, wavelength: float) -> Floats:
-        """Element positions (L, 3) [m] in the body frame, about the array's centre."""
+        """Element positions (L, 3) [m] of the radio's Rx array in the body frame, about its centre."""
         x = (np.arange(self.rows) - (self.rows - 1) / 2.0) * self.spacing * wavelength
         y = (np.arange(self.cols) - (self.cols - 1) / 2.0) * self.spacing * wavelength
         xx, yy = np.meshgrid(x, y, indexing="ij")
@@ -74,7 +74,7 @@ class RadioConfig:
 
     @property
     def wavelength(self) -> float:
-        """Carrier wavelength [m]."""
+        """Wavelength of the radio's carrier [m]."""
         return SPEED_OF_LIGHT / self.carrier
 
     @property

@@ -1,4 +1,4 @@
-"""What a run leaves behind: for each scheme, everything cycle by cycle, and all that is needed to repeat it."""
+"""The result of a run: for each scheme, everything cycle by cycle, and all that is needed to repeat it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -102,7 +102,7 @@ class SchemeResult:
             freeze(self, "smoothed", np.float64, (cycles, 3))
 
     def named(self, panel: int) -> Booleans:
-        """(K, I) whether the landmark was held for a panel."""
+        """(K, I) whether a scheme's landmark was held for a panel."""
         return (self.ris_probability > 0.5) & (panel == (0 if self.panel is None else self.panel))
 
     def __repr__(self) -> str:

@@ -1,4 +1,5 @@
-"""Reconfigurable surfaces: what their controller tells the agent, where they hang, and the code they are set to."""
+"""Reconfigurable surfaces (RIS): what their controller tells the agent, where they hang, and the code they are set
+to."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -53,12 +54,12 @@ class RisSpec:
 
     @property
     def num_elements(self) -> int:
-        """N M."""
+        """N M, elements of a RIS."""
         return self.rows * self.cols
 
     @property
     def right(self) -> Floats:
-        """(3,) unit vector along a row."""
+        """(3,) unit vector along a row of a RIS."""
         return np.cross(self.up, self.normal)
 
     @property
@@ -68,11 +69,11 @@ class RisSpec:
 
     @property
     def panels(self) -> "tuple[RisSpec, ...]":
-        """This panel alone."""
+        """This RIS panel alone."""
         return (self,)
 
     def span(self, panel: int) -> slice:
-        """Where a panel's elements stand among all, row by row: everywhere."""
+        """Where a RIS panel's elements stand among all, row by row: everywhere."""
         return slice(0, self.num_elements)
 
     def parts(self, code: "RisCode") -> "tuple[RisCode, ...]":
@@ -126,7 +127,7 @@ class RisSpecs:
 
     @property
     def num_elements(self) -> int:
-        """E: elements of all panels."""
+        """E, elements of all RIS panels."""
         return sum(panel.num_elements for panel in self.panels)
 
     @property
@@ -135,12 +136,12 @@ class RisSpecs:
         return self.panels[0].levels
 
     def span(self, panel: int) -> slice:
-        """Where a panel's elements stand in the row of all."""
+        """Where one RIS panel's elements stand in the row of all."""
         first = sum(other.num_elements for other in self.panels[:panel])
         return slice(first, first + self.panels[panel].num_elements)
 
     def parts(self, code: "RisCode") -> "tuple[RisCode, ...]":
-        """The code (..., N, M) of each panel."""
+        """The code (..., N, M) of each RIS panel."""
         rows = [code.index[..., 0, self.span(panel)] for panel in range(len(self.panels))]
         shapes = [(*row.shape[:-1], panel.rows, panel.cols) for row, panel in zip(rows, self.panels, strict=True)]
         return tuple(RisCode(row.reshape(shape), code.levels) for row, shape in zip(rows, shapes, strict=True))
@@ -157,12 +158,12 @@ DataSheet: TypeAlias = RisSpec | RisSpecs
 
 
 def join_sheets(sheets: tuple[RisSpec, ...]) -> DataSheet:
-    """One data sheet of one or more panels."""
+    """One data sheet of one or more RIS panels."""
     return sheets[0] if len(sheets) == 1 else RisSpecs(sheets)
 
 
 def join_codes(codes: "tuple[RisCode, ...]") -> "RisCode":
-    """One code of all panels from the code (..., N, M) of each; that of a single panel is taken as it is."""
+    """One code of all RIS panels from the code (..., N, M) of each; that of a single panel is taken as it is."""
     if len(codes) == 1:
         return codes[0]
     rows = [code.index.reshape(*code.index.shape[:-2], 1, -1) for code in codes]
@@ -208,7 +209,7 @@ class RisPanels:
 
 
 def join_panels(panels: tuple[RisPanel, ...]) -> RisPanel | RisPanels | None:
-    """The panels of a room as a scene holds them: none, one, or several."""
+    """The RIS panels of a room as a scene holds them: none, one, or several."""
     return RisPanels(panels) if len(panels) > 1 else panels[0] if panels else None
 
 

@@ -1,4 +1,4 @@
-"""A room: reflecting meshes, point scatterers, panels, and the agent's true motion."""
+"""A scene: reflecting meshes, point scatterers, panels, and the agent's true motion."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -79,7 +79,7 @@ class Material:
 
     @property
     def specular_share(self) -> float:
-        """Share of the reflected field that stays in the mirrored ray."""
+        """Share of a material's reflected field that stays in the mirrored ray."""
         return float(np.sqrt(1.0 - self.scattering**2))
 
     def as_body(self) -> "Material":
@@ -96,7 +96,7 @@ class Material:
 
     @property
     def words(self) -> str:
-        """What it is, in few words."""
+        """What a material is, in few words."""
         if self.reflection is not None:
             return f"R = {self.reflection:g}"
         if self.reflection_te is not None:
@@ -120,7 +120,7 @@ class Reflector:
 
     @property
     def triangles(self) -> Floats:
-        """(F, 3, 3) [m]: face, corner, xyz."""
+        """(F, 3, 3) [m] triangles of a reflector: face, corner, xyz."""
         return self.vertices[self.faces]
 
 
@@ -140,7 +140,7 @@ class Occluder:
 
     @property
     def triangles(self) -> Floats:
-        """(F, 3, 3) [m]: face, corner, xyz."""
+        """(F, 3, 3) [m] triangles of an occluder in the scene: face, corner, xyz."""
         return self.vertices[self.faces]
 
 
@@ -210,23 +210,23 @@ class Scene:
         return html_with(repr(self), self.plan(("true way", self.agent.position)))
 
     def plan(self, *ways: tuple[str, Floats]) -> PlanView:
-        """The room from above, with named courses (K, 3) [m] in it."""
+        """The scene from above, with named courses (K, 3) [m] in it."""
         edges = outline((reflector.vertices, reflector.faces) for reflector in self.reflectors)
         return PlanView(self.bounds, edges, list(zip(self.landmarks, self.landmark_positions, strict=True)), ways)
 
     @property
     def panels(self) -> tuple[RisPanel, ...]:
-        """All panels, in the order of the code's elements; empty without one."""
+        """All panels of a scene, in the order of the code's elements; empty without one."""
         return self.ris.panels if self.ris is not None else ()
 
     @property
     def landmarks(self) -> tuple[str, ...]:
-        """Names in the order of landmark numbers: scatterers first, then the panels."""
+        """Names of a scene's landmarks in the order of their numbers: scatterers first, then the panels."""
         return tuple(s.name for s in self.scatterers) + tuple(panel.name for panel in self.panels)
 
     @property
     def landmark_positions(self) -> Floats:
-        """(num_landmarks, 3) [m], in the order of `landmarks`."""
+        """(num_landmarks, 3) [m] of a scene's landmarks, in the order of `landmarks`."""
         points = [s.position for s in self.scatterers] + [panel.center for panel in self.panels]
         return np.array(points, dtype=np.float64).reshape(-1, 3)
 
@@ -236,13 +236,13 @@ class Scene:
 
     @property
     def bounds(self) -> Floats:
-        """(2, 3) [m]: lowest and highest corner of all reflectors."""
+        """(2, 3) [m] bounds of a scene: lowest and highest corner of all reflectors."""
         points = np.concatenate([r.vertices for r in self.reflectors]) if self.reflectors else np.zeros((1, 3))
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
 def _freeze_mesh(mesh: Any, place: str) -> None:
-    """Check and freeze `vertices` and `faces`."""
+    """Check and freeze `vertices` and `faces` of a mesh in a scene."""
     freeze(mesh, "vertices", np.float64, (None, 3))
     freeze(mesh, "faces", np.int64, (None, 3))
     if len(mesh.faces) == 0:

@@ -1,4 +1,4 @@
-"""What is known of the receiver: which paths it reports, what else it reports, what it cannot tell apart.
+"""The sensor model, what is known of the receiver: which paths it reports, what else, what it cannot tell apart.
 
 One object says it all. The simulation draws from the one that its settings make; filter, bound and rivals reckon with
 the one that they are told, which may be wrong.
@@ -18,7 +18,7 @@ from rislam_rt.model.radio import RadioConfig
 RESOLUTIONS = ("cell", "joint", "all")
 """What two paths must be to come out apart: outside each other's cell; certain of their amplitudes when all else is
 unknown (`information.resolved_probability`); anything at all."""
-CERTAIN_SNR = 30.0
+CERTAIN_SNR = 10.0
 """Standard deviations above the threshold from which on the detection probability is 1 to double precision."""
 
 
@@ -93,8 +93,10 @@ def detection_probability(snr: ArrayLike, threshold: float) -> Floats:
     freedom. `exp(-threshold)` for noise alone.
     """
     level = np.sqrt(2.0 * threshold)
-    mean = np.minimum(np.sqrt(2.0 * np.maximum(np.asarray(snr, dtype=np.float64), 0.0)), level + CERTAIN_SNR)
-    return np.asarray(1.0 - scipy.special.chndtr(level**2, 2.0, mean**2))
+    mean = np.sqrt(2.0 * np.maximum(np.asarray(snr, dtype=np.float64), 0.0))
+    doubtful, found = mean < level + CERTAIN_SNR, np.ones(mean.shape)
+    found[doubtful] = 1.0 - scipy.special.chndtr(level**2, 2.0, mean[doubtful] ** 2)
+    return found
 
 
 def merged_pull(ratio: ArrayLike) -> tuple[Floats, Floats]:

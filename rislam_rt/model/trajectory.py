@@ -1,4 +1,4 @@
-"""The agent's body (where Tx and Rx sit on it) and a motion of it."""
+"""The agent's trajectory, and its body (where Tx and Rx sit on it)."""
 
 from dataclasses import dataclass, field
 
@@ -70,15 +70,15 @@ class Trajectory:
 
     @property
     def elapsed(self) -> Floats:
-        """Times (K,) [s] since the first cycle: time stamps may count from the epoch."""
+        """Times (K,) [s] since a trajectory's first cycle: time stamps may count from the epoch."""
         return np.asarray(self.time - self.time[:1])
 
     @property
     def tx(self) -> Floats:
-        """Tx positions (K, 3) [m]."""
+        """Tx positions (K, 3) [m] along a trajectory."""
         return self.body.ends(self.position, self.heading)[0]
 
     @property
     def rx(self) -> Floats:
-        """Rx positions (K, 3) [m]."""
+        """Rx positions (K, 3) [m] along a trajectory."""
         return self.body.ends(self.position, self.heading)[1]

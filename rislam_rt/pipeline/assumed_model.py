@@ -1,4 +1,4 @@
-"""What the belief is told: the one place where anything crosses from the truth to filter, association and design.
+"""The assumed model: the one place where anything crosses from the truth to filter, association and design.
 
 `tell_belief` makes the filter's and the design's inputs from the truth and the errors of `[told]`; `perceived_paths`
 turns the true signals as an undeclared tilt or clock does. The quantities stand one by one in `docs/told.md`.
@@ -37,7 +37,7 @@ def tell_belief(
     motion: Trajectory, body: Body, panel: DataSheet | None, spec: PipelineSpec, settings: Settings,
     *, start: np.random.Generator, compass: np.random.Generator,
 ) -> AssumedModel:  # fmt: skip
-    """What a run's belief is told of the truth.
+    """All that a run's belief is told of the truth: the assumed model.
 
     Parameters
     ----------
@@ -67,7 +67,8 @@ def tell_start(
     motion: Trajectory, compass: float, start: StartSection, told: AssumedSection, settings: Settings,
     *, rng: np.random.Generator,
 ) -> StartPrior:  # fmt: skip
-    """The truth plus one draw of the prior's errors; a known height without them, a known heading by the compass."""
+    """The start that is told: truth plus one draw of the prior's errors; a known height exact, a known heading by
+    compass."""
     free_height, free_heading = settings.slam.height == "estimated", settings.slam.heading == "estimated"
     axes = told.start_scale * np.array([1.0, 1.0, float(free_height)])
     shift, push = rng.standard_normal(3), rng.standard_normal(3)
@@ -84,7 +85,7 @@ def tell_start(
 
 
 def tell_panel(panel: DataSheet, told: AssumedSection) -> DataSheet:
-    """The data sheet of the panel, or of each of them, its orientation included."""
+    """The panel that is told: its data sheet, or one of each, orientation included."""
     if isinstance(panel, RisSpecs):
         return RisSpecs(tuple(_tell_one(one, told) for one in panel.panels))
     return _tell_one(panel, told)
@@ -104,7 +105,7 @@ def _tell_one(panel: RisSpec, told: AssumedSection) -> RisSpec:
 
 
 def tell_settings(settings: Settings, told: AssumedSection) -> Settings:
-    """Radio, process noise, and what is known of detection and of false components."""
+    """The settings that are told: radio, process noise, what is known of detection and of false components."""
     slam = replace(settings.slam, max_bounces=max(settings.slam.max_bounces - told.bounces_less, 0))
     radio = tell_radio(settings.radio, told)
     sensor = replace(
@@ -120,7 +121,7 @@ def tell_settings(settings: Settings, told: AssumedSection) -> Settings:
 
 
 def tell_radio(radio: RadioConfig, told: AssumedSection) -> RadioConfig:
-    """Carrier, band and array as they are; noise, gains and antennas."""
+    """The radio that is told: carrier, band and array as they are; noise, gains and antennas as assumed."""
     return replace(
         radio,
         noise_psd=radio.noise_psd * _amplitude(told.noise_db) ** 2,
@@ -130,7 +131,7 @@ def tell_radio(radio: RadioConfig, told: AssumedSection) -> RadioConfig:
 
 
 def tell_measurement(measurement: Measurement, told: AssumedSection) -> Measurement:
-    """What the receiver reports, with the array's calibration and its own deviations as far off as is said."""
+    """The measurement that is told: what the receiver reports, calibration and deviations as far off as assumed."""
     if told.array_scale == 1.0 and told.array_bias == 0.0 and told.std_scale == 1.0:
         return measurement
     cosines = told.array_scale * measurement.cosines + told.array_bias
@@ -143,7 +144,7 @@ def tell_measurement(measurement: Measurement, told: AssumedSection) -> Measurem
 
 
 def tilted_motion(motion: Trajectory, told: AssumedSection) -> Trajectory:
-    """The motion of a body that leans as `tilt_deg` says: its ends lie where they truly are."""
+    """Motion of a body that leans by an untold `tilt_deg`: its ends lie where they truly are."""
     if told.tilt_deg == 0.0:
         return motion
     tilt, body = _rotations(np.radians(told.tilt_deg), np.zeros(())), motion.body
@@ -153,7 +154,7 @@ def tilted_motion(motion: Trajectory, told: AssumedSection) -> Trajectory:
 def perceived_paths(
     paths: Paths, motion: Trajectory, told: AssumedSection, *, rng: np.random.Generator, since: float | None = None
 ) -> Paths:
-    """The paths as a leaning, swaying array with a clock of its own hears them.
+    """Paths as heard by a leaning, swaying array with a clock of its own, of which the agent is not told.
 
     Arrivals are such that the body frame of a level agent gives them to the array; delays run with the clock, which
     drifts from the time `since` [s] on, the motion's first if it is not given.
@@ -181,13 +182,13 @@ def _rotations(pitch: Floats, roll: Floats) -> Floats:
 
 
 def _outwards(body: Body) -> Floats:
-    """Unit vector (3,) from the Rx to the Tx."""
+    """Unit vector (3,) from the Rx to the Tx, along which an assumed baseline errs."""
     span = body.tx_offset - body.rx_offset
     return np.asarray(span / np.linalg.norm(span))
 
 
 def _livelier(config: Any, scale: float) -> Any:
-    """An estimator's settings with another process noise."""
+    """An estimator's settings with another assumed process noise."""
     assert "sigma_a" in {field.name for field in fields(config)}
     return replace(config, sigma_a=config.sigma_a * scale)
 

@@ -22,7 +22,7 @@ class ControlLink(NamedTuple):
 
 
 def open_link(spec: DataSheet) -> ControlLink:
-    """A panel at level 0, nothing on its way."""
+    """The control link at the start: a panel at level 0, nothing on its way."""
     start = zero_code(spec)
     return ControlLink(start, start)
 
@@ -30,7 +30,7 @@ def open_link(spec: DataSheet) -> ControlLink:
 def send_code(
     link: ControlLink, code: RisCode, control: ControlSection, *, rng: np.random.Generator, bit_flip: float = 0.0
 ) -> ControlLink:
-    """The link one cycle later, after `code` was sent over a link that turns bits over with a probability."""
+    """The control link one cycle later, after `code` was sent over a link that turns bits with a probability."""
     arrives = bool(rng.random() >= control.loss_probability)
     sent = quantise(code, control.levels)
     heard = _damaged(sent, control.levels or code.levels, bit_flip, rng=rng) if bit_flip else sent
@@ -42,13 +42,13 @@ def send_code(
 
 
 def _damaged(code: RisCode, levels: int, bit_flip: float, *, rng: np.random.Generator) -> RisCode:
-    """What arrives of a code whose message names `levels` levels."""
+    """What arrives over the control link of a code whose message names `levels` levels."""
     step = code.levels // levels
     return RisCode(flip_bits(RisCode(code.index // step, levels), bit_flip, rng=rng).index * step, code.levels)
 
 
 def quantise(code: RisCode, levels: int | None) -> RisCode:
-    """The nearest code that a message of `levels` phase levels can name, in the panel's own levels."""
+    """Nearest code that a control message of `levels` phase levels can name, in the panel's own levels."""
     if levels is None:
         return code
     step = code.levels // levels
@@ -56,13 +56,13 @@ def quantise(code: RisCode, levels: int | None) -> RisCode:
 
 
 def message_seconds(spec: DataSheet, control: ControlSection) -> float:
-    """Air time [s] of one message: so many bits an element as its levels need."""
+    """Air time [s] of one control message: so many bits an element as its levels need."""
     bits = spec.num_elements * int(np.ceil(np.log2(control.levels or spec.levels)))
     return bits / control.rate_bits_s
 
 
 def check_control(spec: DataSheet, control: ControlSection, bit_flip: float = 0.0) -> None:
-    """Check the message against the panel.
+    """Check the control message against the panel.
 
     Raises
     ------

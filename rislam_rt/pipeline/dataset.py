@@ -84,7 +84,7 @@ AXES: dict[str, list[str]] = {
 
 
 def paths_to_dataset(paths: Paths, motion: Trajectory) -> "xr.Dataset":
-    """True trajectory and true paths."""
+    """Data set of the true trajectory and true paths."""
     content = _arrays(paths, PATHS, "")
     truth = {"true_position": motion.position, "true_velocity": motion.velocity, "true_heading": motion.heading}
     content |= variables({"time": motion.time, **truth}, TRAJECTORY, "")
@@ -110,7 +110,7 @@ def dataset_to_paths(data: "xr.Dataset") -> Paths:
 
 
 def scheme_to_dataset(result: SchemeResult) -> "xr.Dataset":
-    """One scheme, with the filter's diagnostics as `info_...` and its last map as `map_...`."""
+    """Data set of one scheme, with the filter's diagnostics as `info_...` and its last map as `map_...`."""
     content = _arrays(result, SCHEME, "") | _arrays(result.map, MAP, "map_")
     for name, values in result.info.items():
         content[f"info_{name}"] = (("time",), values, {"long_name": f"filter diagnostic {name}"})
@@ -159,7 +159,7 @@ def check_dataset(data: "xr.Dataset", path: Path, **about: str | int) -> None:
 
 
 def _checksum(data: "xr.Dataset") -> str:
-    """SHA-256 over names, shapes, types, values and attributes; not over how the file packs them."""
+    """SHA-256 over a data set's names, shapes, types, values and attributes; not over how the file packs them."""
     digest = hashlib.sha256()
     for name in sorted(map(str, data.variables)):
         variable = data.variables[name]
@@ -174,7 +174,7 @@ def _checksum(data: "xr.Dataset") -> str:
 
 
 def _plain(attributes: Any) -> list[tuple[str, list[Any]]]:
-    """Attributes in one form: NetCDF gives numbers as arrays, and a list of one as its only entry."""
+    """A data set's attributes in one form: NetCDF gives numbers as arrays, and a list of one as its only entry."""
     found = []
     for name in sorted(map(str, attributes)):
         value = attributes[name]
@@ -190,7 +190,7 @@ def _arrays(record: Any, table: dict[str, Entry], prefix: str) -> dict[str, Any]
 
 
 def _values(data: "xr.Dataset", table: dict[str, Entry], prefix: str) -> dict[str, Any]:
-    """Arrays by field name."""
+    """A data set's arrays by field name."""
     values: dict[str, Any] = {}
     for name in table:
         key = prefix + name
@@ -210,5 +210,5 @@ def _dataset(content: dict[str, Any], attributes: dict[str, Any], coords: dict[s
 
 
 def names_of(value: Any) -> tuple[str, ...]:
-    """Names from an attribute, which NetCDF gives back as one string if there is only one."""
+    """Names from a data set's attribute, which NetCDF gives back as one string if there is only one."""
     return (value,) if isinstance(value, str) else tuple(str(item) for item in value)

@@ -1,4 +1,4 @@
-"""Who turns measurements into a pose and a map: the project's filter, and the rivals, behind one set of functions."""
+"""Estimators of pose and map from measurements: the project's filters and the rivals, behind one set of functions."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple

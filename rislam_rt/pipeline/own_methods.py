@@ -55,7 +55,7 @@ class OwnEstimator(Protocol):
     def init(
         self, start: StartPrior, body: Body, panel: DataSheet | None, sensor: SensorModel, *, rng: np.random.Generator
     ) -> Any:
-        """The first state, whatever it is; states are not changed afterwards."""
+        """First state of one's own estimator, whatever it is; states are not changed afterwards."""
 
     def step(
         self,
@@ -70,12 +70,12 @@ class OwnEstimator(Protocol):
         """The state after a cycle: `dt` [s] since the last, `heading` [rad] of the compass, `code` in force."""
 
     def estimate(self, state: Any) -> SlamEstimate:
-        """Pose and map (`rislam_rt.model.pose_estimate` makes one of a pose alone)."""
+        """Pose and map of one's own estimator (`rislam_rt.model.pose_estimate` makes one of a pose alone)."""
 
 
 @cache
 def load_own(name: str) -> Any:
-    """What a name stands for; a class that is made without arguments is made.
+    """One's own method, channel or estimator that a name stands for; a class that takes no arguments is made.
 
     Raises
     ------
@@ -166,7 +166,7 @@ class OwnChannel:
             self.inner = load_own(name)(scene, radio, depth)
 
     def paths(self, trajectory: Trajectory) -> Paths:
-        """Every path of every cycle, with the panel at level 0.
+        """What one's own channel gives: every path of every cycle, with the panel at level 0.
 
         Raises
         ------
@@ -181,7 +181,7 @@ class OwnChannel:
         return found
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """The same paths under another code."""
+        """What one's own channel gives: the same paths under another code."""
         with own_method_errors(self.name):
             return self.inner.respond(paths, code)
 
@@ -203,7 +203,7 @@ def _entry_point(name: str) -> Any:
 
 
 def _made(name: str, found: Any) -> Any:
-    """What a name stands for, ready for use: an estimator made, a function or a class of a channel as it is."""
+    """One's own method ready for use: an estimator made, a function or a class of a channel as it is."""
     if not hasattr(found, "step"):
         if hasattr(found, "init") and hasattr(found, "estimate"):
             raise ConfigError(f"'{name}': has 'init' and 'estimate' and no 'step'; a filter has all three")

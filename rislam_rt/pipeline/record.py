@@ -1,4 +1,4 @@
-"""From a list of cycles to arrays over all cycles."""
+"""The record of a run: a list of cycles as arrays over all cycles."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -70,7 +70,7 @@ def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, give
 
 
 def given_of(told: AssumedModel, first: int, cycles: Sequence[Cycle], seed: np.random.SeedSequence) -> RecordedInputs:
-    """What the estimator was given from cycle `first` on."""
+    """Record of what the estimator was given from cycle `first` on."""
     span = slice(first, first + len(cycles))
     time, heading = told.time[span] - told.time[0], told.heading[span]
     measurements = tuple(cycle.measurement for cycle in cycles)
@@ -85,13 +85,13 @@ def given_to_dataset(result: SchemeResult) -> "xr.Dataset":
 
 
 def _codes(codes: Sequence[RisCode | None]) -> Integers:
-    """(K, N, M) level indices; (K, 0, 0) without a panel."""
+    """(K, N, M) level indices of the recorded codes; (K, 0, 0) without a panel."""
     if any(code is None for code in codes):
         return np.zeros((len(codes), 0, 0), dtype=np.int64)
     return np.array([code.index for code in codes if code is not None], dtype=np.int64)
 
 
 def _diagnostics(infos: Sequence[Any]) -> dict[str, Any]:
-    """The scalar numbers among the fields of the filter's infos, (K,) each."""
+    """Record of the filter's diagnostics: the scalar numbers among the fields of its infos, (K,) each."""
     names = [name for name, value in infos[0]._asdict().items() if isinstance(value, bool | int | float | np.number)]
     return {name: np.array([float(getattr(info, name)) for info in infos]) for name in names}

@@ -80,7 +80,7 @@ def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
 
 
 def prepare_setup(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> RunSetup:
-    """Draw the true motion and find all paths along it. None of it depends on the noise, so that one setup serves many.
+    """Set a run up: draw the true motion and find all paths along it, independent of the noise, so that it serves many.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def prepare_setup(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator)
 
 
 def check_one_piece(cycles: int, way_out: str) -> None:
-    """Refuse more cycles than fit into the memory of a small machine at once.
+    """Refuse more cycles than a run in one piece has memory for on a small machine.
 
     Raises
     ------
@@ -177,13 +177,13 @@ def result_of(
 def run_scheme(
     name: str, setup: RunSetup, spec: PipelineSpec, tell: Tell, estimator: Estimator | None = None
 ) -> SchemeResult:
-    """One scheme over all cycles, with its own estimator unless another is given."""
+    """Run one scheme over all cycles, with its own estimator unless another is given."""
     walk = SchemeSimulation(name, setup.scene, setup.body, spec, setup.seeds, estimator, setup.receptions)
     return walk.lead(setup.paths, 0, len(setup.scene.agent), tell, setup.extras)
 
 
 def check_run(scene: Scene, spec: PipelineSpec) -> None:
-    """Check that scene and specification fit, before anything is traced or written.
+    """Check that scene and specification of a run fit, before anything is traced or written.
 
     Raises
     ------
@@ -215,7 +215,7 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
 
 
 def prepare_channel(kind: str) -> None:
-    """Make sure that the machine can do what a channel needs, before anything is written.
+    """Make sure that the machine can do what a run's channel needs, before anything is written.
 
     Raises
     ------
@@ -227,7 +227,7 @@ def prepare_channel(kind: str) -> None:
 
 
 def build_channel(kind: str, scene: Scene, radio: RadioConfig, depth: int) -> Channel:
-    """The channel of that name, or of one's own; the tracer is imported only if it is asked for."""
+    """The channel of a run by name, or of one's own; the tracer is imported only if it is asked for."""
     if kind == "traced":
         from rislam_rt.channel.traced import TracedChannel
 
@@ -240,12 +240,13 @@ def build_channel(kind: str, scene: Scene, radio: RadioConfig, depth: int) -> Ch
 
 
 def cut_scene(scene: Scene, cycles: int | None) -> Scene:
-    """The scene with its trajectory's first cycles alone."""
+    """The run's scene with its trajectory's first cycles alone."""
     return scene if cycles is None else replace(scene, agent=scene.agent[:cycles])
 
 
 def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
-    """Where the panel's formulas leave their range along the true motion; one line each, empty if nowhere.
+    """Warnings where the panel's formulas leave their range along the run's true motion; one line each, empty if
+    nowhere.
 
     Gains are element by element, so that the far field's limit binds nothing; a path over the panel is one delay, which
     a panel larger than the band resolves would not be.
@@ -258,7 +259,7 @@ def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
 
 
 def library_versions() -> dict[str, str]:
-    """Versions of this package, of Python and of the libraries that numbers depend on."""
+    """Versions that a run's numbers depend on: of this package, of Python and of the libraries."""
     from rislam_rt import __version__
 
     found = {"rislam-rt": __version__, "python": platform.python_version()}
@@ -271,6 +272,6 @@ def library_versions() -> dict[str, str]:
 
 
 def _seed_of(rng: np.random.Generator) -> int | None:
-    """The integer that the generator was made from, if it was."""
+    """The integer that a run's generator was made from, if it was."""
     entropy = getattr(rng.bit_generator.seed_seq, "entropy", None)
     return entropy if isinstance(entropy, int) else None

@@ -1,4 +1,4 @@
-"""Where a run's random numbers come from: a child for each purpose, and for each cycle."""
+"""Seeds of a run's random numbers: a child for each purpose, and for each cycle."""
 
 from typing import NamedTuple
 
@@ -23,10 +23,10 @@ class Seeds(NamedTuple):
 
 
 def spawn_seeds(*, rng: np.random.Generator) -> Seeds:
-    """The children of a run's generator."""
+    """Seeds of a run: the children of its generator."""
     return Seeds(*rng.bit_generator.seed_seq.spawn(len(Seeds._fields)))  # type: ignore[attr-defined]
 
 
 def child(seed: np.random.SeedSequence, number: int) -> np.random.Generator:
-    """A generator by number, as of a cycle: the same one every time, however many numbers others draw."""
+    """Child seed by number, as of a cycle: the same generator every time, however many numbers others draw."""
     return np.random.default_rng(np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, number)))

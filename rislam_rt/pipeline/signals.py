@@ -46,7 +46,7 @@ class SignalsSize(NamedTuple):
 
     @property
     def num_bytes(self) -> int:
-        """Of the samples alone."""
+        """Bytes of the signals' samples alone."""
         return self.cycles * self.captures * self.antennas * self.tones * BYTES_PER_SAMPLE
 
     def __str__(self) -> str:
@@ -57,7 +57,7 @@ class SignalsSize(NamedTuple):
 
 
 def load_signals_spec(overrides: Sequence[str]) -> SignalsSpec:
-    """The defaults with `key=value` settings (dotted keys) put over them.
+    """Specification of a data set of signals: defaults with `key=value` settings (dotted keys) put over them.
 
     Raises
     ------
@@ -83,13 +83,13 @@ def signal_settings(spec: SignalsSpec, scene: Scene | None = None) -> tuple[Radi
 
 
 def signals_size(scene: Scene, spec: SignalsSpec) -> SignalsSize:
-    """How large the samples will be."""
+    """How large the samples of a data set of signals will be."""
     radio, receiver = signal_settings(spec, scene)
     return SignalsSize(len(scene.agent), receiver.num_captures, radio.array.num_antennas, num_tones(radio, receiver))
 
 
 def check_space(file: Path, size: SignalsSize) -> None:
-    """Make sure that the samples fit on the disk, before an hour's work is lost.
+    """Make sure that a data set's signals fit on the disk, before an hour's work is lost.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def check_space(file: Path, size: SignalsSize) -> None:
 
 
 def coded_paths(scene: Scene, channel: str, depth: int, spec: SignalsSpec, *, rng: np.random.Generator) -> Paths:
-    """The room's paths with the panel under the code of each cycle.
+    """The room's paths for a data set of signals, with the panel under the code of each cycle.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def coded_paths(scene: Scene, channel: str, depth: int, spec: SignalsSpec, *, rn
 
 
 def panel_codes(scene: Scene, paths: Paths, kind: str, *, rng: np.random.Generator) -> RisCode | None:
-    """Codes (K, N, M), one a cycle; None without a panel, or where its level 0 is asked for."""
+    """Codes (K, N, M) of a data set of signals, one a cycle; None without a panel, or for its level 0."""
     if scene.ris is None or kind == "zero":
         return None
     panel = scene.ris.spec
@@ -149,5 +149,5 @@ def build_signals(
 
 
 def mean_components(data: "xr.Dataset") -> float:
-    """Components a cycle."""
+    """Mean number of components a cycle in a data set of signals."""
     return float((data["found_path"] != NO_COMPONENT).sum()) / max(data.sizes["time"], 1)

@@ -25,7 +25,7 @@ UNSEEN = "#d9d9d9"
 
 
 def print_advice(advice: Advice) -> None:
-    """One row a landmark and kind of codes, then what would help, then the cost."""
+    """Print the adviser's word: one row a landmark and kind of codes, then what would help, then the cost."""
     console = Console(highlight=False)
     table = Table("landmark", "codes", "start", "middle", "end", "heard", "why not")
     for link in advice.links:
@@ -75,7 +75,7 @@ def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> N
 
 
 def _cell(link: LandmarkLink, at: int) -> str:
-    """The margin at a place; in brackets where it is not heard all the same."""
+    """Cell of the adviser's table: the margin at a place, in brackets where it is not heard all the same."""
     if link.margin_db[at] <= NOTHING_DB:
         return "none"
     text = f"{link.margin_db[at]:+.1f}"

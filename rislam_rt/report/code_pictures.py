@@ -56,7 +56,8 @@ def draw_codes(designs: Mapping[str, Design], path: Path, sheet: DataSheet | Non
 
 
 def _draw_code(axis: Axes, index: Integers | Floats, levels: int, sheet: DataSheet | None = None) -> None:
-    """Levels of an (N, M) panel, row 0 at the bottom (rows run along `up`); several panels side by side."""
+    """Picture of the levels of an (N, M) code, row 0 at the bottom (rows run along `up`); several panels side by
+    side."""
     if isinstance(sheet, RisSpecs):
         index = _side_by_side([part.index for part in sheet.parts(RisCode(index, levels))])
     axis.imshow(index, cmap=_colours(levels), vmin=-0.5, vmax=levels - 0.5, origin="lower", interpolation="nearest")
@@ -70,7 +71,7 @@ def _draw_code(axis: Axes, index: Integers | Floats, levels: int, sheet: DataShe
 
 
 def _colours(levels: int) -> ListedColormap:
-    """One colour a level, from a map that goes round as phase does."""
+    """Colours of a code's levels, from a map that goes round as phase does."""
     from matplotlib import colormaps
 
     return ListedColormap(colormaps["twilight"](np.arange(levels) / levels))

@@ -1,4 +1,4 @@
-"""What a run comes to, in sentences: the first thing that a reader of its page sees."""
+"""Conclusions on a run, in sentences: the first thing that a reader of its page sees."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
@@ -30,7 +30,7 @@ class Conclusions(NamedTuple):
 
 
 def judge_run(result: SlamResult, summary: Mapping[str, Any]) -> Conclusions:
-    """The verdict on a run from its scores and from what could be heard in it."""
+    """Conclusion on a run from its scores and from what could be heard in it."""
     found, missing = {}, {}
     for name, scheme in result.schemes.items():
         scores = summary["schemes"][name]
@@ -40,7 +40,7 @@ def judge_run(result: SlamResult, summary: Mapping[str, Any]) -> Conclusions:
 
 
 def _headline(schemes: Mapping[str, Any]) -> str:
-    """`The agent is off by 2.7 cm with optimised codes, 6.7 cm with random codes, 15 cm with no panel.`"""
+    """First conclusion: `The agent is off by 2.7 cm with optimised codes, 6.7 cm with random codes, ...`"""
     best, *others = schemes.items()
     parts = [f"{_centimetres(best[1]['rmse_m'])} with {_words(best[0])}"]
     parts += [f"{_centimetres(scores['rmse_m'])} with {_words(name)}" for name, scores in others]
@@ -66,7 +66,7 @@ def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) 
 
 
 def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> float | None:
-    """Time [s] from which on the map holds a panel as that panel to the end; None if it does not."""
+    """Conclusion on the panel: time [s] from which the map holds it to the end; None if it does not."""
     if panel >= len(result.scene.panels):
         return None
     column = landmark_track(result.scene, scheme).column[:, len(result.scene.scatterers) + panel]
@@ -83,7 +83,7 @@ def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> 
 
 
 def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> Iterator[str]:
-    """One line on each landmark that the last map lacks."""
+    """Conclusion, one line, on each landmark that the last map lacks."""
     spec = PipelineSpec.model_validate(dict(result.config))
     settings = build_settings(spec)
     threshold = build_sensor(settings.radio, settings.receiver).threshold
@@ -98,7 +98,7 @@ def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]
 
 
 def why_not(snr: Any, valid: Booleans, threshold: float) -> str:
-    """Why a landmark with paths (K, P) of these SNRs is not in the map.
+    """Conclusion why a landmark with paths (K, P) of these SNRs is not in the map.
 
     `threshold` is that of detection; both linear, over all antennas.
     """

@@ -1,4 +1,4 @@
-"""Lines and polygons of rooms and estimated planes, for drawing."""
+"""Geometry for drawing: lines and polygons of rooms and estimated planes."""
 
 import numpy as np
 

@@ -25,7 +25,7 @@ WALL_NAME, MOST_NAMES = "#54606e", 40
 
 
 def draw_above(result: SlamResult) -> Figure:
-    """One panel a scheme: room, path, landmarks and walls, true and estimated, and a close-up of the path's end."""
+    """Draw the map from above, one panel a scheme: room, path, landmarks, walls, and a close-up of the path's end."""
     schemes = list(result.schemes.values())
     low, high = result.scene.bounds
     aspect = (high[1] - low[1]) / (high[0] - low[0])
@@ -95,7 +95,7 @@ def name_walls(axis: Axes, scene: Scene) -> None:
 
 
 def _mark(axis: Axes, point: Floats, name: str, marker: str) -> None:
-    """A true landmark, its name and height beside it."""
+    """A true landmark on the map, its name and height beside it."""
     axis.plot(point[0], point[1], marker, ms=13, mfc="none", mec=TRUTH, mew=1.6, zorder=5)
     paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
     axis.annotate(f"{name}\nz = {point[2]:.1f} m", (point[0], point[1]), (12, 0), textcoords="offset points",
@@ -103,7 +103,7 @@ def _mark(axis: Axes, point: Floats, name: str, marker: str) -> None:
 
 
 def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
-    """What the agent holds after the last cycle."""
+    """What the agent's map holds after the last cycle."""
     colour = scheme_colour(scheme.scheme)
     axis.plot(scheme.position[:, 0], scheme.position[:, 1], color=colour, lw=1.4, zorder=4)
     walls = build_walls(scene)
@@ -134,7 +134,8 @@ def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
 
 
 def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) -> None:
-    """The last stretch of the path, magnified, with the believed 2 sigma ellipse of the last position."""
+    """Close-up of the map: the last stretch of the path, magnified, with the believed 2 sigma ellipse of the last
+    position."""
     truth, estimate = scene.agent.position[-1, :2], scheme.position[-1, :2]
     colour = scheme_colour(scheme.scheme)
     low, high = scene.bounds[:, :2]

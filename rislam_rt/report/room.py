@@ -94,7 +94,7 @@ def _draw_objects_3d(axis: Any, scene: Scene, cycle: int) -> None:
 
 
 def _draw_class(axis: Any, scene: Scene, paths: Paths, gain: Floats, cycle: int, kind: PathKind) -> Line2D | None:
-    """Paths of one class; the legend says how many of them are shown."""
+    """Paths of one class in the room's picture; the legend says how many of them are shown."""
     columns = np.flatnonzero((paths.kind == kind) & paths.valid[cycle])
     if not len(columns):
         return None
@@ -111,12 +111,12 @@ def _draw_class(axis: Any, scene: Scene, paths: Paths, gain: Floats, cycle: int,
 
 
 def path_points(scene: Scene, paths: Paths, cycle: int, path: int) -> Floats:
-    """(V + 2, 3) [m]: Tx, interaction points, Rx."""
+    """(V + 2, 3) [m] points of a path in the room's picture: Tx, interaction points, Rx."""
     count = int(paths.num_vertices[path])
     inner = paths.vertices[cycle, path, :count]
     return np.concatenate([scene.agent.tx[cycle][None], inner, scene.agent.rx[cycle][None]])
 
 
 def middle_cycles(count: int, number: int) -> Integers:
-    """Cycles at the middles of `number` equal parts of `count` cycles."""
+    """Cycles shown in the room's picture, at the middles of `number` equal parts of `count`."""
     return ((np.arange(number) + 0.5) / number * count).astype(np.int64)

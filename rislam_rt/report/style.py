@@ -1,4 +1,4 @@
-"""One look for all figures: colours that colour-blind readers can tell apart (Okabe and Ito), sizes, file writing."""
+"""One style for all figures: colours that colour-blind readers can tell apart (Okabe and Ito), sizes, file writing."""
 
 import io
 import warnings
@@ -66,25 +66,25 @@ SETTINGS: dict[Any, Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw in the common look."""
+    """Draw in the style of all figures."""
     with mpl.rc_context(SETTINGS):
         yield
 
 
 def scheme_colour(name: str) -> str:
-    """Colour of a scheme."""
+    """Colour of a scheme in the figures' style."""
     return SCHEME.get(name, "#0072B2")
 
 
 def _save(figure: Figure, target: Any, **how: Any) -> None:
-    """A name in a script that the fonts lack is drawn as boxes; that is no warning's worth."""
+    """Save a figure; a name that the fonts lack is drawn as boxes, which is no warning's worth."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph \d+")
         figure.savefig(target, **how)
 
 
 def to_png(figure: Figure) -> bytes:
-    """A figure as PNG."""
+    """A figure in the common style as PNG."""
     buffer = io.BytesIO()
     _save(figure, buffer, format="png", dpi=DPI, metadata={"Software": ""})
     return buffer.getvalue()

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def print_summary(summary: Mapping[str, Any]) -> None:
-    """Agent, landmarks and walls: one row each, one column a scheme."""
+    """Table of a run on the terminal: agent, landmarks and walls, one column a scheme."""
     schemes = summary["schemes"]
     title = f"{summary['pipeline']} in {summary['scene']}: {summary['cycles']} cycles, seed {summary['seed']}"
     table = Table()
@@ -32,24 +32,34 @@ def print_summary(summary: Mapping[str, Any]) -> None:
 
 
 def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
-    """Rows of text: label, then one entry a scheme."""
+    """Rows of the run's table: label, then one entry a scheme."""
     schemes = list(summary["schemes"].values())
     first = schemes[0]
     rows = [["agent", *(_metres(s["rmse_m"]) for s in schemes)]]
     for name in first["landmarks"]:
         rows.append([f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)])
-    for name in first["walls"]:
+    heard = [name for name in first["walls"] if any(_is_heard(s["walls"][name]) for s in schemes)]
+    for name in heard:
         rows.append([f"wall {name}", *(_wall(s["walls"][name]) for s in schemes)])
+    if len(first["walls"]) > len(heard):
+        rows.append([f"{len(first['walls']) - len(heard)} walls", *("not heard" for _ in schemes)])
     rows.append(["posterior bound of the agent", *(_metres(s["bound_m"]) for s in schemes)])
     rows.append(["GOSPA of the map", *(_metres(s["map"]["gospa_m"]) for s in schemes)])
     rows.append(["association right", *(f"{s['association']['accuracy']:.0%}" for s in schemes)])
     rows.append(["over budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)])
     rows.append(["diverged", *("yes" if s["diverged"] else "no" for s in schemes)])
+    rows.append(["held itself for lost", *(_said(s["outcomes"]) for s in schemes)])
     return rows
 
 
+def _said(outcomes: Mapping[str, int]) -> str:
+    """Entry of a table: in how many cycles an estimator said, without the truth, that it had diverged."""
+    cycles = outcomes.get("diverged", 0)
+    return f"in {cycles} of {sum(outcomes.values())} cycles" if cycles else "never"
+
+
 def path_table(paths: Paths) -> list[dict[str, Any]]:
-    """For every class of paths: how many identities, how many a cycle, and the range of their gains."""
+    """Table of path classes: how many identities, how many a cycle, and the range of their gains."""
     rows = []
     for kind in PathKind:
         columns = np.flatnonzero(paths.kind == kind)
@@ -114,7 +124,7 @@ def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> Non
 
 
 def _nearest(limits: "Mapping[str, Any]") -> str:
-    """How much of its limit the path uses up that comes nearest to it."""
+    """Entry of a table: how much of its limit the path uses up that comes nearest to it."""
     return f"{limits['nearest']['share']:.1%}" if limits else "-"
 
 
@@ -150,7 +160,7 @@ def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"], t
 
 
 def print_sweep(scores: Sequence["SchemeScore"]) -> None:
-    """One line a point of the axes and a scheme."""
+    """Table of a sweep on the terminal: one line a point of the axes and a scheme."""
     keys = [key.rpartition(".")[2] for key in scores[0].point if key != "schemes"]
     table = Table(*keys, "scheme", "agent RMSE", "95 %", "runs", "diverged", "failed")
     for score in scores:
@@ -163,7 +173,7 @@ def print_sweep(scores: Sequence["SchemeScore"]) -> None:
 
 
 def print_scene(scene: Scene) -> None:
-    """What a room holds."""
+    """Table of what a room holds, on the terminal."""
     low, high = scene.bounds
     table = Table("what", "name", "where \\[m]")
     for reflector in scene.reflectors:
@@ -193,6 +203,11 @@ def _metres(value: float | None) -> str:
     if value is None:
         return "not found"
     return f"{100.0 * value:.1f} cm" if value < 1.0 else f"{value:.2f} m"
+
+
+def _is_heard(score: Mapping[str, Any]) -> bool:
+    """Whether a wall belongs in the table: the paths tell anything of it, or something was made of it."""
+    return score["bound_m"] is not None or score["rmse_m"] is not None
 
 
 def _wall(score: Mapping[str, Any]) -> str:

@@ -36,7 +36,7 @@ def draw_agent_error(result: SlamResult) -> Figure:
 
 
 def draw_landmark_errors(result: SlamResult) -> Figure:
-    """Distance between each true landmark and the estimate that stands for it."""
+    """Draw landmark errors against time: distance of each true one from the estimate that stands for it."""
     scene, time = result.scene, result.scene.agent.elapsed
     tracks = {name: landmark_track(scene, scheme).error for name, scheme in result.schemes.items()}
     with styled():
@@ -98,7 +98,7 @@ def draw_levels(result: SlamResult, detection_snr_db: float, snr_per_gain_db: fl
 
 
 def strongest_db(scheme: SchemeResult, columns: Floats) -> Floats:
-    """(K,) level [dB] of the strongest of some paths; NaN where there is none."""
+    """Curve (K,) of the level [dB] of the strongest of some paths; NaN where there is none."""
     gain = np.abs(scheme.gain[:, columns]).max(axis=1, initial=0.0)
     with np.errstate(divide="ignore"):
         level = 20.0 * np.log10(gain)

@@ -1,4 +1,4 @@
-"""Time of the cycle's four steps against their budgets."""
+"""Timing of the cycle's four steps against their budgets."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from rislam_rt.report.style import scheme_colour, styled
 
 
 def draw_timing(result: SlamResult, budget: Sequence[float]) -> Figure:
-    """Median (bar) and 99th percentile (whisker) of each step, and its budget [s]."""
+    """Draw the timing of steps: median (bar), 99th percentile (whisker), and budget [s]."""
     schemes = result.schemes
     height = 0.8 / len(schemes)
     with styled():

@@ -1,4 +1,4 @@
-"""What a real panel does wrong: elements weak, dead, out of phase or stuck, and commands that arrive damaged."""
+"""Impairments of a real panel: elements weak, dead, out of phase or stuck, and commands that arrive damaged."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -67,7 +67,7 @@ class PanelErrors:
 
 
 def draw_panel(spec: DataSheet, tolerance: PanelTolerance, *, rng: np.random.Generator) -> PanelErrors:
-    """A panel, or several, with errors drawn independently for each element.
+    """Draw a panel's impairments, or several panels', independently for each element.
 
     Every kind of error has a draw of its own, so that changing one tolerance leaves the other errors as they are.
     """

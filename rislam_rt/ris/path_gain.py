@@ -14,7 +14,7 @@ def image_amplitude(length: Floats, radio: RadioConfig) -> Floats:
 
 
 def point_amplitude(strength: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig) -> Floats:
-    """|alpha| of eq. `a2` for `strength`, the square root of a cross-section [m]."""
+    """Gain of a path over a point, |alpha| of eq. `a2` for `strength`, the square root of a cross-section [m]."""
     scale = radio.wavelength * np.sqrt(4.0 * np.pi * radio.tx_gain * radio.rx_gain) / (4.0 * np.pi) ** 2
     return scale * strength / (tx_length * rx_length)
 

@@ -1,4 +1,4 @@
-"""Gains of panel paths under a code: linear in exp(-j xi), so that a new code needs no new trace."""
+"""Rephasing panel paths under a code: gains are linear in exp(-j xi), so that a new code needs no new trace."""
 
 from collections.abc import Iterator
 from typing import NamedTuple

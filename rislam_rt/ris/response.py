@@ -1,4 +1,4 @@
-"""Gain of paths over the panel: element-wise (eq. `single`, the default) and far-field (eq. `a3`)."""
+"""Response of a panel, gain of paths over it: element-wise (eq. `single`, the default) and far-field (eq. `a3`)."""
 
 import numpy as np
 
@@ -53,7 +53,7 @@ def far_field_response(
 
 
 def zero_code(spec: DataSheet) -> RisCode:
-    """The code with every element at level 0."""
+    """The code to which a panel responds at rest: every element at level 0."""
     return RisCode(np.zeros((spec.rows, spec.cols), dtype=np.int64), spec.levels)
 
 

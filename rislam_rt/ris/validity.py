@@ -1,4 +1,4 @@
-"""Where a panel's formulas hold: far field, and delays over the panel that the band cannot tell apart."""
+"""Validity of a panel's formulas: far field, and delays over the panel that the band cannot tell apart."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What is wrong with a scene: where, what, and how to mend it."""
+"""Findings on a scene: where, what is wrong, and how to mend it."""
 
 from dataclasses import dataclass
 
@@ -60,7 +60,7 @@ def one_line(text: str) -> str:
 
 
 def raise_errors(findings: list[Finding]) -> None:
-    """Raise the errors, each a line of one exception.
+    """Raise the findings that are errors, each a line of one exception.
 
     Raises
     ------

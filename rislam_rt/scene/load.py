@@ -1,4 +1,4 @@
-"""From a scene folder to a `Scene`."""
+"""Loading a scene folder as a `Scene`."""
 
 import hashlib
 from collections.abc import Sequence
@@ -148,7 +148,7 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
 
 
 def _surfaces(reflectors: Sequence[Reflector], occluders: Sequence[Occluder]) -> Floats:
-    """(T, 3, 3) [m] of all that stands in an agent's way."""
+    """(T, 3, 3) [m] of all loaded surfaces that stand in an agent's way."""
     return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in occluders)])
 
 
@@ -172,7 +172,7 @@ def _material(section: MaterialSection) -> Material:
 
 
 def _scatterer(section: ScattererSection, shelf: MeshFiles) -> Scatterer:
-    """The paper's sphere has the cross-section pi r^2, unless the file gives another one.
+    """Load a scatterer: the paper's sphere has the cross-section pi r^2, unless the file gives another one.
 
     A cylinder's nominal one, pi r h / 2, is the mean of its backscattering over all directions.
     """
@@ -193,7 +193,7 @@ def _scatterer(section: ScattererSection, shelf: MeshFiles) -> Scatterer:
 
 
 def _panels(sections: list[RisSection], file: str, findings: list[Finding]) -> tuple[RisPanel, ...]:
-    """The panels that can be made; what is wrong with the others goes to the findings."""
+    """Load the panels that can be made; what is wrong with the others goes to the findings."""
     panels = []
     for number, section in enumerate(sections):
         try:
@@ -204,7 +204,7 @@ def _panels(sections: list[RisSection], file: str, findings: list[Finding]) -> t
 
 
 def build_panel(section: RisSection) -> RisPanel:
-    """The panel of a section.
+    """Build the panel of a scene file's section.
 
     Raises
     ------

@@ -25,7 +25,7 @@ def place_mesh(mesh: Mesh, up: str, unit: float, origin: Floats) -> Mesh:
 
 
 def place_points(points: Floats, up: str, unit: float, origin: Floats) -> Floats:
-    """The same for points (..., 3) of the file."""
+    """Points (..., 3) of a mesh file placed in the room."""
     if up == "y":
         x, y, z = np.moveaxis(points, -1, 0)
         points = np.stack([x, -z, y], axis=-1)

@@ -70,7 +70,7 @@ def read_inside(folder: Path, name: str, limit: int) -> bytes:
 
 
 def parse_mesh(content: bytes, name: str, node: str | None = None) -> Mesh:
-    """Triangles of a file's content; `node` picks one named node of a GLB file.
+    """Triangles of a mesh file's content; `node` picks one named node of a GLB file.
 
     Raises
     ------
@@ -114,7 +114,7 @@ class MeshReader:
         return sound_mesh(mesh or self._by_trimesh(content, suffix[1:], node), max_faces, reach)
 
     def _by_trimesh(self, content: bytes, file_type: str, node: str | None) -> Mesh:
-        """Any format trimesh reads."""
+        """Mesh of any format that trimesh reads."""
         if self._key != (file_type, content):
             self._loaded = unfold(content, file_type)
             self._key = (file_type, content)
@@ -168,7 +168,7 @@ def _own_ply(content: bytes) -> Mesh | None:
 
 @contextmanager
 def _one_answer(file_type: str) -> Iterator[None]:
-    """A damaged file makes trimesh raise nearly anything and numpy warn; here every cause has the same answer."""
+    """One error for a damaged mesh, which makes trimesh raise nearly anything and numpy warn."""
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"), _silence():
             warnings.simplefilter("ignore")

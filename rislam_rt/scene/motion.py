@@ -98,7 +98,8 @@ def along_heading(course: Floats) -> Floats:
 
 
 def at_cycles(recording: RecordedPoses, cycle_s: float) -> RecordedPoses:
-    """A recording at even times, from its first on: monotone cubics through the places, straight lines through angles.
+    """A recorded motion at even times, from its first on: monotone cubics through the places, straight lines through
+    angles.
 
     Raises
     ------
@@ -148,7 +149,7 @@ def _recorded_motion(agent: AgentSection, content: bytes, body: Body) -> Traject
 
 
 def _velocity(time: Floats, position: Floats) -> Floats:
-    """(K, 3) [m/s] by central differences; zero for a single pose."""
+    """Velocity of a motion (K, 3) [m/s] by central differences; zero for a single pose."""
     if len(time) < 2:
         return np.zeros_like(position)
     return np.asarray(np.gradient(position, time, axis=0), dtype=np.float64)

@@ -66,7 +66,7 @@ def _next(points: list[Floats], radius: float, rng: np.random.Generator) -> Floa
 
 
 def _is_clear(points: list[Floats], radius: float, clearance: float, triangles: Floats) -> bool:
-    """Whether the last two legs and the corner between them keep clear."""
+    """Whether the last two legs of a random walk and the corner between them keep clear."""
     corners = triangles.reshape(-1, 3)
     if (points[-1] < corners.min(axis=0)).any() or (points[-1] > corners.max(axis=0)).any():
         return False
@@ -79,5 +79,5 @@ def _is_clear(points: list[Floats], radius: float, clearance: float, triangles: 
 
 
 def _look(clearance: float) -> float:
-    """Step [m] at which the way is looked at: between two looks it comes nearer by half of it at most."""
+    """Step [m] at which a random walk is looked at: between two looks it comes nearer by half of it at most."""
     return min(LOOK, clearance / 4.0)

@@ -150,7 +150,7 @@ def _checked(time: Floats, position: Floats) -> tuple[Floats, Floats]:
 
 
 def _heading(q: Floats) -> Floats:
-    """(K,) [rad] of quaternions (K, 4) of turns about z."""
+    """Heading (K,) [rad] of recorded quaternions (K, 4) of turns about z."""
     length = np.linalg.norm(np.clip(q, -2.0, 2.0), axis=1)  # a wrong length stays one, and no square overflows
     if (np.abs(length - 1.0) > 1e-3).any():
         raise Fault(

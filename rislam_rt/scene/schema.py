@@ -1,4 +1,4 @@
-"""`scene.toml`: the keys, their types and ranges. Unknown keys are refused; all bad fields are found at once."""
+"""Schema of `scene.toml`: keys, types and ranges. Unknown keys are refused; all bad fields are found at once."""
 
 import unicodedata
 from pathlib import Path
@@ -231,7 +231,7 @@ class LimitsSection(SceneSection):
 
 
 def _listed(value: Any) -> Any:
-    """One table `[ris]` as a list of one."""
+    """The schema's one table `[ris]` as a list of one."""
     return [value] if isinstance(value, dict) else value
 
 
@@ -288,7 +288,7 @@ def parse_spec(content: bytes) -> SceneSpec:
 
 
 def validate_spec(table: dict[str, Any]) -> SceneSpec:
-    """The same from a table already read.
+    """A scene's table that was already read, against the schema.
 
     Raises
     ------
@@ -324,7 +324,7 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
 
 
 def _remark(item: Any, lone_panel: bool) -> str:
-    """One bad field: where, what was received, what is wanted."""
+    """One bad field against the schema: where, what was received, what is wanted."""
     where = item["loc"]
     if lone_panel and where[:2] == ("ris", 0):  # the file has `[ris]`
         where = ("ris", *where[2:])

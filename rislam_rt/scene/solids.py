@@ -1,4 +1,4 @@
-"""Closed meshes of round objects, for their shadows: as large as the true shape, seen from all sides in the mean."""
+"""Closed meshes of round solids, for their shadows: as large as the true shape, seen from all sides in the mean."""
 
 import numpy as np
 
@@ -60,14 +60,14 @@ def _icosahedron() -> Floats:
 
 
 def _quartered(triangles: Floats) -> Floats:
-    """Every triangle (T, 3, 3) cut into four: (4 T, 3, 3)."""
+    """Every triangle (T, 3, 3) of a solid cut into four: (4 T, 3, 3)."""
     a, b, c = triangles.swapaxes(0, 1)
     ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
     return np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
 
 
 def _indexed(triangles: Floats) -> Mesh:
-    """The same triangles with shared corners."""
+    """A solid's triangles with shared corners."""
     vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     faces: Integers = index.reshape(-1, 3)
     return Mesh(vertices, faces)

@@ -6,9 +6,9 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.triangles import distance_to_triangles
-from rislam_rt.scene.built_in_rooms.room import BASELINE
 from rislam_rt.scene.check.mesh_queries import ray_hits, sphere_directions
 from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.room_files import BASELINE
 
 NUM_PLACES, NUM_RAYS, NUM_WAYS = 120, 64, 24
 """Places looked at (a fifth of them in rooms of many faces), rays cast from each, directions of the motion."""
@@ -64,9 +64,8 @@ def free_ways(place: Floats, directions: Floats, triangles: Floats, box: Floats)
 
 
 def _places(triangles: Floats, box: Floats) -> tuple[Floats, Booleans]:
-    """Places (N, 3) [m] spread over the plan, at hand's height above the lowest surface there with headroom, and which
-    of them have nothing above (N,).
-    """
+    """Places (N, 3) [m] for a suggested start, spread over the plan at hand's height above the lowest surface there
+    with headroom, and which of them have nothing above (N,)."""
     count = NUM_PLACES if len(triangles) < MANY_FACES else NUM_PLACES // 5
     k = np.arange(count) + 0.5
     share = np.stack([k / count, (k * 0.5 * (np.sqrt(5.0) - 1.0)) % 1.0], axis=-1)  # Fibonacci lattice
@@ -83,7 +82,8 @@ def _places(triangles: Floats, box: Floats) -> tuple[Floats, Booleans]:
 
 
 def _levels(plan: Floats, triangles: Floats) -> Floats:
-    """Heights [m], ascending, at which the vertical line through a point (2,) of the plan meets triangles."""
+    """Heights [m], ascending, at which the vertical line through a point (2,), for a suggested start, meets
+    triangles."""
     corners = triangles[:, :, :2] - plan
     after = np.roll(corners, -1, axis=1)
     turn = corners[..., 0] * after[..., 1] - corners[..., 1] * after[..., 0]
@@ -96,7 +96,8 @@ def _levels(plan: Floats, triangles: Floats) -> Floats:
 def _motion(
     place: Floats, ways: Floats, ahead: Floats, behind: Floats, keep: float, triangles: Floats
 ) -> dict[str, Any]:
-    """The longest line through a place that keeps clear all along, of the length that the pace asks for."""
+    """Suggested motion: the longest line through a place that keeps clear all along, of the length that the pace asks
+    for."""
     wanted = SPEED * CYCLE * (CYCLES - 1)
     for row in np.argsort(-np.minimum(ahead + behind, wanted), kind="stable"):
         length = min(wanted, float(ahead[row] + behind[row]))

@@ -1,20 +1,17 @@
-"""New scene folders from the built-in rooms."""
+"""Templates: new scene folders from the rooms that come with the package."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
-from textwrap import fill
 
 from rislam_rt.errors import SceneError
-from rislam_rt.scene.built_in_rooms import ROOMS, RoomFiles
 from rislam_rt.scene.load import SCENE_FILE
-from rislam_rt.scene.meshes import ply_bytes
 from rislam_rt.scene.write import write_files
-from rislam_rt.toml import toml_bytes
+from rislam_rt.shipped import shipped_rooms
+from rislam_rt.toml import parse_toml, toml_bytes
 
 
 def new_scene(template: str, folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Write one of the built-in rooms into a folder, the same bytes every time, named after it. Returns the folder.
+    """Write one of the rooms that come with the package into a folder, named after it. Returns the folder.
 
     Raises
     ------
@@ -23,24 +20,19 @@ def new_scene(template: str, folder: str | Path, *, overwrite: bool = False) -> 
     StoreError
         The disk refused.
     """
-    if template not in ROOMS:
-        raise SceneError(f"template: '{template}' received; give one of {', '.join(ROOMS)}")
-    room = ROOMS[template]()
-    named = replace(room, table={**room.table, "name": room_name(Path(folder), template)})
-    origin = f"Made by `rislam-rt new --template {template}`."
-    return write_files(room_files(named, origin), folder, overwrite=overwrite)
+    rooms = shipped_rooms()
+    if template not in rooms:
+        raise SceneError(f"template: '{template}' received; give one of {', '.join(rooms)}")
+    room = rooms[template]
+    files = {file.relative_to(room).as_posix(): file.read_bytes() for file in sorted(room.rglob("*")) if file.is_file()}
+    name = room_name(Path(folder), template)
+    files[SCENE_FILE] = toml_bytes(parse_toml(files[SCENE_FILE].decode()) | {"name": name})
+    _, about, _ = files["README.md"].decode().split("\n\n", 2)
+    files["README.md"] = f"# {name}\n\n{about}\n\nMade by `rislam-rt new --template {template}`.\n".encode()
+    return write_files(files, folder, overwrite=overwrite)
 
 
 def room_name(folder: Path, template: str) -> str:
     """What a room is called that lies in a folder: the folder's name, with what a room's name cannot hold as `_`."""
     name = re.sub(r"[^A-Za-z0-9_.\-]", "_", folder.resolve().name)[:64]
     return name if name.strip("._-") else template
-
-
-def room_files(room: RoomFiles, origin: str = "") -> dict[str, bytes]:
-    """The files of a scene folder: relative name -> content. `origin`: where it comes from, if not from the build."""
-    files = {f"meshes/{name}.ply": ply_bytes(mesh.vertices, mesh.faces) for name, mesh in room.meshes.items()}
-    name = room.table["name"]
-    origin = origin or f"Written by `python -m rislam_rt.scene.build {name} --out scenes`."
-    readme = f"# {name}\n\n{fill(room.readme, 110)}\n\n{origin}\n"
-    return files | room.files | {SCENE_FILE: toml_bytes(room.table), "README.md": readme.encode()}

@@ -29,7 +29,7 @@ class RoundedPath(NamedTuple):
 
     @property
     def total(self) -> float:
-        """[m]."""
+        """Length of a path through waypoints [m]."""
         return float(np.sum(self.length))
 
     def at(self, travelled: Floats) -> tuple[Floats, Floats]:
@@ -80,7 +80,7 @@ def round_corners(waypoints: Floats, radius: float) -> RoundedPath:
 
 
 def _pieces(waypoints: Floats, along: Floats, turn: Floats, cut: Floats, left: Floats, radius: float) -> RoundedPath:
-    """Leg, arc, leg, ..., leg."""
+    """Path through waypoints as leg, arc, leg, ..., leg."""
     count = 2 * len(along) - 1
     start, way, inward = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
     start[::2], way[::2] = waypoints[:-1] + cut[:-1, None] * along, along

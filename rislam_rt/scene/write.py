@@ -1,4 +1,4 @@
-"""From a `Scene` to a scene folder, whole or not at all."""
+"""Writing a `Scene` as a scene folder, whole or not at all."""
 
 import os
 import shutil
@@ -132,7 +132,7 @@ def _panel_table(panel: RisPanel) -> dict[str, Any]:
 
 
 def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
-    """A cross-section is written where it does not follow from shape and law."""
+    """Table to write for a scatterer: a cross-section where it does not follow from shape and law."""
     radius, table = scatterer.radius, {"name": scatterer.name, "position": scatterer.position.tolist()}
     table |= {"radius": radius} if radius is not None else {}
     if scatterer.height is not None:
@@ -149,7 +149,7 @@ def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
 
 
 def _has_own_shadow(scatterer: Scatterer) -> bool:
-    """Whether the shade is the one that `shadow = true` makes."""
+    """Whether to write a shade as `shadow = true`, which makes the same."""
     if scatterer.shade is None or scatterer.radius is None:
         return False
     mesh = solid_mesh(scatterer.position, scatterer.radius, scatterer.height, scatterer.axis)
@@ -179,7 +179,7 @@ def _material_table(material: Material) -> dict[str, Any]:
 
 
 def _agent_table(agent: Trajectory) -> dict[str, Any]:
-    """A straight motion by its velocity, any other by its path file."""
+    """Table to write for the agent: a straight motion by its velocity, any other by its path file."""
     offsets = {"tx_offset_m": agent.body.tx_offset.tolist(), "rx_offset_m": agent.body.rx_offset.tolist()}
     cycles, velocity = len(agent), agent.velocity[0]
     heading = float(np.arctan2(velocity[1], velocity[0])) if velocity[:2].any() else 0.0

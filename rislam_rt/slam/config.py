@@ -1,4 +1,4 @@
-"""Settings of the filter, and what the agent is told about its start."""
+"""Configuration of the filter, and what the agent is told about its start."""
 
 from dataclasses import dataclass
 

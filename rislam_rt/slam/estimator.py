@@ -1,4 +1,4 @@
-"""The front door of localisation and mapping: the same four functions for every filter that `slam.filter` names."""
+"""The estimator of pose and map: the same four functions for every filter that `slam.filter` names."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ def init(
     start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> Any:  # fmt: skip
-    """The start prior, and an empty map."""
+    """An estimator's state at the start: the start prior, and an empty map."""
     if config.filter == "window":
         return window.init(start, body, ris, sensor, config, rng=rng)
     return nested.init(start, body, ris, sensor, config, rng=rng)
@@ -54,7 +54,7 @@ def smoothed(state: Any) -> Floats | None:
 
 
 def estimate(state: Any, config: SlamConfig) -> SlamEstimate:
-    """Mean and covariance of the pose, equally likely samples of it, and the map."""
+    """An estimator's mean and covariance of the pose, equally likely samples of it, and the map."""
     if isinstance(state, window.WindowState):
         return window.estimate(state, config)
     return nested_map.estimate(state, config)

@@ -1,4 +1,4 @@
-"""Which landmark is the panel? Bayes over landmarks, from amplitudes under the codes that were applied.
+"""Identity of landmarks, which one is the panel: Bayes from amplitudes under the codes that were applied.
 
 "Is the panel" predicts the amplitude with no free parameter (Rician about the panel's gain under the code, averaged
 over the belief); "is a scatterer" predicts one unknown cross-section for all cycles, integrated out on a grid. Cycles
@@ -52,7 +52,7 @@ def log_panel_missed(std: Floats, gain: Complexes, threshold: float) -> Floats:
 
 
 def log_scatterer(amplitude: Floats, std: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig) -> Floats:
-    """Log likelihood (P, G) of amplitudes (P,) for every strength of the grid."""
+    """Log likelihood (P, G) of a scatterer's identity from amplitudes (P,), for every strength of the grid."""
     mean = point_amplitude(np.exp(STRENGTHS), tx_length[:, None], rx_length[:, None], radio)
     return log_rice(amplitude[:, None], mean, _spread(std, mean))
 
@@ -87,7 +87,7 @@ def add_evidence(log_grid: Floats, log_ris: Floats, scatterer: Floats, panel: Fl
 
 
 def weigh_silence(hidden: Floats, missed: Floats) -> tuple[Floats, Floats]:
-    """One more silent cycle of P points that are one of Q panels, or a scatterer.
+    """Identities after one more silent cycle of P points that are one of Q panels, or a scatterer.
 
     `missed` (P, Q + 1) is the probability of silence while nothing is in the way, `hidden` (P, Q + 1) that something
     is, the scatterer's last. What is blocked is silent whatever it is: a gap tells as much as its first cycles, not

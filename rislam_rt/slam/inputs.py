@@ -1,4 +1,4 @@
-"""What a filter's step may be handed: checked, because a NaN would go through the whole belief without a word."""
+"""Inputs of a filter's step, checked, because a NaN would go through the whole belief without a word."""
 
 import math
 
@@ -24,7 +24,7 @@ def check_sides(measurement: Measurement, ris: DataSheet | None) -> None:
 
 
 def check_step(dt: float, heading: float, code: RisCode | None = None, ris: DataSheet | None = None) -> None:
-    """Check time step [s], heading [rad] and code before a cycle.
+    """Check a step's inputs before a cycle: time step [s], heading [rad] and code.
 
     Raises
     ------

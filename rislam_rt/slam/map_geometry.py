@@ -38,6 +38,6 @@ def images_in(
 
 
 def diagonal_blocks(covariance: Floats, rows: Integers) -> Floats:
-    """Diagonal blocks (R, 3, 3) of some features."""
+    """Diagonal blocks (R, 3, 3) of some of the map's features."""
     columns = 3 * rows[:, None] + np.arange(3)
     return covariance[columns[:, :, None], columns[:, None, :]]

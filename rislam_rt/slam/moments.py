@@ -1,4 +1,4 @@
-"""Ends of the agent at its poses; samples of Gaussians without a random number."""
+"""Draws with given moments (Gaussians without a random number), and the ends of the agent at its poses."""
 
 from functools import lru_cache
 
@@ -23,6 +23,21 @@ def square_root(covariance: Floats) -> Floats:
     return scale[:, None] * vectors[:, keep] * np.sqrt(values[keep])
 
 
+PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29)
+
+
+def radical_inverse(count: int, base: int) -> Floats:
+    """(count,) van der Corput's sequence in (0, 1): the digits of 1, 2, ... in a base, mirrored at the point.
+
+    `scipy.stats.qmc.Halton` without its half second of import.
+    """
+    left, unit, found = np.arange(1, count + 1), 1.0 / base, np.zeros(count)
+    while left.any():
+        found += (left % base) * unit
+        left, unit = left // base, unit / base
+    return found
+
+
 @lru_cache(maxsize=16)
 def even_draws(count: int, dims: int) -> Floats:
     """(count, dims) equally likely draws of a standard normal without a random number: mean 0, covariance 1.
@@ -31,9 +46,7 @@ def even_draws(count: int, dims: int) -> Floats:
     """
     if not dims:
         return np.zeros((count, 0))
-    from scipy.stats.qmc import Halton  # half a second of import: only once there is something to sample
-
-    draws = scipy.special.ndtri(Halton(dims, scramble=False).random(count + 1)[1:])
+    draws = scipy.special.ndtri(np.stack([radical_inverse(count, base) for base in PRIMES[:dims]], axis=1))
     if count <= dims + 1:
         return np.zeros((count, dims)) if count == 1 else np.asarray(draws - draws.mean(axis=0))
     draws -= draws.mean(axis=0)

@@ -1,4 +1,4 @@
-"""One cycle's components in the units of the filters, and on which side of the panels they are."""
+"""Observations of one cycle in the units of the filters, and on which side of the panels they are."""
 
 from typing import NamedTuple
 
@@ -56,12 +56,12 @@ class Observations(NamedTuple):
         return np.where(number[:, None] == np.arange(panels), self.odds[:, None], -np.abs(self.odds)[:, None])
 
     def take(self, rows: Integers) -> "Observations":
-        """Only some of the measurements."""
+        """Only some of the observations."""
         return Observations._make(None if field is None else field[rows] for field in self)
 
 
 def same_side(first: Integers, second: Integers) -> Booleans:
-    """(A, B) whether things of two sides (A,), (B,) may be one."""
+    """(A, B) whether observations or tracks of two sides (A,), (B,) may be one."""
     return np.asarray((first[:, None] == second) | (first[:, None] == UNTOLD) | (second == UNTOLD))
 
 

@@ -32,7 +32,7 @@ class Returns(NamedTuple):
 
     @property
     def point(self) -> Integers:
-        """(R,) feature row of the point."""
+        """(R,) feature row of each return's point."""
         return self.legs[self.rx, 0]
 
 
@@ -127,7 +127,7 @@ class Linear(NamedTuple):
 
     @property
     def by_pose(self) -> Floats:
-        """(..., R, 3, 3) with respect to the agent's position, which moves both ends."""
+        """(..., R, 3, 3) derivatives of returns by the agent's position, which moves both ends."""
         return self.by_tx + self.by_rx
 
     def by_heading(self, poses: Poses, position: Floats) -> Floats:

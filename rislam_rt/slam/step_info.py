@@ -1,4 +1,4 @@
-"""What a filter says of one cycle."""
+"""What a filter's step says of its cycle (`StepInfo`)."""
 
 from enum import StrEnum
 from typing import NamedTuple

@@ -100,12 +100,12 @@ def make_folders(folder: Path) -> list[Path]:
 
 
 def remove_empty(folders: Iterable[Path]) -> None:
-    """Take away those of the folders, the outermost first, that hold nothing."""
+    """Remove those of the folders, given with the outermost first, that hold no files."""
     for folder in reversed(list(folders)):
         with suppress(OSError):
             folder.rmdir()
 
 
 def refused(path: Path, error: OSError) -> StoreError:
-    """The disk's refusal as one line."""
+    """The disk's refusal to write a file, as one line."""
     return StoreError(f"{path}: cannot be written ({error.strerror}); check permissions and free space")

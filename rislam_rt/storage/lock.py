@@ -1,4 +1,4 @@
-"""One process at a time in a folder.
+"""A lock: one process at a time in a folder.
 
 The lock is the kernel's (`flock`), which ends with the process however that ends: one that died leaves a file behind,
 and the next takes it over. The file says who holds it.
@@ -19,7 +19,7 @@ LOCK_FILE = ".rislam-rt-lock"
 
 @contextmanager
 def hold(folder: Path, what: str) -> Iterator[None]:
-    """Keep other processes out of a folder that exists; `what` is at work in it.
+    """Lock a folder that exists: keep other processes out; `what` is at work in it.
 
     Raises
     ------

@@ -17,7 +17,7 @@ Entry = tuple[tuple[str, ...], str, str]
 
 
 def variables(values: Mapping[str, Any], table: Mapping[str, Entry], prefix: str = "") -> dict[str, Any]:
-    """Variables with their attributes; NetCDF has no complex numbers, so those become `_real` and `_imag`.
+    """NetCDF variables with attributes; there are no complex numbers, so those become `_real` and `_imag`.
 
     A prefix comes before every name and every dimension but xyz.
     """
@@ -34,7 +34,8 @@ def variables(values: Mapping[str, Any], table: Mapping[str, Entry], prefix: str
 
 
 def padded(rows: Sequence[Any], fill: Any, dtype: Any = None) -> Any:
-    """Arrays (M_k, ...) of K cycles as one (K, max M, ...), filled up; of the first one's type by default."""
+    """Arrays (M_k, ...) of K cycles as one (K, max M, ...) for NetCDF, filled up; of the first one's type by
+    default."""
     longest = max((len(row) for row in rows), default=0)
     table = np.full((len(rows), longest, *rows[0].shape[1:]), fill, dtype=dtype or rows[0].dtype)
     for cycle, row in enumerate(rows):

@@ -1,4 +1,4 @@
-"""Plain data with a schema version and a checksum, so that a value changed on the disk is noticed when it is read."""
+"""Seals on plain data, a schema version and a checksum, so that a change on the disk is noticed when it is read."""
 
 import hashlib
 import json
@@ -13,7 +13,7 @@ SCHEMA = 1
 
 
 def seal(content: Mapping[str, Any]) -> dict[str, Any]:
-    """The content with `schema` and `checksum`."""
+    """Seal content: with `schema` and `checksum`."""
     found = {"schema": SCHEMA, **content}
     return {**found, "checksum": checksum(found)}
 
@@ -53,7 +53,7 @@ def read_sealed(file: Path) -> dict[str, Any]:
 
 
 def checksum(content: Any) -> str:
-    """SHA-256 of plain data in one spelling: sorted keys, shortest numbers that read back the same.
+    """Checksum of a seal: SHA-256 of plain data in one spelling, sorted keys, shortest numbers.
 
     NaN, which no sealed file holds but a damaged one may, has a spelling as well.
     """

@@ -83,7 +83,7 @@ def _fig4a(content: Mapping[str, Any] | None) -> list[Claim]:
 
 
 def _lowest(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
-    """The order of the curves."""
+    """Claim on the order of the curves."""
     known = [gain for gain in gains if gain["over"] in RIVALS and gain["gain"] is not None]
     above = [gain for gain in known if gain["gain_low"] > 0.0]
     below = [gain for gain in known if gain["gain_high"] < 0.0]
@@ -96,7 +96,7 @@ def _lowest(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
 
 
 def _share(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
-    """31 % over every benchmark, SNR by SNR."""
+    """Claim of 31 % over every benchmark, SNR by SNR."""
     rows, held = [], []
     for snr, own in _by_snr(gains):
         least = min(own, key=lambda gain: gain["gain"])
@@ -117,7 +117,7 @@ def _share(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
 
 
 def _metres(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
-    """0.1 m below the scheme without a panel."""
+    """Claim of 0.1 m below the scheme without a panel."""
     own = [gain for gain in gains if gain["over"] == "no_ris" and gain["lower_by_m"] is not None]
     held = [gain["lower_by_m"] >= LEAST_FALL for gain in own]
     text = "; ".join(
@@ -131,7 +131,7 @@ def _metres(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
 
 
 def _with_snr(case: str, entries: Sequence[Mapping[str, Any]]) -> list[Claim]:
-    """Errors fall as the SNR grows."""
+    """Claim that errors fall as the SNR grows."""
     own = sorted((e for e in entries if e["scheme"] == OURS and e["rmse_m"]), key=lambda e: float(e["snr_db"]))
     if len(own) < 2:
         return []
@@ -174,7 +174,7 @@ def _pairs(known: Sequence[Mapping[str, Any]], above: Sequence[Mapping[str, Any]
 
 
 def _bounds(known: Sequence[Mapping[str, Any]], above: Sequence[Mapping[str, Any]]) -> str:
-    """What the bounds say where the order does not hold."""
+    """What the bounds say of a claim where the order does not hold."""
     limits = [gain["bound_gain"] for gain in known if gain not in above and gain["bound_gain"] is not None]
     if not limits:
         return ""

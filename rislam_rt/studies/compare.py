@@ -1,4 +1,4 @@
-"""Both channels in many rooms, path by path, and one pose of one room to look at."""
+"""Comparison of both channels in many rooms, path by path, and one pose of one room to look at."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -35,12 +35,12 @@ class Comparison(NamedTuple):
 
     @property
     def unexplained(self) -> int:
-        """One-sided paths without a proof, over all rooms."""
+        """One-sided paths without a proof, over all compared rooms."""
         return sum(row.report.unexplained for row in self.rows)
 
     @property
     def breaches(self) -> int:
-        """Errors beyond their limits, over all rooms and both kinds of numbers."""
+        """Errors beyond their limits, over all compared rooms and both kinds of numbers."""
         return sum(row.report.num_breaches for row in self.rows)
 
     @property
@@ -85,7 +85,7 @@ def run_comparison(
 def compare_room(
     name: str, rooms: Mapping[str, tuple[Scene, int]], radio: RadioConfig, poses: int, seed: int, tell: Tell
 ) -> list[Validation]:
-    """One room: the tracer's own numbers, and the refined ones."""
+    """Compare both channels in one room: the tracer's own numbers, and the refined ones."""
     return validate_rooms([rooms[name]], radio, poses=poses, seed=seed)
 
 
@@ -104,7 +104,7 @@ def certify_pose(scene: Scene, depth: int, radio: RadioConfig, *, poses: int, se
 
 
 def comparison_table(comparison: Comparison) -> list[dict[str, Any]]:
-    """Every room as plain data, each one-sided path with its proof."""
+    """Comparison of every room as plain data, each one-sided path with its proof."""
     return [
         {
             "scene": row.scene,

@@ -36,7 +36,7 @@ class Fig4a(NamedTuple):
 
 
 def check_fig4a(scene: Scene, spec: Fig4aSpec) -> None:
-    """Check that scene and specification fit.
+    """Check that scene and specification of Fig. 4(a) fit.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def check_fig4a(scene: Scene, spec: Fig4aSpec) -> None:
 
 
 def lone_panel(scene: Scene) -> RisPanel:
-    """The room's one panel.
+    """The room's one panel, as Fig. 4(a) needs it.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def lone_panel(scene: Scene) -> RisPanel:
 
 
 def run_fig4a(scene: Scene, spec: Fig4aSpec, *, rng: np.random.Generator, progress: Tell = tell_nobody) -> Fig4a:
-    """Trace the places and design, draw and bound the panel's gain at each of them.
+    """Run Fig. 4(a): trace the places and design, draw and bound the panel's gain at each of them.
 
     Raises
     ------
@@ -132,13 +132,13 @@ def sphere_gain(scene: Scene, motion: Trajectory, radio: RadioConfig, radius: fl
 
 
 def longer_side(panel: RisPanel) -> float:
-    """Longer side [m] of a panel, an element's own width included."""
+    """Longer side [m] of the panel in Fig. 4(a), an element's own width included."""
     spec = panel.spec
     return max(spec.rows * float(spec.spacing[1]), spec.cols * float(spec.spacing[0]))
 
 
 def _check_seen(paths: Paths, landmark: int, motion: Trajectory) -> int:
-    """The column of a landmark's direct path, which must be there at every place."""
+    """Column of a landmark's direct path, which must be there at every place of Fig. 4(a)."""
     column = int(np.flatnonzero(paths.landmark == landmark)[0])
     hidden = np.flatnonzero(~paths.valid[:, column])
     if len(hidden):
@@ -148,7 +148,7 @@ def _check_seen(paths: Paths, landmark: int, motion: Trajectory) -> int:
 
 
 def _joined(parts: list[GainCurves]) -> GainCurves:
-    """Curves of one place each, as curves over all places."""
+    """Curves of Fig. 4(a) of one place each, as curves over all places."""
     optimized, random = (
         GainInterval(*np.concatenate([getattr(part, name) for part in parts], axis=1))
         for name in ("optimized", "random")

@@ -60,7 +60,7 @@ class SchemeScore(NamedTuple):
 
     @property
     def overall(self) -> float | None:
-        """RMSE over all repetitions that ended [m]; None if none did."""
+        """RMSE of a pipeline's sweep over all repetitions that ended [m]; None if none did."""
         return float(rms_over_runs(np.array(self.rmse))) if self.rmse else None
 
     def as_dict(self) -> dict[str, Any]:
@@ -171,7 +171,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
 
 
 def score_rows(rows: Sequence[Row]) -> list[SchemeScore]:
-    """Scores in the order of the axes; failures are counted, never dropped."""
+    """Scores of a pipeline's sweep in the order of the axes; failures are counted, never dropped."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(repr(row.cell.point), []).append(row)
@@ -190,7 +190,7 @@ def score_rows(rows: Sequence[Row]) -> list[SchemeScore]:
 
 
 def write_scores(scores: Sequence[SchemeScore], folder: Path) -> None:
-    """`scores.csv` and `scores.json` beside the table of the cells.
+    """Write a pipeline sweep's `scores.csv` and `scores.json` beside the table of the cells.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What the pipeline file of a study may say."""
+"""Specification of a study: what its pipeline file may say."""
 
 from typing import Annotated, Any, Literal
 

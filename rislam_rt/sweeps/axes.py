@@ -1,4 +1,4 @@
-"""What a sweep goes through: typed values of any setting, repetitions, and the cells that they make."""
+"""Axes that a sweep goes through: typed values of any setting, repetitions, and the cells that they make."""
 
 import json
 import math

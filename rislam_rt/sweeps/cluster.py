@@ -54,7 +54,7 @@ def cluster_pool(address: str, limit: float | None) -> Iterator[tuple[Run, int]]
 
 
 def do_cell(task: Task, limit: float | None) -> tuple[Any, ...]:
-    """One cell, on a Dask worker; the outcome as plain data."""
+    """Do one cell on a worker of the Dask cluster; the outcome as plain data."""
     return tuple(outcome_of(_POOL.do(attempt, (Task(*task),), limit), limit))
 
 
@@ -68,5 +68,5 @@ def _outcome(future: Any, address: str) -> CellOutcome:
 
 
 def dismiss_idle() -> None:
-    """End the workers that wait for nothing."""
+    """End the cluster's workers that wait for nothing."""
     _POOL.dismiss()

@@ -17,7 +17,7 @@ class SweepCost(NamedTuple):
 
 
 def estimate_cost(left: Sequence[Cell], known: Sequence[Mapping[str, Any]], width: int) -> SweepCost:
-    """Time for the cells that are left, `width` at a time: the mean of those at the most similar points that ever ran.
+    """Cost of the cells that are left, in time, `width` at a time: the mean of those at the most similar settings.
 
     Similar is who has the most values of the axes in common: if the number of particles is an axis, cells with as many
     particles tell more than the others.

@@ -1,4 +1,4 @@
-"""Cells by workers on this machine, and what a worker's end says of its cell."""
+"""A local pool: cells by workers on this machine, and what a worker's end says of its cell."""
 
 import signal
 from collections.abc import Callable, Iterable, Iterator
@@ -32,7 +32,7 @@ def local_pool(jobs: int, limit: float | None) -> Iterator[Run]:
 
 
 def outcome_of(found: Any, limit: float | None) -> CellOutcome:
-    """What a worker gave, or how it ended."""
+    """Outcome of a worker of the local pool: what it gave, or how it ended."""
     if isinstance(found, CellOutcome):
         return found
     assert isinstance(found, Lost)

@@ -1,4 +1,4 @@
-"""A cell's result as plain data and as bytes: the same result gives the same bytes, on every machine, at every time."""
+"""The record of a cell: its result as plain data and as bytes, the same on every machine, at every time."""
 
 import json
 import math
@@ -22,7 +22,7 @@ def plain_result(result: Any) -> dict[str, Any]:
 
 
 def flatten(result: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """All values with dotted names."""
+    """All values of a cell's record with dotted names."""
     for name, value in result.items():
         if isinstance(value, Mapping):
             yield from flatten(value, f"{above}{name}.")
@@ -31,7 +31,7 @@ def flatten(result: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, A
 
 
 def json_bytes(content: Any) -> bytes:
-    """JSON in one spelling."""
+    """A cell's record as JSON in one spelling."""
     return (json.dumps(content, sort_keys=True, indent=1, allow_nan=False) + "\n").encode()
 
 

@@ -1,4 +1,4 @@
-"""The engine: what is there already is not done again, what fails is written down, and the rest goes on."""
+"""Running a sweep: what is there already is not done again, what fails is written down, and the rest goes on."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -76,7 +76,7 @@ class SweepReport:
 
     @property
     def failed(self) -> tuple[Row, ...]:
-        """Cells that failed, now or before."""
+        """Cells of a sweep's run that failed, now or before."""
         return tuple(row for row in self.rows if row.failed)
 
 
@@ -131,7 +131,7 @@ def run_sweep(
 
 
 def _hire(stack: ExitStack, effort: SweepOptions) -> tuple[Run, int]:
-    """Who does the cells, and how many at a time."""
+    """Who runs a sweep's cells, and how many at a time."""
     if effort.dask is None:
         return stack.enter_context(local_pool(effort.jobs, effort.time_limit)), effort.jobs
     from rislam_rt.sweeps.cluster import cluster_pool
@@ -140,7 +140,7 @@ def _hire(stack: ExitStack, effort: SweepOptions) -> tuple[Run, int]:
 
 
 def _shares(board: "_Board") -> Iterator[list[tuple[str, Task]]]:
-    """All that is to be done; one cell first, if nothing else says what the rest will cost."""
+    """All of a sweep that is to be run; one cell first, if nothing else says what the rest will cost."""
     tasks = list(board.left.items())
     if board.cost().seconds is None:
         yield tasks[:1]
@@ -186,7 +186,7 @@ class _Board:
         self.show(row)
 
     def cost(self) -> SweepCost:
-        """Of what is left, worked out anew at most once in `TABLE_SECONDS`."""
+        """Cost of what is left of a sweep, worked out anew at most once in `TABLE_SECONDS`."""
         if self.known is None or self.known[1].seconds is None or not self.left or monotonic() >= self.known[0]:
             left = [self.rows[ident].cell for ident in self.left]
             self.known = monotonic() + TABLE_SECONDS, estimate_cost(left, self.timings, self.width)
@@ -201,7 +201,7 @@ class _Board:
             self.tell(SweepProgress(done, failed, len(states), self.cost(), last))
 
     def write(self) -> None:
-        """Bring the table up to date."""
+        """Bring a running sweep's table up to date."""
         begin = monotonic()
         rows = list(self.rows.values())
         write_table(self.folder, rows)

@@ -1,4 +1,4 @@
-"""A sweep's folder: one file a cell, what differs from run to run apart, and a table that grows.
+"""The store of a sweep: one file a cell, what differs from run to run apart, and a table that grows.
 
 sweep.json               what is swept
 cells/<ident>.json       what a cell gave, or how it failed, with a checksum; the same bytes from every run
@@ -45,7 +45,7 @@ class Row(NamedTuple):
 
     @property
     def failed(self) -> bool:
-        """Whether it ran and did not end well."""
+        """Whether a stored cell ran and did not end well."""
         return self.state not in (MISSING, DONE)
 
 
@@ -95,7 +95,7 @@ def open_folder(folder: Path, sweep: Sweep) -> Iterator[None]:
 
 
 def write_sweep(folder: Path, sweep: Sweep) -> None:
-    """Say what is swept; the file is the folder's marker.
+    """Store what is swept; the file is the folder's marker.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def write_sweep(folder: Path, sweep: Sweep) -> None:
 
 
 def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) -> Row:
-    """Put a cell's file in place, whole.
+    """Store a cell's file, whole.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def append_timing(folder: Path, cell: Cell, outcome: CellOutcome) -> None:
 
 
 def read_timings(folder: Path) -> list[dict[str, Any]]:
-    """All lines of the timings that are whole."""
+    """All lines of the stored timings that are whole."""
     found = []
     with suppress(OSError):
         for line in (folder / "timings.jsonl").read_text(encoding="utf-8").splitlines():

@@ -65,7 +65,7 @@ class Cell(NamedTuple):
 
 
 def build_cells(sweep: Sweep) -> list[Cell]:
-    """All cells: the last axis varies fastest, repetitions faster still.
+    """All cells of a sweep: the last axis varies fastest, repetitions faster still.
 
     Raises
     ------

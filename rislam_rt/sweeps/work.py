@@ -40,7 +40,7 @@ class CellOutcome(NamedTuple):
 
 
 def attempt(task: Task, tell: object = None) -> CellOutcome:
-    """Do one cell; an exception is an outcome. A cell has no progress to `tell` of."""
+    """Do one cell's work; an exception is an outcome. A cell has no progress to `tell` of."""
     begin, cpu = perf_counter(), process_time()
     result, cause, message, timing = None, "", "", None
     try:
@@ -57,7 +57,7 @@ def attempt(task: Task, tell: object = None) -> CellOutcome:
 
 
 def find_function(name: str) -> Any:
-    """The function of `module:function`.
+    """The function of `module:function` that does a cell's work.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def find_function(name: str) -> Any:
 
 
 def one_line(error: BaseException) -> str:
-    """Kind and first line of an exception."""
+    """Kind and first line of an exception in a cell's work."""
     text = str(error).strip().splitlines()
     kind = "" if isinstance(error, RislamError) else f"{type(error).__name__}: "
     return (kind + (text[0] if text else "")).rstrip(": ")[:500]

@@ -7,6 +7,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -134,6 +135,9 @@ def test_run_report_and_json(run, tmp_path, monkeypatch):
     assert (content["seed"], content["cycles"]) == (7, 6)
     for scheme in content["schemes"].values():
         assert {"rmse_m", "landmarks", "walls", "diverged", "seconds"} <= set(scheme)
+        assert (scheme["diverged"], sum(scheme["outcomes"].values())) == (False, 6)
+        # the start's own deviation, 0.01 m an axis: nothing measured tells where it was
+        assert scheme["bound_m"] == pytest.approx(np.sqrt(2.0) * 0.01, rel=1e-2)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "run.json"]
     page = tmp_path / "mine" / "report.html"
     first = page.read_bytes()

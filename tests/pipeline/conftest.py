@@ -1,5 +1,6 @@
 """A short run in the paper's room that several tests look at: image sources, few cycles, few particles."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,3 +38,11 @@ def short_spec():
 @pytest.fixture(scope="session")
 def short_result(room, short_spec):
     return run_slam(room, short_spec, rng=np.random.default_rng(short_spec.seed))
+
+
+@pytest.fixture(scope="session")
+def beside_panel(room, run_short):
+    """2.5 s past the panel at 0 dB under designed and under random codes: the map begins empty."""
+    scene = replace(room, agent=room.agent[250:275])
+    settings = ("cycles=25", "depth=1", "radio.reference_snr_db=0", "design.method=coordinate")
+    return run_short(*settings, 'schemes=["optimized", "random"]', scene=scene)

@@ -15,6 +15,7 @@ from rislam_rt.report import draw_figures
 from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace, section
 from rislam_rt.report.page import build_page
 from rislam_rt.report.room import path_points
+from rislam_rt.report.tables import summary_rows
 from rislam_rt.report.time_curves import strongest_db
 from rislam_rt.scene import load_scene
 
@@ -138,3 +139,19 @@ def test_warnings_stand_on_the_page(result):
     warned = replace(result, warnings=("ris: too wide for <the band>",))
     assert "Warning: ris: too wide for &lt;the band&gt;" in build_page(warned, summarise(warned), {})
     assert "Warning" not in build_page(result, summarise(result), {})
+
+
+def test_page_says_what_is_lost_and_what_held_itself_for_lost():
+    """A start told wrong by a metre and a metre a second, against one told right."""
+    rows = {}
+    for scale in (100, 1):
+        settings = ["channel=image_source", "cycles=10", "depth=1", 'schemes=["no_ris"]', f"told.start_scale={scale}"]
+        spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
+        lost = run_slam(load_scene(ROOT / "scenes" / "paper_room"), spec, rng=np.random.default_rng(7))
+        rows[scale] = dict(summary_rows(summarise(lost)))
+        page = build_page(lost, summarise(lost), {})
+        assert ("lost with no panel." in page) == (scale == 100)
+        assert f"<td>{rows[scale]['held itself for lost']}</td>" in page
+    assert (rows[1]["diverged"], rows[1]["held itself for lost"]) == ("no", "never")
+    assert rows[100]["diverged"] == "yes"
+    assert re.fullmatch("in [1-9] of 10 cycles", rows[100]["held itself for lost"])

@@ -57,6 +57,13 @@ def test_a_class_name_that_stands_twice_is_noticed() -> None:
     assert not list(word_rules.doubled_classes([first, Source("report/c.py", "class Bone: ...")]))
 
 
+def test_every_file_says_what_it_is_named_for() -> None:
+    breaches = [b for source in rules.package_sources() for b in word_rules.subject_breaches(source)]
+    assert not breaches, "\n" + "\n".join(breaches)
+    assert list(word_rules.subject_breaches(Source("slam/prune.py", '"""Death of landmarks: those that fail."""')))
+    assert not list(word_rules.subject_breaches(Source("slam/prune.py", '"""Pruning of landmarks."""')))
+
+
 def test_every_word_has_one_that_stands_in_its_place() -> None:
     words = word_rules.listed("Not the field's words") | word_rules.listed("Not alone")
     assert len(words) > 40

@@ -54,3 +54,13 @@ def doubled_classes(sources: Iterable[Source]) -> Iterator[str]:
     for name, files in places.items():
         if len(files) > 1:
             yield f"class {name} stands in {', '.join(files)}"
+
+
+def subject_breaches(source: Source) -> Iterator[str]:
+    """Whether the first lines of a file's docstring lack the words of its name: what a reader looks for by."""
+    stem = source.path.rpartition("/")[2].removesuffix(".py")
+    said = re.findall(r"[a-z]+", (ast.get_docstring(source.tree) or "").partition("\n\n")[0].lower())
+    words = [word for word in words_of(stem) if word.isalpha()]
+    alike = (word.startswith(one[:4]) or (len(word) > 2 and one.startswith(word)) for word in said for one in words)
+    if not stem.startswith("__") and words and not any(alike):
+        yield f"{source.path}: its docstring's first line says nothing of '{stem}'; name what the file is about"

@@ -1,22 +1,18 @@
 """A small valid scene folder that tests damage in one place each."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from rislam_rt.scene.built_in_rooms import ROOMS
-from rislam_rt.scene.templates import room_files
+SCENES = Path(__file__).parents[2] / "scenes"
 
 
 @pytest.fixture
 def room(tmp_path: Path) -> Path:
     """A fresh copy of the paper's room."""
-    folder = tmp_path / "room"
-    for name, content in room_files(ROOMS["paper_room"]()).items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
-    return folder
+    return Path(shutil.copytree(SCENES / "paper_room", tmp_path / "room"))
 
 
 @pytest.fixture

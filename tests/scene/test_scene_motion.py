@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from built_in_rooms.paths import smooth_path
 
 from rislam_rt.errors import SceneError
 from rislam_rt.model import Body
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.built_in_rooms.paths import smooth_path
-from rislam_rt.scene.built_in_rooms.shapes import block
 from rislam_rt.scene.meshes import parse_mesh, ply_bytes
 from rislam_rt.scene.motion import straight_motion
 from rislam_rt.scene.recorded_poses import parse_tum
+from rislam_rt.scene.shapes import block
 from rislam_rt.scene.write import tum_bytes
 
 

@@ -9,8 +9,8 @@ import pytest
 from rislam_rt.errors import SceneError, StoreError
 from rislam_rt.model import Scene
 from rislam_rt.scene import load_scene, new_scene, write_scene
-from rislam_rt.scene.built_in_rooms import ROOMS
 from rislam_rt.scene.write import write_files
+from rislam_rt.shipped import shipped_rooms
 
 SCENES = Path(__file__).parents[2] / "scenes"
 
@@ -37,7 +37,7 @@ def assert_equal(a: Scene, b: Scene) -> None:
     assert np.allclose(a.agent.tx, b.agent.tx, rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("name", sorted(ROOMS))
+@pytest.mark.parametrize("name", sorted(shipped_rooms()))
 def test_written_scene_reads_back_equal(name: str, tmp_path: Path) -> None:
     scene = load_scene(SCENES / name)
     again = load_scene(write_scene(scene, tmp_path / "deep" / name))
@@ -86,7 +86,7 @@ def test_a_file_in_the_way_of_the_folder(tmp_path: Path) -> None:
 def test_new_scene_from_a_template(tmp_path: Path) -> None:
     folder = new_scene("l_room", tmp_path / "mine")
     assert_equal(load_scene(folder), replace(load_scene(SCENES / "l_room"), name="mine"))
-    with pytest.raises(SceneError, match="give one of paper_room, "):
+    with pytest.raises(SceneError, match="give one of empty_box, "):
         new_scene("attic", tmp_path / "other")
     assert not (tmp_path / "other").exists()
 

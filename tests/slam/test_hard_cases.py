@@ -41,18 +41,14 @@ def test_filter_survives(number: int) -> None:
 def test_a_start_wrong_by_a_metre_shifts_the_map_and_nothing_else() -> None:
     """Absolute position is unobservable: the filter cannot notice, must not diverge, and stays off by what it was.
 
-    Relative to its start it errs by what an honest start leaves: 0.01 m/s over 4 s and the landmarks' own errors.
+    Relative to its start it errs by what an honest start leaves, less than half of 0.01 m/s over 2.5 s unlearnt.
     """
-    drifts = []
-    for seed in range(1, 2):
-        case = hard.draw_case("start wrong by 1 m", seed, "window")
-        case = case._replace(config=hard.SlamConfig())
-        verdict = hard.run_case(case)
-        drifts.append(verdict.drift)
-        assert not verdict.lost
-        assert "diverged" not in verdict.outcomes
-        assert np.linalg.norm(case.start.position - case.truth[0]) > 0.9
-    assert max(drifts) < 0.1
+    case = hard.draw_case("start wrong by 1 m", 3, "window")._replace(config=hard.SlamConfig())
+    verdict = hard.run_case(case)
+    assert not verdict.lost
+    assert "diverged" not in verdict.outcomes
+    assert np.linalg.norm(case.start.position - case.truth[0]) > 0.9
+    assert verdict.drift < 0.01
 
 
 def test_faults_would_be_noticed() -> None:

@@ -11,9 +11,11 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.report.studies.sweep import main_axis, scores_figure
+from rislam_rt.report.tables import print_sweep
 from rislam_rt.scene import load_scene
-from rislam_rt.studies.pipeline_sweep import load_section, score_rows, slam_sweep, write_scores
+from rislam_rt.studies.pipeline_sweep import load_section, run_cell, score_rows, slam_sweep, write_scores
 from rislam_rt.sweeps import build_cells, run_sweep
+from rislam_rt.sweeps.store import DONE, Row
 
 ROOT = Path(__file__).parents[2]
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
@@ -102,6 +104,8 @@ def test_a_cell_is_the_run_of_its_seed(swept):
     score = summarise(result)["schemes"]["random"]
     assert row.result["schemes"]["random"]["rmse_m"] == score["rmse_m"]
     assert row.result["schemes"]["random"]["walls"] == score["walls"]
+    # at the start it is the start's own deviation: 0.01 m an axis, of which wall returns take nothing
+    assert score["bound_m"] == pytest.approx(np.sqrt(2.0) * 0.01, rel=1e-2)
 
 
 def test_what_the_clock_says_stays_out_of_the_cells(swept):
@@ -174,3 +178,18 @@ def test_picture_shows_a_line_for_each_scheme(swept):
     np.testing.assert_allclose(axis.containers[0].lines[0].get_xydata(), [
         (s.point["radio.reference_snr_db"], s.overall) for s in scores if s.scheme == "random"
     ])  # fmt: skip
+
+
+def test_a_sweep_counts_what_is_lost_and_keeps_what_was_said(capsys):
+    """A start told right, and one told wrong by two metres and two metres a second; the cells in this process."""
+    settings = ("channel=image_source", "cycles=10", "depth=1", 'schemes=["no_ris"]')
+    sweep = slam_sweep(PIPELINE, settings, ["told.start_scale=1,200"], repeat=2)
+    cells = build_cells(sweep)
+    rows = [Row(cell, DONE, "", run_cell({**cell.settings, **sweep.local}, cell.seed)) for cell in cells]
+    said = [row.result["schemes"]["no_ris"]["outcomes"].get("diverged", 0) > 0 for row in rows]
+    assert said == [cell.point["told.start_scale"] == 200.0 for cell in cells]
+    scores = score_rows(rows)
+    assert [score.diverged for score in scores] == [0, 2]
+    print_sweep(scores)
+    lines = [line.split("│") for line in capsys.readouterr().out.splitlines() if "no_ris" in line]
+    assert [[cell.strip() for cell in line[-4:-1]] for line in lines] == [["2", "0", "0"], ["2", "2", "0"]]

@@ -18,6 +18,7 @@ from rislam_rt.report.studies.certificate import draw_certificate
 from rislam_rt.report.studies.fig4a import claims, fig4a_csv, fig4a_page, findings_of
 from rislam_rt.report.style import to_png
 from rislam_rt.scene import load_scene
+from rislam_rt.storage.files import MARK
 from rislam_rt.studies import CompareSpec, Fig4aSpec, load_any
 from rislam_rt.studies.compare import run_comparison
 from rislam_rt.studies.fig4a import longer_side, run_fig4a, sphere_gain, walk_to_panel
@@ -122,7 +123,7 @@ def test_fig4a_writes_page_figure_and_data(run, tmp_path):
         "fig4a.md", "fig4a.csv", "fig4a.json", "figures/fig4a.png",
     }  # fmt: skip
     content = json.loads((folder / "fig4a.json").read_text())
-    assert content == json.loads((tmp_path / "copy.json").read_text())
+    assert content | {"origin": MARK} == json.loads((tmp_path / "copy.json").read_text())
     assert content["config"]["places"] == 4
     assert content["versions"]["rislam-rt"]
     assert len(content["scenes"]["paper_room"]["sha256"]) == 64

@@ -30,7 +30,7 @@ def compare_channels(
 def trace_both(
     scene: Scene, radio: RadioConfig, *, poses: int, depth: int, rng: np.random.Generator, refine: bool = True
 ) -> tuple[Paths, Paths, Trajectory]:
-    """Traced and analytic paths at random poses, under the same random code, and the poses."""
+    """Paths of both channels to compare, at random poses and under the same random code, and the poses."""
     from rislam_rt.channel.traced import TracedChannel  # starting the tracer takes seconds
 
     trajectory = random_poses(scene, poses, rng=rng)
@@ -60,5 +60,5 @@ def validate_rooms(
 
 
 def room_rng(scene: Scene, seed: int) -> np.random.Generator:
-    """The generator of a room's poses in `validate_rooms`."""
+    """The generator of the poses at which a room's channels are compared."""
     return np.random.default_rng([seed, zlib.crc32(scene.name.encode())])

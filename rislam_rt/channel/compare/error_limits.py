@@ -1,4 +1,4 @@
-"""How far apart two right answers may be, path by path: rounding, the room's size, the lengths of paths.
+"""Error limits, path by path, between two right answers: rounding, the room's size, the lengths of paths.
 
 Rounding is half a unit in the last place, `u = 2^-24` in float32, of the numbers rounded: coordinates up to the room's
 extent E about the tracer's zero, and up to E + L for the images of a leg of length L. With b bounces one end of the
@@ -93,7 +93,8 @@ class RoomPrecision:
 
     @classmethod
     def of(cls, scene: Scene, radio: RadioConfig, *, single: bool) -> "RoomPrecision":
-        """Precision of the tracer's own float32 numbers, which it computes about the room's middle, or of float64."""
+        """Precision from which limits follow: of the tracer's float32 numbers about the room's middle, or of
+        float64."""
         walls = build_walls(scene)
         u = SINGLE if single else DOUBLE
         extent = float(np.abs(scene.bounds - (scene.bounds.mean(axis=0) if single else 0.0)).max())
@@ -128,14 +129,14 @@ class RoomPrecision:
         return ErrorLimits(length, gain, np.minimum(phase, np.pi), angle[:, 0], angle[:, 1])
 
     def _field(self, shape: PathLegs) -> Floats:
-        """(M,) what the materials and antennas may be off, relative to the scale."""
+        """(M,) limit of what materials and antennas may be off, relative to the scale."""
         error = np.full(len(shape.length), 4.0 * FIELD_STEPS * SINGLE)
         for walls in shape.walls:
             error += np.where(walls >= 0, self.field[walls], 0.0).sum(axis=1)
         return error
 
     def _patterns(self, paths: Paths, cycle: Integers, path: Integers) -> Floats:
-        """(M,) what the antennas' patterns may be off: a half-wave dipole's is a difference over a sine."""
+        """(M,) limit of what the antennas' patterns may be off: a half-wave dipole's is a difference over a sine."""
         error, antennas = np.zeros(len(path)), self.radio.antennas
         for pattern, ray in ((antennas.tx, paths.departure), (antennas.rx, paths.arrival)):
             if pattern == "hw_dipole":
@@ -144,7 +145,8 @@ class RoomPrecision:
         return error
 
     def _landmark(self, paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, turn: Floats) -> Floats:
-        """(M,) what turning both directions at the landmark by (M, 2) [rad] does to a panel's or a cylinder's field."""
+        """(M,) limit from turning both directions at the landmark by (M, 2) [rad], for a panel's or a cylinder's
+        field."""
         error = np.zeros(len(path))
         wavenumber = 2.0 * np.pi / self.radio.wavelength
         for number, scatterer in enumerate(self.scene.scatterers):
@@ -163,7 +165,7 @@ class RoomPrecision:
 def coherent_scale(
     paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, precision: RoomPrecision
 ) -> Floats:
-    """(M,) what errors of a gain are relative to: the sum of the magnitudes of all that contributes to it.
+    """(M,) scale of a gain's error limits: the sum of the magnitudes of all that contributes to it.
 
     Of a panel path, over its elements: a null is the difference of large numbers, and its own size says nothing about
     their error. Of a cylinder, its broadside. Of all others the gain itself. Where walls are slabs give `paths` with
@@ -190,7 +192,7 @@ def coherent_scale(
 
 
 def with_perfect_mirrors(scene: Scene) -> Scene | None:
-    """The scene with perfect mirrors in place of its slabs, or nothing if it has none."""
+    """The scene with perfect mirrors for slabs, whose gains are the scale of error limits; nothing without slabs."""
     if not any(reflector.material.is_slab for reflector in scene.reflectors):
         return None
     mirror = Material(reflection=1.0)
@@ -200,14 +202,14 @@ def with_perfect_mirrors(scene: Scene) -> Scene | None:
 
 
 def _polyline(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory) -> Floats:
-    """Tx, interaction points and Rx (M, V + 2, 3) [m], the Rx repeated at the end."""
+    """Tx, interaction points and Rx (M, V + 2, 3) [m] of paths whose limits are wanted, the Rx repeated at the end."""
     tx, rx = trajectory.tx[cycle][:, None], trajectory.rx[cycle][:, None]
     there = np.arange(paths.vertices.shape[2]) < paths.num_vertices[path][:, None]
     return np.concatenate([tx, np.where(there[..., None], paths.vertices[cycle, path], rx), rx], axis=1)
 
 
 def _shape(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, names: tuple[str, ...]) -> PathLegs:
-    """Measure the legs of paths (cycle[i], path[i]); walls as numbers among `names`."""
+    """Legs of paths (cycle[i], path[i]) measured for their error limits; walls as numbers among `names`."""
     segment = np.linalg.norm(np.diff(_polyline(paths, cycle, path, trajectory), axis=1), axis=-1)
     row, on_tx = np.arange(len(path)), (paths.tx_walls[path] >= 0).sum(axis=1)
     joined, last = paths.landmark[path] >= 0, paths.num_vertices[path]
@@ -227,19 +229,19 @@ def _shape(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory
 def _landmark_directions(
     paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory
 ) -> tuple[Floats, Floats]:
-    """Unit vectors (M, 3) from the landmark towards where its path comes from, and goes to."""
+    """Unit vectors (M, 3) for the limits, from the landmark towards where its path comes from, and goes to."""
     points, row = _polyline(paths, cycle, path, trajectory), np.arange(len(path))
     at = (paths.tx_walls[path] >= 0).sum(axis=1) + 1
     return unit(points[row, at - 1] - points[row, at]), unit(points[row, at + 1] - points[row, at])
 
 
 def _ratio(a: Floats, b: Floats) -> Floats:
-    """a / b, 0 where both are nothing."""
+    """a / b for an error limit, 0 where both are nothing."""
     return np.where(a > 0.0, a / np.where(b > 0.0, b, np.finfo(np.float64).tiny), 0.0)
 
 
 def _bend(segments: Floats, beside: Floats) -> Floats:
-    """(M,) [m] by how much a line changes its length when its corners move `beside` (M,) across its segments (M, V).
+    """(M,) [m] how a line's length errs when its corners move `beside` (M,) across its segments (M, V).
 
     A segment's ends then are up to twice that apart across it: `(2 d)^2 / (2 l)`, and never more than both moves.
     """
@@ -248,7 +250,8 @@ def _bend(segments: Floats, beside: Floats) -> Floats:
 
 
 def _flatness(walls: Walls) -> tuple[Floats, Floats]:
-    """(W,) [m] largest distance of a wall's corners from its plane, and smallest altitude of its largest triangle."""
+    """(W,) [m] error of a wall's plane: largest distance of its corners from it, and altitude of its largest
+    triangle."""
     corners, owner = walls.triangles, walls.wall_of_triangle
     height = np.abs(np.einsum("tci,ti->tc", corners, walls.normal[owner]) - walls.offset[owner][:, None])
     flatness = np.zeros(len(walls))
@@ -262,7 +265,7 @@ def _flatness(walls: Walls) -> tuple[Floats, Floats]:
 
 @cache
 def field_error(material: Material, carrier: float) -> float:
-    """What float32 may do to the field at a bounce, relative to the incident field.
+    """Limit of what float32 may do to the field at a bounce, relative to the incident field.
 
     A slab's coefficient follows its permittivity eps and the phase `k d sqrt(z)`, `z = eps - sin^2`, across it, which
     may be hundreds of radians: float32 keeps as many digits of it as of all else. The derivatives by ln d and ln eps

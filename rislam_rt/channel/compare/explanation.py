@@ -1,4 +1,4 @@
-"""Proofs: why one side lacks a path, recomputed from mirror images in float64 without either channel's own tests."""
+"""Explanations why one side lacks a path: proofs from mirror images in float64 without either channel's own tests."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -90,7 +90,7 @@ class DifferenceExplainer:
 
     @classmethod
     def of(cls, scene: Scene, trajectory: Trajectory, depth: int, shortest: float) -> "DifferenceExplainer":
-        """Prepare a scene and its poses."""
+        """Prepare a scene and its poses for explaining differences."""
         walls = build_walls(scene)
         facets = build_facets(walls)
         outlines = [outline_edges(facets.corners[a:b]) for a, b in zip(facets.first, facets.first[1:], strict=False)]
@@ -101,13 +101,13 @@ class DifferenceExplainer:
         return cls(scene, trajectory, depth, shortest, walls.names, facets, edges, owner, tilt, center, walls.hosts)
 
     def label(self, identity: Identity) -> str:
-        """An identity for people; Rx walls after the bar."""
+        """A path's identity in an explanation, for people; Rx walls after the bar."""
         kind, landmark, tx, rx = identity
         text = " ".join([PathKind(kind).name, *tx, *([landmark] if landmark else [])])
         return f"{text} | {' '.join(rx)}" if rx else text
 
     def explain(self, identity: Identity, cycle: int, side: str) -> Explanation:
-        """The proof for a path that only `side` has.
+        """The explanation, with proof, of a path that only `side` has.
 
         A path exists where all its conditions hold. It is proved absent by an object that stands clearly in the way
         of reflections in order, undecidable where a margin is below what float32 leaves open there
@@ -134,7 +134,7 @@ class DifferenceExplainer:
         return Explanation("", f"all its conditions hold, shortest segment {1e3 * shortest:.4f} mm")
 
     def _legs(self, identity: Identity, cycle: int) -> list[UnfoldedLeg]:
-        """The path's legs on unbounded planes, each from its device to the far end."""
+        """Legs of the path to explain on unbounded planes, each from its device to the far end."""
         _, landmark, tx_names, rx_names = identity
         tx_walls, rx_walls = ([self.names.index(n) for n in names] for names in (tx_names, rx_names))
         tx, rx = self.trajectory.tx[cycle], self.trajectory.rx[cycle]
@@ -145,7 +145,7 @@ class DifferenceExplainer:
         return [self._unfolded(tx_walls, tx, point, panel), self._unfolded(rx_walls[::-1], rx, point, panel)]
 
     def _unfolded(self, walls: list[int], device: Floats, far: Floats, panel: int = -1) -> UnfoldedLeg:
-        """Draw a leg on unbounded planes by mirroring the far end."""
+        """A leg to explain drawn on unbounded planes, by mirroring the far end."""
         facets, images = self.facets, [far]
         for wall in walls[::-1]:
             images.append(mirror(images[-1], facets.normal[wall], facets.offset[wall]))
@@ -161,7 +161,7 @@ class DifferenceExplainer:
         return UnfoldedLeg(drawn, np.array(walls, dtype=np.int64), float(clearance), shift, panel)
 
     def _shifts(self, points: Floats, images: Floats, walls: list[int]) -> Floats:
-        """How far beside each segment the tracer's ray may run: (d + 1,) [m].
+        """How far the tracer's ray may run beside each segment of the leg to explain: (d + 1,) [m].
 
         The image method sends a ray from the last point found, moved off its surface by `RAY_OFFSET` of (1 m + its
         largest coordinate), to the image, moved alike. In between, the ray is off by at most the weighted mean of what
@@ -182,7 +182,7 @@ class DifferenceExplainer:
         return shift
 
     def _conditions(self, leg: UnfoldedLeg) -> list[ExistenceCondition]:
-        """All that a leg needs, with margins from the geometry."""
+        """All conditions that a leg has to meet to be there, with margins from the geometry."""
         reach = float(leg.shift.max())
         found = [
             ExistenceCondition(
@@ -202,7 +202,8 @@ class DifferenceExplainer:
         return found
 
     def _on_wall(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
-        """Bounce `number` lies on its wall's triangles, not only in its plane, and not on what lies on them."""
+        """Condition: bounce `number` lies on its wall's triangles, not only in its plane, and not on what lies on
+        them."""
         wall, bounce = int(leg.walls[number]), leg.points[number + 1]
         found = []
         for surface, sign in ((wall, 1.0), *((int(upper), -1.0) for upper in self.facets.over[wall])):
@@ -213,7 +214,7 @@ class DifferenceExplainer:
         return found
 
     def _free(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
-        """No other wall stands across segment `number`: it would have to be crossed, and where it is solid.
+        """Condition: no other wall stands across segment `number`: it would have to be crossed, and where it is solid.
 
         Walls that the segment bounces on, and those in one plane with them, do not stand in its way, nor does the host
         wall before its own panel. A wall that is solid where a segment ends within float32 of it is too close to tell.
@@ -242,7 +243,7 @@ class DifferenceExplainer:
         return found + self._unshaded(leg, number)
 
     def _unshaded(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
-        """No shade stands across segment `number`; the far end's own does not hide it."""
+        """Condition: no shade stands across segment `number`; the far end's own does not hide it."""
         occluders, found = self.facets.occluders, []
         for shade, landmark in enumerate(occluders.landmark):
             last = number == len(leg.walls) and landmark != ALONE

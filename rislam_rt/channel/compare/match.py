@@ -113,7 +113,7 @@ def _scale(
 
 
 def _align(traced: Paths, analytic: Paths) -> IdentityColumns:
-    """The union of both sides' identities."""
+    """Union of both sides' path identities, for matching them."""
     sides = [{named_identity(paths, p): p for p in range(paths.num_paths)} for paths in (traced, analytic)]
     identity = sorted(sides[0].keys() | sides[1].keys())
     here = [np.array([side.get(i, -1) for i in identity], dtype=np.int64) for side in sides]
@@ -121,7 +121,7 @@ def _align(traced: Paths, analytic: Paths) -> IdentityColumns:
 
 
 def named_identity(paths: Paths, path: int) -> Identity:
-    """Identity of a column in names, so that two numberings of walls can meet."""
+    """Identity of a path in names, so that paths of two numberings of walls match."""
     kind, landmark, tx, rx = paths.identity(path)
     walls = paths.walls
     name = paths.landmarks[landmark] if landmark >= 0 else ""
@@ -129,14 +129,14 @@ def named_identity(paths: Paths, path: int) -> Identity:
 
 
 def _valid(paths: Paths, column: Integers) -> Booleans:
-    """(K, I) validity of the aligned identities."""
+    """(K, I) validity of the identities to match."""
     valid = np.zeros((paths.num_cycles, len(column)), dtype=np.bool_)
     valid[:, column >= 0] = paths.valid[:, column[column >= 0]]
     return valid
 
 
 def _certify(certifier: DifferenceExplainer, identity: Identity, cycle: int, is_traced: bool) -> OneSidedPath:
-    """The record of one one-sided path."""
+    """The record of a path without a match on the other side."""
     side = "traced" if is_traced else "analytic"
     proof = certifier.explain(identity, cycle, side)
     return OneSidedPath(cycle, certifier.label(identity), side, proof.reason, proof.text, proof.size)
@@ -170,16 +170,17 @@ def _report(
 
 
 def is_single(source: str) -> bool:
-    """Whether paths of this source hold the tracer's own float32 numbers."""
+    """Whether paths of this source, which are matched, hold the tracer's own float32 numbers."""
     return source.startswith("traced") and "refined" not in source
 
 
 def _level_difference(a: Floats, b: Floats) -> Floats:
-    """|20 lg(a / b)| [dB], 0 where both are nothing (a panel seen edge-on, a horizontal polarisation)."""
+    """|20 lg(a / b)| [dB] of the gains of matched paths, 0 where both are nothing (a panel seen edge-on, a horizontal
+    polarisation)."""
     floor = np.finfo(np.float64).tiny
     return np.abs(20.0 * np.log10(np.maximum(a, floor) / np.maximum(b, floor)))
 
 
 def _relative(error: Floats, scale: Floats) -> Floats:
-    """Errors (M,) in units of their scale, 0 of nothing."""
+    """Errors (M,) of matched paths in units of their scale, 0 of nothing."""
     return error / np.maximum(scale, np.finfo(np.float64).tiny)

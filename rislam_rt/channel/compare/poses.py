@@ -52,7 +52,7 @@ def _as_trajectory(position: Floats, baseline: float, rng: np.random.Generator) 
 
 
 def _reachable(facets: WallFacets, start: Floats, points: Floats) -> Booleans:
-    """Which points (N, 3) a chain of free straight lines joins to the start, other points as stations."""
+    """Which poses (N, 3) a chain of free straight lines joins to the start, other poses as stations."""
     reached = np.zeros(len(points), dtype=np.bool_)
     walls = facets.possible_blockers(np.concatenate([start[None], points]))
     stations = [start]

@@ -1,4 +1,4 @@
-"""What a comparison of two path sets found."""
+"""The report of a comparison of two path sets: what was found."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -87,22 +87,22 @@ class PathReport:
 
     @property
     def matched(self) -> int:
-        """Paths that both sides have, counted per cycle."""
+        """Compared paths that both sides have, counted per cycle."""
         return len(self.kind)
 
     @property
     def explained(self) -> dict[str, int]:
-        """One-sided paths with a proof, counted by reason."""
+        """Compared paths of one side with a proof, counted by reason."""
         return dict(sorted(Counter(path.reason for path in self.one_sided if path.reason).items()))
 
     @property
     def unexplained(self) -> int:
-        """One-sided paths without a proof."""
+        """Compared paths of one side without a proof."""
         return sum(not path.reason for path in self.one_sided)
 
     @property
     def judged(self) -> dict[str, tuple[Floats, Floats]]:
-        """Errors (M,) and limits (M,) by quantity."""
+        """Errors (M,) and limits (M,) of compared paths by quantity."""
         return {
             "length [m]": (self.length_error, self.limits.length),
             "gain [of the coherent scale]": (self.gain_error, self.limits.gain),
@@ -113,12 +113,12 @@ class PathReport:
 
     @property
     def num_breaches(self) -> int:
-        """Errors beyond their limits, over all paths and quantities."""
+        """Errors of compared paths beyond their limits, over all paths and quantities."""
         return sum(int(np.sum(~(error <= limit))) for error, limit in self.judged.values())
 
     @property
     def breaches(self) -> list[LimitViolation]:
-        """The worst of them first, at most `MOST_LISTED`."""
+        """The worst breaches of the report first, at most `MOST_LISTED`."""
         found = []
         for quantity, (error, limit) in self.judged.items():
             for row in np.flatnonzero(~(error <= limit)):
@@ -139,7 +139,7 @@ class PathReport:
         return {r: max(path.size for path in self.one_sided if path.reason == r) for r in self.explained}
 
     def as_dict(self) -> dict[str, Any]:
-        """Counts, largest errors and their distributions, for JSON."""
+        """The comparison's report for JSON: counts, largest errors and their distributions."""
         return {
             "cycles": self.cycles,
             "searched": self.searched,
@@ -184,12 +184,12 @@ class PathReport:
 
 
 def _largest(errors: Floats) -> float:
-    """Largest error, 0 of none."""
+    """Largest error in the comparison's report, 0 of none."""
     return float(errors.max(initial=0.0))
 
 
 def _percentiles(errors: Floats) -> dict[str, float]:
-    """Median, 90th, 99th percentile and maximum; nothing of none."""
+    """Median, 90th, 99th percentile and maximum of errors for the comparison's report; nothing of none."""
     if len(errors) == 0:
         return {}
     p50, p90, p99, top = np.percentile(errors, [50.0, 90.0, 99.0, 100.0])

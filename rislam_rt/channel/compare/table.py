@@ -1,4 +1,4 @@
-"""The validation page: one row a room, from the reports of one run."""
+"""The table of the validation page: one row a room, from the reports of one run."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -68,7 +68,7 @@ def validation_page(rows: Sequence[Validation], *, seed: int) -> str:
 
 
 def _reasons(numbers: Mapping[str, Any]) -> str:
-    """`edge: 3 (1.2e-6 m)`, one after the other."""
+    """Cell of the comparison's table: `edge: 3 (1.2e-6 m)`, one reason after the other."""
     limits = numbers["proof_limits_m"]
     texts = [
         f"{reason}: {n}" + (f" ({limits[reason]:.1e} m)" if limits[reason] else "")
@@ -78,12 +78,12 @@ def _reasons(numbers: Mapping[str, Any]) -> str:
 
 
 def _share(limits: Mapping[str, Any]) -> str:
-    """Of the path that comes nearest to its limit."""
+    """Cell of the comparison's table: share of its limit that the nearest path takes."""
     return f"{limits['nearest']['share']:.0%}" if limits else "-"
 
 
 def _error(spread: Mapping[str, float]) -> str:
-    """Largest error and 99th percentile; rounding is rounding, whatever its digits."""
+    """Cell of the comparison's table: largest error and 99th percentile; rounding is rounding, whatever its digits."""
     if not spread:
         return "-"
     return " ".join(

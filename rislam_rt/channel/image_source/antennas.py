@@ -27,7 +27,8 @@ class LegEnds(NamedTuple):
     def coefficient(
         self, coatings: Coatings, walls: Integers, normals: Floats, direction: Floats, cycle: Integers
     ) -> Complexes:
-        """(N,) what the far end receives of legs that leave along `direction` (N, 3) and meet `walls` (N, d)."""
+        """(N,) what the far end's antenna receives of legs that leave along `direction` (N, 3) and meet `walls` (N,
+        d)."""
         heading = self.heading[cycle]
         basis = polarisation_basis(direction)
         parts = radiated(*self.device, direction, heading)
@@ -47,7 +48,7 @@ def radiated(pattern: str, polarization: str, direction: Floats, heading: Floats
 
 
 def peak_amplitude(antennas: Antennas) -> float:
-    """What either end's pattern makes of a path at most: all of them are strongest ahead."""
+    """What the antennas' patterns make of a path at most: all of them are strongest ahead."""
     ahead, heading = np.array([[1.0, 0.0, 0.0]]), np.zeros(1)
     return float(amplitude(antennas.tx, ahead, heading)[0] * amplitude(antennas.rx, ahead, heading)[0])
 

@@ -44,7 +44,7 @@ def group_positions(points: Floats, limit: float) -> list[Integers]:
 
 
 def enclosing_balls(points: Floats, groups: list[Integers]) -> BoundingBalls:
-    """The balls about the middle of each group's bounds."""
+    """Balls about the middle of each group's bounds, from which beams start."""
     middle = np.array([(points[g].min(axis=0) + points[g].max(axis=0)) / 2.0 for g in groups]).reshape(-1, 3)
     radius = [np.linalg.norm(points[g] - m, axis=-1).max() for g, m in zip(groups, middle, strict=True)]
     return BoundingBalls(middle, np.array(radius, dtype=np.float64))
@@ -65,7 +65,7 @@ class Beams(NamedTuple):
     """(N, P) [m]."""
 
     def only(self, keep: Booleans | Integers | slice) -> "Beams":
-        """The rows chosen."""
+        """The beams of the rows chosen."""
         return Beams(self.ball[keep], self.walls[keep], self.image[keep], self.normal[keep], self.offset[keep])
 
 
@@ -80,7 +80,7 @@ class FoundSequences(NamedTuple):
 def search_beams(
     clusters: WallClusters, device: BoundingBalls, far: BoundingBalls, pairs: Integers, depth: int, barred: Booleans
 ) -> Iterator[FoundSequences]:
-    """Sequences of 1 to `depth` walls, in blocks.
+    """Search by beams for sequences of 1 to `depth` walls, in blocks.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def _followed(
 
 
 def _blocks(count: int, width: int) -> Iterator[slice]:
-    """Slices of rows that each make `width` numbers, 256 at the least."""
+    """Slices of beams' rows that each make `width` numbers, 256 at the least."""
     step = max(256, _BLOCK // width)
     return (slice(i, i + step) for i in range(0, count, step))
 
@@ -173,7 +173,7 @@ def _through(rectangles: Rectangles, beams: Beams, wall: Integers, radius: Float
 def _half_spaces(
     rectangles: Rectangles, wall: Integers, front: Floats, image: Floats, height: Floats, radius: Floats
 ) -> tuple[Floats, Floats]:
-    """Normals (N, 5, 3) and offsets (N, 5): beyond the wall's plane, and inside its rectangle's four edges.
+    """Half-spaces that bound beams: normals (N, 5, 3), offsets (N, 5): wall's plane, its rectangle's four edges.
 
     Through each edge goes the plane that touches the image's ball, `height` (N,) behind the wall, such that ball and
     beam are on different sides of it. With the edge's inward normal q, and the ball's centre at (m, -height)

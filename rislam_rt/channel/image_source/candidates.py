@@ -1,4 +1,4 @@
-"""Which pairs of a cycle and a wall sequence are worth an exact look: all of them, or what mirrored beams leave."""
+"""Candidate pairs of a cycle and a wall sequence that are worth an exact look: all, or what mirrored beams leave."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -40,12 +40,12 @@ class SequenceSearch(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What is searched, for people."""
+        """What candidates are searched, for people."""
         return "all wall sequences" if self.exhaustive else "mirrored beams"
 
 
 def build_search(facets: WallFacets, depth: int, how: str) -> SequenceSearch:
-    """Choose by the number of sequences that W walls make, unless told."""
+    """The search for candidate wall sequences, chosen by the number that W walls make, unless told."""
     count = sum(len(facets) * max(len(facets) - 1, 0) ** (bounces - 1) for bounces in range(1, depth + 1))
     diagonal = np.linalg.norm(facets.box[1].max(axis=0) - facets.box[0].min(axis=0)) if len(facets) else 0.0
     exhaustive = how == "exhaustive" or (how == "auto" and count <= FEW)
@@ -55,7 +55,7 @@ def build_search(facets: WallFacets, depth: int, how: str) -> SequenceSearch:
 def candidate_rows(
     search: SequenceSearch, device: Floats, far: Floats, depth: int, host: int
 ) -> Iterator[tuple[Integers, Integers]]:
-    """Cycles (N,) and wall sequences (N, d) from device to far end, in blocks of one d each.
+    """Candidates: cycles (N,) and wall sequences (N, d) from device to far end, in blocks of one d each.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def candidate_rows(
 
 
 def _rows(found: FoundSequences, groups: list[Integers]) -> Iterator[tuple[Integers, Integers]]:
-    """Every cycle of each device ball, in blocks."""
+    """Candidates of every cycle of each device ball, in blocks."""
     if len(found.device) == 0:
         return
     sizes = np.array([len(group) for group in groups])

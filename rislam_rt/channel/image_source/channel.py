@@ -57,7 +57,7 @@ class ImageSourceChannel:
         object.__setattr__(self, "looked", build_search(self.facets, self.depth, self.search))
 
     def paths(self, trajectory: Trajectory) -> Paths:
-        """Every path of every cycle, with the panel at level 0."""
+        """Every path of every cycle by image sources, with the panel at level 0."""
         expect("trajectory", trajectory, Trajectory)
         tx, rx = trajectory.tx, trajectory.rx
         ends = self.antennas or self.radio.antennas
@@ -83,7 +83,7 @@ class ImageSourceChannel:
         )
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """The same paths under another code."""
+        """The same image-source paths under another code."""
         return rephase(paths, code)
 
     def _landmark_legs(self, device: Floats, number: int, terminals: LegEnds | None) -> SpecularLegs:

@@ -1,4 +1,4 @@
-"""Walls as the image method needs them: which part of a plane is solid, who stands on which side, who hides whom."""
+"""Facets of walls for the image method: which part of a plane is solid, who stands on which side, who hides whom."""
 
 from dataclasses import dataclass
 
@@ -57,7 +57,7 @@ class WallFacets:
         return len(self.offset)
 
     def distance(self, points: Floats) -> Floats:
-        """Signed distances (N, W) [m] of points (N, 3) from every wall's plane."""
+        """Signed distances (N, W) [m] of points (N, 3) from every wall's plane, for tests against facets."""
         return points @ self.normal.T - self.offset
 
     def contains(self, points: Floats, wall: Integers) -> Booleans:
@@ -96,11 +96,11 @@ class WallFacets:
         return own
 
     def _planes(self, wall: Integers) -> Integers:
-        """The planes (N,) of walls (N,), -1 for -1."""
+        """Facets' planes (N,) of walls (N,), -1 for -1."""
         return np.where(wall >= 0, self.plane[wall], -1) if len(self) else wall
 
     def _on_wall(self, points: Floats, wall: int) -> Booleans:
-        """Whether points (N, 3) of the plane of one wall lie on its triangles."""
+        """Whether points (N, 3) of the plane of one wall lie on its facets."""
         span = slice(self.first[wall], self.first[wall + 1])
         normals, offsets = self.edge_normal[span].reshape(-1, 3), self.edge_offset[span].reshape(-1)
         inside = np.zeros(len(points), dtype=np.bool_)
@@ -148,7 +148,7 @@ class WallFacets:
         return bits
 
     def point_sides(self, points: Floats) -> Integers:
-        """Side bits (W,): on which sides of each wall any of the points (N, 3) lies."""
+        """Facets' side bits (W,): on which sides of each wall any of the points (N, 3) lies."""
         distance = self.distance(points)
         front, back = distance.max(axis=0) > SEAM, distance.min(axis=0) < -SEAM
         bits: Integers = FRONT * front + BACK * back
@@ -156,7 +156,7 @@ class WallFacets:
 
 
 def build_facets(walls: Walls) -> WallFacets:
-    """Sort the triangles by wall."""
+    """Facets of the walls: triangles sorted by wall."""
     order = np.argsort(walls.wall_of_triangle, kind="stable")
     corners = walls.triangles[order]
     first = np.searchsorted(walls.wall_of_triangle[order], np.arange(len(walls) + 1))
@@ -185,6 +185,6 @@ def build_facets(walls: Walls) -> WallFacets:
 
 
 def row_blocks(count: int, width: int) -> list[slice]:
-    """Slices of `count` rows of `width` numbers, each of about `_BLOCK` numbers."""
+    """Slices of `count` rows of `width` numbers for tests against facets, each of about `_BLOCK` numbers."""
     step = max(1, _BLOCK // max(width, 1))
     return [slice(i, min(i + step, count)) for i in range(0, count, step)]

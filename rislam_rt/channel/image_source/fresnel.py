@@ -1,4 +1,4 @@
-"""Reflection on slabs of building materials: ITU-R P.2040 (permittivity, slab) and what it does to a polarised ray."""
+"""Fresnel reflection on slabs of building materials: ITU-R P.2040 (permittivity, slab), and a polarised ray."""
 
 from dataclasses import dataclass
 
@@ -118,7 +118,7 @@ class Coatings:
     def _reflect(
         self, field: Complexes, incident: Floats, reflected: Floats, normal: Floats, wall: Integers
     ) -> Complexes:
-        """Field vectors (N, 3) after a bounce on walls (N,).
+        """Field vectors (N, 3) after a Fresnel bounce on walls (N,).
 
         A slab acts on the components across (TE) and in (TM) the plane of incidence; a wall with a constant
         coefficient keeps the vertical and the horizontal component and scales both.
@@ -137,7 +137,7 @@ class Coatings:
 
 
 def build_coatings(materials: tuple[Material, ...], carrier: float) -> Coatings:
-    """Look up the walls' materials at the carrier [Hz].
+    """Coatings for Fresnel reflection: the walls' materials looked up at the carrier [Hz].
 
     Raises
     ------
@@ -167,6 +167,6 @@ def _incidence_basis(incident: Floats, reflected: Floats, normal: Floats) -> tup
 
 
 def _turned(field: Complexes, onto: Floats, out: Floats, coefficient: Floats | Complexes) -> Complexes:
-    """`coefficient (onto . field) out`."""
+    """Fresnel-reflected field part `coefficient (onto . field) out`."""
     result: Complexes = (coefficient * np.sum(field * onto, axis=-1))[:, None] * out
     return result

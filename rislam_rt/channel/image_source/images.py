@@ -1,4 +1,4 @@
-"""From wall sequences to legs: mirror the far end, walk back from the device, test facets and occlusion."""
+"""Legs from wall sequences by images: mirror the far end, walk back from the device, test facets and occlusion."""
 
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ class ImageRays(NamedTuple):
     image: Floats
 
     def only(self, keep: Booleans) -> "ImageRays":
-        """The rows where `keep` (N,) holds."""
+        """Image-source rays of the rows where `keep` (N,) holds."""
         return ImageRays(self.cycle[keep], self.walls[keep], self.bounces[keep], self.image[keep])
 
 
@@ -64,19 +64,19 @@ def find_legs(
 
 
 def _joined(parts: list[ImageRays]) -> ImageRays:
-    """All rays of one number of bounces."""
+    """All rays of image sources of one number of bounces."""
     return ImageRays(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def _direct_rays(device: Floats, far: Floats) -> ImageRays:
-    """The legs without a bounce."""
+    """Rays of image sources without a bounce."""
     cycles = len(device)
     nothing = np.zeros((cycles, 0), dtype=np.int64)
     return ImageRays(np.arange(cycles), nothing, np.zeros((cycles, 0, 3)), np.broadcast_to(far, device.shape))
 
 
 def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device: Floats, far: Floats) -> ImageRays:
-    """The legs of cycles (N,) over walls (N, d) whose every bounce lies on its wall; occlusion is not looked at."""
+    """Image-source rays of cycles (N,) over walls (N, d) whose every bounce lies on its wall; nothing hides yet."""
     images = [far[cycle if len(far) > 1 else np.zeros_like(cycle)]]
     for wall in walls.T[::-1]:
         images.insert(0, mirror(images[0], facets.normal[wall], facets.offset[wall]))
@@ -96,7 +96,8 @@ def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device
 def _plane_crossing(
     start: Floats, end: Floats, normal: Floats, offset: Floats, tolerance: tuple[float, float]
 ) -> tuple[Booleans, Floats]:
-    """Which segments (N, 3) cross their plane, both ends farther from it than the tolerance [m], and where: (M, 3)."""
+    """Which segments (N, 3) from an image cross their wall's plane, both ends farther off than the tolerance [m],
+    where."""
     a = np.einsum("ni,ni->n", start, normal) - offset
     b = np.einsum("ni,ni->n", end, normal) - offset
     crosses = (a * b < 0.0) & (np.abs(a) > tolerance[0]) & (np.abs(b) > tolerance[1])
@@ -114,7 +115,7 @@ def _visible(
     front: Floats | None,
     landmark: int,
 ) -> ImageRays:
-    """The legs that nothing hides and that reach a panel at the far end from its front."""
+    """Image-source rays that nothing hides and that reach a panel at the far end from its front."""
     count, bounces = rays.walls.shape
     target = np.broadcast_to(far, device.shape)[rays.cycle]
     points = np.concatenate([device[rays.cycle][:, None], rays.bounces, target[:, None]], axis=1)
@@ -141,7 +142,7 @@ def _legs(
     depth: int,
     terminals: LegEnds | None,
 ) -> SpecularLegs:
-    """Rays scattered into dense arrays, one column a sequence that some cycle has."""
+    """Image-source rays as dense legs, one column a sequence that some cycle has."""
     cycles = len(device)
     columns: list[Integers] = []
     parts: list[tuple[Integers, Integers, ImageRays]] = []
@@ -173,7 +174,7 @@ def _legs(
 
 
 def _followed(direction: Floats, normals: Floats) -> Floats:
-    """Directions (N, 3) after the bounces on walls with normals (N, d, 3)."""
+    """Directions (N, 3) of image-source rays after the bounces on walls with normals (N, d, 3)."""
     for normal in normals.swapaxes(0, 1):
         direction = mirror_direction(direction, normal)
     return direction

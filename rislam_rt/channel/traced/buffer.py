@@ -15,7 +15,7 @@ from rislam_rt.channel.traced.tracer_scene import TracerScene, as_points
 def fill_buffer(
     tracer_scene: TracerScene, sequences: Integers, rows: CandidateIndices, vertices: Floats | None = None
 ) -> PathsBuffer:
-    """Paths from far ends (sources) to devices (targets) over `sequences` (N, D), which run the other way.
+    """The tracer's path buffer, from far ends (sources) to devices (targets) over `sequences` (N, D), in reverse.
 
     `vertices` (N, D, 3) [m] are in the order from device to far end; without them any point of each wall's plane, which
     the image method needs, from the tracer scene's origin.
@@ -39,7 +39,7 @@ def fill_buffer(
 
 
 def read_vertices(tracer_scene: TracerScene, buffer: PathsBuffer, keep: Integers, sequences: Integers) -> Floats:
-    """Bounce points (N, D, 3) [m] of the paths `keep`, from device to far end over `sequences` (N, D)."""
+    """Bounce points (N, D, 3) [m] read from the tracer's buffer for the paths `keep`, from device to far end."""
     columns = [np.array(getattr(buffer, f"vertices_{axis}"), dtype=np.float64) for axis in "xyz"]
     return turned_vertices(np.stack(columns, axis=-1)[keep, : sequences.shape[1]] + tracer_scene.origin, sequences)
 
@@ -50,7 +50,7 @@ def as_indices(values: Integers) -> mi.UInt:
 
 
 def turned_vertices(vertices: Floats, sequences: Integers) -> Floats:
-    """Bounce points (N, D, 3) in the opposite order, zero where the sequences (N, D) have no wall."""
+    """Bounce points (N, D, 3) of the tracer's buffer in opposite order, zero where there is no wall."""
     index = (sequences != NO_WALL).sum(axis=1)[:, None] - 1 - np.arange(sequences.shape[1])
     turned = np.take_along_axis(vertices, np.maximum(index, 0)[..., None], axis=1)
     return np.where((index >= 0)[..., None], turned, 0.0)

@@ -16,12 +16,12 @@ class CandidateIndices(NamedTuple):
     sequence: Integers
 
     def only(self, keep: Integers | slice) -> "CandidateIndices":
-        """The rows chosen."""
+        """Candidate indices of the rows chosen."""
         return CandidateIndices(self.far[keep], self.device[keep], self.sequence[keep])
 
 
 def in_blocks(parts: Iterable[CandidateIndices], size: int) -> Iterator[CandidateIndices]:
-    """The same rows in blocks of `size`, the last one shorter."""
+    """Candidate indices in blocks of `size`, the last one shorter."""
     waiting: list[CandidateIndices] = []
     for part in parts:
         waiting.append(part)
@@ -34,5 +34,5 @@ def in_blocks(parts: Iterable[CandidateIndices], size: int) -> Iterator[Candidat
 
 
 def join_indices(parts: list[CandidateIndices]) -> CandidateIndices:
-    """All rows, one part after the other."""
+    """Candidate indices of several parts, one after the other."""
     return CandidateIndices(*(np.concatenate(column) for column in zip(*parts, strict=True)))

@@ -68,7 +68,7 @@ class TracedChannel:
         self.tracer_scene = build_tracer_scene(self.walls, radio.carrier, room_center(scene), occluders)
 
     def paths(self, trajectory: Trajectory) -> Paths:
-        """Every path of every cycle, with the panel at level 0."""
+        """Every path of every cycle, traced, with the panel at level 0."""
         expect("trajectory", trajectory, Trajectory)
         tx, rx, heading = trajectory.tx, trajectory.rx, trajectory.heading
         problems = [LegQuery(tx, rx, heading, to_rx=True)]

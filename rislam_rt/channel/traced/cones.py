@@ -75,7 +75,7 @@ class Cones(NamedTuple):
 
 
 def build_cones(tracer_scene: "TracerScene", device: Floats, far: Floats) -> Cones:
-    """Gather positions (N, 3) and their far ends (N, 3), or the single one (1, 3), in balls."""
+    """Cones of positions (N, 3) gathered in balls with their far ends (N, 3), or the single one (1, 3)."""
     device, far = device - tracer_scene.origin, far - tracer_scene.origin
     cell = (
         NEAR * 2.0 * (tracer_scene.wall_boxes.margin * 1e3 - 1.0)
@@ -92,7 +92,7 @@ def build_cones(tracer_scene: "TracerScene", device: Floats, far: Floats) -> Con
 
 
 def _ball(points: Floats) -> PositionBall:
-    """The ball about the middle of some points (N, 3)."""
+    """Ball about the middle of some points (N, 3), an end of a cone."""
     middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
     x, y, z = middle.tolist()
     return PositionBall((x, y, z), float(np.linalg.norm(points - middle, axis=-1).max()))
@@ -106,13 +106,13 @@ def _columns(walls: Integers) -> list[Any]:
 
 
 def _wall_ball(tracer_scene: "TracerScene", wall: Any) -> tuple[Any, Any]:
-    """Centre and radius of a ball about walls (N,)."""
+    """Centre and radius of a ball about walls (N,) that a cone may meet."""
     half = dr.gather(mi.Vector3f, tracer_scene.wall_boxes.half, wall)
     return dr.gather(mi.Point3f, tracer_scene.wall_boxes.center, wall), dr.norm(half)
 
 
 def _mirrored(point: Any, normal: Any, offset: Any) -> Any:
-    """Mirror images in planes."""
+    """Cones' balls mirrored in planes."""
     return point - 2.0 * (dr.dot(normal, point) - offset) * normal
 
 

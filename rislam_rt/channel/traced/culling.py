@@ -1,4 +1,4 @@
-"""Candidates worth a ray: those whose bounces on the unbounded planes come near their walls.
+"""Culling of candidates: worth a ray are those whose bounces on the unbounded planes come near their walls.
 
 A lossless test in front of the tracer. In a furnished room one candidate in a hundred survives it, and asking the
 tracer costs twenty times as much as sifting.
@@ -25,7 +25,7 @@ BLOCK = 4_000_000
 def cull_candidates(
     tracer_scene: TracerScene, sequences: Integers, device: Floats, far: Floats
 ) -> Iterator[tuple[Integers, Integers]]:
-    """Pairs (device, sequence), in blocks, out of all devices (N, 3) with all sequences (S, D).
+    """Candidate pairs (device, sequence) that survive culling, in blocks, of all devices (N, 3) and sequences (S, D).
 
     Far ends (N, 3) go with their devices, a single one (1, 3) with all.
     """
@@ -48,7 +48,7 @@ def cull_candidates(
 
 
 def _near_walls(tracer_scene: TracerScene, walls: list[mi.UInt], device: mi.Point3f, far: mi.Point3f) -> mi.Bool:
-    """Whether the mirror path over `walls` could bounce on every one of them.
+    """Whether a pair survives culling: the mirror path over `walls` could bounce on every one of them.
 
     The margin is a thousandth of the room: hundreds of times what float32 leaves uncertain. Where both ends of a bounce
     are that near the plane the bounce may be anywhere along, and stays.

@@ -60,7 +60,8 @@ def leg_coefficients(
 
 
 def _jones(material: Any, incident: Floats, reflected: Floats, normal: Floats) -> Complexes:
-    """Jones matrices (N, 2, 2), or (1, 2, 2) for all, between the (theta, phi) bases of rays (N, 3) before and after.
+    """Jones matrices (N, 2, 2), or (1, 2, 2) for all, of fields between the (theta, phi) bases of rays (N, 3) before
+    and after.
 
     A wall of constant R is given in those bases; a slab across the plane of incidence and in it, and turned here.
     """
@@ -77,7 +78,7 @@ def _jones(material: Any, incident: Floats, reflected: Floats, normal: Floats) -
 
 
 def incidence_jones(material: Any, cosine: Floats) -> Complexes:
-    """Jones matrices (N, 2, 2) of a radio material at cosines (N,) of incidence, across and in the plane of incidence.
+    """Jones matrices (N, 2, 2) of the field at a radio material, at cosines (N,) of incidence, across and in plane.
 
     The first component of a field is along a unit vector s across the plane, the second along `k x s`, k being the
     ray's direction. Sionna's material is evaluated with the wall's normal along x and the rays level, where its own
@@ -99,7 +100,7 @@ def incidence_jones(material: Any, cosine: Floats) -> Complexes:
 
 
 def spherical_basis(direction: Floats) -> tuple[Floats, Floats]:
-    """Unit vectors theta_hat and phi_hat (N, 3) of directions (N, 3)."""
+    """Basis of fields theta_hat and phi_hat (N, 3) of directions (N, 3)."""
     cosine, azimuth = direction[:, 2], _azimuth(direction)
     c, s = np.cos(azimuth), np.sin(azimuth)
     sine = np.hypot(direction[:, 0], direction[:, 1])
@@ -107,13 +108,14 @@ def spherical_basis(direction: Floats) -> tuple[Floats, Floats]:
 
 
 def _azimuth(direction: Floats) -> Floats:
-    """(N,) [rad] of directions (N, 3), 0 along the vertical."""
+    """(N,) [rad] azimuth of field directions (N, 3), 0 along the vertical."""
     x, y = direction[:, 0], direction[:, 1]
     return np.where(np.hypot(x, y) > POLE, np.arctan2(y, x), 0.0)
 
 
 def _turn(basis: tuple[Floats, Floats], across: Floats) -> Floats:
-    """Matrices (N, 2, 2): components along theta_hat and phi_hat to those along s = `across` (N, 3) and k x s."""
+    """Matrices (N, 2, 2) that turn fields: components along theta_hat and phi_hat to those along s = `across` (N, 3)
+    and k x s."""
     c, s = (np.vecdot(vector, across) for vector in basis)
     return np.stack([np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)], axis=1)
 

@@ -39,7 +39,7 @@ class LegQuery(NamedTuple):
 
     @property
     def paired(self) -> bool:
-        """Whether every device has a far end of its own."""
+        """Whether every device of a query has a far end of its own."""
         return len(self.far) != 1
 
 
@@ -88,7 +88,7 @@ class QueryBatch(NamedTuple):
 
     @property
     def all_sequences(self) -> Integers:
-        """(S, D) of all problems."""
+        """(S, D) wall sequences of all queries."""
         return np.concatenate(self.sequences)
 
     def candidates(self, tracer_scene: "TracerScene") -> Iterator[CandidateIndices]:
@@ -105,7 +105,7 @@ class QueryBatch(NamedTuple):
             first_sequence += len(sequences)
 
     def ends(self, rows: CandidateIndices) -> LegEndpoints:
-        """The two ends of each row."""
+        """The two ends of each queried leg, row by row."""
         sizes = [len(problem.device) for problem in self.problems]
         far = np.concatenate([problem.far for problem in self.problems])
         heading = np.concatenate([problem.heading for problem in self.problems])
@@ -114,7 +114,7 @@ class QueryBatch(NamedTuple):
         return LegEndpoints(self.device[device], far[rows.far], heading[device], from_rx[device], to_rx[device])
 
     def _flags(self) -> tuple[list[bool], list[bool]]:
-        """Which problems start, and which end, at the Rx."""
+        """Which queries start, and which end, at the Rx."""
         return [problem.from_rx for problem in self.problems], [problem.to_rx for problem in self.problems]
 
     def legs(self, found: FoundLegs) -> list[SpecularLegs]:
@@ -134,7 +134,7 @@ class QueryBatch(NamedTuple):
 
 
 def build_batch(problems: Sequence[LegQuery], tracer_scene: "TracerScene", sides: Integers, depth: int) -> QueryBatch:
-    """Enumerate the wall sequences of every problem up to `depth` bounces."""
+    """Queries for legs: the wall sequences of every problem up to `depth` bounces."""
     from rislam_rt.channel.traced.cones import build_cones
 
     walls, sequences, complete = tracer_scene.walls, [], True
@@ -160,7 +160,7 @@ def join_found(parts: list[FoundLegs]) -> FoundLegs:
 
 
 def _lifted(problem: LegQuery, walls: Walls) -> Floats:
-    """Far ends (F, 3), a panel's at least `LIFT` in front of its host wall."""
+    """Far ends (F, 3) of queried legs, a panel's at least `LIFT` in front of its host wall."""
     if problem.host < 0 or problem.front is None:
         return problem.far
     outward = np.copysign(1.0, walls.normal[problem.host] @ problem.front)

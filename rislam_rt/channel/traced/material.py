@@ -44,7 +44,7 @@ class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
         sample2: mi.Point2f,
         active: bool | mi.Bool = True,
     ) -> tuple[mi.BSDFSample3f, mi.Spectrum]:
-        """Direction of the mirrored ray; always a specular reflection."""
+        """Direction of the ray mirrored at a material of constant R; always a specular reflection."""
         count = dr.width(si.wi)
         result = mi.BSDFSample3f()
         result.sampled_component = dr.full(mi.UInt32, InteractionType.SPECULAR, count)
@@ -64,15 +64,15 @@ class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
     def pdf(
         self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: bool | mi.Bool = True
     ) -> mi.Float:
-        """Probability of a specular reflection: 1."""
+        """Probability of a specular reflection at a material of constant R: 1."""
         return dr.full(mi.Float, 1.0, dr.width(si.wi))
 
     def traverse(self, callback: mi.TraversalCallback) -> None:
-        """Name R for Mitsuba's differentiable parameters."""
+        """Name R of the material for Mitsuba's differentiable parameters."""
         callback.put("reflection", self._reflection, mi.ParamFlags.Differentiable)
 
     def to_string(self) -> str:
-        """Text for people."""
+        """The material as text for people."""
         return f"ConstantReflection R={self._reflection[0]:.3f}"
 
     def _jones(self, si: mi.SurfaceInteraction3f, wo: mi.Vector3f) -> mi.Matrix4f:

@@ -1,4 +1,4 @@
-"""Where found legs run: as the tracer left them, or refined in float64.
+"""Geometry of found paths, leg by leg: as the tracer left them, or refined in float64.
 
 Refinement keeps the tracer's word on which walls are met and seen; the images on the walls' planes say where.
 """

@@ -104,7 +104,7 @@ def _receiver(name: str, point: Floats) -> Any:
 def _solve(
     tracer_scene: Any, cycle: int, depth: int, samples: int, number_of: dict[int, int], walls: Walls
 ) -> list[tuple[int, SolverLeg]]:
-    """(far end, leg) of all that Sionna finds from one place of a device."""
+    """(far end, leg) of all that Sionna's own path solver finds from one place of a device."""
     import sionna.rt as rt
 
     paths = rt.PathSolver(deterministic=True)(
@@ -130,7 +130,7 @@ def _solve(
 
 
 def _legs(rows: list[SolverLeg], device: Floats, far: Floats, depth: int, radio: RadioConfig) -> SpecularLegs:
-    """Legs (K, S) of all rows; of two with one identity in one cycle the first."""
+    """Legs (K, S) of all that the path solver found; of two with one identity in one cycle the first."""
     first = {(row.cycle, row.walls): row for row in reversed(rows)}
     columns = sorted({walls for _, walls in first}, key=lambda walls: (len(walls), walls))
     table = np.full((len(columns), depth), -1)

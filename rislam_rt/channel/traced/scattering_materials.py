@@ -22,7 +22,7 @@ class RoughConstantReflection(rt.RadioMaterial):  # type: ignore[misc]
         self._reflection = reflection
 
     def _event_probabilities(self, r_te: Any, r_tm: Any, t_te: Any, t_tm: Any, enabled_interactions: Any) -> Any:
-        """Nothing passes; the rest is Sionna's."""
+        """A scattering wall of constant R lets nothing pass; the rest is Sionna's."""
         r, t = mi.Complex2f(self._reflection), mi.Complex2f(0.0)  # type: ignore[operator]
         return super()._event_probabilities(r, r, t, t, enabled_interactions)
 
@@ -42,7 +42,7 @@ class PolarisedReflection(rt.RadioMaterial):  # type: ignore[misc]
         self._te, self._tm = material.reflection_te, material.reflection_tm
 
     def _event_probabilities(self, r_te: Any, r_tm: Any, t_te: Any, t_tm: Any, enabled_interactions: Any) -> Any:
-        """Nothing passes; the rest is Sionna's."""
+        """A scattering wall with polarised R lets nothing pass; the rest is Sionna's."""
         te, tm, none = (mi.Complex2f(value) for value in (self._te, self._tm, 0.0))  # type: ignore[operator]
         return super()._event_probabilities(te, tm, none, none, enabled_interactions)
 

@@ -1,4 +1,4 @@
-"""A small box traced from end to end: the proof that this machine's tracer works."""
+"""Self-test of this machine's tracer: a small box traced from end to end."""
 
 from dataclasses import dataclass
 from time import perf_counter
@@ -58,7 +58,7 @@ def trace_small_box() -> SelfTest:
 
 
 def _box(reflection: float) -> Reflector:
-    """A closed box as one mesh of six planes, two triangles each."""
+    """Room of the self-test: a closed box as one mesh of six planes, two triangles each."""
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * _SIZE
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = np.array([[a, b, c] for a, b, c, _ in quads] + [[a, c, d] for a, _, c, d in quads])

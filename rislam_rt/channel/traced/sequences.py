@@ -35,7 +35,7 @@ _BLOCK = 4_000_000
 
 
 def wall_sides(walls: Walls) -> Integers:
-    """(W, W): on which sides of wall i's plane wall j has parts."""
+    """(W, W) side bits that rule wall sequences out: on which sides of wall i's plane wall j has parts."""
     order = np.argsort(walls.wall_of_triangle, kind="stable")
     corners = walls.triangles[order].reshape(-1, 3)
     first = 3 * np.searchsorted(walls.wall_of_triangle[order], np.arange(len(walls)))
@@ -48,7 +48,7 @@ def wall_sides(walls: Walls) -> Integers:
 
 
 def point_sides(walls: Walls, points: Floats) -> Integers:
-    """(N, W): on which side of wall j's plane point i lies; 0 in the plane."""
+    """(N, W) side that rules wall sequences out: on which side of wall j's plane point i lies; 0 in the plane."""
     height = points @ walls.normal.T - walls.offset
     return np.where(height > SURFACE_TOLERANCE, FRONT, np.where(height < -SURFACE_TOLERANCE, BACK, 0))
 
@@ -127,7 +127,7 @@ def _growth(level: Integers, onward: Integers, sides: Integers) -> int:
 
 
 def _check(count: int, most: int, sides: Integers, depth: int, verb: str) -> None:
-    """Refuse what would not end in an hour or fit the memory, before it is built."""
+    """Refuse sequences that would not end in an hour or fit the memory, before they are built."""
     if count > most:
         raise ConfigError(
             f"depth: {depth} received; {len(sides)} walls {verb} {count} sequences, more than {most}: "
@@ -153,7 +153,7 @@ def _with_wall_before(level: Integers, onward: Integers, sides: Integers) -> Ite
 
 
 def _blocks(count: int, width: int) -> Iterator[slice]:
-    """Slices of `count` rows such that rows times width stay bounded."""
+    """Slices of `count` sequences such that rows times width stay bounded."""
     step = max(1, _BLOCK // max(width, 1))
     for start in range(0, count, step):
         yield slice(start, min(start + step, count))

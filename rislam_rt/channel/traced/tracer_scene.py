@@ -1,4 +1,4 @@
-"""The room as Sionna RT sees it: one mesh a material, triangle numbers kept, so that every hit names its wall."""
+"""The tracer's scene, as Sionna RT sees the room: one mesh a material, so that every hit names its wall."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ class TracerScene:
         return float(self.scene.wavelength[0])
 
     def wall_hit(self, shape: Integers, primitive: Integers) -> Integers:
-        """Walls (...,) of hits, `NO_WALL` where nothing was hit."""
+        """Walls (...,) of the tracer's hits, `NO_WALL` where nothing was hit."""
         place = np.searchsorted(self.shapes, shape)
         known = (place < len(self.shapes)) & np.isin(shape, self.shapes)
         index = np.where(known, self.first[np.where(known, place, 0)] + primitive, 0)
@@ -159,7 +159,7 @@ def _numbered(
     views: dict[int, mi.Scene],
     occluders: dict[int, mi.Scene],
 ) -> TracerScene:
-    """Number the triangles of all shapes (M,) and pick each wall's largest."""
+    """Triangles of all shapes (M,) of the tracer's scene numbered, and each wall's largest."""
     order = np.argsort(ids)
     rows = np.concatenate([members[m] for m in order] or [np.zeros(0, dtype=np.int64)])
     sizes = [len(members[m]) for m in order]
@@ -189,7 +189,7 @@ def _numbered(
 
 
 def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
-    """Planes and bounds about the origin."""
+    """Planes and bounds of the walls of the tracer's scene, about the origin."""
     low, high = np.full((len(walls), 3), np.inf), np.full((len(walls), 3), -np.inf)
     np.minimum.at(low, walls.wall_of_triangle, walls.triangles.min(axis=1) - origin)
     np.maximum.at(high, walls.wall_of_triangle, walls.triangles.max(axis=1) - origin)
@@ -210,7 +210,7 @@ def as_points(points: Floats) -> mi.Point3f:
 
 
 def build_mesh(name: str, triangles: Floats) -> mi.Mesh:
-    """A mesh of separate triangles (T, 3, 3), in their order."""
+    """Mesh for the tracer's scene of separate triangles (T, 3, 3), in their order."""
     mesh = mi.Mesh(
         name, vertex_count=3 * len(triangles), face_count=len(triangles), has_vertex_normals=False,
         has_vertex_texcoords=False,
@@ -223,7 +223,7 @@ def build_mesh(name: str, triangles: Floats) -> mi.Mesh:
 
 
 def _material(material: Material, number: int) -> rt.RadioMaterialBase:
-    """The radio material of a wall: a constant R of ours, or Sionna's own slab."""
+    """Radio material of a wall in the tracer's scene: a constant R of ours, or Sionna's own slab."""
     if material.reflection is not None:
         return ConstantReflection(f"constant-{number}", material.reflection * material.specular_share)
     if material.reflection_te is not None:

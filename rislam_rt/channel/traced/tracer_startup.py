@@ -8,7 +8,7 @@ from rislam_rt.backend import BackendInfo, prepare_backend
 
 @cache
 def start_tracer() -> BackendInfo:
-    """Set Mitsuba's variant and import Sionna RT (3 to 4 s the first time).
+    """Start the tracer: set Mitsuba's variant and import Sionna RT (3 to 4 s the first time).
 
     Raises
     ------

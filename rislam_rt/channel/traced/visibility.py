@@ -1,4 +1,4 @@
-"""Sionna's image method on chosen wall sequences: which candidates the meshes really admit, and where they bounce.
+"""Visibility by Sionna's image method: which candidates the meshes really admit, and where they bounce.
 
 `PathSolver` finds its candidates by shooting rays, for all pairs of sources and targets. Here the candidates are
 given (`sequences.py`), each row naming one far end, one device and one wall sequence, so that a whole trajectory is
@@ -52,7 +52,7 @@ def visible_rows(
     rows: CandidateIndices,
     spared: int = NO_OCCLUDER,
 ) -> tuple[CandidateIndices, Floats]:
-    """The candidates that exist, and their bounce points (N, D, 3) [m] from device to far end.
+    """The candidates that are visible, and their bounce points (N, D, 3) [m] from device to far end.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def visible_rows(
 def _clear_of_occluder(
     tracer_scene: TracerScene, spared: int, sequences: Integers, device: Floats, vertices: Floats
 ) -> Integers:
-    """Legs whose segments up to the last bounce miss a scatterer's shade."""
+    """Visible legs whose segments up to the last bounce miss a scatterer's shade."""
     clear = np.ones(len(device), dtype=np.bool_)
     last = device
     for bounce, wall in enumerate(sequences.T):
@@ -102,7 +102,7 @@ def _trace(
     method: ImageMethod,
     spared: int,
 ) -> PathsBuffer:
-    """Run the image method on candidates (N, D), a shade taken out of the room."""
+    """Visible candidates (N, D) by the tracer's image method, a shade taken out of the room."""
     with _short_segments():
         return method(
             scene=SingleRays(tracer_scene.views[spared]),
@@ -136,7 +136,7 @@ def _confirmed(tracer_scene: TracerScene, sequences: Integers, traced: PathsBuff
 
 @contextmanager
 def _short_segments() -> Iterator[None]:
-    """Let the image method keep short segments while this lasts."""
+    """Let the tracer's visibility test keep short segments while this lasts."""
     own = image_method.MIN_SEGMENT_LENGTH
     image_method.MIN_SEGMENT_LENGTH = SEGMENT_LIMIT
     try:

@@ -1,4 +1,4 @@
-"""Search for new paths in a residual: peaks of the matched filter on a grid, interpolated and taken off one by one."""
+"""Detection of new paths in a residual: peaks of the matched filter on a grid, interpolated, taken off one by one."""
 
 from typing import NamedTuple
 
@@ -37,7 +37,7 @@ class MatchedFilterGrid(NamedTuple):
 
 
 def build_grid(sounding: Sounding, window: tuple[float, float]) -> MatchedFilterGrid:
-    """Grid over the sky and over a window of delays, given in resolution cells."""
+    """Grid on which paths are detected: over the sky and a window of delays, given in resolution cells."""
     u, v = np.meshgrid(_axis(sounding.row), _axis(sounding.col), indexing="ij")
     step = np.hypot(1.0 / len(_axis(sounding.row)), 1.0 / len(_axis(sounding.col)))
     inside = np.hypot(u, v) <= 1.0 + step
@@ -54,7 +54,7 @@ def build_grid(sounding: Sounding, window: tuple[float, float]) -> MatchedFilter
 
 
 def spectrum(grid: MatchedFilterGrid, residual: Complexes) -> Complexes:
-    """Matched filter's output (G, T), up to a phase, for samples (L, M)."""
+    """Spectrum in which paths are detected: matched filter's output (G, T), up to a phase, for samples (L, M)."""
     return np.asarray(grid.antennas @ _delay_spectrum(grid, residual.astype(np.complex64)))
 
 
@@ -70,7 +70,7 @@ def pick_peaks(
     window: tuple[float, float],
     most: int,
 ) -> Floats:
-    """Parameters (P, 3) of new paths whose measured SNR in the residual exceeds a linear threshold.
+    """Detected paths (P, 3): peaks of the residual's spectrum whose measured SNR exceeds a linear threshold.
 
     The strongest first; each is interpolated and taken off before the next is looked for.
     """
@@ -100,7 +100,7 @@ def pick_peaks(
 def _climb(
     grid: MatchedFilterGrid, start: Floats, residual: Complexes, window: tuple[float, float]
 ) -> tuple[Floats, complex, Complexes, Complexes]:
-    """The peak of the matched filter next to a grid point, by Newton steps along each parameter.
+    """From a grid point to the detected peak of the matched filter next to it, by Newton steps along each parameter.
 
     Also returns `a^H y` there, and the signal's factors over antennas (L,) and tones (M,).
     """
@@ -114,12 +114,12 @@ def _climb(
 
 
 def _signals(grid: MatchedFilterGrid, point: Floats) -> list[Complexes]:
-    """A signal's factors over tones, rows and columns."""
+    """A detected path's signal as factors over tones, rows and columns."""
     return [np.exp(1j * value * place) for place, value in zip(grid.places, point, strict=True)]
 
 
 def _moments(grid: MatchedFilterGrid, signal: list[Complexes], residual: Complexes) -> Complexes:
-    """(3, 3) `a^H y` and its first two derivatives by each of (B tau, u, v)."""
+    """Matched filter near a detected peak: (3, 3) `a^H y` and its first two derivatives by each of (B tau, u, v)."""
     tones, row, col = (weight * factor.conj() for weight, factor in zip(grid.powers, signal, strict=True))
     field = residual @ tones.T
     beam = field[:, 0].reshape(row.shape[1], col.shape[1])
@@ -127,7 +127,7 @@ def _moments(grid: MatchedFilterGrid, signal: list[Complexes], residual: Complex
 
 
 def _newton_moves(moments: Complexes, grid: MatchedFilterGrid) -> Floats:
-    """Newton steps (3,) of |a^H y|^2, each parameter on its own; uphill where the curvature has the wrong sign."""
+    """Newton steps (3,) to a detected peak of |a^H y|^2, each parameter alone; uphill where it curves the wrong way."""
     value, first, second = moments.T
     power = value.real**2 + value.imag**2
     gradient = value.real * first.real + value.imag * first.imag
@@ -137,14 +137,14 @@ def _newton_moves(moments: Complexes, grid: MatchedFilterGrid) -> Floats:
 
 
 def into_range(parameters: Floats, window: tuple[float, float]) -> Floats:
-    """Parameters (..., 3) with the delay within the window and the cosines within the unit disc."""
+    """Detected parameters (..., 3) with the delay brought into the window and the cosines into the unit disc."""
     delay = np.clip(parameters[..., :1], *window)
     cosines = parameters[..., 1:]
     return np.concatenate([delay, cosines / np.maximum(np.linalg.norm(cosines, axis=-1, keepdims=True), 1.0)], axis=-1)
 
 
 def _axis(positions: Floats) -> Floats:
-    """Cosines along one axis of the array; 0 alone where it has no aperture."""
+    """Cosines of the detection grid along one axis of the array; 0 alone where it has no aperture."""
     if len(positions) < 2:
         return np.zeros(1)
     beam = 1.0 / (len(positions) * (positions[1] - positions[0]))

@@ -64,7 +64,7 @@ def estimate_paths(
     most: int,
     known: Floats = NOTHING,
 ) -> Estimate:
-    """All paths in samples (L, M) whose noise has unit variance.
+    """Estimate all paths in samples (L, M) whose noise has unit variance: detect, refine, drop, again.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def estimate_paths(
 def _finish(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
 ) -> Estimate:
-    """All paths refined to the end, those taken out that the others can stand in for."""
+    """The estimate refined to the end, without the paths that others can stand in for."""
     fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
     fit, bound = prune(sounding, drop(sounding, fit, samples, threshold, window), samples, threshold)
     final = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
@@ -109,7 +109,8 @@ def _finish(
 
 
 def _touched(fit: LeastSquaresFit, fresh: int, num_samples: int) -> Booleans:
-    """(P,) the last so many paths, and those which would lose more than noise if they did not give way to them."""
+    """(P,) which estimated paths are refined again: the last few, and those that would lose more than noise
+    otherwise."""
     energy = np.abs(fit.amplitude[-fresh:]) ** 2 / num_samples
     touched = np.any(np.abs(fit.inner.signal[:, -fresh:]) ** 2 * energy > TOUCHED, axis=1)
     touched[-fresh:] = True
@@ -117,7 +118,7 @@ def _touched(fit: LeastSquaresFit, fresh: int, num_samples: int) -> Booleans:
 
 
 def _refine_some(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, chosen: Booleans) -> LeastSquaresFit:
-    """Refine the chosen paths (P,) for the next search, the others held."""
+    """The estimate with some paths (P,) refined for the next search, the others held."""
     if chosen.all():
         return refine(sounding, fit, samples, steps=SEARCH_STEPS)
     return refine_some(sounding, fit, samples, np.flatnonzero(chosen), steps=SEARCH_STEPS)
@@ -126,7 +127,7 @@ def _refine_some(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, c
 def drop(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
 ) -> LeastSquaresFit:
-    """Without the paths that left the window or the sky, and those whose loss alone costs less than the threshold."""
+    """The estimate without paths that left the window or the sky, or whose loss costs less than the threshold."""
     keep = _inside(fit.parameters, window)
     if not keep.all():
         fit = subset_fit(sounding, fit, keep, samples)
@@ -137,7 +138,7 @@ def drop(
 def prune(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float
 ) -> tuple[LeastSquaresFit, Accuracy]:
-    """Without the paths that their neighbours, refined, can stand in for; and the bound of what is left.
+    """The estimate without paths that their refined neighbours can stand in for; and the bound of what is left.
 
     Noise alone lowers the cost by its highest peak when a path is added, so the threshold is the one of the search.
     Only paths whose amplitude is uncertain by more than that are tried, the most uncertain first.
@@ -160,7 +161,7 @@ def prune(
 def _neighbours_instead(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, row: int, enough: float
 ) -> Floats | None:
-    """Parameters (P - 1, 3) without a path, its neighbours refined, if the cost stays below `enough`."""
+    """Estimated parameters (P - 1, 3) without a path, its neighbours refined, if the cost stays below `enough`."""
     near = np.flatnonzero(np.abs(fit.inner.signal[row]) > COUPLED * sounding.num_samples)
     whole, local = residual_fit(sounding, fit, near, samples)
     others = near != row
@@ -174,11 +175,11 @@ def _neighbours_instead(
 
 
 def _inside(parameters: Floats, window: tuple[float, float]) -> Booleans:
-    """Whether parameters (P, 3) stayed within the window and the sky, or near enough."""
+    """(P,) whether estimated parameters (P, 3) stayed within the window and the sky, or near enough."""
     return np.all(np.abs(parameters - into_range(parameters, window)) <= SLACK, axis=-1)
 
 
 def _among(parameters: Floats, marked: Floats) -> Booleans:
-    """Which of the parameters (P, 3) are marked (Q, 3), or have moved little since."""
+    """Which of the estimated parameters (P, 3) are marked (Q, 3), or have moved little since."""
     apart = np.abs(parameters[:, None] - marked)
     return np.any(np.all(apart < SLACK, axis=-1), axis=1)

@@ -26,7 +26,7 @@ class PathSignals(NamedTuple):
     """(C, P)."""
 
     def take(self, rows: Booleans | Integers) -> "PathSignals":
-        """Some of the paths."""
+        """Signals of some of the paths."""
         return PathSignals(self.parameters[rows], self.delay[:, rows], self.row[:, rows], self.col[:, rows])
 
     @property
@@ -47,7 +47,7 @@ class PathSignals(NamedTuple):
         return seen
 
     def sum(self, amplitude: Complexes) -> Complexes:
-        """Samples (L, M) of all paths with amplitudes (P,)."""
+        """Samples (L, M) as the sum of all paths' signals with amplitudes (P,)."""
         return np.asarray((self.antennas * amplitude) @ self.delay.T)
 
 
@@ -62,12 +62,12 @@ class InnerProducts(NamedTuple):
     """(3, P, 3, P) `d_i^H d_j`."""
 
     def take(self, keep: Booleans | Integers) -> "InnerProducts":
-        """Some of the paths."""
+        """Inner products of some of the paths."""
         return InnerProducts(self.signal[keep][:, keep], self.mixed[keep][..., keep], self.slope[:, keep][..., keep])
 
 
 def waves_at(sounding: Sounding, parameters: Floats) -> PathSignals:
-    """Signals of paths at parameters (P, 3)."""
+    """Signals for inner products of paths at parameters (P, 3)."""
     delay, u, v = parameters.T
     row, col = (np.exp(2j * np.pi * np.multiply.outer(x, c)) for x, c in ((sounding.row, u), (sounding.col, v)))
     return PathSignals(parameters, tone_response(sounding.frequency, delay), row, col)
@@ -94,7 +94,7 @@ def inner_of(sounding: Sounding, waves: PathSignals) -> InnerProducts:
 
 
 def _axis_products(wave: Complexes, place: Floats) -> tuple[Floats, Floats, Floats]:
-    """(P, P) along one axis of the signals (n, P), of signals and derivatives, and of derivatives."""
+    """Inner products (P, P) along one axis of the signals (n, P): of signals with derivatives, and of derivatives."""
     count, size = wave.shape
     half = wave[: count // 2] if count % 2 == 0 else wave
     flat = np.concatenate([half, (2j * np.pi * place[: len(half)])[:, None] * half], axis=1)

@@ -10,7 +10,7 @@ RIDGE = 1e-9
 
 
 def inverse(matrix: Floats) -> Floats:
-    """Inverse (n, n)."""
+    """Inverse (n, n) of a positive definite matrix."""
     if not len(matrix):
         return matrix
     scale, factor = _factor(matrix)
@@ -21,7 +21,7 @@ def inverse(matrix: Floats) -> Floats:
 
 
 def solve(matrix: Floats, right: Floats) -> Floats:
-    """Solution (n,) for one right-hand side."""
+    """Solution (n,) of a positive definite system for one right-hand side."""
     if not len(matrix):
         return right
     scale, factor = _factor(matrix)

@@ -74,7 +74,7 @@ class Accuracy(NamedTuple):
 
 
 def fit_amplitudes(sounding: Sounding, parameters: Floats, samples: Complexes) -> LeastSquaresFit:
-    """The fit with these parameters (P, 3) and the amplitudes that suit them best, to samples (L, M)."""
+    """Amplitudes that fit samples (L, M) best with these path parameters (P, 3): where refinement starts and ends."""
     waves = waves_at(sounding, parameters)
     inner, energy = inner_of(sounding, waves), float(np.vdot(samples, samples).real)
     if sounding.squint:
@@ -83,7 +83,8 @@ def fit_amplitudes(sounding: Sounding, parameters: Floats, samples: Complexes) -
 
 
 def _fit(waves: PathSignals, inner: InnerProducts, seen: Complexes, energy: float) -> LeastSquaresFit:
-    """From the products (4, P) of signals and derivatives with samples of this energy."""
+    """Least-squares fit of amplitudes from the products (4, P) of signals and derivatives with samples of this
+    energy."""
     count, matched = len(waves.parameters), seen[0]
     covariance = inverse(inner.signal)
     amplitude = covariance @ matched
@@ -95,7 +96,7 @@ def _fit(waves: PathSignals, inner: InnerProducts, seen: Complexes, energy: floa
 def _exact_fit(
     sounding: Sounding, waves: PathSignals, inner: InnerProducts, samples: Complexes, energy: float
 ) -> LeastSquaresFit:
-    """Likewise with the signals of `waves.wave_signals`."""
+    """Least-squares fit of amplitudes with the exact spherical signals of `waves.wave_signals`."""
     exact = wave_signals(sounding, waves.parameters)
     products = exact.conj().T @ exact + RIDGE * sounding.num_samples * np.eye(exact.shape[1])
     amplitude = np.asarray(np.linalg.solve(products, exact.conj().T @ samples.ravel()), dtype=np.complex128)
@@ -106,7 +107,7 @@ def _exact_fit(
 
 
 def subset_fit(sounding: Sounding, fit: LeastSquaresFit, keep: Booleans, samples: Complexes) -> LeastSquaresFit:
-    """The fit of some of the paths alone."""
+    """The fit of some of the refined paths alone."""
     if fit.exact is not None:
         return fit_amplitudes(sounding, fit.parameters[keep], samples)
     return _fit(fit.waves.take(keep), fit.inner.take(keep), fit.seen[:, keep], fit.energy)
@@ -115,7 +116,7 @@ def subset_fit(sounding: Sounding, fit: LeastSquaresFit, keep: Booleans, samples
 def residual_fit(
     sounding: Sounding, fit: LeastSquaresFit, rows: Integers, samples: Complexes
 ) -> tuple[LeastSquaresFit, Complexes]:
-    """The fit of some paths to the samples less all the others; and those (L, M)."""
+    """The fit of some paths to the samples less all the others, for refining them alone; and those (L, M)."""
     others = np.ones(len(fit.amplitude), dtype=bool)
     others[rows] = False
     local = samples - contribution(fit, others, samples)
@@ -131,7 +132,7 @@ def residual_fit(
 
 
 def residual(fit: LeastSquaresFit, samples: Complexes) -> Complexes:
-    """Samples (L, M) less the fitted paths."""
+    """Samples (L, M) less the fitted paths, in which more are detected."""
     return samples - contribution(fit, np.arange(len(fit.amplitude)), samples)
 
 
@@ -151,7 +152,7 @@ def refine(
     tolerance: float = SEARCH_TOLERANCE,
     enough: float = 0.0,
 ) -> LeastSquaresFit:
-    """Up to so many damped Gauss-Newton steps.
+    """Refine path parameters by up to so many damped Gauss-Newton steps.
 
     They end when one promises less than `tolerance` of noise energy from every path; with `enough`, also when the cost
     has come below it, or will not: if every step left gained as much as the last, or twice what the next promises.
@@ -205,12 +206,13 @@ def refine_some(
 
 
 def _along(sounding: Sounding, fit: LeastSquaresFit, chosen: Booleans) -> Integers:
-    """Rows of the paths that overlap with chosen ones (P,), themselves among them."""
+    """Rows of the paths that overlap with chosen ones (P,) and are refined along with them."""
     return np.flatnonzero((np.abs(fit.inner.signal[:, chosen]) > OVERLAP * sounding.num_samples).any(axis=1))
 
 
 def accuracy(fit: LeastSquaresFit) -> Accuracy:
-    """Joint bound of parameters and amplitudes; enormous where paths cannot be told apart."""
+    """Accuracy of refined paths: joint bound of parameters and amplitudes; enormous where paths cannot be told
+    apart."""
     covariance, variance = joint_bound(fit.inner, fit.amplitude, fit.covariance)
     deviations = np.sqrt(np.maximum(np.diagonal(covariance), 0.0)).reshape(3, -1).T
     return Accuracy(deviations, np.sqrt(variance))
@@ -264,5 +266,5 @@ def information_matrix(inner: InnerProducts, covariance: Floats, amplitude: Comp
 
 
 def _limited(step: Floats) -> Floats:
-    """A step (3P,) as (P, 3), no path moving further than the model holds."""
+    """A refining step (3P,) as (P, 3), no path moving further than the model holds."""
     return np.clip(step.reshape(3, -1).T, -LARGEST_STEP, LARGEST_STEP)

@@ -32,14 +32,15 @@ class Sounding(NamedTuple):
 
 
 def build_sounding(num_tones: int, radio: RadioConfig, *, element_exact: bool = False) -> Sounding:
-    """Tones and element positions of a radio."""
+    """The sounding of a radio: tones, and element positions of its array."""
     x = radio.array.positions(1.0).reshape(radio.array.rows, radio.array.cols, 3)
     squint = radio.bandwidth / radio.carrier if element_exact else 0.0
     return Sounding(subcarrier_frequencies(num_tones, 1.0), x[:, 0, 0], x[0, :, 1], squint)
 
 
 def tone_response(frequency: Floats, delay: Floats) -> Complexes:
-    """`exp(-j 2 pi f tau)` (M, P); of evenly spaced tones: a coarse and a fine factor save most exponentials."""
+    """Response of a sounding's tones to delays, `exp(-j 2 pi f tau)` (M, P); by coarse and fine factors if evenly
+    spaced."""
     count = len(frequency)
     fine = next(size for size in range(int(np.sqrt(count)), 0, -1) if count % size == 0)
     coarse = np.exp(-2j * np.pi * frequency[::fine, None] * delay)

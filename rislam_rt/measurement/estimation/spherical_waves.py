@@ -25,7 +25,7 @@ def wave_signals(sounding: Sounding, parameters: Floats) -> Complexes:
 
 
 def correlate_waves(sounding: Sounding, waves: Complexes, samples: Complexes) -> tuple[Complexes, Complexes]:
-    """`a^H y` (P,) and `d^H y` (3, P) of samples (L, M)."""
+    """Spherical waves correlated with samples (L, M): `a^H y` (P,) and `d^H y` (3, P)."""
     product = waves.conj() * samples.reshape(-1, 1)
     x, y = (part.ravel() for part in np.meshgrid(sounding.row, sounding.col, indexing="ij"))
     stretch = 1.0 + sounding.squint * sounding.frequency

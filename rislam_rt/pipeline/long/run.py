@@ -175,7 +175,7 @@ def _check_settings(folder: Path, config: Mapping[str, Any]) -> None:
 
 
 def _complete(store: RunFolder, scene: Scene, found: LongRun, about: Mapping[str, Any]) -> None:
-    """All that the slices do not hold; the last step is the marker."""
+    """Complete a long run: all that the slices do not hold; the last step is the marker."""
     tracks = {"truth.tum": _truth_lines(scene)}
     for name in about["schemes"]:
         tracks[f"estimate_{name}.tum"] = _estimate_lines(store, name, scene)
@@ -188,7 +188,7 @@ def _complete(store: RunFolder, scene: Scene, found: LongRun, about: Mapping[str
 
 
 def _remove_unfinished(store: RunFolder) -> None:
-    """Take away the slices of schemes that did not come to their end: they begin anew."""
+    """Remove a long run's slices of schemes that did not come to their end: they begin anew."""
     for place in sorted((store.folder / FOLDER).glob("*")):
         for file in place.glob("*.nc"):
             if str(file.relative_to(store.folder)) not in store.files:

@@ -1,4 +1,4 @@
-"""The scores of a run in slices, counted slice by slice: the same as of the whole run, but for the posterior bound.
+"""Tally of a run's scores, slice by slice: the same as of the whole run, but for the posterior bound.
 
 The bound is a recursion over all cycles with every path that is ever heard among its unknowns; it is left out (None).
 """
@@ -44,7 +44,7 @@ class Tally:
         self.panel = False
 
     def add(self, part: SlicePart) -> None:
-        """Count one slice."""
+        """Count one slice of a long run."""
         scheme, truth = part.scheme, part.motion.position
         errors = position_errors(scheme.position, truth)
         self.cycles += len(errors)
@@ -64,7 +64,7 @@ class Tally:
         self._count_components(part)
 
     def scores(self) -> dict[str, Any]:
-        """As `summarise_scheme` gives them."""
+        """Scores from the tally of a long run, as `summarise_scheme` gives them."""
         walls = wall_scores(self.scene, self.map)
         seconds = dict(zip(STEPS, (self.seconds / self.cycles).tolist(), strict=True))
         nees = None if self.nees is None else self.nees[0] / self.cycles
@@ -143,7 +143,7 @@ class _Overlap:
         self.origin: Floats | None = None
 
     def add(self, estimate: Floats, truth: Floats) -> None:
-        """About the first true position, so that little cancels."""
+        """Add positions to the tally of the aligned error, about the first true one, so that little cancels."""
         self.origin = truth[0].copy() if self.origin is None else self.origin
         estimate, truth = estimate - self.origin, truth - self.origin
         self.count += len(truth)

@@ -1,4 +1,4 @@
-"""What an estimator is given, cycle by cycle, as arrays and as a NetCDF file: so that others can be given the same."""
+"""Inputs of an estimator, cycle by cycle, as arrays and as a NetCDF file: so that others can be given the same."""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -121,7 +121,7 @@ def marked_rng(data: "xr.Dataset") -> np.random.Generator | None:
 
 
 def _panel(data: "xr.Dataset") -> tuple[DataSheet | None, tuple[RisCode | None, ...]]:
-    """Data sheet, and one code a cycle; None without a panel."""
+    """Recorded panel: its data sheet, and one code a cycle; None without a panel."""
     if "code" not in data:
         return None, (None,) * data.sizes["time"]
     levels, elements = int(data.attrs["panel_levels"]), names_of(data.attrs["panel_element"])
@@ -134,7 +134,7 @@ def _panel(data: "xr.Dataset") -> tuple[DataSheet | None, tuple[RisCode | None, 
 
 
 def _measurements(data: "xr.Dataset") -> tuple[Measurement, ...]:
-    """One a cycle, without the padding."""
+    """Recorded measurements, one a cycle, without the padding."""
     fields = {name: name for name in (*PARTS, "from_panel")} | {"which_panel": "panel"}
     table = {field: data[name].to_numpy() for name, field in fields.items() if name in data}
     held = table["tau"] != PADDING

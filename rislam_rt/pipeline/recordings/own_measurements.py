@@ -161,7 +161,7 @@ def inputs_of(
 
 
 def check_inputs(inputs: Inputs, place: str) -> Inputs:
-    """The inputs, if units and ranges are such as a room has.
+    """One's own measurements, if units and ranges are such as a room has.
 
     Raises
     ------
@@ -280,7 +280,7 @@ def _filled(columns: Mapping[str, Floats], radio: RadioConfig, place: str) -> di
 
 
 def _read_csv(file: Path) -> dict[str, list[float]]:
-    """Columns by name; an empty field is NaN."""
+    """Columns by name of one's own measurements in a CSV file; an empty field is NaN."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as lines:
             reader = csv.DictReader(lines)

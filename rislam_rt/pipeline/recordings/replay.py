@@ -1,4 +1,4 @@
-"""What an estimator was given, cycle by cycle, and what it answered: so that others can be given the same."""
+"""Replay of what an estimator was given, cycle by cycle, and what it answered."""
 
 from collections.abc import Mapping, Sequence
 from time import process_time
@@ -45,7 +45,7 @@ def answers_from_arrays(
     lost: Booleans | None = None,
     landmark: Sequence[Integers] | None = None,
 ) -> Answers:
-    """The answers of an estimator that is none of this package's, from plain arrays.
+    """Answers to a replayed recording by an estimator that is none of this package's, from plain arrays.
 
     Parameters
     ----------
@@ -91,18 +91,18 @@ class Recorder:
 
     @property
     def estimator(self) -> Estimator:
-        """To be used in the inner one's place."""
+        """Recorder to be used in an estimator's place."""
         return self.inner._replace(init=self._init, step=self._step, estimate=self._estimate)
 
     @property
     def inputs(self) -> Inputs:
-        """What the estimator was given."""
+        """Recorded inputs: what the estimator was given."""
         measurements, codes, dt, heading = zip(*self.steps, strict=True)
         return Inputs(*self.begin, np.cumsum(dt), np.array(heading, dtype=np.float64), measurements, codes)
 
     @property
     def answers(self) -> Answers:
-        """What it answered."""
+        """Recorded answers of the estimator."""
         return Answers(tuple(self.estimates), tuple(self.infos), self.seconds / max(len(self.steps), 1))
 
     def _init(

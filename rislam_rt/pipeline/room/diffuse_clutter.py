@@ -10,7 +10,7 @@ from rislam_rt.pipeline.specification.diffuse import DiffuseSection
 
 
 def check_diffuse(scene: Scene, section: DiffuseSection, channel: str) -> None:
-    """Refuse what nobody could trace.
+    """Refuse diffuse paths that nobody could trace.
 
     Raises
     ------
@@ -46,5 +46,5 @@ def trace_diffuse_clutter(
 
 
 def received_clutter(paths: Paths, motion: Trajectory, radio: RadioConfig) -> Clutter:
-    """Such paths with what they turn by within the slot."""
+    """Diffuse clutter as received, with what it turns by within the slot."""
     return Clutter(paths, doppler_shift(paths, motion, radio.wavelength))

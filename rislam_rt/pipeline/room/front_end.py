@@ -1,4 +1,4 @@
-"""The receiver of a run as it was built, and its calibration before the run."""
+"""The front end of a run's receiver as it was built, and its calibration before the run."""
 
 from dataclasses import replace
 

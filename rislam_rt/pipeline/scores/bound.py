@@ -81,7 +81,7 @@ def bound_problem(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Ma
 
 
 def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Mapping[str, Any]) -> SchemeBound:
-    """Least RMS errors of agent, landmarks and walls under a scheme.
+    """Bound on the errors of a scheme: least RMS of agent, landmarks and walls.
 
     Linearised at the true motion, under the codes that were applied. Landmarks and walls are unknown, the start is
     known to its prior. A path that the array hears and whose delay is reported counts with its information times the
@@ -112,7 +112,8 @@ def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Map
 
 
 def over_distortion(paths: Paths, settings: Settings) -> Complexes:
-    """Gains (K, P), smaller by as much as the distortion that the estimator is told of exceeds the noise."""
+    """Gains (K, P) for the bound, smaller by as much as the distortion that the estimator is told of exceeds the
+    noise."""
     hardware, receiver, radio = settings.hardware, settings.receiver, settings.radio
     if not hardware.told:
         return paths.gain

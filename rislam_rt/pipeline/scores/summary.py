@@ -1,4 +1,4 @@
-"""The scores of a run: agent, each landmark, each wall, for every scheme."""
+"""Summary of a run's scores: agent, each landmark, each wall, for every scheme."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -117,7 +117,7 @@ def has_diverged(errors: Floats, limit: Floats | None) -> bool:
 
 
 def map_score(scene: Scene, estimate: MapEstimate, *, panel: bool = True) -> dict[str, Any]:
-    """GOSPA of the last map's points (images left out) against all landmarks, cut off at `NEAR_LANDMARK`, order 2.
+    """Score of the map: GOSPA of its last points (no images) against all landmarks, cut at `NEAR_LANDMARK`, order 2.
 
     Without a `panel` in the scheme there is none to be found.
     """
@@ -129,7 +129,7 @@ def map_score(scene: Scene, estimate: MapEstimate, *, panel: bool = True) -> dic
 
 
 def over_budget(seconds: Mapping[str, float], budget: Mapping[str, float]) -> list[str]:
-    """Names of the steps whose mean time exceeds their share of the cycle."""
+    """Names of the steps whose mean time exceeds their share of the cycle, for the summary."""
     return [step for step in STEPS if seconds[step] > budget[f"{step}_s"]]
 
 
@@ -150,7 +150,7 @@ def landmark_track(scene: Scene, scheme: SchemeResult) -> LandmarkTrack:
 
 
 def landmark_scores(scene: Scene, scheme: SchemeResult, least: SchemeBound | None = None) -> dict[str, dict[str, Any]]:
-    """Error of each landmark: RMS over the cycles that hold it, and at the end; null where it was never found.
+    """Scores of each landmark: error RMS over the cycles that hold it, and at the end; null where never found.
 
     With its bound at the end, null where nothing was heard of it.
     """
@@ -172,7 +172,7 @@ def landmark_scores(scene: Scene, scheme: SchemeResult, least: SchemeBound | Non
 
 
 def wall_scores(scene: Scene, estimate: MapEstimate, least: SchemeBound | None = None) -> dict[str, dict[str, Any]]:
-    """Each wall of the last map: RMS distance over its true surface, angle, offset at its middle; null if missing.
+    """Scores of each wall of the last map: RMS distance over its true surface, angle, offset; null if missing.
 
     With the deviation of the angle, both tilts together, that the map itself reckons with, and the bounds of angle and
     offset. A wall that no path meets cannot be found: it has no bound, and no plane stands for it.
@@ -219,7 +219,7 @@ def match_walls(walls: Walls, estimate: MapEstimate, heard: Booleans | None = No
 
 
 def surface_rms(walls: Walls, number: int, normal: Floats, offset: float) -> float:
-    """RMS distance [m] of a plane from a wall, over the wall's surface.
+    """Score of a wall: RMS distance [m] of a plane from it, over its surface.
 
     The distance is linear in the point: over a triangle its mean square is (sum of squares + square of the sum) / 12.
     """

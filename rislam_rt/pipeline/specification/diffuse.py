@@ -1,4 +1,4 @@
-"""What is heard beside the paths that have an identity: the table `[extras]` of a pipeline file."""
+"""Diffuse and diffracted paths, heard beside those that have an identity: the table `[extras]` of a pipeline file."""
 
 from typing import Annotated
 
@@ -21,5 +21,5 @@ class DiffuseSection(Section):
 
     @property
     def wanted(self) -> bool:
-        """Whether there are any."""
+        """Whether diffuse or diffracted paths are wanted."""
         return self.diffuse or self.diffraction

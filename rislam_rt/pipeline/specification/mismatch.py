@@ -1,4 +1,4 @@
-"""Errors in what the belief is told: the table `[told]` of a pipeline file."""
+"""Mismatches between truth and what the belief is told: the table `[told]` of a pipeline file."""
 
 from typing import Annotated, Literal
 

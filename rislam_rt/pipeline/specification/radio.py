@@ -79,14 +79,14 @@ class RadioSection(Section):
 
     @property
     def energy(self) -> float:
-        """[J] of one sounding."""
+        """[J] of one sounding by the radio's section."""
         if self.power_dbm is None or self.sounding_s is None:
             return self.energy_j
         return 1e-3 * linear(self.power_dbm) * self.sounding_s
 
     @property
     def antennas(self) -> Antennas:
-        """Pattern and polarisation of either end."""
+        """Antennas of the radio's section: pattern and polarisation of either end."""
         return Antennas(self.tx_pattern, self.rx_pattern, self.tx_polarization, self.rx_polarization or "")
 
 
@@ -115,5 +115,5 @@ def build_radio(section: RadioSection) -> RadioConfig:
 
 
 def linear(decibel: float) -> float:
-    """A power ratio."""
+    """A power ratio of decibels in the radio's section."""
     return float(np.power(10.0, decibel / 10.0))

@@ -54,7 +54,7 @@ class RadioSpec(Section):
 
 
 def load_radio(overrides: Sequence[str]) -> RadioConfig:
-    """The usual radio, with `radio.key=value` settings put over it.
+    """Read the usual radio, with `radio.key=value` settings put over it.
 
     Raises
     ------
@@ -82,8 +82,8 @@ def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
 
 
 def make_way(table: Table, keys: Sequence[str]) -> None:
-    """Take out of a table what excludes one of some keys (dotted) that are to be set later, unless the command line set
-    it: then it is a contradiction, and stays one."""
+    """Take out of a specification what excludes one of some keys (dotted) that are to be set later, unless the command
+    line set it: then it is a contradiction, and stays one."""
     for section, *names in EITHER:
         if any(f"{section}.{name}" in keys for name in names):
             for name in names:
@@ -92,7 +92,7 @@ def make_way(table: Table, keys: Sequence[str]) -> None:
 
 
 def settings_table(overrides: Sequence[str], defaults: dict[str, Any]) -> Table:
-    """A table of `key=value` settings (dotted keys) alone, put over defaults.
+    """Specification as a table of `key=value` settings (dotted keys) alone, put over defaults.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def _override(table: dict[str, Any], setting: str) -> str:
 
 
 def _make_way(table: dict[str, Any], changed: Sequence[str]) -> None:
-    """Of two keys that exclude each other, the file's goes where the command line set the other."""
+    """Of two keys of a specification that exclude each other, the file's goes where the command line set the other."""
     for section, *keys in EITHER:
         given = [key for key in keys if f"{section}.{key}" in changed]
         if len(given) == 1:
@@ -174,7 +174,7 @@ def _make_way(table: dict[str, Any], changed: Sequence[str]) -> None:
 
 
 def _value(text: str) -> Any:
-    """A TOML value, or the text itself (so that strings need no quotes)."""
+    """A setting's TOML value, or the text itself (so that strings need no quotes)."""
     try:
         return parse_toml(f"value = {text}")["value"]
     except (ValueError, KeyError):
@@ -182,7 +182,7 @@ def _value(text: str) -> Any:
 
 
 def _source(path: Path, place: str, changed: Sequence[str]) -> str:
-    """The command line if it set the field at fault, else the file."""
+    """Where the field at fault was read: the command line if that set it, else the file."""
     return "--set" if any(place == key or place.startswith((f"{key}.", f"{key}[")) for key in changed) else str(path)
 
 
@@ -191,7 +191,7 @@ def _place(item: Any) -> str:
 
 
 def _remark(item: Any, model: type[BaseModel]) -> str:
-    """One bad field: where, what was received, how to mend it."""
+    """One bad field of a specification: where, what was received, how to mend it."""
     place = _place(item)
     if item["type"] == "missing":
         return f"{place}: missing; add it"
@@ -225,7 +225,7 @@ def _near_key(words: list[str], model: type[BaseModel]) -> list[str]:
 
 
 def _keys(section: type[BaseModel], above: str = "") -> list[str]:
-    """Every key of a section and of those below it, dotted."""
+    """Every key of a specification's section and of those below it, dotted."""
     keys = []
     for name, field in section.model_fields.items():
         keys.append(f"{above}{name}")

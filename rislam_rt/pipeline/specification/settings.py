@@ -101,14 +101,14 @@ def _setting(model: type[BaseModel], name: str, field: FieldInfo, prefix: str) -
 
 
 def _owner(model: type[BaseModel], name: str) -> tuple[type, type | None]:
-    """The class that declares the field, and the record behind it."""
+    """The class that declares a setting, and the record behind it."""
     owner = next(part for part in model.__mro__ if name in inspect.get_annotations(part))
     return owner, RECORDS.get(owner)
 
 
 @cache
 def _meanings(declared: type) -> dict[str, str]:
-    """The docstrings under a class's fields, in one line each, by name."""
+    """Meanings of settings: the docstrings under a class's fields, in one line each, by name."""
     body = _classes(declared.__module__)[declared.__name__]
     found = {}
     for field, doc in zip(body.body, body.body[1:], strict=False):
@@ -120,7 +120,7 @@ def _meanings(declared: type) -> dict[str, str]:
 
 @cache
 def _classes(module: str) -> dict[str, ast.ClassDef]:
-    """A module's classes as they stand in its file, by name."""
+    """A module's classes as they stand in its file, by name, for the settings' docstrings."""
     body = ast.parse(inspect.getsource(sys.modules[module])).body
     return {node.name: node for node in body if isinstance(node, ast.ClassDef)}
 
@@ -141,7 +141,7 @@ def _kind(annotation: Any) -> str:
 
 
 def _of_constraints(field: FieldInfo) -> str:
-    """What a field's type says of its values."""
+    """What a setting's type says of its values."""
     metadata = [*field.metadata, *_inner_metadata(field.annotation)]
     choices = list(_choices(field.annotation)) + [name for m in metadata if isinstance(m, Choices) for name in m.names]
     if choices:
@@ -164,7 +164,7 @@ def _choices(annotation: Any) -> Iterator[Any]:
 
 
 def _inner_metadata(annotation: Any) -> Iterator[Any]:
-    """Constraints inside an optional or a list."""
+    """Constraints of a setting inside an optional or a list."""
     for part in get_args(annotation):
         for item in getattr(part, "__metadata__", ()):
             yield from getattr(item, "metadata", ()) if isinstance(item, FieldInfo) else (item,)
@@ -199,7 +199,7 @@ def _of_record(record: type, name: str) -> str:
 
 
 def _edge(passes: Callable[[Any], bool], inside: float, sign: int, whole: bool) -> str:
-    """The end of the range on one side of a value that passes, by bisection; empty if there is none."""
+    """End of a setting's range on one side of a value that passes, by bisection; empty if there is none."""
     outside: float = sign * (int(LARGEST) if whole else LARGEST)
     step = 1 if whole else 1e-9
     if passes(outside):

@@ -37,7 +37,8 @@ RECORDS: dict[type, type] = {}
 
 
 def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()) -> Any:
-    """A section with the fields, types and defaults of a frozen record of scalars, which checks its own ranges."""
+    """Section of a specification with the fields, types and defaults of a frozen record, which checks its own
+    ranges."""
     kinds: dict[str, Any] = {f.name: (f.type, f.default) for f in fields(record) if f.name not in without}
     section = create_model(name, __base__=Section, __doc__=doc, **kinds)
     RECORDS[section] = record
@@ -117,7 +118,7 @@ class DesignSection(DesignerSection):
 
     @property
     def least_snr(self) -> float:
-        """Linear; 0 if there is none."""
+        """Least SNR of the design's section, linear; 0 if there is none."""
         return 0.0 if self.least_snr_db is None else linear(self.least_snr_db)
 
 
@@ -182,7 +183,7 @@ class PanelSection(Section):
 
     @property
     def tolerance(self) -> PanelTolerance:
-        """In radians."""
+        """Tolerances of the panel's section in radians."""
         return PanelTolerance(self.amplitude_std, float(np.radians(self.phase_std_deg)), self.dead, self.stuck)
 
 
@@ -274,7 +275,7 @@ ESTIMATOR_SECTIONS = {
 
 
 def share_settings(content: dict[str, Any]) -> dict[str, Any]:
-    """The content of a file with `sigma_a` and `height` handed on to every estimator that is not told its own.
+    """A pipeline's content with `sigma_a`, `height`, `use_vt` handed on to every estimator not told its own.
 
     The motion's acceleration goes to the filter, and the filter's to the others. What is not a table is left for the
     validation to complain about.
@@ -309,7 +310,7 @@ class Settings(NamedTuple):
 
 
 def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
-    """Radio, receiver and filter settings in SI units and linear ratios, in a room of so many panels.
+    """Settings in SI units of a pipeline's specification: radio, receiver, filters, in a room of so many panels.
 
     Raises
     ------
@@ -341,7 +342,7 @@ def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> Hardw
 
 
 def build_design(section: DesignerSection) -> DesignConfig:
-    """The designer's settings; no certificate, which takes longer than a cycle has.
+    """Designer's settings of a specification; no certificate, which takes longer than a cycle has.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A run in forms that others read: trajectories, maps, configuration, scores, and its room."""
+"""Exports of a run, in forms that others read: trajectories, maps, configuration, scores, and its room."""
 
 import json
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ SUMMARY_FILE = "summary.json"
 
 
 def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, bytes]:
-    """Trajectories, maps, room, configuration and summary: name -> content."""
+    """Files that a run exports: trajectories, maps, room, configuration and summary, name -> content."""
     motion = result.scene.agent
     files = {"truth.tum": tum_bytes(motion.time, motion.position, motion.heading)}
     for name, scheme in result.schemes.items():
@@ -23,7 +23,7 @@ def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, by
 
 
 def record_files(result: SlamResult, scene: Scene, summary: Mapping[str, Any]) -> dict[str, bytes]:
-    """Maps, configuration and summary of a result, and its room: name -> content."""
+    """Exported record of a result: maps, configuration, summary and its room, name -> content."""
     maps = {name: map_table(scheme.map) for name, scheme in result.schemes.items()}
     files = {"map.json": json_text(maps), "config.toml": toml_bytes(_without_none({**result.config}))}
     files |= {f"scene/{name}": content for name, content in scene_files(scene).items()}
@@ -31,7 +31,7 @@ def record_files(result: SlamResult, scene: Scene, summary: Mapping[str, Any]) -
 
 
 def map_table(estimate: MapEstimate) -> dict[str, Any]:
-    """A map as plain lists: landmarks, their images, walls."""
+    """An exported map as plain lists: landmarks, their images, walls."""
     std = np.sqrt(np.einsum("nii->ni", estimate.covariance))
     features = [
         {
@@ -53,12 +53,12 @@ def map_table(estimate: MapEstimate) -> dict[str, Any]:
 
 
 def json_text(content: Any) -> bytes:
-    """JSON as people read it."""
+    """Exported JSON as people read it."""
     return (json.dumps(content, indent=2, allow_nan=False) + "\n").encode()
 
 
 def _without_none(table: dict[str, Any]) -> dict[str, Any]:
-    """TOML has no null: what is not set is left out."""
+    """Exported configuration without what is not set: TOML has no null."""
     return {
         key: _without_none(value) if isinstance(value, dict) else value
         for key, value in table.items()

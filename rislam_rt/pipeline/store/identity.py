@@ -1,4 +1,4 @@
-"""What decides a run's numbers, and the name that its folder has from it."""
+"""Identity of a run: what decides its numbers, and the name that its folder has from it."""
 
 import hashlib
 import os
@@ -69,13 +69,14 @@ def run_identity(spec: PipelineSpec, scene: Scene) -> RunIdentity:
 
 
 def short_name(name: str, digest: str) -> str:
-    """The name with the first digits of a hash."""
+    """Name of a run's folder, with the first digits of its identity's hash."""
     return f"{name}-{digest[:SHORT]}"
 
 
 @cache
 def code_digest(root: Path = Path(__file__).parents[2]) -> str:
-    """SHA-256 over this package's files but those that only show numbers: an edit is another version."""
+    """SHA-256 in a run's identity over this package's files but those that only show numbers: an edit is another
+    version."""
     digest = hashlib.sha256()
     for file in sorted(root.rglob("*")):
         parts = file.relative_to(root).parts

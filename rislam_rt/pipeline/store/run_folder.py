@@ -133,14 +133,14 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         self.mark(RUNNING)
 
     def holds(self, names: Iterable[str]) -> bool:
-        """Whether files are there as they were written."""
+        """Whether files of a run are there as they were written."""
         try:
             return all(name in self.files and file_digest(self.folder / name) == self.files[name] for name in names)
         except ResultError:
             return False
 
     def abandon(self) -> None:
-        """Take the marker away if no scheme was completed."""
+        """Take the run's marker away if no scheme was completed."""
         if not self.files:
             (self.folder / RUN_FILE).unlink(missing_ok=True)
 
@@ -273,12 +273,12 @@ def read_summary(folder: Path, about: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def scheme_file(folder: Path, name: str) -> Path:
-    """Where a scheme's data set lies."""
+    """Where a scheme's data set lies in the run folder."""
     return folder / f"scheme_{name}.nc"
 
 
 def given_file(folder: Path, name: str) -> Path:
-    """Where what a scheme's estimator was given lies."""
+    """Where the run folder holds what a scheme's estimator was given."""
     return folder / f"measurements_{name}.nc"
 
 

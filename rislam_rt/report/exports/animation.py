@@ -1,4 +1,4 @@
-"""A run as a moving picture: the room from above, and beside it the agent in close-up, moment by moment."""
+"""Animation of a run as a GIF: the room from above, and beside it the agent in close-up, moment by moment."""
 
 import io
 from typing import TYPE_CHECKING, Any
@@ -35,7 +35,7 @@ HALVES = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 
 def gif_bytes(result: SlamResult, tell: Tell = tell_nobody) -> bytes:
-    """The content of a GIF file. `tell` is told of every frame."""
+    """The animation as a GIF file. `tell` is told of every frame."""
     rows = spread(len(result.scene.agent), FRAMES)
     pictures: list[Image] = []
     with styled():
@@ -64,7 +64,7 @@ def gif_bytes(result: SlamResult, tell: Tell = tell_nobody) -> bytes:
 
 
 def _empty_frame(result: SlamResult) -> tuple[Figure, Axes, Axes]:
-    """The figure with all that stands still, its layout settled."""
+    """Figure of the animation with all that stands still, its layout settled."""
     low, high = result.scene.bounds
     aspect = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.35, 1.6))
     figure = Figure(figsize=(WIDTH, 0.6 * WIDTH * aspect + 0.9), dpi=DPI)
@@ -100,7 +100,7 @@ def _half_width(result: SlamResult) -> float:
 
 
 def _draw_moment(room: Axes, near: Axes, result: SlamResult, cycle: int) -> list[Artist]:
-    """All that moves, to be taken off again; the close-up follows the agent."""
+    """All that moves in the animation at one moment, to be taken off again."""
     scene, half = result.scene, _half_width(result)
     truth = scene.agent.position[cycle, :2]
     moving: list[Artist] = []
@@ -131,7 +131,7 @@ def _draw_belief(room: Axes, near: Axes, scheme: SchemeResult, cycle: int) -> li
 
 
 def _picture(canvas: Any) -> "Image":
-    """What is drawn, in the 256 colours of a GIF."""
+    """A frame of the animation in the 256 colours of a GIF."""
     from PIL import Image
 
     return Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()).quantize(64)

@@ -42,7 +42,7 @@ PER_PATH = ("power", "phase", "delay", "aod_az", "aod_el", "aoa_az", "aoa_el", "
 
 
 def deepmimo_files(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> dict[str, bytes]:
-    """All files of a scenario by name.
+    """All files of a DeepMIMO scenario by name.
 
     Power is the path gain [dB], phase [deg] holds the carrier's, so that the sum over paths is the channel at the
     carrier; angles [deg] are azimuth and zenith angle in the world's frame. The panel is at the level of `paths`.
@@ -67,7 +67,7 @@ def deepmimo_files(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -
 
 
 def check_name(name: str) -> None:
-    """A scenario's folder must be one that the package finds: it looks for names in lower case alone.
+    """A DeepMIMO scenario's folder must be one that its package finds: names in lower case alone.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def check_name(name: str) -> None:
 
 
 def cycle_matrices(paths: Paths, cycle: int) -> dict[str, Floats]:
-    """The quantities of one cycle, (1, P) each and (1, P, V, 3) for the interaction points, strongest path first."""
+    """DeepMIMO's matrices of one cycle, (1, P) each and (1, P, V, 3) for the points, strongest path first."""
     found = np.flatnonzero(paths.valid[cycle])
     found = found[np.argsort(-np.abs(paths.gain[cycle, found]), kind="stable")]
     gain = paths.gain[cycle, found]
@@ -105,7 +105,7 @@ def cycle_matrices(paths: Paths, cycle: int) -> dict[str, Floats]:
 
 
 def _interactions(paths: Paths, path: int) -> int:
-    """The digits of a path: reflections at walls, one scattering at a landmark or at the panel."""
+    """DeepMIMO's digits of a path: reflections at walls, one scattering at a landmark or at the panel."""
     kind, _, tx, rx = paths.identity(path)
     middle = [] if kind in (PathKind.LOS, PathKind.VT) else [SCATTERING]
     digits = len(tx) * [REFLECTION] + middle + len(rx) * [REFLECTION]
@@ -188,7 +188,7 @@ def _materials(scene: Scene, radio: RadioConfig) -> list[dict[str, Any]]:
 
 
 def _electric(material: Material, carrier: float) -> dict[str, float]:
-    """Permittivity and conductivity [S/m] at the carrier [Hz].
+    """Permittivity and conductivity [S/m] of a material for DeepMIMO, at the carrier [Hz].
 
     A constant coefficient has neither: it is written as the half-space that reflects so at normal incidence, and a
     coefficient of 1 as a metal.
@@ -207,7 +207,7 @@ def _electric(material: Material, carrier: float) -> dict[str, float]:
 
 
 def _room_files(scene: Scene, radio: RadioConfig) -> dict[str, bytes]:
-    """The reflectors as one pool of vertices, with faces and materials of each."""
+    """DeepMIMO's room: reflectors as one pool of vertices, with faces and materials of each."""
     materials = _distinct(scene)
     faces: dict[str, Integers] = {}
     kinds: dict[str, Integers] = {}

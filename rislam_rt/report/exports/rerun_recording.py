@@ -18,7 +18,7 @@ GREY = (90, 90, 90)
 
 
 def recording_bytes(result: SlamResult, identity: str) -> bytes:
-    """The content of an `.rrd` file, metres and seconds.
+    """Recording for Rerun as the content of an `.rrd` file, metres and seconds.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def recording_bytes(result: SlamResult, identity: str) -> bytes:
 
 
 def _log_room(rerun: Any, stream: Any, scene: Scene) -> None:
-    """Edges of the walls, true landmarks, true way: the same at all times."""
+    """Record for Rerun the edges of the walls, true landmarks, true way: the same at all times."""
     stream.log("/", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     edges = outline_edges(build_walls(scene))
     stream.log("truth/room", rerun.LineStrips3D(edges, colors=[GREY]), static=True)
@@ -63,7 +63,7 @@ def _log_room(rerun: Any, stream: Any, scene: Scene) -> None:
 
 
 def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: int) -> None:
-    """Estimate with its 2 sigma ellipsoid, and the map as it then was."""
+    """Record for Rerun the estimate of a cycle with its 2 sigma ellipsoid, and the map as it then was."""
     size, axes = np.linalg.eigh(scheme.covariance[cycle, :3, :3])
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0

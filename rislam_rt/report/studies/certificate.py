@@ -24,7 +24,8 @@ MOST_LISTED = 6
 
 
 def draw_certificate(certificate: Certificate) -> Figure:
-    """Four parts: traced paths, analytic paths, one-sided ones with their proofs, and errors of the matched ones."""
+    """Draw the certificate of two channels in four parts: traced paths, analytic paths, one-sided ones with their
+    proofs, and errors of the matched ones."""
     scene, report = certificate.scene, certificate.report
     low, high = scene.bounds
     aspect = float((high[1] - low[1]) / (high[0] - low[0]))
@@ -51,7 +52,7 @@ def draw_certificate(certificate: Certificate) -> Figure:
 
 
 def _draw_side(axis: Axes, certificate: Certificate, paths: Paths, name: str) -> None:
-    """All paths of one side, from above; those that the other side lacks on top."""
+    """All paths of one side in the certificate, from above; those that the other side lacks on top."""
     _draw_plan(axis, certificate)
     columns = np.flatnonzero(paths.valid[0])
     only = {path.label for path in certificate.report.one_sided if path.side == name}
@@ -66,7 +67,7 @@ def _draw_side(axis: Axes, certificate: Certificate, paths: Paths, name: str) ->
 
 
 def _draw_alone(axis: Axes, certificate: Certificate) -> None:
-    """What only one side has, from above, and the proof of each below."""
+    """What only one side has, in the certificate, and the proof of each below."""
     _draw_plan(axis, certificate)
     sides = {"traced": certificate.traced, "analytic": certificate.analytic}
     one_sided = certificate.report.one_sided
@@ -82,7 +83,7 @@ def _draw_alone(axis: Axes, certificate: Certificate) -> None:
 
 
 def _proofs(one_sided: Sequence[OneSidedPath]) -> str:
-    """One line a path, the first few of them."""
+    """Proofs in the certificate, one line a path, the first few of them."""
     if not one_sided:
         return "nothing: both sides have the same paths"
     lines = [f"{p.label}\n  only {p.side}: {p.reason or 'UNEXPLAINED'}, {p.proof}" for p in one_sided[:MOST_LISTED]]
@@ -91,7 +92,8 @@ def _proofs(one_sided: Sequence[OneSidedPath]) -> str:
 
 
 def _draw_errors(axis: Axes, certificate: Certificate) -> None:
-    """Errors of the matched paths, the tracer's float32 against float64: one row of dots a quantity and class."""
+    """Errors of matched paths in the certificate, the tracer's float32 against float64: one row of dots a quantity and
+    class."""
     report = certificate.report
     rows = (
         ("length [m]", report.length_error), ("gain [dB]", report.gain_error_db), ("phase [rad]", report.phase_error),
@@ -112,7 +114,7 @@ def _draw_errors(axis: Axes, certificate: Certificate) -> None:
 
 
 def _draw_plan(axis: Axes, certificate: Certificate) -> None:
-    """Walls from above, landmarks, Tx and Rx."""
+    """Walls from above in the certificate, landmarks, Tx and Rx."""
     scene = certificate.scene
     for edge in outline_edges(build_walls(scene)):
         axis.plot(edge[:, 0], edge[:, 1], color=WALL, lw=1.6, solid_capstyle="round", zorder=2)

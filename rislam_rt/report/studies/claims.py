@@ -13,7 +13,7 @@ from rislam_rt.sweeps.record import json_bytes
 
 
 def write_claims(claims: Sequence[Claim], name: str, sources: Mapping[str, Any], folder: Path) -> Path:
-    """Write `<name>.md`, `.csv` and `.json`; returns the page.
+    """Write the claims as `<name>.md`, `.csv` and `.json`; returns the page.
 
     Raises
     ------

@@ -30,14 +30,14 @@ FEWEST = 5
 
 
 def weights_file(found: Training) -> bytes:
-    """The trained network as `.npz` without pickle."""
+    """The classifier's trained network as `.npz` without pickle."""
     buffer = io.BytesIO()
     np.savez(buffer, **network_arrays(found.network))
     return buffer.getvalue()
 
 
 def draw_scores(found: Training) -> Figure:
-    """F1 of every rule in every room, with intervals, on the whole range and near 1."""
+    """Draw the classifier's scores: F1 of every rule in every room, with intervals."""
     rooms = {name: scores for name, scores in found.scores.items() if has_keep(found, name)}
     place = np.arange(len(rooms))
     with styled():
@@ -64,7 +64,8 @@ def draw_scores(found: Training) -> Figure:
 
 
 def draw_importance(found: Training) -> Figure:
-    """Loss of F1 when a feature is shuffled, and F1 against age of the track and SNR, on the test rooms."""
+    """Draw the classifier's loss of F1 when a feature is shuffled, and F1 against age of the track and SNR, on the test
+    rooms."""
     with styled():
         figure = Figure(figsize=(12.0, 4.8))
         left, middle, right = figure.subplots(1, 3)
@@ -87,7 +88,8 @@ def draw_importance(found: Training) -> Figure:
 
 
 def draw_panel(found: Training) -> Figure:
-    """Share of the looks at the panel's direct path in which it is removed: a dot a room, by policy and rule."""
+    """Draw the share of looks at the panel's direct path in which the classifier removes it: a dot a room, by policy
+    and rule."""
     judges = rules(found.network)
     with styled():
         figure = Figure(figsize=(9.0, 4.0))
@@ -106,7 +108,7 @@ def draw_panel(found: Training) -> Figure:
 
 
 def classifier_table(found: Training) -> dict[str, Any]:
-    """All scores as plain data."""
+    """All scores of the classifier as plain data."""
     tested, drawn, judges = found.sets.tested, found.sets.all_drawn, rules(found.network)
     return {
         "scores": {
@@ -128,7 +130,7 @@ def classifier_table(found: Training) -> dict[str, Any]:
 
 
 def classifier_page(found: Training, spec: ClassifierSpec, figures: tuple[str, str, str] | None) -> str:
-    """Markdown: what was done, scores by room, by class and of the panel by code, features."""
+    """The classifier's page: what was done, scores by room, by class and of the panel by code, features."""
     about = f"""Written by `rislam-rt run` from one pipeline, do not edit. Seed {spec.seed}, paths by
     {"ray tracing" if spec.channel == "traced" else "image sources"}, receiver `{spec.receiver.estimator}`. Trained on
     {spec.train} random rooms, one walk of {spec.cycles} cycles each, reference SNR {spec.snr_low_db:g} to
@@ -167,12 +169,12 @@ def classifier_page(found: Training, spec: ClassifierSpec, figures: tuple[str, s
 
 
 def has_keep(found: Training, name: str) -> bool:
-    """Whether there is anything to keep in a room."""
+    """Whether there is anything for the classifier to keep in a room."""
     return name not in found.sets.test or bool(found.sets.test[name].keep.any())
 
 
 def share_of(found: Training, name: str) -> tuple[float, float]:
-    """Which share of all labelled components of the test, and of those to keep, comes from a room."""
+    """Share of the classifier's labelled components, and of those to keep, that comes from a room."""
     room, tested = found.sets.test[name], found.sets.tested
     return float(room.labelled.sum() / tested.labelled.sum()), float(room.keep.sum() / max(tested.keep.sum(), 1))
 
@@ -195,12 +197,12 @@ def _score_table(found: Training) -> list[str]:
 
 
 def _rooms(found: Training) -> dict[str, Examples]:
-    """All rooms of the test, named and drawn."""
+    """All rooms of the classifier's test, named and drawn."""
     return {**found.sets.test, **found.sets.drawn}
 
 
 def _panel_summary(found: Training) -> list[str]:
-    """Dropped looks by code and rule: share of all, and of the room where it is largest."""
+    """Panel looks that the classifier drops by code and rule: share of all, and of the room where largest."""
     judges = rules(found.network)
     titles = ["codes", "looks", "rooms", *(f"{name}: dropped, worst room" for name in NAME.values())]
     lines = [_row(titles), _row(["---"] * len(titles))]
@@ -217,7 +219,7 @@ def _panel_summary(found: Training) -> list[str]:
 
 
 def _panel_rooms(found: Training) -> list[str]:
-    """Dropped of all looks of the network by code, and of the baselines under the best code."""
+    """Panel looks that the network drops by code, of all, and those of the baselines under the best code."""
     judges = rules(found.network)
     titles = ["room", *(f"`{policy}`" for policy in POLICIES), "geometric, `exact`", "amplitude, `exact`"]
     lines = [_row(titles), _row(["---"] * len(titles))]

@@ -19,7 +19,7 @@ NUM_SHOWN = 9
 
 
 def draw_fig4a(found: Fig4a, spec: Fig4aSpec) -> Figure:
-    """Gain against distance, one part an element pattern."""
+    """Draw Fig. 4(a): gain against distance, one part an element pattern."""
     with styled():
         figure = Figure(figsize=(1.0 + 4.6 * len(found.curves), 4.6))
         axes = figure.subplots(1, len(found.curves), sharey=True, squeeze=False)[0]
@@ -43,7 +43,7 @@ def draw_fig4a(found: Fig4a, spec: Fig4aSpec) -> Figure:
 
 
 def fig4a_csv(found: Fig4a) -> str:
-    """One row a pattern and place."""
+    """Fig. 4(a) as CSV, one row a pattern and place."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([
@@ -60,7 +60,7 @@ def fig4a_csv(found: Fig4a) -> str:
 
 
 def fig4a_table(found: Fig4a) -> dict[str, Any]:
-    """Curves, and which order of them holds at how many places, as plain data."""
+    """Fig. 4(a) as plain data: curves, and which order of them holds at how many places."""
     return {
         "distance_m": found.distance.tolist(),
         "sphere_radius_m": found.radius,
@@ -80,7 +80,8 @@ def fig4a_table(found: Fig4a) -> dict[str, Any]:
 
 
 def claims(found: Fig4a, curves: GainCurves) -> dict[str, Booleans]:
-    """Each order of two curves, and the places (K,) where it holds; optimised codes by their interval's low end."""
+    """Claims of Fig. 4(a): each order of two curves, and the places (K,) where it holds; optimised codes by their
+    interval's low end."""
     return {
         "optimised above random codes, intervals apart": curves.optimized.low > curves.random.high,
         "optimised above the sphere": curves.optimized.low > found.sphere,
@@ -89,7 +90,7 @@ def claims(found: Fig4a, curves: GainCurves) -> dict[str, Booleans]:
 
 
 def fig4a_page(found: Fig4a, spec: Fig4aSpec, scene: str, figure: str | None) -> str:
-    """Markdown: what was done, what holds, the picture (if there is one), a table a pattern."""
+    """Page of Fig. 4(a): what was done, what holds, the picture (if there is one), a table a pattern."""
     lines = ["# Gain against distance: Fig. 4(a)", "", *_method(found, spec, scene), "", "## What holds", ""]
     lines += ["The paper's claim: optimised codes lie significantly above random codes and above the sphere.", ""]
     for element in found.curves:
@@ -109,7 +110,7 @@ def fig4a_page(found: Fig4a, spec: Fig4aSpec, scene: str, figure: str | None) ->
 
 
 def _method(found: Fig4a, spec: Fig4aSpec, scene: str) -> list[str]:
-    """Where the curves come from."""
+    """Where the curves of Fig. 4(a) come from."""
     source = "ray tracing (Sionna RT)" if spec.channel == "traced" else "image sources"
     far, near, share = found.distance[0], found.distance[-1], f"{spec.coverage:.0%}"
     return [
@@ -128,7 +129,7 @@ def _method(found: Fig4a, spec: Fig4aSpec, scene: str) -> list[str]:
 
 
 def findings_of(found: Fig4a, element: str) -> list[str]:
-    """Markdown: what holds with one element pattern, and where what does not hold fails."""
+    """What holds in Fig. 4(a) with one element pattern, and where what does not hold fails."""
     curves = found.curves[element]
     gap = curves.exact - curves.optimized.middle
     return [
@@ -140,7 +141,7 @@ def findings_of(found: Fig4a, element: str) -> list[str]:
 
 
 def _extent(distance: Floats, where: Booleans) -> str:
-    """At how many places something holds, and the distances between which it does not."""
+    """At how many places a claim of Fig. 4(a) holds, and the distances between which it does not."""
     if where.all():
         return f"at all {len(where)} places"
     near, far = distance[~where].min(), distance[~where].max()

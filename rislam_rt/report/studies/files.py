@@ -21,7 +21,7 @@ CURVES, CURVES_FIGURE = "fig4a", "figures/fig4a.png"
 def write_comparison(
     found: Comparison, spec: CompareSpec, content: Mapping[str, Any], folder: Path, *, figures: bool = True
 ) -> Path:
-    """Write page, JSON and certificate of a comparison of channels; returns the page.
+    """Write the files of a comparison of channels: page, JSON and certificate; returns the page.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def write_comparison(
 def write_fig4a(
     found: Fig4a, spec: Fig4aSpec, scene: str, content: Mapping[str, Any], folder: Path, *, figures: bool = True
 ) -> Path:
-    """Write page, CSV, JSON and figure of the gain curves; returns the page.
+    """Write the files of the gain curves: page, CSV, JSON and figure; returns the page.
 
     Raises
     ------

@@ -15,7 +15,7 @@ LINES = ("-", "--", ":", "-.")
 
 
 def draw_scores(scores: Sequence[SchemeScore], path: Path) -> Path | None:
-    """Draw what there is; None, and no picture, before the first run has ended.
+    """Draw a sweep's scores so far; None, and no picture, before the first run has ended.
 
     Raises
     ------
@@ -27,7 +27,7 @@ def draw_scores(scores: Sequence[SchemeScore], path: Path) -> Path | None:
 
 
 def scores_figure(scores: Sequence[SchemeScore]) -> Figure:
-    """RMSE with its interval, and how many runs each point rests on."""
+    """Figure of a sweep: RMSE with its interval, and how many runs each point rests on."""
     along = main_axis(scores)
     ticks = list(dict.fromkeys(str(score.point.get(along, score.scheme)) for score in scores))
     numeric = all(_is_number(score.point.get(along)) for score in scores)
@@ -62,7 +62,7 @@ def scores_figure(scores: Sequence[SchemeScore]) -> Figure:
 
 
 def main_axis(scores: Sequence[SchemeScore]) -> str:
-    """The first axis of numbers, else the first one but that of the schemes; empty without any."""
+    """Axis of a sweep along which it is drawn: the first of numbers, else the first but that of the schemes."""
     keys = [key for key in scores[0].point if key != "schemes"]
     numbers = [key for key in keys if _is_number(scores[0].point[key])]
     return next(iter((*numbers, *keys)), "")

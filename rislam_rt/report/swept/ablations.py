@@ -1,4 +1,4 @@
-"""One setting changed at a time: what each is worth, as table, figure and page."""
+"""Ablations, one setting changed at a time: what each is worth, as table, figure and page."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -48,7 +48,7 @@ def ablations_content(groups: Sequence[Group], spec: AblationsSpec) -> dict[str,
 
 
 def draw_ablations(content: Mapping[str, Any]) -> Figure:
-    """RMSE of every variant with its interval, its bound as a tick, the reference as a line."""
+    """Draw ablations: RMSE of every variant with its interval, its bound as a tick, the reference as a line."""
     entries = [entry for entry in content["entries"] if entry["rmse_m"] is not None]
     with styled():
         figure = Figure(figsize=(8.2, 1.4 + 0.3 * len(entries)))
@@ -74,7 +74,7 @@ def draw_ablations(content: Mapping[str, Any]) -> Figure:
 def ablations_page(
     content: Mapping[str, Any], groups: Sequence[Group], about: Sequence[str], figure: str | None
 ) -> str:
-    """Markdown: what was done, the picture, a table a group of variants."""
+    """Page of the ablations: what was done, the picture, a table a group of variants."""
     lines = ["# Ablations: one setting at a time", "", *about, ""]
     lines += [
         f"The reference is `{content['reference']}`. The change is that of the agent's RMSE against it, from pairs of"

@@ -1,4 +1,4 @@
-"""One line a point and scheme of a swept study: numbers for tables, CSV and JSON, and how they are written."""
+"""Entries of a swept study, one a point and scheme: numbers for tables, CSV and JSON, and how they are written."""
 
 import csv
 import io
@@ -21,7 +21,7 @@ NOTHING = "-"
 
 
 def scheme_entry(group: Group, scheme: str) -> dict[str, Any]:
-    """Scores of one scheme at one point, over all repetitions. Errors are root mean squares over the repetitions."""
+    """Entry of one scheme at one point of a study, over all repetitions. Errors are RMS over the repetitions."""
     rmse, bound = group.column(scheme, "rmse_m"), group.column(scheme, "bound_m")
     overall, least = spread(rmse), spread(bound)
     known = rmse[~np.isnan(rmse)]
@@ -45,13 +45,14 @@ def scheme_entry(group: Group, scheme: str) -> dict[str, Any]:
 
 
 def interval_entry(name: str, interval: Interval | None, unit: str = "") -> dict[str, float | None]:
-    """Value and ends under three names; None where there is none."""
+    """Value and ends under three names of an entry; None where there is none."""
     value, low, high = interval or (None, None, None)
     return {f"{name}{unit}": value, f"{name}_low{unit}": _finite(low), f"{name}_high{unit}": _finite(high)}
 
 
 def what_limits(entry: Mapping[str, Any], over_bound: float | None = None) -> str:
-    """The first of bound, association and filter that explains an error: the agent's, or one so far over its bound."""
+    """What limits an entry's error, the agent's, or one so far over its bound: the first of bound, association and
+    filter that explains it."""
     over_bound = entry["over_bound"] if over_bound is None else over_bound
     if over_bound is None:
         return NOTHING
@@ -71,12 +72,12 @@ def csv_text(entries: Sequence[Mapping[str, Any]]) -> str:
 
 
 def metres(value: float | None) -> str:
-    """Three decimals."""
+    """Entry in metres, three decimals."""
     return NOTHING if value is None or np.isnan(value) else f"{value:.3f}"
 
 
 def metres_between(entry: Mapping[str, Any], name: str = "rmse") -> str:
-    """An error with its interval."""
+    """Entry in metres: an error with its interval."""
     value, low, high = (entry[f"{name}{end}_m"] for end in ("", "_low", "_high"))
     if value is None or low is None:
         return metres(value)
@@ -84,19 +85,19 @@ def metres_between(entry: Mapping[str, Any], name: str = "rmse") -> str:
 
 
 def ratio(value: float | None) -> str:
-    """Two decimals."""
+    """Entry as a ratio, two decimals."""
     return NOTHING if value is None else f"{value:.2f}"
 
 
 def percent_between(interval: Interval | None) -> str:
-    """A share with its interval, in percent."""
+    """Entry in percent: a share with its interval."""
     if interval is None:
         return NOTHING
     return f"{100 * interval.value:.0f} % ({100 * interval.lower:.0f} to {100 * interval.upper:.0f})"
 
 
 def table_lines(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """A markdown table."""
+    """Entries as a markdown table."""
     return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
 
 
@@ -106,7 +107,7 @@ def paragraph(text: str) -> list[str]:
 
 
 def failure_notes(groups: Sequence[Group]) -> list[str]:
-    """Markdown: how many runs failed or diverged, and why they failed."""
+    """Notes in markdown beside entries: how many runs failed or diverged, and why they failed."""
     runs = sum((len(group.results) - group.missing) * len(group.schemes) for group in groups)
     failed = sum(group.failed(scheme) for group in groups for scheme in group.schemes)
     diverged = sum(group.diverged(scheme) for group in groups for scheme in group.schemes)
@@ -117,19 +118,20 @@ def failure_notes(groups: Sequence[Group]) -> list[str]:
 
 
 def panel_of(group: Group, scheme: str) -> str | None:
-    """Name of the landmark that is the panel, of several the first."""
+    """Name of the landmark in an entry that is the panel, of several the first."""
     known = _panels_of(group, scheme)
     return known[0] if known else None
 
 
 def _panels_of(group: Group, scheme: str) -> list[str]:
-    """Names of the landmarks that are panels."""
+    """Names of the landmarks in an entry that are panels."""
     names = group.parts(scheme, "landmarks")
     return [name for name in names if not np.isnan(group.column(scheme, "landmarks", name, "cycles_identified")).all()]
 
 
 def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
-    """Errors at the end of the run with their bounds, and the share of (landmark, run) pairs that were in the map then.
+    """Landmarks of an entry: errors at the end of the run with their bounds, and the share of (landmark, run) pairs
+    that were in the map then.
 
     None where there is nothing to be found.
     """
@@ -145,7 +147,8 @@ def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
 
 
 def _walls(group: Group, scheme: str) -> dict[str, float | None]:
-    """Angle and distance errors at the end of the run over all walls that were found, with bounds and own deviation.
+    """Walls of an entry: angle and distance errors at the end of the run over all that were found, with bounds and own
+    deviation.
 
     The share is that of those found among the walls that have a bound: no path meets the others.
     """
@@ -167,12 +170,13 @@ def _walls(group: Group, scheme: str) -> dict[str, float | None]:
 
 
 def _pooled(group: Group, scheme: str, name: str, members: Sequence[str], part: str) -> Floats:
-    """A score of all members, e.g. walls, in all repetitions, one after the other."""
+    """A score pooled for an entry over all members, e.g. walls, in all repetitions."""
     return np.concatenate([np.zeros(0), *(group.column(scheme, name, member, part) for member in members)])
 
 
 def bound_beside(bound: Floats, error: Floats) -> float | None:
-    """RMS of the bounds of those that were found, so that it compares with their error; of all, if none was."""
+    """Bound beside an entry's error: RMS over those that were found, so that it compares with their error; of all, if
+    none was."""
     found = ~np.isnan(error)
     return _rms(bound[found] if found.any() else bound)
 

@@ -33,7 +33,7 @@ def draw_schemes(axis: Axes, x: Sequence[float], curves: Mapping[str, Sequence[M
 
 
 def mark_metres(side: Axis) -> None:
-    """Marks at 1, 2 and 5 of every power of ten, in plain numbers."""
+    """Marks on the axis of error curves at 1, 2 and 5 of every power of ten, in plain numbers."""
     side.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     side.set_major_formatter(lambda value, _: f"{value:g}")
     side.set_minor_formatter(NullFormatter())
@@ -58,7 +58,7 @@ def label_ends(axis: Axes, ends: Mapping[str, float]) -> None:
 
 
 def explain_lines(figure: Figure, axis: Axes) -> None:
-    """What solid and dashed lines are, below the figure."""
+    """What solid and dashed error curves are, below the figure."""
     error = axis.plot([], [], color=TRUTH, lw=1.7, label="RMSE over seeds, band: 95 % interval")
     bound = axis.plot([], [], color=TRUTH, lw=1.1, ls="--", label="posterior bound")
     figure.legend(handles=[*error, *bound], loc="outside lower center", ncols=2, fontsize=8)

@@ -46,7 +46,7 @@ def fig4b_content(groups: Sequence[Group], spec: Fig4bSpec) -> dict[str, Any]:
 
 
 def gain_entries(group: Group) -> list[dict[str, Any]]:
-    """How far the paper's scheme is below each other one, in share and metres, and what the bounds say of it."""
+    """Gains of Fig. 4(b): how far the paper's scheme is below each other one, and what the bounds say of it."""
     if OURS not in group.schemes:
         return []
     found = []
@@ -70,7 +70,7 @@ def gain_entries(group: Group) -> list[dict[str, Any]]:
 
 
 def draw_fig4b(content: Mapping[str, Any], spec: Fig4bSpec) -> Figure:
-    """RMSE against SNR, one part a case; the paper's SNR along the top."""
+    """Draw Fig. 4(b): RMSE against SNR, one part a case; the paper's SNR along the top."""
     cases = [case for case in spec.cases if any(e["case"] == case.name for e in content["entries"])]
     with styled():
         figure = Figure(figsize=(1.2 + 5.2 * len(cases), 5.0))
@@ -95,7 +95,7 @@ def draw_fig4b(content: Mapping[str, Any], spec: Fig4bSpec) -> Figure:
 def fig4b_page(
     content: Mapping[str, Any], groups: Sequence[Group], spec: Fig4bSpec, about: Sequence[str], figure: str | None
 ) -> str:
-    """Markdown: what was done, the picture, errors, gains, and what limits them."""
+    """Page of Fig. 4(b): what was done, the picture, errors, gains, and what limits them."""
     lines = ["# Error of the agent against SNR: Fig. 4(b)", "", *about, ""]
     if figure is not None:
         lines += [f"![RMSE of the agent against SNR]({figure})", ""]
@@ -118,7 +118,7 @@ def _error_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _schemes_lines(entries: Sequence[Mapping[str, Any]], error: str) -> list[str]:
-    """One error of all schemes, SNR by SNR."""
+    """Table of Fig. 4(b): one error of all schemes, SNR by SNR."""
     schemes = list(dict.fromkeys(entry["scheme"] for entry in entries))
     rows = []
     for snr in dict.fromkeys(entry["snr_db"] for entry in entries):
@@ -130,7 +130,7 @@ def _schemes_lines(entries: Sequence[Mapping[str, Any]], error: str) -> list[str
 
 
 def _gain_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Gains, in pairs of runs with the same motion and noise."""
+    """Table of Fig. 4(b): gains, in pairs of runs with the same motion and noise."""
     rivals = list(dict.fromkeys(entry["over"] for entry in gains))
     rows = []
     for snr in dict.fromkeys(entry["snr_db"] for entry in gains):

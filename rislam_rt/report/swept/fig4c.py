@@ -33,7 +33,7 @@ def fig4c_content(groups: Sequence[Group]) -> dict[str, Any]:
 
 
 def draw_fig4c(content: Mapping[str, Any]) -> Figure:
-    """Agent left, panel right, on a logarithmic axis of sizes."""
+    """Draw Fig. 4(c): agent left, panel right, on a logarithmic axis of panel sizes."""
     entries = content["entries"]
     sizes = sorted({entry["size"] for entry in entries})
     curves: dict[str, list[Mapping[str, Any]]] = {}
@@ -67,7 +67,7 @@ def draw_fig4c(content: Mapping[str, Any]) -> Figure:
 
 
 def fig4c_page(content: Mapping[str, Any], groups: Sequence[Group], about: Sequence[str], figure: str | None) -> str:
-    """Markdown: what was done, the picture, the tables."""
+    """Page of Fig. 4(c): what was done, the picture, the tables."""
     lines = ["# Error against the panel's size: Fig. 4(c)", "", *about, ""]
     lines += [
         "Gains of the panel are summed element by element; the far field begins farther off than the room is high"
@@ -95,7 +95,7 @@ def fig4c_page(content: Mapping[str, Any], groups: Sequence[Group], about: Seque
 
 
 def panel_error(group: Group, scheme: str) -> Any:
-    """(R,) distance [m] of the panel's estimate at the end; NaN where the map has none."""
+    """(R,) distance [m] of the panel's estimate at the end, for Fig. 4(c); NaN where the map has none."""
     name = panel_of(group, scheme)
     return np.full(len(group.results), np.nan) if name is None else group.column(scheme, "landmarks", name, "final_m")
 
@@ -106,7 +106,7 @@ def _entry(group: Group, scheme: str) -> dict[str, Any]:
 
 
 def _fall(groups: Sequence[Group], scheme: str) -> dict[str, Any]:
-    """Lower RMSE with the largest panel than with the smallest, as a share."""
+    """Fall in Fig. 4(c): lower RMSE with the largest panel than with the smallest, as a share."""
     ordered = sorted(groups, key=lambda group: group.point["size"])
     small, large = ordered[0], ordered[-1]
     agent = paired_gain(large.column(scheme, "rmse_m"), small.column(scheme, "rmse_m"))

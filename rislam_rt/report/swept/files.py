@@ -41,7 +41,7 @@ class StudyLayout(NamedTuple):
 def write_swept(
     rows: Sequence[Row], spec: SweptSpec, record: Mapping[str, Any], folder: Path, *, figures: bool = True
 ) -> Path | None:
-    """Write `<name>.md`, `.csv`, `.json` and `figures/<name>.png`; returns the page, None before any cell is done.
+    """Write the files of a swept study, `.md`, `.csv`, `.json`, figure; returns the page, None before any cell.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def write_swept(
 
 
 def shape_of(groups: Sequence[Group], spec: SweptSpec) -> StudyLayout:
-    """Content, figure and page of a study of any kind."""
+    """Content, figure and page for the files of a study of any kind."""
     if isinstance(spec, Fig4bSpec):
         content = fig4b_content(groups, spec)
         return StudyLayout(
@@ -94,7 +94,7 @@ def _of_receiver(spec: SweptSpec) -> bool:
 
 
 def about_lines(groups: Sequence[Group], spec: SweptSpec, record: Mapping[str, Any], wanted: int) -> list[str]:
-    """Where the numbers come from; `wanted`: how many cells there will be."""
+    """Where the numbers in a study's files come from; `wanted`: how many cells there will be."""
     config = record["settings"]
     source = "ray tracing (Sionna RT)" if config["channel"] == "traced" else "image sources"
     cycles = f"the first {config['cycles']} cycles" if config["cycles"] else "all cycles"

@@ -1,4 +1,4 @@
-"""What faults of the front end do to the receiver, before and after calibration, as table, figure and page."""
+"""What faults of the hardware do to the receiver, before and after calibration, as table, figure and page."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -48,7 +48,7 @@ def hardware_content(groups: Sequence[Group], spec: HardwareSpec) -> dict[str, A
 
 
 def draw_hardware(content: Mapping[str, Any]) -> Figure:
-    """False components, and the panel's share, of every level, however the fault is met."""
+    """Draw hardware faults: false components, and the panel's share, of every level, however the fault is met."""
     entries = content["entries"]
     rows = list(dict.fromkeys((entry["fault"], entry["level"]) for entry in entries))
     with styled():
@@ -72,7 +72,7 @@ def draw_hardware(content: Mapping[str, Any]) -> Figure:
 
 
 def hardware_page(content: Mapping[str, Any], groups: Sequence[Group], about: Sequence[str], figure: str | None) -> str:
-    """Markdown: what a laboratory must reach, the picture, all numbers."""
+    """Page on hardware: what a laboratory must reach, the picture, all numbers."""
     lines = ["# Hardware: what a laboratory must reach for the panel to matter", "", *about, "", *paragraph(LAW), ""]
     ideal = content["entries"][0]
     text = f"""Largest level at which the panel is heard in {100 * HEARD:.0f} % of the looks in which an ideal front end
@@ -97,7 +97,7 @@ TITLES = {"false": "false", "panel": "panel", "landmarks": "landmarks", "error_o
 
 
 def _means(group: Group | None, key: str) -> dict[str, Any]:
-    """Mean of every score over the receivers that were built."""
+    """Mean of every score over the hardware that was built."""
     rows = [result.get(key, result["receiver"]) for result in group.results if result] if group is not None else []
     known = {name: [row[name] for row in rows if row.get(name) is not None] for name in SCORES}
     return {"runs": len(rows), **{name: float(np.mean(values)) if values else None for name, values in known.items()}}
@@ -106,7 +106,8 @@ def _means(group: Group | None, key: str) -> dict[str, Any]:
 def _limit(
     fault: MismatchSection, entries: Sequence[Mapping[str, Any]], way: str, ideal: Mapping[str, Any]
 ) -> str | None:
-    """Largest level, as they stand in the file, up to which the panel still matters; None if it does at none."""
+    """Largest level of a hardware fault, as they stand in the file, up to which the panel still matters; None if it
+    does at none."""
     limit = None
     for entry in entries:
         if entry["fault"] == fault.name and entry["way"] == way:

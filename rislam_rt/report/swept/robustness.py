@@ -1,4 +1,4 @@
-"""What happens when the belief is told wrong: the agent's error against each mismatch, as table, figure and page."""
+"""Robustness against a belief that is told wrong: the agent's error by mismatch, as table, figure and page."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -57,14 +57,15 @@ def robustness_content(groups: Sequence[Group], spec: RobustnessSpec) -> dict[st
 
 
 def worst_mismatches(entries: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Names by their change at the level of ordinary equipment, the largest first; the first scheme counts."""
+    """Mismatches that robustness is worst against, by their change at the level of ordinary equipment, the largest
+    first; the first scheme counts."""
     first = entries[0]["scheme"] if entries else ""
     known = {e["mismatch"]: e["change"] for e in entries if e["ordinary"] and e["scheme"] == first and e["change"]}
     return sorted((name for name, change in known.items() if change > 0.0), key=lambda name: -known[name])
 
 
 def draw_robustness(content: Mapping[str, Any]) -> Figure:
-    """RMSE of every level with its interval, one row a mismatch, the reference as a line."""
+    """Draw robustness: RMSE of every level with its interval, one row a mismatch, the reference as a line."""
     entries = [entry for entry in content["entries"] if entry["rmse_m"] is not None]
     scheme = entries[0]["scheme"] if entries else ""
     own = [entry for entry in entries if entry["scheme"] == scheme]
@@ -91,7 +92,7 @@ def draw_robustness(content: Mapping[str, Any]) -> Figure:
 def robustness_page(
     content: Mapping[str, Any], groups: Sequence[Group], about: Sequence[str], figure: str | None
 ) -> str:
-    """Markdown: what was done, the worst mismatches with their cures, the picture, a table."""
+    """Page on robustness: what was done, the worst mismatches with their cures, the picture, a table."""
     lines = ["# Robustness: what happens when the belief is told wrong", "", *about, ""]
     lines += [*paragraph(LAW), "", "## The worst at the level of ordinary equipment", ""]
     lines += [*table_lines(["mismatch", "level", "change", "what would cure it"], _worst_rows(content)), ""]

@@ -58,7 +58,8 @@ def rooms_content(groups: Sequence[Group]) -> dict[str, Any]:
 
 
 def budget(entry: Mapping[str, Any], name: str) -> str:
-    """What limits an aim that is missed: bound, association or filter; the bound, too, if nothing can be heard."""
+    """What limits an aim that is missed in a room: bound, association or filter; the bound, too, if nothing can be
+    heard."""
     if name not in BOUND_OF:
         return what_limits(entry)
     error, bound = entry[name], entry[BOUND_OF[name]]
@@ -70,7 +71,7 @@ def budget(entry: Mapping[str, Any], name: str) -> str:
 
 
 def missed_aims(entry: Mapping[str, Any]) -> list[str]:
-    """Names of the aims that are missed; what is there and was never found misses its own."""
+    """Names of the aims that are missed in a room; what is there and was never found misses its own."""
     there = {"ris_m": "ris_found", "scatterer_m": "scatterer_found"}
     asked = {name: limit for name, limit in AIMS.items() if name not in there or entry[there[name]] is not None}
     return [name for name, limit in asked.items() if entry[name] is None or entry[name] > limit]
@@ -163,7 +164,7 @@ NAMES = {
 
 
 def _found(entry: Mapping[str, Any], name: str, share: str, digits: int = 3) -> str:
-    """Error, bound and share of those found."""
+    """Error, bound and share of a room's landmarks or walls that were found."""
     bound = entry[BOUND_OF[name]]
     known = "" if bound is None else f"bound {bound:.{digits}f}"
     if entry[name] is None:

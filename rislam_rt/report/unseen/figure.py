@@ -1,4 +1,4 @@
-"""Errors of every run in unseen rooms: by class of motion and of plan, one mark a room."""
+"""Figure of the errors of every run in unseen rooms: by class of motion and of plan, one mark a room."""
 
 from collections.abc import Mapping, Sequence
 
@@ -17,7 +17,7 @@ DIVISIONS = ("motion", "plan", "size", "reflection")
 
 
 def draw_unseen(runs: Mapping[str, Sequence[SchemeRun]]) -> Figure:
-    """Relative RMSE of every run, crosses where it was lost, bars at the medians and at those of the bounds."""
+    """Figure of unseen rooms: relative RMSE of every run, crosses where lost, bars at medians and bounds."""
     with styled():
         figure = Figure(figsize=(12.0, 8.0))
         axes = figure.subplots(2, 2, sharey=True).ravel()
@@ -64,5 +64,5 @@ def _draw_division(axis: Axes, division: str, runs: Mapping[str, Sequence[Scheme
 
 
 def _scatter(count: int, width: float) -> Floats:
-    """Places side by side, the same every time."""
+    """Places side by side for the dots of the figure, the same every time."""
     return np.asarray(width * ((np.arange(count) * 0.618034) % 1.0 - 0.5))

@@ -52,7 +52,7 @@ def write_unseen(
 
 
 def unseen_content(runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Plain data: a card a series, and one a class of it."""
+    """Content of the unseen rooms' files as plain data: a card a series, and one a class of it."""
     times = cycle_times(runs, timings)
     cards = {name: {**card(members), "cycle_ms": times[name]} for name, members in runs.items()}
     classes = {name: [_brief(entry) for entry in class_cards(members)] for name, members in runs.items()}
@@ -66,7 +66,7 @@ def _brief(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def run_entries(runs: Mapping[str, Sequence[SchemeRun]]) -> list[dict[str, Any]]:
-    """One row a run: series, room, its classes, its scores with six digits."""
+    """Rows of the unseen rooms' CSV, one a run: series, room, its classes, its scores with six digits."""
     good = [run for members in runs.values() for run in members if run.scores]
     names = list(dict.fromkeys(name for run in good for name in run.scores))
     entries = []

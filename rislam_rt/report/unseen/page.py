@@ -27,7 +27,7 @@ def unseen_page(
     content: Mapping[str, Any], runs: Mapping[str, Sequence[SchemeRun]], spec: UnseenSpec, about: Sequence[str],
     figure: str | None,
 ) -> str:  # fmt: skip
-    """Markdown."""
+    """The page on unseen rooms in Markdown."""
     lines = ["# Unseen rooms", "", *about, "", *_meaning(), ""]
     if figure is not None:
         lines += [f"![Relative error of every run, by class of room and motion]({figure})", ""]
@@ -39,13 +39,13 @@ def unseen_page(
 
 
 def card_table(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """One row a score, one column a series."""
+    """Table on the unseen rooms' page, one row a score, one column a series."""
     rows = [[label, *(show(entry) for entry in cards.values())] for label, show in ROWS.items()]
     return table_lines(["", *cards], rows)
 
 
 def class_table(cards: Sequence[Mapping[str, Any]]) -> list[str]:
-    """One row a class."""
+    """Table on the unseen rooms' page, one row a class of rooms."""
     head = ["class of", "", *COLUMNS]
     return table_lines(
         head, [[entry["division"], entry["class"], *(show(entry) for show in COLUMNS.values())] for entry in cards]
@@ -71,7 +71,7 @@ def _meaning() -> list[str]:
 
 
 def about_lines(spec: UnseenSpec, record: Mapping[str, Any], tests: int, there: int, wanted: int) -> list[str]:
-    """Where the numbers come from."""
+    """Lines on the page that say where the unseen rooms' numbers come from."""
     config = record["settings"]
     unfinished = "" if there == wanted else f" Not complete: {there} of {wanted} cells."
     purpose = "for tests" if spec.is_test else "for development"
@@ -86,7 +86,7 @@ def about_lines(spec: UnseenSpec, record: Mapping[str, Any], tests: int, there: 
 
 
 def _series(spec: UnseenSpec) -> list[str]:
-    """What each variant sets, and what all run."""
+    """Lines on the page: what each variant sets, and what all run."""
     schemes = spec.run.get("schemes", [])
     lines = [f"- all: schemes {', '.join(f'`{name}`' for name in schemes)} (without a panel, what needs none)"]
     for variant in spec.variants:
@@ -100,7 +100,7 @@ def _toml(value: Any) -> str:
 
 
 def _worst(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
-    """The runs farthest off, of all series."""
+    """Table on the page of the unseen runs farthest off, of all series."""
     found = [(name, run) for name, members in runs.items() for run in members if run.scores]
     found.sort(key=lambda item: -item[1].scores["relative_rmse_m"])
     head = ["room", "series", "relative RMSE [m]", "bound [m]", "lost", "motion", "plan", "size [m]", "R", "panel"]
@@ -124,7 +124,7 @@ def _failures(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
 
 
 def _median(name: str, scale: float = 1.0, digits: int = 2) -> Any:
-    """Median, its interval, and the 95th percentile."""
+    """Entry on the page: median, its interval, and the 95th percentile."""
 
     def show(entry: Mapping[str, Any]) -> str:
         parts = [entry[name], entry[f"{name}_low"], entry[f"{name}_high"], entry[f"{name}_p95"]]
@@ -137,7 +137,7 @@ def _median(name: str, scale: float = 1.0, digits: int = 2) -> Any:
 
 
 def _short(name: str, scale: float = 1.0, digits: int = 2) -> Any:
-    """Median and 95th percentile."""
+    """Entry on the page: median and 95th percentile."""
 
     def show(entry: Mapping[str, Any]) -> str:
         if entry[name] is None:

@@ -32,7 +32,7 @@ class SchemeRun(NamedTuple):
 
 
 def read_runs(rows: Sequence[Row]) -> list[SchemeRun]:
-    """All runs that there are, in the order of the series; cells that have not run are left out."""
+    """All unseen runs that score cards are made of, in the order of the series; cells not run are left out."""
     keys = {key: {row.cell.point.get(key) for row in rows} for key in ("variant", SNR)}
     schemes = {name for row in rows for name in row.result.get("schemes", {})}
     found = []
@@ -60,7 +60,7 @@ def read_runs(rows: Sequence[Row]) -> list[SchemeRun]:
 
 
 def _banded(name: str, limits: Sequence[float], unit: str = "") -> Callable[[Mapping[str, Any]], str]:
-    """Class of a number: below the first limit, between two, from the last on."""
+    """Class on a score card of a number: below the first limit, between two, from the last on."""
 
     def band(traits: Mapping[str, Any]) -> str:
         number = int(np.searchsorted(limits, traits[name], side="right"))
@@ -130,7 +130,7 @@ def class_cards(runs: Sequence[SchemeRun]) -> list[dict[str, Any]]:
 
 
 def by_series(runs: Sequence[SchemeRun]) -> dict[str, list[SchemeRun]]:
-    """Runs of each series, in their order."""
+    """Runs of each series, for its score card."""
     found: dict[str, list[SchemeRun]] = {}
     for run in runs:
         found.setdefault(run.series, []).append(run)
@@ -140,7 +140,8 @@ def by_series(runs: Sequence[SchemeRun]) -> dict[str, list[SchemeRun]]:
 def cycle_times(
     runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Mapping[str, Any]]
 ) -> dict[str, float | None]:
-    """Median CPU time [ms] of the estimator a cycle, by series; of cells timed more than once the last one counts."""
+    """Median CPU time [ms] of the estimator a cycle for score cards, by series; of cells timed more than once the last
+    one counts."""
     told = {entry["ident"]: entry.get("timing", {}) for entry in timings}
     found: dict[str, float | None] = {}
     for name, members in runs.items():
@@ -161,7 +162,7 @@ def _count(runs: Sequence[SchemeRun], name: str) -> int:
 
 
 def _spread(name: str, values: Floats) -> dict[str, float | None]:
-    """Median with its 95 % interval, and 95th percentile."""
+    """Median with its 95 % interval, and 95th percentile, for a score card."""
     known = values[~np.isnan(values)]
     low = high = None
     if len(known) > 1:

@@ -14,7 +14,7 @@ from rislam_rt.sweeps import Row
 
 
 def print_cards(rows: Sequence[Row], timings: Sequence[Mapping[str, Any]]) -> None:
-    """One column a series."""
+    """Print the score cards on the terminal, one column a series."""
     cards = unseen_content(by_series(read_runs(rows)), timings)["cards"]
     table = Table(title="median (95 % interval); 95th percentile")
     table.add_column("score")

@@ -36,17 +36,17 @@ def room_data(scene: Scene) -> dict[str, Any]:
 
 
 def spread(count: int, most: int) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
-    """Rows spread evenly over `count`, `most` of them at most, with the first and the last."""
+    """Rows of a view spread evenly over `count`, `most` of them at most, with the first and the last."""
     return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(np.int64))
 
 
 def rounded(points: Floats, digits: int = DIGITS) -> Any:
-    """Nested lists of numbers with so many digits."""
+    """Nested lists of numbers for a view with so many digits."""
     return (np.round(points, digits) + 0.0).tolist()
 
 
 def _walls(scene: Scene) -> tuple[list[dict[str, Any]], int]:
-    """The largest walls, and how many are left out."""
+    """The room's largest walls for a view, and how many are left out."""
     walls = build_walls(scene)
     corners = walls.triangles
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
@@ -76,7 +76,7 @@ def _walls(scene: Scene) -> tuple[list[dict[str, Any]], int]:
 
 
 def _same_sense(triangles: Floats, normal: Floats) -> Floats:
-    """Triangles (T, 3, 3) all counter-clockwise about a normal, so that no seam shows between neighbours."""
+    """Triangles (T, 3, 3) of a view's wall all counter-clockwise about a normal, so that no seam shows."""
     sense = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) @ normal
     return np.where((sense < 0.0)[:, None, None], triangles[:, ::-1], triangles)
 

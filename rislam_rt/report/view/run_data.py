@@ -18,7 +18,7 @@ KNOWN = 0.5
 
 
 def run_data(result: SlamResult) -> dict[str, Any]:
-    """Room, truth, and every scheme, at up to `FRAMES` cycles spread evenly."""
+    """Data of a run's view: room, truth, and every scheme, at up to `FRAMES` cycles spread evenly."""
     rows = spread(len(result.scene.agent), FRAMES)
     return room_data(result.scene) | {
         "kind": "run",
@@ -49,14 +49,14 @@ def _scheme(result: SlamResult, scheme: SchemeResult, rows: Integers) -> dict[st
 
 
 def _ellipse(covariance: Floats) -> list[float]:
-    """Half axes [m] of the 2 sigma ellipse and the angle [rad] of the first."""
+    """Half axes [m] of a run's 2 sigma ellipse in a view and the angle [rad] of the first."""
     value, vector = np.linalg.eigh(covariance)
     half = 2.0 * np.sqrt(np.maximum(value, 0.0))
     return [*rounded(half, FINE + 1), round(float(np.arctan2(vector[1, 0], vector[0, 0])), 3)]
 
 
 def _landmark(scheme: SchemeResult, column: int, rows: Integers) -> dict[str, Any] | None:
-    """One landmark from the first moment that it is held to the last; None if it is never."""
+    """One landmark of a run in a view, from when it is first held to the last; None if it is never."""
     held = scheme.held[rows, column]
     if not held.any():
         return None
@@ -73,7 +73,8 @@ def _landmark(scheme: SchemeResult, column: int, rows: Integers) -> dict[str, An
 
 
 def _code(scheme: SchemeResult, row: int, shapes: list[list[int]]) -> str:
-    """Levels in base 36, panel by panel, `|` between panels, each with as many digits as the largest level has."""
+    """Levels of a run's code in a view in base 36, panel by panel, `|` between panels, each with as many digits as the
+    largest level has."""
     index = scheme.applied[row].ravel()
     digits = len(np.base_repr(scheme.levels - 1, 36))
     sizes = [rows * cols for rows, cols in shapes]

@@ -81,7 +81,7 @@ def _through_wall(room: TriangleArray) -> Iterator[Finding]:
 
 
 def _inside_object(room: TriangleArray) -> Iterator[Finding]:
-    """The start only: the path crosses no surface, or that was found before."""
+    """Whether the agent's start is inside an object: the path crosses no surface, or that was found before."""
     start = room.scene.agent.position[0]
     name = _enclosing(room, start, holding=room.scene.landmark_positions)
     if name:
@@ -89,7 +89,7 @@ def _inside_object(room: TriangleArray) -> Iterator[Finding]:
 
 
 def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
-    """Name of an object around a point, if any.
+    """Name of an object around the agent's start, if any.
 
     An object is a connected piece that takes up less than a tenth of the scene's box and, so that a room of a larger
     building is none, has none of the points `holding` (H, 3) in it.

@@ -1,4 +1,4 @@
-"""Questions to a triangle array: what is near, what is crossed, what does a ray hit, what encloses a point."""
+"""Queries to a mesh's triangle array: what is near, what is crossed, what does a ray hit, what encloses a point."""
 
 from collections.abc import Iterator
 
@@ -75,7 +75,7 @@ def winding(point: Floats, triangles: Floats) -> float:
 
 
 def sphere_directions(count: int) -> Floats:
-    """Unit vectors (count, 3) spread evenly (Fibonacci lattice)."""
+    """Unit vectors (count, 3) for mesh queries all round, spread evenly (Fibonacci lattice)."""
     k = np.arange(count) + 0.5
     z = 1.0 - 2.0 * k / count
     phi = k * np.pi * (3.0 - np.sqrt(5.0))
@@ -84,7 +84,7 @@ def sphere_directions(count: int) -> Floats:
 
 
 def _depth(points: Floats, edges: tuple[Floats, Floats], triangle: Integers) -> Floats:
-    """Distance (S,) [m] of points (S, 3) from the nearest edge line of their own triangle: positive inside."""
+    """Distance (S,) [m] of mesh points (S, 3) from the nearest edge line of their own triangle: positive inside."""
     inward, offset = edges
     return (np.einsum("sei,si->se", inward[triangle], points) - offset[triangle]).min(axis=1, initial=np.inf)
 

@@ -11,7 +11,7 @@ from rislam_rt.scene.findings import Finding
 
 
 def name_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Two parts of one name."""
+    """Check meshes for two parts of one name."""
     names = [r.name for r in room.scene.reflectors] + list(room.scene.landmarks)
     names += [shade.name for shade in room.scene.occluders]
     for name, count in Counter(names).items():
@@ -20,7 +20,7 @@ def name_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def face_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Faces without area."""
+    """Check meshes for faces without area."""
     bad = without_area(room.triangles)
     for number in np.unique(room.owner[bad]):
         name, mine = room.scene.reflectors[number].name, bad[room.owner == number]
@@ -47,7 +47,7 @@ def scatterer_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def mesh_warnings(room: TriangleArray) -> Iterator[Finding]:
-    """A size in wrong units, doubled faces."""
+    """Check meshes for a size in wrong units and for doubled faces."""
     yield from _size(room)
     yield from _coincident(room)
 

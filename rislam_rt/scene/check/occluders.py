@@ -1,4 +1,4 @@
-"""Scene check, the part of scatterers that hide things: sound meshes, nothing inside but their own centre."""
+"""Scene check of occluders, scatterers that hide things: sound meshes, nothing inside but their own centre."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,7 @@ from rislam_rt.scene.findings import Finding
 
 
 def occluder_face_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Faces without area."""
+    """Check occluders for faces without area."""
     for field, _, shade in _occluders(room):
         bad = without_area(shade.triangles)
         if bad.any():
@@ -66,12 +66,12 @@ def _occluders(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]
 
 
 def _inside(points: Floats, shade: Occluder) -> Booleans:
-    """Which points (N, 3) a shade encloses."""
+    """Which points (N, 3) an occluder encloses."""
     return np.array([abs(winding(point, shade.triangles)) > 0.5 for point in points], dtype=np.bool_)
 
 
 def _enters(points: Floats, shade: Occluder) -> int | None:
-    """The first cycle of a track (K, 3) that begins inside, or after which the track crosses the mesh."""
+    """First cycle of a track (K, 3) that begins inside an occluder, or after which it crosses its mesh."""
     if _inside(points[:1], shade)[0]:
         return 0
     cycles, _ = crossings(points[:-1], points[1:], shade.triangles)

@@ -71,7 +71,7 @@ def _overlap(one: RisPanel, other: RisPanel) -> bool:
 
 
 def _implausible(room: TriangleArray, panel: RisPanel, key: str, radio: RadioConfig) -> Iterator[Finding]:
-    """Reflecting more than a plate; elements so far apart that their beams are ambiguous."""
+    """Check a panel for reflecting more than a plate, and for elements so far apart that beams are ambiguous."""
     spec = panel.spec
     area = float(spec.spacing[0] * spec.spacing[1])
     excess = 10.0 * np.log10(2.0 * radio.wavelength**2 / (np.pi * area))
@@ -117,7 +117,7 @@ def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding
 
 
 def _gap(room: TriangleArray, panel: RisPanel) -> float:
-    """Distance [m] from the nearest plane of the host."""
+    """Distance [m] of a panel from the nearest plane of its host."""
     host = [r.name for r in room.scene.reflectors].index(panel.host or "")
     normal, offset = triangle_planes(room.triangles[room.owner == host])
     return float(np.abs(normal @ panel.center - offset).min())
@@ -138,7 +138,7 @@ def _facing(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]
 
 
 def _delay_spread(room: TriangleArray, panel: RisPanel) -> float:
-    """Largest difference [s] over elements of the delay Tx, element, Rx, at 50 cycles of the motion."""
+    """Delay spread over a panel [s]: largest difference over elements of Tx, element, Rx, at 50 cycles."""
     motion = room.scene.agent
     cycles = np.unique(np.linspace(0, len(motion) - 1, 50).astype(np.int64))
     corners = panel.spec.offsets()[:: max(panel.spec.rows - 1, 1), :: max(panel.spec.cols - 1, 1)].reshape(-1, 3)

@@ -33,7 +33,7 @@ class TriangleArray(NamedTuple):
         return self.scene.reflectors[self.owner[triangle]].name
 
     def outside(self, points: Floats) -> Integers:
-        """Indices of those points (K, 3) that lie outside the bounds."""
+        """Indices of those points (K, 3) that lie outside the triangles' bounds."""
         low, high = self.bounds
         return np.flatnonzero(((points < low) | (points > high)).any(axis=-1))
 

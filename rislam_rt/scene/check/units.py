@@ -63,7 +63,7 @@ def unit_warnings(file: str, table: Mapping[str, Any], bounds: Floats | None) ->
 
 
 def _room_unit(bounds: Floats) -> tuple[str, str] | None:
-    """What is odd about the room's size, and the mend."""
+    """What is odd about the unit of the room's size, and the mend."""
     size = bounds[1] - bounds[0]
     longest, words = float(size.max()), " x ".join(f"{side:.3g}" for side in size)
     if longest > LARGEST_ROOM:

@@ -1,4 +1,4 @@
-"""From a floor plan to walls, floor and ceiling: doors and windows are cut out, and closed where they are."""
+"""A floor plan extruded to walls, floor and ceiling: doors and windows are cut out, and closed where they are."""
 
 from itertools import pairwise
 from typing import Any
@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.scene.built_in_rooms.shapes import joined, quad
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.floor_plan import FloorPlan, Opening
 from rislam_rt.scene.importing.materials import MaterialAssignment
@@ -17,6 +16,7 @@ from rislam_rt.scene.importing.regions.region_groups import numbered, plain_name
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.wall_lines import SAME_LINE, Line, Spans, wall_lines, without_span
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.shapes import joined, quad
 
 THICKEST = 0.6
 """[m] An opening goes through all walls this near it that run along it: both faces of a thick wall."""
@@ -28,7 +28,7 @@ Entry = tuple[str, Mesh, dict[str, Any] | None]
 
 
 def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft:
-    """The room of a plan.
+    """Extrude a plan to a room.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def _named(entries: list[Entry], plan: FloorPlan, options: ImportOptions) -> Roo
 
 
 def _cut_lines(opening: Opening, lines: list[Line]) -> list[int]:
-    """The lines that an opening goes through."""
+    """Lines of walls to extrude that an opening goes through."""
     along = (opening.ends[1] - opening.ends[0]) / np.linalg.norm(opening.ends[1] - opening.ends[0])
     near = []
     for number, line in enumerate(lines):
@@ -103,7 +103,7 @@ def _reach(opening: Opening, line: Line) -> tuple[float, float]:
 
 
 def _cells(line: Line, holes: list[tuple[float, float, float, float]], height: float) -> list[Mesh]:
-    """Rectangles of a line of walls about its openings (from, to, bottom, top)."""
+    """Rectangles of an extruded line of walls about its openings (from, to, bottom, top)."""
     found = []
     for low, high in line.spans:
         cuts = sorted({low, high, *(min(max(x, low), high) for hole in holes for x in hole[:2])})
@@ -123,7 +123,8 @@ def _panel(line: Line, low: float, high: float, bottom: float, top: float) -> Me
 
 
 def _frame(opening: Opening, lines: list[Line], thresholds: dict[float, list[Mesh]]) -> list[Mesh]:
-    """What joins both faces of a thick wall about an opening; at floor and ceiling it is part of them."""
+    """Extruded frame that joins both faces of a thick wall about an opening; at floor and ceiling it is part of
+    them."""
     first, second = lines
     if abs(float(second.distance(first.start + _reach(opening, first)[0] * first.along))) < SAME_LINE:
         return []
@@ -139,7 +140,7 @@ def _frame(opening: Opening, lines: list[Line], thresholds: dict[float, list[Mes
 
 
 def _floor_triangles(plan: FloorPlan, lines: list[Line]) -> Floats:
-    """(T, 3, 2) [m] of all rooms; of the rectangle about all walls where no room is drawn."""
+    """(T, 3, 2) [m] floors to extrude of all rooms; of the rectangle about all walls where none is drawn."""
     found = []
     for room in plan.rooms:
         triangles = triangulate(room, [])
@@ -160,7 +161,8 @@ def _at_height(triangles: Floats, height: float) -> Mesh:
 
 
 def _line_name(line: Line, plan: FloorPlan) -> str:
-    """`wall_north` where a room lies on one side only, `partition` between two; the drawn name if there is one."""
+    """Name of an extruded wall: `wall_north` where a room lies on one side only, `partition` between two; the drawn
+    name if there is one."""
     if line.name:
         return line.name
     low, high = line.spans[int(np.argmax([high - low for low, high in line.spans]))]

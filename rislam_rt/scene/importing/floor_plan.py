@@ -56,7 +56,7 @@ class FloorPlan:
 
 
 def parse_corners(text: str) -> list[PlanShape]:
-    """One room from `0,0 4,0 4,3 0,3`.
+    """Floor plan of one room from `0,0 4,0 4,3 0,3`.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def parse_corners(text: str) -> list[PlanShape]:
 
 
 def parse_geojson(content: bytes) -> list[PlanShape]:
-    """Shapes of a GeoJSON file: polygons are rooms, lines are walls, unless a feature's `kind` says otherwise.
+    """Floor plan from a GeoJSON file: polygons are rooms, lines are walls, unless a feature's `kind` says else.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def _add(plan: FloorPlan, shape: PlanShape, unit: float, height: float) -> None:
 
 
 def _room(points: Floats) -> Floats:
-    """The corners of a room, counter-clockwise, none of them twice."""
+    """Corners of a room on a floor plan, counter-clockwise, none of them twice."""
     after = np.roll(points, -1, axis=0)
     points = points[np.linalg.norm(after - points, axis=1) > 1e-6]
     if len(points) < 3:
@@ -185,7 +185,7 @@ def _room(points: Floats) -> Floats:
 
 
 def _material(shape: PlanShape) -> dict[str, Any] | None:
-    """What a wall is of, or what closes an opening; doors are open unless they say otherwise, windows are glass."""
+    """What a wall on a floor plan is of, or what closes an opening; doors are open unless they say otherwise."""
     text = shape.about.get("material")
     given = shape.about.get("open")
     is_open = shape.kind == "door" and text is None if given is None else str(given).lower() in ("true", "1", "yes")
@@ -207,7 +207,7 @@ def _number(shape: PlanShape, key: str, usual: float) -> float:
 
 
 def _middle_line(points: Floats) -> Floats:
-    """(2, 2) the line that an opening stands for: itself, or the long axis of an area."""
+    """(2, 2) line on the floor plan that an opening stands for: itself, or the long axis of an area."""
     middle = points.mean(axis=0)
     along = np.linalg.svd(points - middle)[2][0]
     reach = (points - middle) @ along

@@ -86,7 +86,7 @@ def reachable(start: Floats, points: Floats, triangles: Floats) -> Booleans:
 
 
 def _longest_way(stations: Floats, triangles: Floats, clearance: float) -> Floats | None:
-    """(2, 3) the longest way between two stations that keeps clear, cut to `LONGEST`."""
+    """(2, 3) longest way through free space between two stations that keeps clear, cut to `LONGEST`."""
     chosen = stations[np.linspace(0, len(stations) - 1, min(len(stations), _STATIONS)).astype(int)]
     i, j = np.triu_indices(len(chosen), 1)
     length = np.linalg.norm(chosen[i] - chosen[j], axis=1)
@@ -136,7 +136,7 @@ def _eyes(stations: Floats, triangles: Floats) -> Floats:
 
 
 def _spread(triangles: Floats, count: int) -> tuple[Floats, Floats]:
-    """Points spread over triangles by their area, and the normals there."""
+    """Points spread over triangles about the free space by their area, and the normals there."""
     edge = triangles[:, 1:] - triangles[:, :1]
     area = np.cumsum(np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1))
     chosen: Integers = np.searchsorted(area, (np.arange(count) + 0.5) / count * area[-1])

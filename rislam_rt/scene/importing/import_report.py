@@ -15,7 +15,7 @@ def summarise_import(
     facets: FlatRegions, found: SortedSurfaces, surfaces: list[Surface], unseen: float, reflectors: dict[str, Any],
     occluders: dict[str, Mesh], options: ImportOptions, *, scanned: bool,
 ) -> list[str]:  # fmt: skip
-    """What became of the mesh, in numbers."""
+    """Report of an import: what became of the mesh, in numbers."""
     walls = sum(
         len(planar_regions(mesh.vertices[mesh.faces], COPLANAR_ANGLE, COPLANAR_OFFSET).offset)
         for mesh, _ in reflectors.values()
@@ -51,6 +51,6 @@ def summarise_import(
 
 
 def _counted(cylinders: list[tuple[float, int, float]]) -> list[tuple[tuple[float, int, float], int]]:
-    """Cylinders of one size (to a millimetre) together, the most frequent first."""
+    """Cylinders of one size (to a millimetre) together in the report of an import, the most frequent first."""
     sizes = Counter((round(radius, 3), sides, round(error, 4)) for radius, sides, error in cylinders)
     return sizes.most_common()

@@ -96,7 +96,7 @@ class MaterialAssignment:
         return self.rest
 
     def by_hand(self, *names: str) -> dict[str, Any] | None:
-        """What was given for any of the names."""
+        """Material that was given for any of the names."""
         for pattern, table in self.choices.items():
             if any(fnmatchcase(name, pattern) for name in names if name):
                 self.used.add(pattern)
@@ -104,7 +104,7 @@ class MaterialAssignment:
         return None
 
     def remarks(self) -> list[str]:
-        """What was assumed, on one line, if anything."""
+        """What was assumed of materials, on one line, if anything."""
         if not self.assumed:
             return []
         names, what = sorted(self.assumed), ", ".join(f"{value}" for value in self.rest.values())
@@ -112,7 +112,7 @@ class MaterialAssignment:
         return [f"material unknown, taken as {what}: {', '.join(names[:8])}{more} (--material NAME=...)"]
 
     def unused(self) -> list[str]:
-        """Patterns that nothing matched."""
+        """Patterns of materials that nothing matched."""
         return sorted(set(self.choices) - self.used)
 
 

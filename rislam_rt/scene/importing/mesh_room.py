@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.scene.built_in_rooms.shapes import joined
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.free_space import find_free, is_seen
 from rislam_rt.scene.importing.import_report import summarise_import
@@ -29,6 +28,7 @@ from rislam_rt.scene.importing.regions.welded_mesh import weld
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.scans.scan_room import looks_scanned, sort_scan
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.shapes import joined
 
 
 def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
@@ -50,7 +50,7 @@ def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
 
 
 def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], options: ImportOptions) -> RoomDraft:
-    """Walls, things and clutter, of flat regions or of the planes of a scan."""
+    """Draft of a room from a mesh: walls, things and clutter, of flat regions or of the planes of a scan."""
     if options.scan or (options.scan is None and looks_scanned(facets, options)):
         found, about = sort_scan(facets.mesh, options)
         pieces = [RegionGroup("", "", np.zeros(0, dtype=np.int64), True)]
@@ -74,7 +74,8 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
 
 
 def _seen(found: SortedSurfaces) -> tuple[list[Surface], float]:
-    """The surfaces that an agent inside can see, and the area [m^2] of the others: outer skins, insides of boards."""
+    """Surfaces of a mesh that an agent inside the room can see, and the area [m^2] of the others: outer skins, insides
+    of boards."""
     triangles = np.concatenate([
         *(s.mesh.vertices[s.mesh.faces] for s in found.surfaces), *(c.triangles for c in found.clutter)
     ])  # fmt: skip
@@ -115,7 +116,7 @@ def _reflectors(
 
 
 def _occluders(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str]) -> dict[str, Mesh]:
-    """Clutter by the piece that it belongs to."""
+    """Clutter of a mesh as occluders, by the piece that it belongs to."""
     by_piece: dict[int, list[Floats]] = {}
     for clutter in found.clutter:
         by_piece.setdefault(clutter.piece, []).append(clutter.triangles)

@@ -1,4 +1,4 @@
-"""What a drawing program wrote, as triangles with the names of their node and material: GLB, glTF, OBJ, PLY, STL."""
+"""Source of meshes, triangles with the names of their node and material: GLB, glTF, OBJ, PLY, STL."""
 
 import json
 import struct
@@ -63,7 +63,7 @@ def read_source(path: Path) -> tuple[list[MeshPart], list[str]]:
 
 
 def read_content(path: Path, limit: int = MAX_MESH_BYTES) -> bytes:
-    """All of a file that the user named.
+    """All of a mesh file that the user named.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def _sound(part: MeshPart) -> Floats:
 
 
 def _from_gltf(content: bytes, suffix: str, folder: Path) -> list[MeshPart]:
-    """Parts of a glTF file, its buffers from beside it, pictures left where they are."""
+    """Parts of a mesh in glTF, its buffers from beside it, pictures left where they are."""
     content = _plain_glb(content) if suffix == ".glb" else _joined_glb(content, folder)
     check_glb(content, MAX_IMPORT_FACES, MAX_IMPORT_NODES)
     loaded = unfold(content, "glb")
@@ -111,7 +111,7 @@ def _from_gltf(content: bytes, suffix: str, folder: Path) -> list[MeshPart]:
 
 
 def _plain_glb(content: bytes) -> bytes:
-    """A GLB file without its pictures: the same chunks, another table of contents."""
+    """A mesh in GLB without its pictures: the same chunks, another table of contents."""
     try:
         magic, version, length, size, kind = struct.unpack_from("<4sIII4s", content)
     except struct.error:
@@ -127,7 +127,7 @@ def _plain_glb(content: bytes) -> bytes:
 
 
 def _joined_glb(content: bytes, folder: Path) -> bytes:
-    """A glTF file and its buffers as one GLB file."""
+    """A mesh in glTF and its buffers as one GLB file."""
     document = _without_pictures(content)
     data, starts = b"", []
     for number, buffer in enumerate(_rows(document, "buffers")):
@@ -167,7 +167,7 @@ def _glb(document: dict[str, Any], rest: bytes) -> bytes:
 
 
 def _without_pictures(text: bytes) -> dict[str, Any]:
-    """The table of contents; materials keep their names alone, so that no picture is unpacked."""
+    """Table of contents of a glTF mesh without pictures; materials keep their names alone."""
     try:
         document = json.loads(text)
         if not isinstance(document, dict):

@@ -1,4 +1,4 @@
-"""From a file to a scene folder, checked before it appears."""
+"""A new room from a file: a scene folder, checked before it appears."""
 
 import tempfile
 from pathlib import Path
@@ -18,7 +18,8 @@ from rislam_rt.scene.importing.room_draft import RoomDraft, finish_room
 from rislam_rt.scene.importing.svg import parse_svg
 from rislam_rt.scene.load import check_scene
 from rislam_rt.scene.mesh_placement import UNITS
-from rislam_rt.scene.templates import room_files, room_name
+from rislam_rt.scene.room_files import room_files
+from rislam_rt.scene.templates import room_name
 from rislam_rt.scene.write import write_files
 
 PLANS = (".svg", ".geojson", ".json")

@@ -60,7 +60,7 @@ def _read_lines(text: str) -> _Reading:
 
 
 def _corners(text: str, count: int) -> list[int]:
-    """Corners of a polygon from 0; a negative number counts from the last corner so far."""
+    """Corners of an OBJ file's polygon from 0; a negative number counts from the last corner so far."""
     numbers = [int(word.partition("/")[0]) for word in text.split()]
     if len(numbers) < 3:
         raise ValueError(f"a face of {len(numbers)} corners")
@@ -71,7 +71,7 @@ def _corners(text: str, count: int) -> list[int]:
 
 
 def _split(corners: Floats) -> Floats:
-    """A polygon (n, 3) as triangles (n - 2, 3, 3)."""
+    """An OBJ file's polygon (n, 3) as triangles (n - 2, 3, 3)."""
     middle = corners.mean(axis=0)
     normal = np.linalg.svd(corners - middle)[2] if np.isfinite(corners).all() else np.eye(3)
     flat = (corners - middle) @ normal[:2].T

@@ -1,4 +1,4 @@
-"""What a user can say about a file that is to become a room."""
+"""Options of an import: what a user can say about a file that is to become a room."""
 
 from dataclasses import dataclass, field
 from typing import Any

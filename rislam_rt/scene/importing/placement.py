@@ -15,7 +15,7 @@ USUAL = (2.0, 60.0)
 
 
 def place_parts(parts: list[MeshPart], suffix: str, options: ImportOptions) -> tuple[list[Floats], list[str]]:
-    """The parts' triangles (T, 3, 3) [m], z up, and remarks.
+    """Place imported parts: triangles (T, 3, 3) [m], z up, and remarks.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def place_parts(parts: list[MeshPart], suffix: str, options: ImportOptions) -> t
 
 
 def check_size(diagonal: float, units: str | None) -> None:
-    """Refuse what has no room's size [m across], and say which unit would mend it.
+    """Refuse to place what has no room's size [m across], and say which unit would mend it.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def check_size(diagonal: float, units: str | None) -> None:
 
 
 def _facing(placed: list[Floats]) -> Floats:
-    """(3,) area [m^2] seen along each axis."""
+    """(3,) area [m^2] seen along each axis, which tells how a mesh is to be placed."""
     triangles = np.concatenate(placed)
     edge = triangles[:, 1:] - triangles[:, :1]
     return np.asarray(0.5 * np.abs(np.cross(edge[:, 0], edge[:, 1])).sum(axis=0))

@@ -152,7 +152,7 @@ def _crosses_any(start: Floats, end: Floats, heads: Floats, tails: Floats) -> bo
 
 
 def _turn(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Twice the signed area of triangles."""
+    """Twice the signed area of a polygon's triangles."""
     return np.asarray((b - a)[..., 0] * (c - a)[..., 1] - (b - a)[..., 1] * (c - a)[..., 0])
 
 

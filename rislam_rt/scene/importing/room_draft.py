@@ -8,12 +8,12 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import triangle_planes
-from rislam_rt.scene.built_in_rooms.room import BASELINE, CYCLES, RoomFiles, panel, reflector
 from rislam_rt.scene.check.mesh_queries import ray_hits
 from rislam_rt.scene.file_names import safe_name
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.free_space import FreeSpace, find_free
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.room_files import BASELINE, CYCLES, RoomFiles, panel, reflector
 
 FROM_EDGE = 0.1
 """[m] The panel measures 9 cm: so far it keeps off the edges of its host."""

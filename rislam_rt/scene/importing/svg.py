@@ -81,7 +81,7 @@ def _walk(element: Tree.Element, matrix: Floats, inherited: str, depth: int) -> 
 
 
 def _kind(element: Tree.Element) -> str:
-    """The first word for a kind in an element's own names."""
+    """First word for a kind in an SVG element's own names."""
     own = " ".join(
         value
         for key, value in element.attrib.items()
@@ -125,7 +125,7 @@ def _length(element: Tree.Element, key: str) -> float:
 
 
 def _path(text: str) -> Iterator[tuple[Floats, bool]]:
-    """Straight parts of a path: (points, closed)."""
+    """Straight parts of an SVG path: (points, closed)."""
     here = np.zeros(2)
     points: list[Floats] = []
     for letter, rest in _STEP.findall(text):
@@ -156,7 +156,7 @@ def _path(text: str) -> Iterator[tuple[Floats, bool]]:
 
 
 def _matrix(text: str) -> Floats:
-    """(3, 3) of a `transform` attribute."""
+    """(3, 3) of an SVG `transform` attribute."""
     total = np.eye(3)
     for name, rest in _TRANSFORM.findall(text):
         n = [float(word) for word in _NUMBER.findall(rest)]

@@ -35,15 +35,15 @@ class Line(NamedTuple):
 
     @property
     def across(self) -> Floats:
-        """(2,) unit vector to its left."""
+        """(2,) unit vector to the left of a wall's line."""
         return np.array([-self.along[1], self.along[0]])
 
     def at(self, place: float, height: float) -> Floats:
-        """(3,) [m]."""
+        """(3,) [m] point of a wall's line."""
         return np.append(self.start + place * self.along, height)
 
     def distance(self, points: Floats) -> Floats:
-        """Signed distances (...,) [m] of points (..., 2), positive to its left."""
+        """Signed distances (...,) [m] of points (..., 2) from a wall's line, positive to its left."""
         return np.asarray((points - self.start) @ self.across)
 
 
@@ -93,7 +93,7 @@ def _joined_spans(spans: Spans) -> Spans:
 
 
 def without_span(spans: Spans, low: float, high: float) -> Spans:
-    """Spans with what lies from `low` to `high` cut out."""
+    """Spans of a wall's line with what lies from `low` to `high` cut out."""
     found: Spans = []
     for a, b in spans:
         found += [(x, y) for x, y in ((a, min(b, low)), (max(a, high), b)) if y - x > SAME_LINE]

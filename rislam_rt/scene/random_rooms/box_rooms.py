@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, Occluder, Reflector, RisPanel, RisSpec, Scatterer, Scene, Trajectory
-from rislam_rt.scene.built_in_rooms.shapes import block, hexahedron
+from rislam_rt.scene.shapes import block, hexahedron
 from rislam_rt.scene.solids import sphere_mesh
 
 SIZE, HEIGHT = (3.5, 9.0), (2.3, 4.0)
@@ -53,7 +53,7 @@ def random_room(name: str, *, rng: np.random.Generator) -> Scene:
 
 
 def _corners(size: Floats, tilt: float, rng: np.random.Generator) -> Floats:
-    """Corners (2, 2, 2, 3): each the common point of three planes, so that all faces are flat."""
+    """Corners of a random box room (2, 2, 2, 3): each the common point of three planes, so that faces are flat."""
     normal = np.concatenate([np.eye(3), np.eye(3)]).reshape(2, 3, 3)
     normal = unit(normal + tilt * rng.standard_normal((2, 3, 3)))
     point = np.stack([0.5 * size * (1.0 - np.eye(3)), 0.5 * size * (1.0 + np.eye(3))])

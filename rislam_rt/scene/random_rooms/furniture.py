@@ -6,10 +6,10 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.scene.built_in_rooms.shapes import block
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.random_rooms.plan import depth_inside
 from rislam_rt.scene.random_rooms.shell import Roof
+from rislam_rt.scene.shapes import block
 
 KINDS = {
     "cabinet": ((0.5, 1.6), (0.35, 0.7), (0.6, 2.2)),
@@ -44,7 +44,7 @@ class FurniturePiece(NamedTuple):
         return np.asarray(rotation_z(np.array(self.yaw))[:2, :2])
 
     def rim(self) -> Floats:
-        """(16, 2) points around its outline."""
+        """(16, 2) points around a piece of furniture's outline."""
         share = np.array([-1.0, -0.5, 0.0, 0.5])
         one = np.ones(4)
         square = np.concatenate(
@@ -53,17 +53,17 @@ class FurniturePiece(NamedTuple):
         return np.asarray(self.center + (square * self.half) @ self.turn.T)
 
     def distance(self, points: Floats) -> Floats:
-        """(...,) [m] of points (..., 2) from it, zero inside."""
+        """(...,) [m] of points (..., 2) from a piece of furniture, zero inside."""
         local = np.abs((points - self.center) @ self.turn) - self.half
         return np.asarray(np.linalg.norm(np.maximum(local, 0.0), axis=-1))
 
     def holds(self, points: Floats, margin: float) -> Booleans:
-        """Which points (..., 3) lie in it or within a margin [m] of it."""
+        """Which points (..., 3) lie in a piece of furniture or within a margin [m] of it."""
         near = self.distance(points[..., :2]) < margin
         return np.asarray(near & (points[..., 2] > self.bottom - margin) & (points[..., 2] < self.top + margin))
 
     def mesh(self) -> Mesh:
-        """Without the face that stands on the floor, so that no two faces coincide."""
+        """Mesh of a piece of furniture without the face on the floor, so that no two faces coincide."""
         size = [*self.half.tolist()]
         without = ("floor",) if self.bottom == 0.0 else ()
         solid = block([-size[0], -size[1], self.bottom], [*size, self.top], without=without)
@@ -103,7 +103,7 @@ def draw_piece(kind: str, center: Floats, yaw: float, *, rng: np.random.Generato
 
 
 def fits(piece: FurniturePiece, ground: PlacementLimits, others: list[FurniturePiece]) -> bool:
-    """Whether a piece stands inside the plan, below the ceiling, off the way and off all others."""
+    """Whether a piece of furniture stands inside the plan, below the ceiling, off the way and off all others."""
     rim = piece.rim()
     if depth_inside(ground.outline, rim).min() < OFF_WALLS or ground.roof.height(rim).min() < piece.top + HEADROOM:
         return False

@@ -1,4 +1,5 @@
-"""Scatterers and panel drawn at random: open, below the agent, or behind a screen; on any wall or in the ceiling."""
+"""Landmarks drawn at random, scatterers and panel: open, below the agent, behind a screen; on any wall or in the
+ceiling."""
 
 from typing import NamedTuple
 
@@ -75,7 +76,7 @@ def draw_scatterer(
 
 
 def hidden_share(point: Floats, way: Floats, pieces: list[FurniturePiece]) -> float:
-    """Share of a way (K, 3), every tenth of it looked at, from which pieces hide a point (3,)."""
+    """Share of a way (K, 3) from which furniture hides a random landmark (3,), every tenth of it looked at."""
     seen_from = way[::10]
     triangles = [mesh.vertices[mesh.faces] for mesh in (piece.mesh() for piece in pieces)]
     if not triangles:
@@ -114,7 +115,8 @@ def _data_sheet(normal: Floats, up: Floats, rng: np.random.Generator) -> RisSpec
 
 
 def _on_wall(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
-    """Host, centre, normal and up: a wall, longer ones more often, above the start and below its upper edge."""
+    """Place for a random panel on a wall, longer ones more often, above the start and below its upper edge: host,
+    centre, normal and up."""
     outline = ground.outline
     along = np.roll(outline, -1, axis=0) - outline
     length = np.linalg.norm(along, axis=1)
@@ -145,7 +147,7 @@ def _in_ceiling(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str,
 
 
 def _screen_before(point: Floats, ground: PlacementLimits, rng: np.random.Generator) -> FurniturePiece:
-    """A screen across the line from a point to the middle of the way."""
+    """A screen that hides a random landmark: across the line from it to the middle of the way."""
     toward = unit(ground.way[len(ground.way) // 2, :2] - point[:2])
     center = point[:2] + rng.uniform(*BEHIND) * toward
     screen = draw_piece("screen", center, float(np.arctan2(toward[1], toward[0]) + np.pi / 2.0), rng=rng)

@@ -91,7 +91,7 @@ def draw_motion(outline: Floats, roof: Roof, course: MotionProfile, *, rng: np.r
 
 
 def _times() -> Floats:
-    """(K,) [s]."""
+    """(K,) [s] of a random motion."""
     return CYCLE * np.arange(CYCLES, dtype=np.float64)
 
 
@@ -103,7 +103,7 @@ def _start_height(roof: Roof, place: Floats, rise: Floats, rng: np.random.Genera
 
 
 def _wander(time: Floats, rng: np.random.Generator) -> Floats:
-    """A smooth rate of turn: three sines of 6 to 20 s and a mean."""
+    """Random motion's smooth rate of turn: three sines of 6 to 20 s and a mean."""
     period, phase = rng.uniform(6.0, 20.0, size=3), rng.uniform(0.0, 2.0 * np.pi, size=3)
     weight = rng.standard_normal(4) * WANDER * np.array([0.6, 0.6, 0.6, 0.5])
     waves = np.sin(2.0 * np.pi * time[:, None] / period + phase)
@@ -121,7 +121,7 @@ def _corners(time: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _stop_and_go(time: Floats, rng: np.random.Generator) -> tuple[Floats, list[tuple[float, float]]]:
-    """Shares of the speed, and from when to when the agent stands."""
+    """Random motion's shares of the speed, and from when to when the agent stands."""
     pace, stops, at = np.ones(len(time)), [], rng.uniform(*WALKING)
     while at < time[-1]:
         end = at + rng.uniform(*STANDING)
@@ -133,7 +133,7 @@ def _stop_and_go(time: Floats, rng: np.random.Generator) -> tuple[Floats, list[t
 
 
 def _spins(time: Floats, stops: list[tuple[float, float]], rng: np.random.Generator) -> Floats:
-    """A turn in every stop, at a constant rate over all of it."""
+    """Random motion's turn in every stop, at a constant rate over all of it."""
     rate = np.zeros(len(time))
     for begin, end in stops:
         angle = rng.uniform(*SPIN) * rng.choice([-1.0, 1.0])
@@ -142,7 +142,7 @@ def _spins(time: Floats, stops: list[tuple[float, float]], rng: np.random.Genera
 
 
 def _climb(time: Floats, rng: np.random.Generator) -> Floats:
-    """One rise or fall over 4 to 10 s, its rate a raised cosine."""
+    """Random motion's one rise or fall over 4 to 10 s, its rate a raised cosine."""
     begin, length = rng.uniform(2.0, 8.0), rng.uniform(4.0, 10.0)
     share = np.clip((time - begin) / length, 0.0, 1.0)
     height = rng.uniform(*CLIMB) * rng.choice([-1.0, 1.0])

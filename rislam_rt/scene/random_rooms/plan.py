@@ -30,18 +30,18 @@ def draw_plan(shape: str, *, rng: np.random.Generator) -> Floats:
 
 
 def extent(outline: Floats) -> float:
-    """Largest distance [m] between two corners."""
+    """Largest distance [m] between two corners of a random room's plan."""
     return float(np.linalg.norm(outline[:, None] - outline, axis=-1).max())
 
 
 def area(outline: Floats) -> float:
-    """[m^2], positive where the corners run counter-clockwise."""
+    """[m^2] of a random room's plan, positive where the corners run counter-clockwise."""
     x, y = outline.T
     return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
 def depth_inside(outline: Floats, points: Floats) -> Floats:
-    """Distance (...,) [m] of points (..., 2) from the outline, negative outside."""
+    """Distance (...,) [m] of points (..., 2) from the outline of a plan, negative outside."""
     start, along = outline, np.roll(outline, -1, axis=0) - outline
     offset = points[..., None, :] - start
     share = np.clip(np.sum(offset * along, axis=-1) / np.sum(along**2, axis=-1), 0.0, 1.0)
@@ -50,7 +50,7 @@ def depth_inside(outline: Floats, points: Floats) -> Floats:
 
 
 def triangulate(outline: Floats) -> Integers:
-    """Triangles (E - 2, 3), counter-clockwise, of a simple polygon, by cutting off ears."""
+    """Triangles (E - 2, 3), counter-clockwise, of a plan (a simple polygon), by cutting off ears."""
     left = list(range(len(outline)))
     faces = []
     while len(left) > 3:
@@ -61,7 +61,7 @@ def triangulate(outline: Floats) -> Integers:
 
 
 def halve(outline: Floats, point: Floats, normal: Floats) -> Floats:
-    """The part of a convex outline where `normal . (x - point)` is not negative."""
+    """Part of a convex plan where `normal . (x - point)` is not negative."""
     side = (outline - point) @ normal
     kept = []
     for a, b, near, far in zip(outline, np.roll(outline, -1, axis=0), side, np.roll(side, -1), strict=True):
@@ -105,7 +105,7 @@ def _horseshoe(sides: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _inside(outline: Floats, points: Floats) -> Booleans:
-    """Whether a ray towards +x crosses the outline an odd number of times."""
+    """Whether a point lies in a plan: a ray towards +x crosses the outline an odd number of times."""
     a, b = outline, np.roll(outline, -1, axis=0)
     y = points[..., None, 1]
     straddles = (a[:, 1] > y) != (b[:, 1] > y)

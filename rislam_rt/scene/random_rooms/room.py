@@ -125,7 +125,7 @@ def _attempt(seed: int, shape: str, ceiling: str, motion: str, panel: str, *, rn
 def _landmarks(
     ground: PlacementLimits, pieces: list[FurniturePiece], panel: str, rng: np.random.Generator
 ) -> tuple[list[Scatterer], RisPanel | None]:
-    """Scatterers, as many as fit, and the panel; screens that hide something join the pieces."""
+    """Landmarks of a random room: scatterers, as many as fit, and the panel; screens join the pieces."""
     positions = np.zeros((0, 3))
     ris = None if panel == "none" else draw_panel(panel, ground, pieces, positions, rng=rng)
     marks = positions if ris is None else ris.center[None]
@@ -141,7 +141,7 @@ def _landmarks(
 def _reflectors(
     shell: dict[str, Mesh], pieces: list[FurniturePiece], rng: np.random.Generator
 ) -> tuple[Reflector, ...]:
-    """Walls and furniture with their materials."""
+    """Walls and furniture of a random room with their materials."""
     common = float(rng.uniform(*REFLECTION))
     own = rng.uniform(*REFLECTION, size=len(shell))
     walls = np.full(len(shell), common) if rng.uniform() < ALIKE else own

@@ -1,4 +1,4 @@
-"""Floor, walls and ceiling over a plan."""
+"""Shell of a random room: floor, walls and ceiling over a plan."""
 
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ class Roof(NamedTuple):
     highest: float
 
     def height(self, points: Floats) -> Floats:
-        """(...,) [m] over points (..., 2)."""
+        """(...,) [m] height of the shell's roof over points (..., 2)."""
         along = (points - self.point) @ self.axis
         if self.form == "gable":
             return np.asarray(self.highest - self.slope * np.abs(along))
@@ -39,7 +39,7 @@ class Roof(NamedTuple):
 
 
 def draw_roof(outline: Floats, form: str, *, rng: np.random.Generator) -> Roof:
-    """A ceiling of one of `CEILINGS` over a plan."""
+    """Draw the shell's ceiling, of one of `CEILINGS`, over a plan."""
     width = extent(outline)
     lowest = min(float(np.exp(rng.uniform(*np.log(LOWEST)))), max(LOWEST[0], SLENDER * width))
     angle = rng.uniform(-np.pi, np.pi)
@@ -58,7 +58,8 @@ def draw_roof(outline: Floats, form: str, *, rng: np.random.Generator) -> Roof:
 
 
 def build_shell(outline: Floats, roof: Roof) -> dict[str, Mesh]:
-    """Meshes by name, normals inwards: `floor`, `ceiling` (a gable has `ceiling_a` and `ceiling_b`), `wall_0`, ..."""
+    """Meshes of a random room's shell by name, normals inwards: `floor`, `ceiling` (a gable has `ceiling_a` and
+    `ceiling_b`), `wall_0`, ..."""
     faces = triangulate(outline)
     meshes = {"floor": Mesh(_lifted(outline, np.zeros(len(outline))), faces)}
     if roof.form == "gable":
@@ -85,7 +86,7 @@ def ceiling_normal(roof: Roof, point: Floats) -> Floats:
 
 
 def _wall(a: Floats, b: Floats, roof: Roof) -> Mesh:
-    """A strip from the floor to the ceiling, with a corner more where a ridge meets it."""
+    """Wall of the shell: a strip from the floor to the ceiling, with a corner more where a ridge meets it."""
     feet = [a, b]
     near, far = ((p - roof.point) @ roof.axis for p in (a, b))
     if roof.form == "gable" and near * far < 0.0:

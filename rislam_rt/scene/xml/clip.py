@@ -1,4 +1,4 @@
-"""Triangles cut to a window of the plan."""
+"""Clipping triangles to a window of the plan."""
 
 import numpy as np
 
@@ -23,7 +23,7 @@ def clip_mesh(mesh: Mesh, window: Floats) -> Mesh:
 
 
 def _clipped(polygon: Floats, window: Floats) -> Floats:
-    """The part (N, 3) of a convex polygon within the window."""
+    """Part (N, 3) of a convex polygon of an XML scene within the window to which it is clipped."""
     for axis in (0, 1):
         for sign, limit in ((1.0, window[0, axis]), (-1.0, window[1, axis])):
             depth = sign * (polygon[:, axis] - limit)
@@ -39,5 +39,5 @@ def _clipped(polygon: Floats, window: Floats) -> Floats:
 
 
 def _fan(polygon: Floats) -> list[Floats]:
-    """Triangles (3, 3) of a convex polygon."""
+    """Triangles (3, 3) of a clipped convex polygon."""
     return [polygon[[0, k, k + 1]] for k in range(1, len(polygon) - 1)]

@@ -92,7 +92,7 @@ def _number(values: dict[str, Element], name: str, default: float) -> float:
 
 
 def _made(**values: Any) -> Material:
-    """A material whose numbers are in range."""
+    """A material of an XML scene whose numbers are in range."""
     try:
         return Material(**values)
     except SceneError as error:

@@ -1,4 +1,4 @@
-"""XML from people who may mean harm: a tree without entities, declarations or anything that leads elsewhere."""
+"""Parsing XML from people who may mean harm: a tree without entities, declarations or anything that leads elsewhere."""
 
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -36,7 +36,7 @@ def parse_xml(content: bytes) -> Element:
 
 
 def children(element: Element, *tags: str) -> Iterator[Element]:
-    """The direct children with one of the tags, in order."""
+    """Direct children of a parsed element with one of the tags, in order."""
     return (child for child in element if child.tag in tags)
 
 

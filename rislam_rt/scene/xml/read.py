@@ -1,4 +1,4 @@
-"""A Mitsuba or Sionna RT scene file as meshes with names and materials."""
+"""Reading a Mitsuba or Sionna RT scene file as meshes with names and materials."""
 
 import importlib.util
 import re
@@ -123,7 +123,7 @@ class _Coats:
         self.notes: list[str] = []
 
     def of(self, shape: Element) -> Material | None:
-        """The material of a shape: its own, or the one it refers to."""
+        """Material of a shape that was read from XML: its own, or the one it refers to."""
         for own in children(shape, "bsdf"):
             return self._noted(read_material(own)).material
         for reference in children(shape, "ref"):
@@ -154,7 +154,7 @@ def _root(path: Path) -> Element:
 
 
 def _shapes(parent: Element) -> Iterator[Element]:
-    """All shapes in order, those within a `merge` too.
+    """All shapes of an XML scene in order, those within a `merge` too.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def _too_many(root: Element, number: int, max_faces: int) -> Fault:
 
 
 def _take(found: XmlScene, identity: str, mesh: Mesh, material: Material | None) -> None:
-    """Add a shape under a name of its own, without faces that are no more than a line."""
+    """Add a shape of an XML scene under a name of its own, without faces that are no more than a line."""
     bad = without_area(mesh.vertices[mesh.faces])
     if bad.any():
         found.notes.append(f"{identity}: {int(bad.sum())} faces without area left out")
@@ -195,7 +195,7 @@ def _take(found: XmlScene, identity: str, mesh: Mesh, material: Material | None)
 
 
 def _free_name(wanted: str, taken: set[str]) -> str:
-    """What a reflector is called: letters, digits, `_`, `-` and `.`, and nobody else's name."""
+    """Name of a reflector read from XML: letters, digits, `_`, `-` and `.`, and nobody else's name."""
     plain = re.sub(r"[^\w.\-]", "_", wanted)[:MAX_NAME]
     plain = plain if re.search(r"\w", plain) else "shape"
     name, number = plain, 1

@@ -89,7 +89,7 @@ def scene_of_xml(path: Path, name: str, within: Sequence[float] = ()) -> tuple[S
 
 
 def _window(within: Sequence[float]) -> Floats | None:
-    """(2, 2) [m] lowest and highest x, y; None for everything."""
+    """(2, 2) [m] lowest and highest x, y of an XML scene to keep; None for everything."""
     if not within:
         return None
     window = np.array(within, dtype=np.float64)
@@ -108,7 +108,7 @@ def _exact(read: Material, exact: Material | None) -> Material:
 def _panel(
     reflectors: Sequence[Reflector], occluders: Sequence[Occluder], agent: Trajectory
 ) -> tuple[RisPanel | None, str]:
-    """A panel like the paper's above or beside the way, where there is a place for one, and words on it."""
+    """Panel for an XML scene above or beside the way, where there is a place for one, and words on it."""
     draft = RoomDraft(
         {r.name: (Mesh(r.vertices, r.faces), {}) for r in reflectors},
         {s.name: Mesh(s.vertices, s.faces) for s in occluders},

@@ -65,7 +65,7 @@ def to_world(shape: Element) -> Floats:
 
 
 def number(element: Element, name: str, default: float | None = None) -> float:
-    """A number in an element's attribute.
+    """A number in an attribute of an XML shape.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def _from_file(shape: Element, folder: Path, suffix: str, max_faces: int) -> Mes
 
 
 def _part(part: Element) -> Floats:
-    """The (4, 4) matrix of one element of a transform."""
+    """The (4, 4) matrix of one element of an XML shape's transform."""
     matrix = np.eye(4)
     if part.tag == "translate":
         matrix[:3, 3] = _triple(part, 0.0)
@@ -116,7 +116,7 @@ def _part(part: Element) -> Floats:
 
 
 def _triple(part: Element, default: float) -> Floats:
-    """Three numbers from `value` (one for all, or three) or from x, y and z."""
+    """Three numbers of an XML shape from `value` (one for all, or three) or from x, y and z."""
     if part.get("value") is None:
         return np.array([number(part, axis, default) for axis in "xyz"])
     values = _numbers(part)
@@ -134,7 +134,7 @@ def _numbers(part: Element) -> list[float]:
 
 
 def _rotation(axis: Floats, angle: float) -> Floats:
-    """(3, 3) as `<rotate>` asks for it."""
+    """(3, 3) as `<rotate>` of an XML shape asks for it."""
     length = np.linalg.norm(axis)
     if not length > 0.0:
         raise Fault("<rotate> without an axis", "give x, y and z of one")

@@ -1,4 +1,4 @@
-"""A scene as a folder that Sionna RT opens: `scene.xml` beside the scene's own files."""
+"""Writing a scene as a folder that Sionna RT opens: `scene.xml` beside the scene's own files."""
 
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -83,7 +83,7 @@ def left_behind(scene: Scene) -> list[str]:
 
 
 def _word(material: Material | None) -> str:
-    """What a material is called in the file. Sionna reads names that begin with `itu` in a way of its own."""
+    """Name of a material in a written XML scene. Sionna reads names that begin with `itu` in a way of its own."""
     if material is None:
         return "air"
     return material.itu if material.itu else ("constant" if material.level is not None else "slab")

@@ -1,4 +1,4 @@
-"""Could a track be the return of two walls whose own returns are there too?
+"""Echoes: could a track be the return of two walls whose own returns are there too?
 
 A wall's return says where its image of the Tx is, hence where the wall is: halfway. The image over two walls is then
 known, in place and in strength, without any map.
@@ -30,7 +30,7 @@ class Echo(NamedTuple):
 
 
 def echo_misfit(seen: Floats, std: Floats, strength: Floats, offset: Floats) -> Echo:
-    """How near each track is to the return over two others taken for walls.
+    """How far each track is from an echo: the return over two others taken for walls.
 
     `seen` (T, 3): length [m] and two cosines in the room's axes; `strength` (T,): log amplitude over that of free
     space of the same length; `offset` (3,) [m]: from Rx to Tx, in the room's axes.

@@ -1,4 +1,4 @@
-"""What a track shows of its path: strength, fading, direction, and how it answers to the agent's own motion.
+"""Features of a track, what it shows of its path: strength, fading, direction, answer to the agent's own motion.
 
 To first order, over a displacement d of the agent, the direction cosines h of a path that comes from a fixed point at
 distance 1/q turn by `-q P d`, P the projection across h; its length changes by `-a h . d`. For a scatterer
@@ -139,7 +139,7 @@ def track_features(sightings: Sightings, body: Body, radio: RadioConfig) -> Floa
 
 
 def fit_motion(sightings: Sightings) -> MotionFit:
-    """Least squares of turns and approach, held by their priors, and how well the two simple cases fit."""
+    """Features of a track's motion: least squares of turns and approach, and how well the two simple cases fit."""
     held, seen = sightings.held, sightings.seen
     std = np.maximum(STD_SCALE * sightings.std, [LENGTH_FLOOR, COSINE_FLOOR, COSINE_FLOOR])
     weight = np.where(held[..., None], 1.0 / std**2, 0.0)
@@ -188,7 +188,8 @@ class _Fitted(NamedTuple):
 
 
 def _fit_turns(seen: Floats, weight: Floats, level: Floats, by_turn: Floats) -> _Fitted:
-    """Both turns; `level` (T, W, 2, 2) brings the mean cosines, which are free, into the body frame."""
+    """Turns of a track as features; `level` (T, W, 2, 2) brings the mean cosines, which are free, into the body
+    frame."""
     root = np.sqrt(weight)
     columns = np.concatenate([level, by_turn, seen[..., None]], axis=-1) * root[..., None]
     gram = np.einsum("tkia,tkib->tab", columns, columns)
@@ -204,7 +205,7 @@ def _fit_turns(seen: Floats, weight: Floats, level: Floats, by_turn: Floats) -> 
 
 
 def _fit_approach(seen: Floats, weight: Floats, towards: Floats, bulge: Floats) -> _Fitted:
-    """The approach; the mean length is free."""
+    """Approach of a track as a feature; the mean length is free."""
     total = np.maximum(weight.sum(axis=1), 1e-300)
     x, y, z = (v - (np.sum(weight * v, axis=1) / total)[:, None] for v in (towards, seen, bulge))
     mean, spread = APPROACH_PRIOR
@@ -216,7 +217,7 @@ def _fit_approach(seen: Floats, weight: Floats, towards: Floats, bulge: Floats) 
 
 
 def _latest(sightings: Sightings) -> tuple[Floats, Floats]:
-    """Last measurement (T, 3) of each track and its deviations, cosines in the room's axes."""
+    """Last measurement (T, 3) of each track and its deviations, as features need it: cosines in the room's axes."""
     last = sightings.held.shape[1] - 1 - np.argmax(sightings.held[:, ::-1], axis=1)
     rows = np.arange(len(last))
     seen, std = sightings.seen[rows, last], sightings.std[rows, last]
@@ -225,6 +226,6 @@ def _latest(sightings: Sightings) -> tuple[Floats, Floats]:
 
 
 def _mean(values: Floats, held: Booleans) -> Floats:
-    """Mean (T, ...) over the cycles held, of values (T or 1, W, ...)."""
+    """Mean (T, ...) over the cycles that a track was seen, of values (T or 1, W, ...)."""
     share = held / np.maximum(held.sum(axis=1, keepdims=True), 1)
     return np.einsum("tk,tk...->t...", share, np.broadcast_to(values, (*held.shape, *values.shape[2:])))

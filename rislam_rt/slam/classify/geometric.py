@@ -15,6 +15,6 @@ APPROACH, APPROACH_STD = FEATURES.index("approach"), FEATURES.index("approach_st
 
 
 def classify_geometric(features: Floats) -> Floats:
-    """Probability (M,) of keep from rows of features (M, F): see `stillness`."""
+    """Probability (M,) that a track is a landmark's by geometry alone, from features (M, F): see `stillness`."""
     turn, approach = features[:, TURN], features[:, APPROACH]
     return stillness(turn, np.exp(features[:, TURN_STD]), approach, np.exp(features[:, APPROACH_STD]))

@@ -111,7 +111,7 @@ def _mirrors(shown: Floats, offset: Floats, strength: Floats, cost: Floats, wall
 def _predict(
     mirrors: _Mirrors, point: Floats, offset: Floats, strength: Floats, length: Floats, points: Integers
 ) -> tuple[Floats, Floats, Floats, Integers]:
-    """Place (C, 3), log strength (C,), uncertainty (C,) and parents (C, 5) of the paths over points and mirrors."""
+    """Predicted images of points in mirrors: place (C, 3), log strength (C,), uncertainty (C,), parents (C, 5)."""
     rx, tx = np.nonzero(mirrors.bounces[:, None] + mirrors.bounces <= 2)
     keep = mirrors.bounces[rx] + mirrors.bounces[tx] > 0
     rx, tx = rx[keep], tx[keep]

@@ -39,7 +39,7 @@ def classify(features: Floats, network: Network) -> Floats:
 
 
 def log_odds(features: Floats, network: Network) -> Floats:
-    """Log odds (M,) of keep against remove; hidden layers are tanh."""
+    """Network's log odds (M,) of keep against remove; hidden layers are tanh."""
     value = (features - network.mean) / network.scale
     for layer, (weight, bias) in enumerate(zip(network.weight, network.bias, strict=True)):
         value = value @ weight + bias
@@ -49,7 +49,7 @@ def log_odds(features: Floats, network: Network) -> Floats:
 
 
 def blend(odds: Floats, looks: Integers, fresh: Floats) -> Floats:
-    """Log odds (M,) of a track over its life: `odds` after `looks` (M,) earlier looks, and this look's `fresh` ones.
+    """Network's log odds (M,) of a track over its life: `odds` after `looks` (M,) earlier looks, and `fresh` ones now.
 
     A mean of the first looks, then one that forgets; clipped, so that no single look decides for good.
     """

@@ -1,4 +1,4 @@
-"""The filter's own tracks as the classifier wants them."""
+"""Sightings: the filter's own tracks as the classifier wants them."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from rislam_rt.slam.classify.features import Sightings
 def sightings_of(
     seen: Floats, std: Floats, cycles: Integers, log_amplitude: Floats, position: Floats, heading: Floats, now: int
 ) -> Sightings:
-    """What T tracks have shown up to the cycle `now`.
+    """Sightings of T tracks up to the cycle `now`.
 
     Parameters
     ----------

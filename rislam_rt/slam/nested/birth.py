@@ -120,7 +120,7 @@ class Birth(NamedTuple):
         return np.diag([*tilt, BROAD**2])
 
     def enter(self, table: LandmarkTable) -> LandmarkTable:
-        """The table with the feature in its last row."""
+        """The landmark table with the feature born in its last row."""
         parent = self.verdict.parent
         parent = int(table.ident[parent]) if parent >= 0 else -1
         table = enter(table, self.verdict.kind is not POINT, self.anchor, parent)
@@ -191,7 +191,7 @@ def track_history(
 
 
 def is_explained(tracks: LandmarkTracks, row: int, history: History, scene: BirthContext) -> bool:
-    """Whether a return of the map runs along the track's whole history."""
+    """Whether a track needs no birth: a return of the map runs along its whole history."""
     covariance = np.diag(tracks.covariance[row, :, 0, 0] + np.mean(history.std**2, axis=0))
     near = explained(scene.predicted, tracks.mean[row, :, 0], covariance, scene.config.nested.gate, history.side)
     if not len(near):
@@ -228,7 +228,7 @@ def judge(history: History, scene: BirthContext) -> BirthDecision | None:
 
 
 def _best(verdicts: list[BirthDecision], history: History, margin: float) -> tuple[BirthDecision, bool]:
-    """The cheapest, and whether it explains the history and no other comes near."""
+    """The best hypothesis for a birth, the cheapest; whether it explains the history and no other comes near."""
     best, *others = sorted(verdicts, key=lambda v: float(v.fit.cost))
     clear = min((float(v.fit.cost - best.fit.cost) for v in others), default=np.inf) > margin
     return best, clear and plausible(best.fit, len(history.seen), 3)
@@ -275,13 +275,13 @@ def _is_single(wall: Fit, history: History, scene: BirthContext) -> bool:
 
 
 def _sharp(verdict: BirthDecision) -> bool:
-    """Whether the feature's worst axis is known well enough."""
+    """Whether a feature is known well enough for its birth along its worst axis."""
     limit = MAX_POINT_STD if verdict.kind is POINT else MAX_WALL_STD
     return _worst_std(verdict) < limit
 
 
 def _worst_std(verdict: BirthDecision) -> float:
-    """Standard deviation [m] of the feature along its worst axis."""
+    """Standard deviation [m] of a feature to be born along its worst axis."""
     return float(np.sqrt(np.linalg.eigvalsh(verdict.fit.covariance)[-1]))
 
 
@@ -308,7 +308,7 @@ def _dimness(history: History, walls: int) -> float:
 
 
 def _images(history: History, scene: BirthContext) -> list[BirthDecision]:
-    """The image of each known point in a new wall on the Rx leg."""
+    """Images of known points in a new wall on the Rx leg that is to be born."""
     verdicts = []
     for kind in (IMAGE, TWIN):
         sources = _sources(scene.table, history.side)
@@ -335,7 +335,7 @@ def _sources(table: LandmarkTable, side: int) -> Integers:
 
 
 def _one_cell(wall: Floats, parent: Floats, scene: BirthContext, history: History, cells: float) -> bool:
-    """Whether a wall would throw both its returns within so many resolution cells, halfway through the history."""
+    """Whether a wall to be born would throw both its returns within so many cells, halfway through the history."""
     middle = len(history.seen) // 2
     poses = Poses(history.poses.tx[middle], history.poses.rx[middle], history.poses.heading[middle])
     seen = observe(TWIN, np.stack([wall, parent]), np.stack([scene.anchor, scene.anchor]), poses).seen
@@ -343,7 +343,7 @@ def _one_cell(wall: Floats, parent: Floats, scene: BirthContext, history: Histor
 
 
 def _established(table: LandmarkTable, side: int) -> Integers:
-    """Points of a side that are known well enough to be looked for in mirrors."""
+    """Points of a side that are known well enough for births of their images."""
     points = _sources(table, side)
     return points[table.hits[points] >= PARENT_HITS]
 

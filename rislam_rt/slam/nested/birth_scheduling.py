@@ -1,4 +1,4 @@
-"""Whose turn it is to be born: which tracks to examine in a cycle, and which have to wait for another."""
+"""Schedule of births: which tracks to examine in a cycle, and which have to wait for another."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ PARALLEL = 4.0
 
 
 def due_tracks(tracks: LandmarkTracks, predicted: PredictedMeasurements, cycle: int, config: SlamConfig) -> Integers:
-    """Tracks to examine now, the shortest first: an image lies behind its point, and is weaker.
+    """Tracks whose birth is due to be examined, the shortest first: an image lies behind its point, and is weaker.
 
     So a track has to wait while another that is shorter and stronger is still unexplained.
     """
@@ -46,7 +46,8 @@ def due_tracks(tracks: LandmarkTracks, predicted: PredictedMeasurements, cycle: 
 
 
 def _aligned(tracks: LandmarkTracks) -> Booleans:
-    """(T, T) whether two tracks come from one direction: the longer is likely the shorter over a wall on the Tx leg."""
+    """(T, T) whether the birth of one track waits for another's from the same direction: the longer is likely the
+    shorter over a wall on the Tx leg."""
     gap = np.abs(tracks.mean[None, :, 1:, 0] - tracks.mean[:, None, 1:, 0])
     variance = tracks.covariance[..., 1:, 0, 0]
     return np.asarray((gap < PARALLEL * np.sqrt(variance[None] + variance[:, None] + 0.02**2)).all(axis=-1))

@@ -1,4 +1,4 @@
-"""What this cycle's measurements may belong to: expected returns of the map first, tracks behind them."""
+"""Candidates for this cycle's measurements: expected returns of the map first, tracks behind them."""
 
 from typing import NamedTuple
 
@@ -63,7 +63,7 @@ class PredictedMeasurements(NamedTuple):
 def look_ahead(
     belief: MapBelief, expected: ExpectedReturns, moments: Moments, tracks: LandmarkTracks, apart: bool = False
 ) -> PredictedMeasurements:
-    """Predicted returns with their uncertainty; `apart`: the receiver sets the panel's returns apart."""
+    """Candidates of association for the next cycle, with uncertainty; `apart`: panel returns come separately."""
     returns, table = expected.returns, belief.table
     linear = linearise(returns, belief.features, table.anchor, belief.poses)
     seen, by_feature = linear.seen, linear.by_feature
@@ -90,7 +90,7 @@ def look_ahead(
 
 
 def return_sides(returns: Returns, table: LandmarkTable, odds: float) -> Integers:
-    """(R,) which returns run over a panel, once that is named and its log odds are above `odds`.
+    """(R,) which candidate returns run over a panel, once that is named and its log odds are above `odds`.
 
     Those of no panel are known for that once all panels are.
     """
@@ -106,7 +106,7 @@ def return_sides(returns: Returns, table: LandmarkTable, odds: float) -> Integer
 def merge_returns(
     seen: Floats, expected: ExpectedReturns, tracks: LandmarkTracks, cell: Floats, side: Integers
 ) -> UnresolvedGroups:
-    """Foresee what the receiver cannot resolve: from the strongest down, each takes in all that is in its cell.
+    """Candidates merged as the receiver will: from the strongest down, each takes in all that is in its cell.
 
     Phases change by a turn every half wavelength of motion: a weaker path shifts the stronger by the root mean square
     of what `merged_pull` says of the gap. A reciprocal is as strong as its twin, so that the two come out halfway
@@ -146,7 +146,7 @@ def merge_returns(
 
 
 def candidates(predicted: PredictedMeasurements, tracks: LandmarkTracks, hidden: Booleans) -> Candidates:
-    """Expected returns, then the tracks that are not `hidden` (T,) behind one."""
+    """Candidates of association: expected returns, then the tracks that are not `hidden` (T,) behind one."""
     spread = predicted.covariance.copy()
     spread[:, DIAGONAL, DIAGONAL] += predicted.groups.disturbance**2
     follow = track_covariance(tracks)
@@ -163,14 +163,15 @@ def candidates(predicted: PredictedMeasurements, tracks: LandmarkTracks, hidden:
 
 
 def track_covariance(tracks: LandmarkTracks) -> Floats:
-    """(T, 3, 3) of the predicted measurement of each track."""
+    """(T, 3, 3) covariance of the predicted measurement of each track, as a candidate."""
     follow = np.zeros((len(tracks.misses), 3, 3))
     follow[:, DIAGONAL, DIAGONAL] = tracks.covariance[..., 0, 0]
     return follow
 
 
 def hidden_tracks(predicted: PredictedMeasurements, tracks: LandmarkTracks, gate: float) -> Booleans:
-    """(T,) whether a track runs where the map expects a return of its strength (wall returns: where one is expected).
+    """(T,) whether a track is no candidate: it runs where the map expects a return of its strength (wall returns: where
+    one is expected).
 
     Such a track would keep the measurements that prove the map right; it gives way to a return that fits at all.
     """
@@ -191,6 +192,7 @@ def hidden_tracks(predicted: PredictedMeasurements, tracks: LandmarkTracks, gate
 def explained(
     predicted: PredictedMeasurements, seen: Floats, covariance: Floats, gate: float, side: int = UNTOLD
 ) -> Integers:
-    """Returns of a side within the gate of one prediction (3,) with covariance (3, 3), whatever their strength."""
+    """Candidate returns of a side within the gate of one prediction (3,) with covariance (3, 3), whatever their
+    strength."""
     distance, _ = squared_distance(seen - predicted.seen, predicted.covariance + covariance)
     return ((distance < gate) & same_side(np.array([side]), predicted.side)[0]).nonzero()[0]

@@ -1,4 +1,4 @@
-"""Does the filter still follow the room? Values that say so, and what the motion model makes of them.
+"""Monitor of divergence: does the filter still follow the room, and what does the motion model make of it?
 
 An agent that turns harder than its motion model allows shows first in the innovations, then its landmarks stop showing
 where they are expected. Either makes the model livelier until measurements fit again.
@@ -29,12 +29,12 @@ class DivergenceMonitor(NamedTuple):
 
     @property
     def diverged(self) -> bool:
-        """Whether measurements contradict the belief, or have lost touch with it."""
+        """Whether the filter has diverged: measurements contradict the belief, or have lost touch with it."""
         return self.strain > MAX_STRAIN or self.found < 0.2
 
 
 def check(monitor: DivergenceMonitor, nis: float, dof: int, seen: float, due: float) -> DivergenceMonitor:
-    """After a cycle with a NIS of `dof` degrees of freedom, in which `seen` of `due` certain returns showed.
+    """The divergence monitor after a cycle whose NIS has `dof` degrees, in which `seen` of `due` sure returns showed.
 
     Both count a return by the share of the cycles in which it showed lately: what has long been silent is blocked, or
     was never there, and says nothing of the agent.

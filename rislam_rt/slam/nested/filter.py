@@ -1,4 +1,4 @@
-"""One cycle of localisation and mapping: predict, associate, update, learn who is who, grow and prune the map."""
+"""The nested filter, one cycle of it: predict, associate, update, learn who is who, grow and prune the map."""
 
 from typing import NamedTuple
 
@@ -67,7 +67,7 @@ def init(
     *,
     rng: np.random.Generator,
 ) -> NestedState:
-    """Particles drawn from the start prior, and an empty map."""
+    """The nested filter's state at the start: particles drawn from the start prior, and an empty map."""
     panels = 1 if ris is None else len(ris.panels)
     return NestedState(
         0,
@@ -84,7 +84,8 @@ def init(
 
 
 def revisit(state: NestedState, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> NestedState:
-    """Another run, or another agent, on the map of an earlier one: landmarks, walls and who they are stay known.
+    """The nested filter of another run, or another agent, on the map of an earlier one: landmarks, walls and who they
+    are stay known.
 
     The map keeps the covariance that it had; its frame is the earlier run's, and so must be the start's.
     """
@@ -105,7 +106,7 @@ def step(
     *,
     rng: np.random.Generator,
 ) -> tuple[NestedState, StepInfo]:
-    """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied.
+    """Advance the nested filter by one cycle: `dt` [s] since the last, `heading` [rad], `code` believed applied.
 
     Raises
     ------
@@ -159,7 +160,7 @@ def step(
 
 
 def believed(state: NestedState) -> Moments:
-    """Mean and covariance of pose and map."""
+    """Mean and covariance of pose and map that the nested filter believes in."""
     return operations.moments(state.particles)
 
 
@@ -176,7 +177,7 @@ def _correct(
     *,
     rng: np.random.Generator,
 ) -> ParticleUpdate:
-    """The belief after the returns `hit` were seen as measurements `taken`."""
+    """The nested filter's belief after the returns `hit` were seen as measurements `taken`."""
     partner = predicted.groups.partner[hit]
     returns = compact(predicted.expected.returns, hit)
     paired = (partner >= 0).any()
@@ -195,7 +196,7 @@ def _tidy(
     *,
     rng: np.random.Generator,
 ) -> NestedState:
-    """Births and deaths: at most one track becomes a feature; features that should not be there go."""
+    """Births and deaths in the nested filter: at most one track becomes a feature; features that should not be go."""
     moments, table, particles = believed(state), state.table, state.particles
     past = Past(*operations.trail(particles, np.arange(config.nested.window)), state.time, state.body, state.cycle)
     row, tracks, birth = examine(
@@ -222,7 +223,7 @@ def _follow(
     num_returns: int,
     config: SlamConfig,
 ) -> tuple[LandmarkTracks, Integers]:
-    """Tracks extended, begun and ended; and which measurements were taken for wall returns."""
+    """The nested filter's tracks extended, begun and ended; and which measurements were taken for wall returns."""
     bright = (observations.ratio > config.nested.specular_ratio) & (observations.sides < PANEL)
     kept = (picks[num_returns:] >= 0).nonzero()[0]
     used = picks[num_returns:][kept]
@@ -244,7 +245,7 @@ def _follow(
 def _move(
     state: NestedState, dt: float, heading: float, config: SlamConfig, *, rng: np.random.Generator
 ) -> NestedState:
-    """The belief carried to the next cycle, whose pose joins the trail."""
+    """The nested filter's belief carried to the next cycle, whose pose joins the trail."""
     cycle = state.cycle + 1
     slot, last = cycle % config.nested.window, state.cycle % config.nested.window
     accelerate = state.monitor.haste * config.sigma_a * config.axes
@@ -260,7 +261,8 @@ def _speed(moments: Moments) -> float:
 
 
 def _rates(moments: Moments) -> Floats:
-    """Spread (3,) of a new track's rates: both legs may shorten by the speed; half a metre is near for a landmark."""
+    """(3,) deviations of a new track's rates: both legs may shorten by the speed; half a metre is near for a
+    landmark."""
     speed = _speed(moments)
     return np.array([2.0 * speed, speed / 0.5, speed / 0.5])
 

@@ -1,4 +1,4 @@
-"""What could a track be? Least-squares fits of a static point, an image of a known point, a moving image, the floor."""
+"""Hypotheses of what a track could be: fits of a static point, an image of a known point, a moving image, the floor."""
 
 from typing import NamedTuple
 
@@ -85,7 +85,7 @@ def fit_feature(
     steps: int,
     upright: float = np.inf,
 ) -> Fit:
-    """Gauss-Newton from `start` (..., 3), measurements far off counting for less (Student's t).
+    """Fit a hypothesis of a feature to a track: Gauss-Newton from `start` (..., 3), outliers by Student's t.
 
     `parent` (..., 3) is the known point of an image hypothesis. With `history.pose_uncertainty` the pose is fitted
     along, held by its own covariance: a wrong speed must not speak against a hypothesis that is right. `upright` is the
@@ -105,7 +105,7 @@ def fit_feature(
 
 
 def _held(gram: Floats, uncertainty: Floats) -> Floats:
-    """Information (..., 3, 3) on the feature, today's position held and the velocity as uncertain as it is."""
+    """Information (..., 3, 3) on a hypothesis, today's position held and the velocity as uncertain as it is."""
     size = uncertainty.shape[1]
     inner = gram[..., :size, :size] + np.eye(size) + uncertainty[:3].T @ uncertainty[:3] / HELD**2
     lost = gram[..., size:-1, :size] @ np.linalg.solve(inner, gram[..., :size, size:-1])
@@ -163,14 +163,14 @@ def _solve(
 
 
 def plausible(fit: Fit, count: int, parameters: int) -> bool:
-    """Whether a fit to `count` measurements is no worse than 2.5 standard deviations above what it should cost."""
+    """Whether a hypothesis that fits `count` measurements costs at most 2.5 deviations more than it should."""
     # each parameter takes out about as much as one of the 3 count squared residuals contributes
     expected = COST_MEAN * (count - parameters / 3.0)
     return bool(fit.cost < expected + 2.5 * COST_STD * np.sqrt(count))
 
 
 def initial_value(kind: Returns, parent: Floats | None, anchor: Floats, history: History) -> Floats | None:
-    """A start (3,) for `fit_feature` from the averages over the history, or None where the geometry forbids it."""
+    """Start (3,) of a hypothesis' fit from the averages over the history; None where the geometry forbids it."""
     weight = 1.0 / history.std[:, 0] ** 2
     seen = weight @ history.seen / weight.sum()
     tx, rx = history.poses.tx.mean(axis=-2), history.poses.rx.mean(axis=-2)
@@ -191,7 +191,7 @@ def initial_value(kind: Returns, parent: Floats | None, anchor: Floats, history:
 
 
 def fit_reciprocal(parent: Floats, anchor: Floats, history: History) -> Fit | None:
-    """The best wall on the Tx leg to a known point: only distances speak of it, so that many walls may fit as well."""
+    """Hypothesis of a wall on the Tx leg to a known point: only distances speak of it, so that many may fit."""
     tx, rx = history.poses.tx, history.poses.rx
     reach = float(np.mean(history.seen[:, 0] - np.linalg.norm(rx - parent, axis=-1)))
     middle = tx.mean(axis=0)
@@ -208,7 +208,7 @@ def fit_reciprocal(parent: Floats, anchor: Floats, history: History) -> Fit | No
 
 
 def fit_floor(parent: Floats, anchor: Floats, history: History) -> Fit | None:
-    """A floor below: level as the agent's motion is, at the height that the lengths of the Tx leg tell.
+    """Hypothesis of a floor below: level as the agent's motion is, at the height that Tx leg lengths tell.
 
     The array is blind for what comes from below, so that the floor shows on Tx legs alone, and distances taken on a
     straight line cannot tell below from beside. That floors are level is what the agent knows from driving on it.
@@ -224,7 +224,7 @@ def fit_floor(parent: Floats, anchor: Floats, history: History) -> Fit | None:
 
 
 def fit_doubles(wall: Floats, anchor: Floats, history: History) -> list[Fit]:
-    """What two walls may throw together, where the one `wall` (3,) throws a moving image: opposite, edge, corner.
+    """Hypotheses of two walls, where the one `wall` (3,) throws a moving image: opposite, edge, corner.
 
     Until the agent has moved enough these look like the image in one wall, or like a point.
     """
@@ -236,7 +236,7 @@ def fit_doubles(wall: Floats, anchor: Floats, history: History) -> list[Fit]:
 
 
 def _fit_opposite(wall: Floats, anchor: Floats, history: History) -> Fit:
-    """Opposite walls: the image goes along with the agent, so that all is as if the agent stood still."""
+    """Hypothesis of opposite walls: the image goes along with the agent, as if it stood still."""
     poses = history.poses
     tx = np.broadcast_to(poses.tx.mean(axis=-2, keepdims=True), poses.tx.shape)
     still = Poses(tx, tx + poses.rx - poses.tx, poses.heading)
@@ -244,7 +244,7 @@ def _fit_opposite(wall: Floats, anchor: Floats, history: History) -> Fit:
 
 
 def _fit_edge(wall: Floats, anchor: Floats, history: History) -> Fit:
-    """An upright wall and the ceiling: the image moves as that in the wall alone, at another height."""
+    """Hypothesis of an upright wall and the ceiling: the image moves as in the wall alone, at another height."""
     tx, rx, seen = history.poses.tx.mean(axis=-2), history.poses.rx.mean(axis=-2), history.seen
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.0))
     rise = (np.mean(seen[:, 0] * up) + rx[2] - tx[2]) * AXES[2]
@@ -257,7 +257,7 @@ def _fit_edge(wall: Floats, anchor: Floats, history: History) -> Fit:
 
 
 def _fit_corner(wall: Floats, anchor: Floats, history: History) -> Fit:
-    """Two upright walls: the image is turned about their edge, which is met there and back from between both ends."""
+    """Hypothesis of two upright walls: the image is turned about their edge, met there and back between both ends."""
     middle = 0.5 * (history.poses.tx + history.poses.rx)
     centre = middle.mean(axis=-2)
     edge = 0.5 * (centre + reflect(centre, wall, anchor))
@@ -267,7 +267,7 @@ def _fit_corner(wall: Floats, anchor: Floats, history: History) -> Fit:
 
 
 def slack_of_height(feature: Floats, anchor: Floats) -> float:
-    """Standard deviation [m] of the height of what upright walls throw."""
+    """Standard deviation [m] of the height of what upright walls throw, under a birth hypothesis."""
     return max(float(np.linalg.norm(feature - anchor)) * UPRIGHT_TILT, 1e-3)
 
 
@@ -286,7 +286,7 @@ def floor_height(parent: Floats, history: History) -> tuple[Floats, Floats]:
 
 
 def floor_image(height: Floats, anchor: Floats) -> Floats:
-    """The level mirror at heights (...,) as images (..., 3) of the anchor."""
+    """Hypothesis of a level mirror at heights (...,) as images (..., 3) of the anchor."""
     height = np.asarray(height)
     return np.stack(
         [np.full(height.shape, anchor[0]), np.full(height.shape, anchor[1]), 2.0 * height - anchor[2]], axis=-1

@@ -52,17 +52,17 @@ class LandmarkTable(NamedTuple):
 
     @property
     def points(self) -> Integers:
-        """Rows of the points."""
+        """Rows of the table that are points."""
         return (~self.is_wall).nonzero()[0]
 
     @property
     def walls(self) -> Integers:
-        """Rows of the walls."""
+        """Rows of the table that are walls."""
         return self.is_wall.nonzero()[0]
 
     @property
     def ris_probability(self) -> Floats:
-        """(F, Q) of being each panel; 0 for walls."""
+        """(F, Q) of each landmark in the table being each panel; 0 for walls."""
         return ris_probabilities(self.log_ris, self.points)
 
     @property
@@ -72,7 +72,7 @@ class LandmarkTable(NamedTuple):
 
     @property
     def log_strength(self) -> tuple[Floats, Floats]:
-        """Mean and standard deviation (F,) of the log strength."""
+        """Mean and standard deviation (F,) of the log strength of each landmark in the table."""
         return strength_moments(self.log_grid)
 
 
@@ -127,7 +127,8 @@ def remove(table: LandmarkTable, keep: Booleans) -> LandmarkTable:
 
 
 def image_idents(table: LandmarkTable, points: Integers, walls: Integers) -> tuple[LandmarkTable, Integers]:
-    """The numbers (Q,) of the images of point rows (Q,) in wall rows (Q,), entered if new; their hits are counted."""
+    """Numbers (Q,) in the landmark table of the images of point rows (Q,) in wall rows (Q,), entered if new; their hits
+    are counted."""
     row_of = {(point, wall): row for row, (point, wall, _) in enumerate(table.images.tolist())}
     pairs = zip(table.ident[points].tolist(), table.ident[walls].tolist(), strict=True)
     rows = np.array([row_of.setdefault(pair, len(row_of)) for pair in pairs], dtype=np.int64)
@@ -139,7 +140,7 @@ def image_idents(table: LandmarkTable, points: Integers, walls: Integers) -> tup
 
 
 def learn_ratio(table: LandmarkTable, wall: int, log_ratio: float) -> LandmarkTable:
-    """A wall's log amplitude ratio after one more return."""
+    """A wall's log amplitude ratio in the landmark table after one more return."""
     gain = table.ratio_variance[wall] / (table.ratio_variance[wall] + RATIO_NOISE**2)
     ratio, variance = table.ratio.copy(), table.ratio_variance.copy()
     ratio[wall] += gain * (np.clip(log_ratio, -3.0, 0.5) - ratio[wall])

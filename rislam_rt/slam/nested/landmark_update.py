@@ -59,7 +59,7 @@ def learn(
     *,
     rng: np.random.Generator,
 ) -> tuple[LandmarkTable, Integers]:
-    """The table after this cycle's hits, and the ident that each of them went to."""
+    """Update the landmark table by this cycle's hits, and say to which ident each of them went."""
     table, expected = belief.table, predicted.expected
     owner, number = expected.owner[hits.row], expected.bounces[hits.row]
     table, names = _name(table, expected, hits.row)
@@ -104,7 +104,7 @@ def _name(table: LandmarkTable, expected: ExpectedReturns, rows: Integers) -> tu
 
 
 def _detection_rate(table: LandmarkTable, predicted: PredictedMeasurements, hit: Integers) -> Floats:
-    """Who showed, of those that should have: strong enough, and not beside something stronger.
+    """Update of who showed, of those that should have: strong enough, and not beside something stronger.
 
     A wall is judged by the images of the point that it was found by: those of others may never have been there.
     """
@@ -131,7 +131,7 @@ def _weigh(
     *,
     rng: np.random.Generator,
 ) -> LandmarkTable:
-    """Amplitudes of direct returns weighed for every strength, and for each panel, by its odds as `told` (P, Q)."""
+    """Update by amplitudes of direct returns: for every strength, and for each panel, by its odds `told` (P, Q)."""
     points = direct.point
     sight = observe(direct, belief.features, table.anchor, belief.poses)
     scatterer = log_scatterer(amplitude, std, sight.tx_length, sight.rx_length, belief.radio)
@@ -157,7 +157,7 @@ def _weigh_silent(
     *,
     rng: np.random.Generator,
 ) -> LandmarkTable:
-    """Silence of direct returns weighed for the panels. Strengths stay: something may stand in the way for long."""
+    """Update by silence of direct returns, of the panels' odds alone: something may stand in the way for long."""
     points = direct.point
     sight = observe(direct, belief.features, table.anchor, belief.poses)
     std = np.full(len(points), amplitude_std(belief.radio))
@@ -176,7 +176,7 @@ def _weigh_silent(
 def _sampled_gains(
     belief: MapBelief, moments: Moments, points: Sequence[int] | Integers, code: RisCode, *, rng: np.random.Generator
 ) -> list[Complexes]:
-    """The gain (P, S) of each panel if it were at each of the points, over samples of pose and map together."""
+    """Gain (P, S) of each panel if it were at each landmark, over samples of pose and map together."""
     assert belief.ris is not None
     columns = np.concatenate([np.arange(3), moments.columns(np.asarray(points))])
     root = square_root(moments.covariance[np.ix_(columns, columns)])

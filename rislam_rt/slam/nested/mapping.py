@@ -1,4 +1,4 @@
-"""From moments to the estimate that others read: pose, landmarks, images, walls."""
+"""The map and pose that others read, from moments: landmarks, images, walls."""
 
 from dataclasses import replace
 from typing import Any
@@ -21,7 +21,7 @@ WALL_HITS = 40
 
 
 def predict(state: NestedState, dt: float, config: SlamConfig) -> SlamEstimate:
-    """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent; with the suspect."""
+    """Belief and map carried over `dt` [s] without noise, to where the next cycle finds the agent; with the suspect."""
     moments = believed(state)
     mean = moments.mean.copy()
     mean[:3] += dt * moments.velocity
@@ -35,7 +35,7 @@ def predict(state: NestedState, dt: float, config: SlamConfig) -> SlamEstimate:
 
 
 def estimate(state: NestedState, config: SlamConfig, moments: Moments | None = None) -> SlamEstimate:
-    """Mean and covariance of the pose, equally likely samples of it, and the map."""
+    """Estimated map, with mean and covariance of the pose and equally likely samples of it."""
     moments = believed(state) if moments is None else moments
     root = square_root(moments.covariance[:3, :3])
     return SlamEstimate(
@@ -50,7 +50,7 @@ def estimate(state: NestedState, config: SlamConfig, moments: Moments | None = N
 
 
 def build_map(moments: Moments, table: LandmarkTable) -> MapEstimate:
-    """Points, first-order images that were seen, and walls that are known.
+    """Map of points, first-order images that were seen, and walls that are known.
 
     Ghosts, such as a corner's image taken for that of one slanted wall, seldom throw a return of their own: a wall is
     shown once it was measured `WALL_HITS` times, its reflection by itself (`LandmarkTable.ratio`), and its normal is
@@ -84,5 +84,5 @@ def build_map(moments: Moments, table: LandmarkTable) -> MapEstimate:
 
 
 def _padded(values: Any, count: int) -> Any:
-    """Values (P,) of points, then a 0 for each of `count` images."""
+    """Values (P,) of the map's points, then a 0 for each of `count` images."""
     return np.concatenate([values, np.zeros(count, dtype=values.dtype)])

@@ -1,4 +1,4 @@
-"""Which returns of the believed map should show now, and how strong."""
+"""Prediction of measurements: which returns of the believed map should show now, and how strong."""
 
 from functools import lru_cache
 from itertools import product
@@ -64,12 +64,12 @@ class MapBelief(NamedTuple):
 
     @property
     def threshold(self) -> float:
-        """Amplitude at the detection threshold."""
+        """Predicted amplitude at the detection threshold."""
         return float(amplitude_std(self.radio) * np.sqrt(2.0 * self.sensor.threshold))
 
 
 def expected_returns(belief: MapBelief, code: RisCode | None, max_bounces: int, use_vt: bool) -> ExpectedReturns:
-    """All returns of up to `max_bounces` bounces that arrive from above and are not hopelessly faint."""
+    """Predict all returns of up to `max_bounces` bounces that arrive from above and are not hopelessly faint."""
     table = belief.table
     returns = enumerate_returns(tuple(table.points.tolist()), tuple(table.walls.tolist()), max_bounces, use_vt)
     real = possible_legs(belief, returns)
@@ -90,7 +90,7 @@ def expected_returns(belief: MapBelief, code: RisCode | None, max_bounces: int, 
 
 @lru_cache(maxsize=64)
 def enumerate_returns(points: tuple[int, ...], walls: tuple[int, ...], max_bounces: int, use_vt: bool) -> Returns:
-    """Every point over every pair of legs, and with `use_vt` the images of the Tx."""
+    """Predicted returns one by one: every point over every pair of legs, and with `use_vt` the images of the Tx."""
     single = [(int(w), NONE) for w in walls] if max_bounces >= 1 else []
     double = [(int(a), int(b)) for a, b in product(walls, walls) if a != b] if max_bounces >= 2 else []
     sequences = [(NONE, NONE), *single, *double]
@@ -114,13 +114,13 @@ def enumerate_returns(points: tuple[int, ...], walls: tuple[int, ...], max_bounc
 
 
 def bounces(returns: Returns) -> Integers:
-    """(R,) wall bounces of each return."""
+    """(R,) wall bounces of each predicted return."""
     walls = (returns.legs[:, 1:] != NONE).sum(axis=1)
     return walls[returns.tx] + walls[returns.rx]
 
 
 def _roles(table: LandmarkTable, returns: Returns) -> tuple[Integers, Integers, Booleans]:
-    """Bounces, owner, and whether by_parent, (R,) each."""
+    """(R,) bounces, owner, and whether by_parent, of each predicted return."""
     number, point = bounces(returns), returns.point
     walls = returns.legs[:, 1]
     first = np.where(walls[returns.rx] != NONE, walls[returns.rx], walls[returns.tx])
@@ -132,7 +132,7 @@ def _roles(table: LandmarkTable, returns: Returns) -> tuple[Integers, Integers, 
 
 
 def partners(returns: Returns) -> Integers:
-    """(R,) row of each return's reciprocal, -1 where there is none or it is the return itself."""
+    """(R,) row of each predicted return's reciprocal, -1 where there is none or it is the return itself."""
     row_of = {pair: row for row, pair in enumerate(zip(returns.tx.tolist(), returns.rx.tolist(), strict=True))}
     pairs = zip(returns.rx.tolist(), returns.tx.tolist(), strict=True)
     return np.array([row_of.get((rx, tx), -1) if rx != tx else -1 for rx, tx in pairs], dtype=np.int64)
@@ -147,7 +147,7 @@ def detection_share(table: LandmarkTable, expected: ExpectedReturns) -> Floats:
 def predicted_amplitudes(
     belief: MapBelief, returns: Returns, sight: PredictedReturn, code: RisCode | None
 ) -> tuple[Floats, Floats]:
-    """Amplitude (R,) and standard deviation of its logarithm (R,)."""
+    """Amplitude (R,) predicted of each return, and standard deviation of its logarithm (R,)."""
     table, radio = belief.table, belief.radio
     if not len(returns.tx):
         return np.zeros(0), np.zeros(0)
@@ -176,7 +176,7 @@ def predicted_amplitudes(
 
 
 def _panel_amplitudes(belief: MapBelief, returns: Returns, sheet: RisSpec, code: RisCode) -> Floats:
-    """|gain| (R,) of a panel's returns with perfect walls."""
+    """Predicted |gain| (R,) of a panel's returns with perfect walls."""
     radio, returns = belief.radio, compact(returns, np.arange(len(returns.tx)))
     center, legs = belief.features[returns.legs[:, 0]], returns.legs
     tx, rx = (
@@ -196,7 +196,7 @@ def _unfolded(belief: MapBelief, legs: Integers, device: Floats) -> Floats:
 
 
 def _leg_ratio(table: LandmarkTable, returns: Returns) -> tuple[Floats, Floats]:
-    """Log amplitude ratio (G,) of each leg's walls, and its variance (G,)."""
+    """Predicted log amplitude ratio (G,) of each leg's walls, and its variance (G,)."""
     walls, none = returns.legs[:, 1:], returns.legs[:, 1:] == NONE
     total, variance = table.ratio[walls], table.ratio_variance[walls]
     total[none] = variance[none] = 0.0
@@ -204,7 +204,7 @@ def _leg_ratio(table: LandmarkTable, returns: Returns) -> tuple[Floats, Floats]:
 
 
 def possible_legs(belief: MapBelief, returns: Returns) -> Booleans:
-    """(G,) whether each bounce of a leg has both its ends on one side of the wall.
+    """(G,) whether a leg can be predicted: each of its bounces has both ends on one side of the wall.
 
     Mirroring takes a source away from the device then, by twice the smaller of both depths at least; an image that
     comes nearer belongs to a wall that stands between. A point in the wall (the panel in its ceiling) has no image.

@@ -1,4 +1,4 @@
-"""The agent's own images: what lies behind a wall, as its wall returns tell."""
+"""Mirror images of the agent: what lies behind a wall, as its wall returns tell."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Mean and covariance of the nested filter's belief: all that its front end (association, births, map) asks of it."""
+"""Moments (mean, covariance) of the nested filter's belief: all that births, association and map ask of it."""
 
 from typing import NamedTuple
 
@@ -20,30 +20,30 @@ class Moments(NamedTuple):
 
     @property
     def position(self) -> Floats:
-        """(3,) [m]."""
+        """(3,) [m] mean position of the belief's moments."""
         return self.mean[:3]
 
     @property
     def velocity(self) -> Floats:
-        """(3,) [m/s]."""
+        """(3,) [m/s] mean velocity of the belief's moments."""
         return self.mean[3:6]
 
     @property
     def heading(self) -> float:
-        """[rad]."""
+        """[rad] mean heading of the belief's moments."""
         return float(self.mean[6])
 
     @property
     def features(self) -> Floats:
-        """(F, 3) [m]."""
+        """(F, 3) [m] mean places of features by the belief's moments."""
         return self.mean[POSE:].reshape(-1, 3)
 
     def block(self, feature: int) -> Floats:
-        """(3, 3) [m^2] covariance of one feature."""
+        """(3, 3) [m^2] covariance of one feature in the belief's moments."""
         return self.covariance[where(feature), where(feature)]
 
     def columns(self, features: Integers) -> Integers:
-        """Columns (3P,) of some features."""
+        """Columns (3P,) of some features in the belief's moments."""
         return np.asarray((POSE + 3 * np.asarray(features, dtype=np.int64)[:, None] + np.arange(3)).ravel())
 
 
@@ -59,10 +59,3 @@ def normalised(log_weight: Floats) -> tuple[Floats, float]:
         return np.full(len(log_weight), -np.log(len(log_weight))), -np.inf
     total = top + float(np.log(np.sum(np.exp(log_weight - top))))
     return log_weight - total, total
-
-
-def systematic_ancestors(log_weight: Floats, count: int, *, rng: np.random.Generator) -> Integers:
-    """Ancestors (count,) by systematic resampling: particle i is drawn `count w_i` times on average, unbiased."""
-    edges = np.cumsum(np.exp(log_weight))
-    comb = (np.arange(count) + rng.random()) / count * edges[-1]
-    return np.minimum(np.searchsorted(edges, comb, side="right"), len(log_weight) - 1)

@@ -1,4 +1,4 @@
-"""Death of landmarks: those that fail to show, contradict the measurements, double another, or follow from others."""
+"""Pruning of landmarks: those that fail to show, contradict the measurements, double another, or follow from others."""
 
 import numpy as np
 
@@ -29,7 +29,7 @@ SLACK = 0.03
 def keepers(
     moments: Moments, table: LandmarkTable, predicted: PredictedMeasurements, belief: MapBelief, config: SlamConfig
 ) -> Booleans:
-    """(F,) the features that should stay."""
+    """(F,) the features that pruning keeps."""
     if not len(table.ident):
         return np.zeros(0, dtype=np.bool_)
     old = np.where(table.hits >= OLD_HITS, OLD_DRIFT, MAX_DRIFT)
@@ -42,7 +42,7 @@ def keepers(
 
 
 def _doubles(moments: Moments, table: LandmarkTable, distance: float) -> Booleans:
-    """(F,) the younger of any two features of one kind that the belief cannot tell apart."""
+    """(F,) features to prune as doubles: the younger of any two of one kind that the belief cannot tell apart."""
     means = moments.features
     double = np.zeros(len(table.ident), dtype=np.bool_)
     for kind in (table.points, table.walls):
@@ -58,7 +58,7 @@ def _doubles(moments: Moments, table: LandmarkTable, distance: float) -> Boolean
 
 
 def _derived(moments: Moments, predicted: PredictedMeasurements, belief: MapBelief, distance: float) -> Booleans:
-    """(F,) points that are images of other points, and walls whose images other walls make together.
+    """(F,) features to prune as derived: points that are images of others, walls that other walls make together.
 
     A corner throws an image that a single slanted wall would throw as well, and walls on both legs make a static
     point of it: both are told by the walls that the map holds besides.
@@ -86,7 +86,8 @@ def _derived(moments: Moments, predicted: PredictedMeasurements, belief: MapBeli
 
 
 def _images(moments: Moments, belief: MapBelief, legs: Integers) -> tuple[Floats, Floats]:
-    """Images (G, 3) of the legs at the mean belief, with a covariance (G, 3, 3) from their features one by one."""
+    """Images (G, 3) of legs at the mean belief, for pruning what they explain, with a covariance (G, 3, 3) from their
+    features one by one."""
     image = belief.features[legs[:, 0]]
     spread = np.array([moments.block(int(row)) for row in legs[:, 0]])
     for column in (1, 2):
@@ -101,7 +102,7 @@ def _images(moments: Moments, belief: MapBelief, legs: Integers) -> tuple[Floats
 
 
 def _same(gap: Floats, spread: Floats, distance: float) -> bool:
-    """Whether two places a `gap` (3,) apart are one, given the covariance of the gap."""
+    """Whether two features a `gap` (3,) apart are one and the younger is pruned, given the covariance of the gap."""
     if gap @ gap > CLOSE**2:
         return False
     return bool(gap @ np.linalg.solve(spread + SLACK**2 * np.eye(3), gap) < distance)

@@ -1,4 +1,4 @@
-"""Where may the panel hang, while no landmark is held for it? Its identity, weighed for tracks as for landmarks.
+"""The RIS candidate, where the panel may hang while no landmark is held for it: tracks weighed as landmarks are.
 
 A track is taken for the point that its delay and direction tell. What its amplitudes say under the codes applied, and
 the cycles in which it was silent, is counted as in `identity`; the design then aims at whatever may yet be the panel.
@@ -25,7 +25,7 @@ DRAWS = 12
 
 
 def weigh_tracks(tracks: LandmarkTracks, belief: MapBelief, code: RisCode | None) -> LandmarkTracks:
-    """The tracks after what this cycle tells of each: is it one of the panels?"""
+    """Tracks weighed as RIS candidates by what this cycle tells: is each one of the panels?"""
     rows = np.flatnonzero(~tracks.specular)
     if belief.ris is None or code is None or not len(rows):
         return tracks
@@ -58,7 +58,7 @@ def weigh_tracks(tracks: LandmarkTracks, belief: MapBelief, code: RisCode | None
 def find_panel_candidate(
     tracks: LandmarkTracks, table: LandmarkTable, moments: Moments, body: Body, panel: int = 0
 ) -> PanelCandidate | None:
-    """The landmark or track that is the likeliest to be a panel; None if nothing is likelier the panel than not.
+    """The RIS candidate: landmark or track likeliest to be a panel; None if nothing is likelier so than not.
 
     A track that seems to come from behind a mirror may be the panel over walls: aiming there would miss it.
     """

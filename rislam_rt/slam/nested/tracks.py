@@ -64,11 +64,11 @@ class LandmarkTracks(NamedTuple):
 
     @property
     def length(self) -> Integers:
-        """(T,) measurements held."""
+        """(T,) measurements held of each track."""
         return np.sum(self.cycle >= 0, axis=1)
 
     def age(self, cycle: int) -> Integers:
-        """(T,) cycles since the oldest measurement that is held."""
+        """(T,) cycles since the oldest measurement that is held of a track."""
         return np.asarray(cycle - np.min(np.where(self.cycle >= 0, self.cycle, cycle), axis=1))
 
     def earlier_misses(self, cycle: int) -> Integers:
@@ -118,7 +118,7 @@ def overstatement(tracks: LandmarkTracks, cycle: int, threshold: float) -> Float
 
 
 def no_tracks(window: int, panels: int = 1) -> LandmarkTracks:
-    """Nothing seen yet, in a room of so many panels."""
+    """No tracks yet of possible landmarks, in a room of so many panels."""
     return LandmarkTracks(
         np.zeros((0, 3, 2)),
         np.zeros((0, 3, 2, 2)),
@@ -219,7 +219,7 @@ def begin(
 
 
 def panel_surplus(log_ris: float) -> float:
-    """What amplitudes tell for a point, as chi^2: it may be the panel or a scatterer, an image is the latter alone.
+    """What a track's amplitudes tell for a point, as chi^2: panel or scatterer; an image is the latter alone.
 
     Before a panel is known, that is: its own images change with the code as well.
     """

@@ -1,4 +1,4 @@
-"""What every estimator of pose and map is: four functions, the same inputs and outputs for all of them.
+"""The protocol of every estimator of pose and map: four functions, the same inputs and outputs for all of them.
 
 The default filter (`slam`) and each folder of `slam.schemes` are such a set, as modules.
 """
@@ -33,5 +33,5 @@ class SlamEstimator(Protocol):
         ...
 
     def estimate(self, state: Any, config: Any) -> SlamEstimate:
-        """Mean and covariance of the pose, equally likely samples of it, and the map."""
+        """What every estimator gives: mean and covariance of the pose, equally likely samples of it, and the map."""
         ...

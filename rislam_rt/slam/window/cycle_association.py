@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
-from rislam_rt.slam.associate import Candidates, cheapest, pair_costs, squared_distance
+from rislam_rt.slam.associate import Candidates, cheapest, pair_costs
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
@@ -46,8 +46,6 @@ class CycleAssociation(NamedTuple):
     """Log likelihood of the cycle over that of strangers alone."""
     surprise: float
     """Standard deviations by which fewer of the returns that should show did."""
-    strain: float
-    """Mean square of the innovations, normalised: about 1 when all is well."""
 
 
 def echoes(observed: Observations, cell: Floats) -> Booleans:
@@ -82,14 +80,21 @@ def associate_cycle(
     clear, scatter = recall(visibility, expected, landmarks)
     groups = cluster(expected, scene.sensor.cell_length, clear, None if sides is None else np.maximum(sides, OTHER))
     shows = visible(expected, groups, clear)
-    row, pick, gain, strain = _associate(expected, groups, shows, scatter, covariance, observed, sides, strangers)
+    row, pick, score = _associate(expected, groups, shows, scatter, covariance, observed, sides, strangers)
     alone = groups.by_itself == 1.0
     due, seen = shows[alone], np.isin(np.arange(len(shows)), row)[alone]
-    miss = float(np.log1p(-due[~seen]).sum())
     surprise = (due.sum() - seen.sum()) / np.sqrt((due * (1.0 - due)).sum() + 0.25)
-    return CycleAssociation(
-        mean, poses, expected, groups, shows, scatter, row, pick, gain + miss, float(surprise), strain
-    )
+    return CycleAssociation(mean, poses, expected, groups, shows, scatter, row, pick, score, float(surprise))
+
+
+def score_again(
+    view: CycleAssociation, window: Window, landmarks: WindowTable, observed: Observations, strangers: Floats
+) -> float:
+    """The cycle's score under another belief: what is expected moves with it to first order, clusters stay."""
+    mean, covariance = window_gaussian.now(window)
+    expected = view.expected._replace(seen=view.expected.seen + view.expected.jacobian @ (mean - view.mean))
+    sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
+    return _associate(expected, view.groups, view.shows, view.scatter, covariance, observed, sides, strangers)[2]
 
 
 def return_sides(forms: Integers, landmarks: WindowTable) -> Integers:
@@ -107,11 +112,12 @@ def _associate(
     expected: ExpectedComponents, groups: UnresolvedClusters, shows: Floats, scatter: Floats, covariance: Floats,
     observed: Observations,
     sides: Integers | None, strangers: Floats,
-) -> tuple[Integers, Integers, float, float]:  # fmt: skip
-    """Rows of the clusters that were seen, the components that they were seen as, the log likelihood gained over
-    strangers, and the strain: the best assignment."""
+) -> tuple[Integers, Integers, float]:  # fmt: skip
+    """Rows of the clusters that were seen, the components that they were seen as, and the log likelihood of the cycle
+    over that of strangers alone: the best assignment."""
+    missed = groups.by_itself == 1.0
     if not len(groups.leader) or not len(observed.seen):
-        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), 0.0, 1.0
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), float(np.log1p(-shows[missed]).sum())
     lead, mate = groups.leader, groups.partner
     share = groups.share[:, None]
     seen = expected.seen[lead] + share * groups.gap
@@ -119,7 +125,7 @@ def _associate(
     extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(observed.std, axis=0) ** 2
     most = np.abs(expected.jacobian) @ np.sqrt(np.diagonal(covariance))  # no correlation makes a deviation larger
     near = _within_reach(seen, (most[lead] + share * (most[mate] - most[lead])) ** 2 + extra, observed)
-    lead, mate, share, seen, shows = lead[near], mate[near], share[near], seen[near], shows[near]
+    lead, mate, share, seen, every, shows = lead[near], mate[near], share[near], seen[near], shows, shows[near]
     jacobian = expected.jacobian[lead] + share[..., None] * (expected.jacobian[mate] - expected.jacobian[lead])
     spread = (jacobian.reshape(-1, jacobian.shape[-1]) @ covariance).reshape(jacobian.shape)
     spread = spread @ np.swapaxes(jacobian, 1, 2)
@@ -132,10 +138,9 @@ def _associate(
     rows, columns = cheapest(cost)
     # the cost counts what is missed: seen against missed, both against strangers
     gain = -0.5 * float(cost[rows, columns].sum()) + float(np.log1p(-shows[rows]).sum())
-    noise = np.zeros((len(rows), 3, 3))
-    noise[:, [0, 1, 2], [0, 1, 2]] = observed.std[columns] ** 2
-    distance, _ = squared_distance(observed.seen[columns] - seen[rows], spread[rows] + noise)
-    return near[rows], columns, gain, float(distance.mean() / 3.0) if len(rows) else 1.0
+    rows = near[rows]
+    missed[rows] = False
+    return rows, columns, gain + float(np.log1p(-every[missed]).sum())
 
 
 def _within_reach(seen: Floats, variance: Floats, observed: Observations) -> Integers:

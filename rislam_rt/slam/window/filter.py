@@ -17,7 +17,7 @@ from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.births import births
 from rislam_rt.slam.window.births.feature_removal import condemned, release
-from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes
+from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes, score_again
 from rislam_rt.slam.window.divergence import divergence_monitor, recovery
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, empty_table, idents, image_ident
 from rislam_rt.slam.window.landmarks.landmark_update import learn, no_observations
@@ -29,7 +29,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
 )
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, empty_log, renew
-from rislam_rt.slam.window.numerics import DAMPING, MANOEUVRE, MISSED, REFRESH, STRAINED
+from rislam_rt.slam.window.numerics import DAMPING, LATELY, MISSED, REFRESH
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.excess import grow, take_in
@@ -177,16 +177,17 @@ def _notice(
             window, state.landmarks, state.visibility, heading, state.scene, code, observed, strangers
         )
 
-    best, window = view_of(state.window), state.window
-    learnt = state.config.motion == "learnt"
-    if learnt and (best.surprise > MISSED or best.strain > STRAINED) and len(state.window.step):
-        for steps, liveliness in MANOEUVRE:
-            precision = state.window.precision.copy()
-            lively = COLUMNS[: precision.shape[1]] != 1
-            precision[-steps:, lively] = np.minimum(precision[-steps:, lively], liveliness**-2.0)
-            trial = window_gaussian.solve(state.window._replace(precision=precision))
+    calm = best = view_of(state.window)
+    window = state.window
+    if state.config.motion == "learnt" and len(calm.groups.leader) and len(state.window.step):
+        precision = state.window.precision.copy()
+        lively = COLUMNS[: precision.shape[1]] != 1
+        precision[-LATELY:, lively] = np.minimum(precision[-LATELY:, lively], CONSTANTS.liveliest**-2.0)
+        trial = window_gaussian.solve(state.window._replace(precision=precision))
+        score = score_again(calm, trial, state.landmarks, observed, strangers)
+        if score + CONSTANTS.log_rare > calm.score:
             view = view_of(trial)
-            if view.score + CONSTANTS.log_rare > best.score:
+            if view.score + CONSTANTS.log_rare > calm.score:
                 best, window = view, trial
     if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
         by = divergence_monitor.jump(best, observed)

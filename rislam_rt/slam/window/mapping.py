@@ -1,4 +1,4 @@
-"""From the window's belief to the estimate that others read."""
+"""The map and pose that others read, from the window's belief."""
 
 from dataclasses import replace
 

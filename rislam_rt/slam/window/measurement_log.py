@@ -1,4 +1,4 @@
-"""The components of the window's cycles, and what each is held to be; their quadratics on poses and features."""
+"""Log of the window's measurements, and what each is held to be; their quadratics on poses and features."""
 
 from typing import Any, NamedTuple
 

@@ -1,6 +1,6 @@
-"""Steps of the solver and limits of what is worth a look.
+"""Numerics: steps of the solver and limits of what is worth a look.
 
-Some belong to the model and are not in its table: `LADDER`, `SHORTER`, `BEARING`, `ALIGNED`.
+Some belong to the model and are not in its table: `EDGE`, `LEVEL`, `IN_WALL`, `SHORTER`, `BEARING`, `ALIGNED`.
 """
 
 import numpy as np
@@ -29,11 +29,10 @@ NEARBY = 2.0
 """Distance [m] beyond which two places are not compared."""
 ASIDE = 10.0
 """Log evidence behind a track's best from which on a hypothesis is not weighed for others, or as the panel."""
-MANOEUVRE = ((3, 0.5), (10, 1.0))
-"""Latest steps that are tried as lively ones, and standard deviation [m/s^2] of their accelerations then."""
-MISSED, STRAINED = 1.5, 1.5
-"""Standard deviations by which fewer returns show than should, and mean square of their innovations, from which on a
-manoeuvre is looked for."""
+LATELY = 5
+"""Last steps that may all have been as lively as can be: what began within half a second."""
+MISSED = 1.5
+"""Standard deviations by which fewer returns show than should, from which on a jump is looked for."""
 DRAWS = 12
 """Places of the belief over which the panel's predicted gain is averaged."""
 CERTAIN = 30.0

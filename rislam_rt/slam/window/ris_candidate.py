@@ -1,4 +1,5 @@
-"""What may be a panel that the map does not hold: tracks are weighed as points are; the design aims at the best."""
+"""The RIS candidate, a panel that the map does not hold: tracks are weighed as points are; the design aims at the
+best."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What the window filter carries from cycle to cycle."""
+"""The window filter's state, carried from cycle to cycle."""
 
 from typing import NamedTuple
 

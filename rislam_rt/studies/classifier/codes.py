@@ -30,6 +30,6 @@ def set_codes(paths: Paths, panel: DataSheet | None, policy: str, *, rng: np.ran
 
 
 def _middle(paths: Paths) -> int:
-    """The cycle in the middle of those in which the direct path over the panel is there."""
+    """Cycle at which a code is aimed: the middle one of those with a direct path over the panel."""
     there = np.flatnonzero(paths.valid[:, paths.kind == PathKind.RIS].any(axis=1))
     return int(there[len(there) // 2]) if len(there) else 0

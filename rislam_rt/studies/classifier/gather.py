@@ -1,4 +1,4 @@
-"""Labelled tracks from walks: what the receiver reports, tracked as the agent would, and what each truly was."""
+"""Gathering labelled tracks from walks: what the receiver reports, tracked as the agent would, and what each was."""
 
 from typing import NamedTuple
 
@@ -47,21 +47,21 @@ class Examples(NamedTuple):
 
     @property
     def keep(self) -> Booleans:
-        """(N,) whether it came over a landmark."""
+        """(N,) whether a gathered example came over a landmark."""
         return self.kind >= PathKind.PS
 
     @property
     def labelled(self) -> Booleans:
-        """(N,) whether it was a path, and not clutter."""
+        """(N,) whether a gathered example was a path, and not clutter."""
         return self.kind != CLUTTER
 
     def pick(self, rows: Booleans | Integers) -> "Examples":
-        """Some of them."""
+        """Some of the gathered examples."""
         return Examples._make(field[rows] for field in self)
 
 
 def join(parts: list[Examples]) -> Examples:
-    """Several sets as one."""
+    """Several sets of gathered examples as one."""
     return Examples._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
 
 
@@ -100,7 +100,7 @@ def gather_walk(
 
 
 def _classes(paths: Paths, column: Integers) -> tuple[Integers, Integers]:
-    """`Examples.kind` and `.legs` of components that are these columns of the paths, -1 for clutter."""
+    """`Examples.kind` and `.legs` of gathered components that are these columns of the paths, -1 for clutter."""
     over = OVER_RX * np.any(paths.rx_walls >= 0, axis=1) + OVER_TX * np.any(paths.tx_walls >= 0, axis=1)
     over = np.where(paths.kind >= PathKind.PS, over, 0)
     true = column >= 0
@@ -122,7 +122,7 @@ class _Memory:
         self.rows = {label: held for label, held in self.rows.items() if label in alive}
 
     def sightings(self, labels: Integers, cycle: int, position: Floats, heading: Floats) -> Sightings:
-        """What the labels have shown in the window that ends at a cycle."""
+        """What the labels of gathered tracks have shown in the window that ends at a cycle."""
         first = max(0, cycle - WINDOW + 1)
         table = np.zeros((len(labels), cycle - first + 1, 7))
         table[..., 3:6] = 1.0

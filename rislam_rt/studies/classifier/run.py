@@ -1,4 +1,4 @@
-"""Gather examples in random rooms, train and choose on them, and score once on the named rooms."""
+"""A run of the training: gather examples in random rooms, train and choose on them, score once on the named rooms."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -81,7 +81,7 @@ def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:
 
 
 def _fit(examples: Examples, spec: ClassifierSpec, *, rng: np.random.Generator) -> Network:
-    """One network from one random start."""
+    """One network of the classifier, trained from one random start."""
     known, section = examples.pick(examples.labelled & ~examples.near), spec.network
     return train_network(
         known.features, known.keep, balance(known), section.hidden, section.penalty, section.iterations, rng=rng
@@ -89,7 +89,8 @@ def _fit(examples: Examples, spec: ClassifierSpec, *, rng: np.random.Generator) 
 
 
 def balance(examples: Examples) -> Floats:
-    """Weights (N,) of examples: keep and remove count alike, and so does every path class of either, however rare.
+    """Weights (N,) of the classifier's examples: keep and remove count alike, and so does every path class of either,
+    however rare.
 
     Within a class an example counts by one over the root of its walk's number of examples.
     """

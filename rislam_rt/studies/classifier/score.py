@@ -1,4 +1,4 @@
-"""How good a classifier is: F1 of "keep", intervals over walks, what each feature is worth."""
+"""Scores of a classifier: F1 of "keep", intervals over walks, what each feature is worth."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -93,7 +93,7 @@ def mean_over_rooms(rooms: list[Examples], rule: Rule, coverage: float, *, rng: 
 
 
 def importance(examples: Examples, network: Network, *, rng: np.random.Generator) -> dict[str, Floats]:
-    """Loss of F1 (S,) when one feature is shuffled among the examples, S times."""
+    """Score of a feature: loss of F1 (S,) when it is shuffled among the examples, S times."""
     known = examples.pick(examples.labelled & ~examples.near)
     full = f1(known.keep, odds_over_life(known, network) > 0.0)
     lost: dict[str, Floats] = {}
@@ -108,7 +108,7 @@ def importance(examples: Examples, network: Network, *, rng: np.random.Generator
 
 
 def by_value(examples: Examples, rule: Rule, value: Floats, edges: tuple[int, ...]) -> dict[str, tuple[float, int]]:
-    """F1, and how many examples, in bins `edges[i] <= value < edges[i + 1]` of age or SNR."""
+    """Score F1, and how many examples, in bins `edges[i] <= value < edges[i + 1]` of age or SNR."""
     kept, known = rule(examples), examples.labelled & ~examples.near
     bins = {}
     for low, high in pairwise(edges):
@@ -120,7 +120,7 @@ def by_value(examples: Examples, rule: Rule, value: Floats, edges: tuple[int, ..
 
 
 def path_classes(examples: Examples) -> dict[str, Booleans]:
-    """Which examples (N,) are of each path class, those over walls apart by the legs that the walls are on."""
+    """Which examples (N,) to score are of each path class, those over walls apart by the legs with walls."""
     found = {}
     for kind in PathKind:
         over_walls = kind in (PathKind.VS, PathKind.VRIS)
@@ -132,7 +132,7 @@ def path_classes(examples: Examples) -> dict[str, Booleans]:
 
 
 def mistakes(examples: Examples, rule: Rule) -> dict[str, tuple[int, int]]:
-    """Wrong examples by path class: wrong, and how many there are."""
+    """Score of mistakes by path class: how many examples are wrong, and how many there are."""
     wrong = rule(examples) != examples.keep
     return {name: (int(np.sum(wrong & rows)), int(np.sum(rows))) for name, rows in path_classes(examples).items()}
 
@@ -152,18 +152,18 @@ def panel_dropped(examples: Examples, rule: Rule) -> dict[str, tuple[int, int]]:
 
 
 def f1(keep: Booleans, kept: Booleans) -> float:
-    """F1 of keep."""
+    """Score F1 of keep."""
     return float(_f1(np.array(_counts(kept, keep, np.ones(len(keep), dtype=np.bool_)))[None])[0])
 
 
 def _tables(examples: Examples, kept: Booleans) -> Integers:
-    """(walks, 4) counts of each walk, clutter left out."""
+    """Score counts (walks, 4) of each walk, clutter left out."""
     walks = np.unique(examples.walk)
     return np.array([_counts(kept, examples.keep, examples.labelled & (examples.walk == walk)) for walk in walks])
 
 
 def _counts(kept: Booleans, keep: Booleans, rows: Booleans) -> tuple[int, int, int, int]:
-    """Kept rightly, kept wrongly, removed wrongly, removed rightly."""
+    """Score counts: kept rightly, kept wrongly, removed wrongly, removed rightly."""
     return (
         int(np.sum(rows & kept & keep)),
         int(np.sum(rows & kept & ~keep)),

@@ -1,4 +1,4 @@
-"""Examples to learn from, to choose by and to test on: walks through random rooms and through named ones."""
+"""Sets of examples to learn from, to choose by and to test on: walks through random rooms and through named ones."""
 
 import zlib
 from collections.abc import Sequence
@@ -39,17 +39,17 @@ class Sets(NamedTuple):
 
     @property
     def tested(self) -> Examples:
-        """All named rooms together."""
+        """Test set of all named rooms together."""
         return join(list(self.test.values()))
 
     @property
     def all_drawn(self) -> Examples:
-        """All drawn rooms together."""
+        """Set of all drawn rooms together."""
         return join(list(self.drawn.values()))
 
 
 def gather_sets(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Tell = tell_nobody) -> Sets:
-    """Everything that a specification asks for; its seed decides all draws.
+    """All sets of examples that a specification asks for; its seed decides all draws.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def gather_random(number: int, spec: ClassifierSpec) -> Examples:
 
 
 def gather_drawn(seed: int, spec: ClassifierSpec) -> Examples:
-    """Examples of the room of a seed along its own motion, under every policy."""
+    """Set of examples of the room of a seed along its own motion, under every policy."""
     scene, rng = draw_room(seed).scene, np.random.default_rng([spec.seed, seed, 1])
     policies = range(len(POLICIES))
     return gather_motion(

@@ -1,4 +1,4 @@
-"""What the pipeline file of a classifier's training may say."""
+"""Specification of a classifier's training: what its pipeline file may say."""
 
 from typing import Annotated, Literal
 
@@ -18,7 +18,7 @@ Share = Annotated[float, Field(ge=0.0, le=100.0)]
 
 
 def build_receiver(section: ReceiverSection) -> ReceiverConfig:
-    """The receiver's settings.
+    """The receiver's settings by the specification of a classifier's training.
 
     Raises
     ------

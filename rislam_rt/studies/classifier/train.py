@@ -1,4 +1,4 @@
-"""Fit the network: penalised cross-entropy by L-BFGS, gradients by back-propagation."""
+"""Training of the network: penalised cross-entropy by L-BFGS, gradients by back-propagation."""
 
 from itertools import pairwise
 

@@ -40,7 +40,7 @@ def random_walk(scene: Scene, cycles: int, *, rng: np.random.Generator) -> Traje
 
 
 def _arc(scene: Scene, start: Floats, cycles: int, rng: np.random.Generator) -> Trajectory:
-    """Constant speed and rate of turn from a start."""
+    """Walk at constant speed and rate of turn from a start."""
     time = CYCLE * np.arange(cycles, dtype=np.float64)
     speed, rate = rng.uniform(*SPEED), TURN_RATE * rng.standard_normal()
     heading = rng.uniform(-np.pi, np.pi) + rate * time

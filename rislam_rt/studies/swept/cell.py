@@ -26,7 +26,7 @@ CLOCK = ("seconds", "step_seconds", "over_budget")
 
 
 def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """The scores of all schemes; one that fails costs no other, and says why."""
+    """Run a cell of a swept study: scores of all schemes; one that fails costs no other, and says why."""
     spec = cell_spec(settings)
     prepare_channel(spec.channel)
     scene = load_scene(Path(settings["beside"]) / str(settings["scene"]))
@@ -67,7 +67,7 @@ def _scores(result: SlamResult, name: str) -> dict[str, Any]:
 
 
 def _paper_snr(setup: RunSetup, spec: PipelineSpec) -> float:
-    """SNR [dB] as the paper has it, of the mean power at some twenty places of the way, panel at level 0."""
+    """SNR [dB] of a cell as the paper has it, of the mean power at some twenty places of the way, panel at level 0."""
     settings, rows = build_settings(spec), np.arange(len(setup.scene.agent))
     rows = rows[:: max(1, len(rows) // 20)]
     per_cycle = ("valid", "tau", "departure", "arrival", "gain", "vertices")

@@ -1,4 +1,4 @@
-"""From the cells of a swept study to numbers with intervals. Failures are counted, never dropped."""
+"""Collecting the cells of a swept study as numbers with intervals. Failures are counted, never dropped."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -41,25 +41,25 @@ class Group(NamedTuple):
 
     @property
     def reasons(self) -> list[str]:
-        """Why schemes failed, each reason once."""
+        """Why schemes failed in a collected group, each reason once."""
         entries = [(name, entry) for result in self.results if result for name, entry in result["schemes"].items()]
         return list(dict.fromkeys(f"{name}: {entry['failed']}" for name, entry in entries if "failed" in entry))
 
     def failed(self, scheme: str) -> int:
-        """Repetitions without a score of the scheme: it failed, or its cell did."""
+        """Repetitions in a collected group without a score of the scheme: it failed, or its cell did."""
         return int(np.isnan(self.column(scheme, "rmse_m")).sum()) - self.missing
 
     def diverged(self, scheme: str) -> int:
-        """Repetitions in which the estimate was lost."""
+        """Repetitions in a collected group in which the estimate was lost."""
         return int(np.nansum(self.column(scheme, "diverged")))
 
     def mean(self, name: str) -> float:
-        """Mean of a number that belongs to the cell and to no scheme."""
+        """Mean in a collected group of a number that belongs to the cell and to no scheme."""
         return float(np.mean([result[name] for result in self.results if result]))
 
 
 def group_rows(rows: Sequence[Row]) -> list[Group]:
-    """Rows by their point, both in their order."""
+    """Collect rows by their point, both in their order."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(repr(row.cell.point), []).append(row)
@@ -74,7 +74,7 @@ def group_rows(rows: Sequence[Row]) -> list[Group]:
 
 
 def spread(values: Floats) -> Interval | None:
-    """Root mean square over the runs that have a value, with its interval; None if none has."""
+    """RMS over the collected runs that have a value, with its interval; None if none has."""
     known = values[~np.isnan(values)]
     if not len(known):
         return None

@@ -26,7 +26,7 @@ HALF = 0.683
 
 
 def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """False components, whether the panel's direct path is heard, and errors over reported deviations.
+    """Run a cell of a receiver study: false components, panel's direct path heard, errors over reported deviations.
 
     Once as set, and once more with an estimator that is told of the faults, on the same front end and noise.
     """
@@ -57,7 +57,7 @@ def _look(
     paths: Paths, motion: Trajectory, cycle: int, made: Settings, front_end: FrontEnd | None,
     *, rng: np.random.Generator
 ) -> dict[str, Any]:  # fmt: skip
-    """Counts and whitened errors of one cycle."""
+    """Counts and whitened errors of the receiver in one cycle."""
     heading, shift = float(motion.heading[cycle]), doppler_shift(paths, motion, made.radio.wavelength)[cycle]
     measurement, truth = measure(
         paths, cycle, heading, made.radio, made.receiver, None, shift, front_end, rng=rng

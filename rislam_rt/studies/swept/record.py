@@ -1,4 +1,4 @@
-"""What is needed to repeat a swept study."""
+"""The record of a swept study: what is needed to repeat it."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""What the pipeline file of a swept study may say."""
+"""Specification of a swept study: what its pipeline file may say."""
 
 from typing import Annotated, Any, Literal
 
@@ -43,6 +43,11 @@ class SweptSpec(Section):
         """Variants that the study goes through; none by default."""
         return []
 
+    @model_validator(mode="after")
+    def _each_once(self) -> "SweptSpec":
+        check_names(self.all_variants)
+        return self
+
 
 class _OneRoom(SweptSpec):
     scene: str | None = None
@@ -63,11 +68,6 @@ class Fig4bSpec(_OneRoom):
     def all_variants(self) -> list[VariantSection]:
         """The cases."""
         return self.cases
-
-    @model_validator(mode="after")
-    def _each_once(self) -> "Fig4bSpec":
-        check_names(self.cases)
-        return self
 
 
 class Fig4cSpec(_OneRoom):
@@ -105,7 +105,7 @@ class MismatchSection(Section):
         return self
 
     def variant(self, level: float | int | str) -> "VariantSection":
-        """Its settings at a level."""
+        """Settings of a mismatch in a study's specification at a level."""
         values = {**self.set, self.key: level}
         return VariantSection(name=f"{self.name}_{level}", group=self.name, note=self.note, set=values)
 
@@ -123,11 +123,6 @@ class RobustnessSpec(_OneRoom):
         """The reference, in which all is as it is told, and then every level of every mismatch."""
         levels = [mismatch.variant(level) for mismatch in self.mismatches for level in mismatch.levels]
         return [VariantSection(name="reference"), *levels]
-
-    @model_validator(mode="after")
-    def _each_once(self) -> "RobustnessSpec":
-        check_names(self.all_variants)
-        return self
 
 
 class HardwareSpec(_OneRoom):
@@ -153,11 +148,6 @@ class HardwareSpec(_OneRoom):
                 variants += [one, VariantSection(name=f"{one.name}{CALIBRATED}", group=one.group, set=more)]
         return variants
 
-    @model_validator(mode="after")
-    def _each_once(self) -> "HardwareSpec":
-        check_names(self.all_variants)
-        return self
-
 
 CALIBRATED = "_calibrated"
 """End of the name of a variant with calibration."""
@@ -178,11 +168,6 @@ class RoomsSpec(SweptSpec):
         """The variants."""
         return self.variants
 
-    @model_validator(mode="after")
-    def _each_once(self) -> "RoomsSpec":
-        check_names(self.variants)
-        return self
-
 
 class AblationsSpec(_OneRoom):
     """One setting changed at a time."""
@@ -197,11 +182,6 @@ class AblationsSpec(_OneRoom):
         """The variants."""
         return self.variants
 
-    @model_validator(mode="after")
-    def _each_once(self) -> "AblationsSpec":
-        check_names(self.variants)
-        return self
-
 
 SWEPT: dict[str, type[SweptSpec]] = {
     "fig4b": Fig4bSpec,
@@ -215,7 +195,7 @@ SWEPT: dict[str, type[SweptSpec]] = {
 
 
 def check_names(variants: list[VariantSection]) -> None:
-    """Refuse variants of one name."""
+    """Refuse a study's specification with variants of one name."""
     names = [variant.name for variant in variants]
     if len(set(names)) < len(names):
         raise ValueError("a name comes twice; give each once")

@@ -95,7 +95,7 @@ def _axes(spec: SweptSpec) -> tuple[Axis, ...]:
 
 
 def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
-    """All settings of a cell, defaults filled in, its room and the versions."""
+    """All settings of a swept study's cell, defaults filled in, its room and the versions."""
     load, versions = cache(load_scene), library_versions()
 
     def depends(settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -29,7 +29,7 @@ SEEN_BY_TRACER_NOT = ("name", "description", "scene", "seed", "schemes", "receiv
 
 
 def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """The score cards of all schemes; one that fails costs no other, and says why.
+    """Run a cell of unseen rooms: score cards of all schemes; one that fails costs no other, and says why.
 
     All randomness comes of the room's own seed, so that every variant and SNR has the same motion and noise.
     """
@@ -60,7 +60,7 @@ class KeptOutputs(NamedTuple):
 def _run(
     name: str, setup: RunSetup, spec: PipelineSpec, traits: Mapping[str, Any], keep: KeptOutputs
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Scores and times of one scheme."""
+    """Scores and times of one scheme in a cell of unseen rooms."""
     recorder = Recorder(ESTIMATORS[SCHEMES[name].estimator])
     result = run_scheme(name, setup, spec, tell_nobody, recorder.estimator)
     truth = build_truth(setup.scene, setup.paths, result, spec)
@@ -76,14 +76,14 @@ def _run(
 
 
 def cell_label(settings: Mapping[str, Any]) -> str:
-    """Variant and SNR, for names of files."""
+    """Label of a cell by variant and SNR, for names of files."""
     snr = settings["run"].get("radio", {}).get("reference_snr_db")
     parts = [str(settings["variant"])] if settings.get("variant") else []
     return "".join(f"{part}_" for part in [*parts, *([f"{snr:g}dB"] if snr is not None else [])])
 
 
 def scheme_here(asked: str, room: RandomRoom) -> str:
-    """The scheme itself, or, in a room without a panel, that of the same estimator which needs none."""
+    """Scheme of a cell, or, in a room without a panel, that of the same estimator which needs none."""
     scheme = SCHEMES[asked]
     if room.scene.ris is not None or not scheme.panel:
         return asked
@@ -91,7 +91,7 @@ def scheme_here(asked: str, room: RandomRoom) -> str:
 
 
 def trace_key(spec: PipelineSpec) -> str:
-    """The settings that decide true motion and paths, as text."""
+    """Key of a cell's trace: the settings that decide true motion and paths, as text."""
     content = spec.model_dump(mode="json", exclude={*SEEN_BY_TRACER_NOT, *ESTIMATOR_SECTIONS})
     content["radio"] |= {"reference_snr_db": None, "noise_psd": None}
     return json.dumps(content, sort_keys=True)
@@ -106,6 +106,6 @@ def find_setup(seed: int, key: str) -> tuple[RandomRoom, RunSetup]:
 
 
 def room_traits(room: RandomRoom) -> dict[str, Any]:
-    """The classes of a room, plain."""
+    """Traits of a cell's room: its classes, plain."""
     traits = {field.name: getattr(room, field.name) for field in fields(room) if field.name != "scene"}
     return {**traits, "scatterers": len(room.scene.scatterers)}

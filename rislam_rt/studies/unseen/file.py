@@ -64,7 +64,7 @@ def write_recording(recording: Recording, path: Path) -> None:
 
 
 def read_recording(path: str | Path) -> Recording:
-    """What `write_recording` wrote.
+    """Read the file that `write_recording` wrote.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def recording_to_dataset(recording: Recording) -> "xr.Dataset":
 
 
 def dataset_to_recording(data: "xr.Dataset") -> Recording:
-    """The inverse of `recording_to_dataset`."""
+    """Recording of a file's data set; the inverse of `recording_to_dataset`."""
     marks = data.attrs
     values = {name: data[f"true_{name}"].to_numpy() for name in TRUTH}
     for name in ("landmark_audible", "wall_audible"):

@@ -1,4 +1,4 @@
-"""What is needed to repeat a study in unseen rooms."""
+"""The record of a study in unseen rooms: what is needed to repeat it."""
 
 from typing import Any
 

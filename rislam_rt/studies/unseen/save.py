@@ -1,4 +1,4 @@
-"""What a cell leaves beside its scores: recorded runs, rooms, samples."""
+"""Files to save beside a cell's scores: recorded runs, rooms, samples."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +18,7 @@ from rislam_rt.studies.unseen.file import Recording, write_recording
 
 
 def save_run(recording: Recording, folder: Path, label: str) -> Path:
-    """The recorded run as `<room>/<label>.nc`; returns the file.
+    """Save the recorded run as `<room>/<label>.nc`; returns the file.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def save_run(recording: Recording, folder: Path, label: str) -> Path:
 
 
 def save_room(scene: Scene, traits: Mapping[str, Any], folder: Path) -> None:
-    """The room as a scene folder, with the motion of the runs, once.
+    """Save the room as a scene folder, with the motion of the runs, once.
 
     Raises
     ------
@@ -68,5 +68,5 @@ def save_signals(
 
 
 def room_folder(folder: Path, traits: Mapping[str, Any]) -> Path:
-    """Where all of a room lies."""
+    """Where all saved files of a room lie."""
     return folder / f"room_{int(traits['seed']):05d}"

@@ -59,7 +59,7 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
 
 
 def lost_scores(relative: Floats, bound: Floats, own: Floats, time: Floats, outcomes: list[Any]) -> dict[str, Any]:
-    """Whether the estimate was lost, when, and whether it was so in silence.
+    """Score of being lost: whether the estimate was, when, and whether it was so in silence.
 
     It is not in silence if an outcome says so from then on, or if the believed deviation `own` (K,) [m] does.
     """
@@ -74,7 +74,7 @@ def lost_scores(relative: Floats, bound: Floats, own: Floats, time: Floats, outc
 
 
 def _lasting(flag: Booleans, time: Floats) -> Booleans:
-    """Cycles from which on a flag (K,) stays for `LASTING` seconds."""
+    """Cycles of a score from which on a flag (K,) stays for `LASTING` seconds."""
     step = float(np.median(np.diff(time))) if len(time) > 1 else LASTING
     length = max(1, round(LASTING / step))
     return np.asarray(np.convolve(flag, np.ones(length), "valid") >= length) if len(flag) >= length else flag[:0]
@@ -139,7 +139,7 @@ def point_scores(truth: Truth, maps: list[MapEstimate], inputs: Inputs, told: Fl
 
 
 def kind_scores(truth: Truth, maps: list[MapEstimate], answers: Answers) -> dict[str, Any]:
-    """How many landmarks were born, and of how many the kind was right.
+    """Score of birth kinds: how many landmarks were born, and of how many the kind was right.
 
     A point is right if most of its components came straight from a landmark; an image, over a wall from one; what got
     fewer than `MIN_PARTS` components is not judged.
@@ -164,7 +164,7 @@ def kind_scores(truth: Truth, maps: list[MapEstimate], answers: Answers) -> dict
 
 
 def heard_long(audible: Booleans, time: Floats) -> Booleans:
-    """Which columns of (K, N) are audible for `HEARD` seconds in all."""
+    """Which columns of (K, N) count in a score: audible for `HEARD` seconds in all."""
     step = float(np.median(np.diff(time))) if len(time) > 1 else HEARD
     return np.asarray(audible.sum(axis=0) * step >= HEARD - 1e-9)
 
@@ -195,13 +195,13 @@ def _errors(truth: Truth, answers: Answers, told: Floats) -> Errors:
 
 
 def _ratio(name: str, errors: Floats, bound: Floats) -> dict[str, float | None]:
-    """RMSE, RMS bound and their ratio."""
+    """Score of a run: RMSE, RMS bound and their ratio."""
     rmse, least = root_mean_square(errors), root_mean_square(bound)
     return {f"{name}rmse_m": rmse, f"{name}bound_m": least, f"{name}ratio": rmse / least if least else None}
 
 
 def _nees(truth: Truth, answers: Answers) -> float | None:
-    """Mean over the cycles, per degree of freedom, of the absolute error."""
+    """Score of consistency: mean NEES over the cycles, per degree of freedom, of the absolute error."""
     covariance = np.array([estimate.covariance for estimate in answers.estimates])
     axes = np.flatnonzero(np.einsum("kii->ki", covariance[:, :3, :3]).min(axis=0) > 0.0)
     if not len(axes):
@@ -212,7 +212,8 @@ def _nees(truth: Truth, answers: Answers) -> float | None:
 
 
 def _delay(first: Integers, audible: Booleans, time: Floats) -> float | None:
-    """Median time [s] from the first audible cycle to the first match, of what was ever matched and audible."""
+    """Score of delay: median time [s] from the first audible cycle to the first match, of what was ever matched and
+    audible."""
     known = (first >= 0) & audible.any(axis=0)
     return _median(time[first[known]] - time[np.argmax(audible[:, known], axis=0)])
 

@@ -1,4 +1,4 @@
-"""What the pipeline file of a study in unseen rooms may say."""
+"""Specification of a study in unseen rooms: what its pipeline file may say."""
 
 from typing import Annotated, Literal
 
@@ -39,7 +39,7 @@ class UnseenSpec(SweptSpec):
 
     @property
     def is_test(self) -> bool:
-        """Whether the rooms are those for tests."""
+        """Whether the unseen rooms are those for tests."""
         return self.first >= TEST
 
     @model_validator(mode="after")

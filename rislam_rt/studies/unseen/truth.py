@@ -1,4 +1,4 @@
-"""What a run's score is measured against: true motion, landmarks, walls, when each could be heard, and the bounds."""
+"""The truth that a run's score is measured against: motion, landmarks, walls, when each could be heard, the bounds."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -77,7 +77,7 @@ def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: Pipeline
 
 
 def run_bounds(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineSpec) -> tuple[Floats, Floats]:
-    """Least RMS position errors (K,) [m], absolute, and relative to the start.
+    """Bounds to hold a run against: least RMS position errors (K,) [m], absolute, and relative to the start.
 
     The motion's law is white acceleration of the root mean square that this motion truly has, so that a lively one has
     a looser bound; what a filter is told of it does not count. No measurement of an unknown room tells where it lies:
@@ -112,7 +112,7 @@ def audible_paths(paths: Paths, settings: Settings) -> Booleans:
 
 
 def coplanar(walls: Walls) -> Integers:
-    """(W,) number of the plane of each wall, in the order of the walls: what an agent can tell apart."""
+    """(W,) number of the true plane of each wall, in the order of the walls: what an agent can tell apart."""
     group = np.full(len(walls), -1)
     count = 0
     for wall in range(len(walls)):
@@ -128,7 +128,7 @@ def coplanar(walls: Walls) -> Integers:
 
 
 def _surfaces(walls: Walls, group: Integers) -> tuple[Floats, Floats, Floats]:
-    """Centroid, normal and covariance of the points of each plane's surface.
+    """True surface of each plane: centroid, normal and covariance of its points.
 
     Over a triangle the mean of x x^T is (sum of v v^T + s s^T) / 12, with its corners v and their sum s.
     """

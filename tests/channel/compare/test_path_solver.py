@@ -12,8 +12,8 @@ from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.errors import TraceError
 from rislam_rt.model import RadioConfig
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.built_in_rooms import ROOMS
 from rislam_rt.scene.xml import scene_of_xml, sionna_scenes, write_xml
+from rislam_rt.shipped import shipped_rooms
 
 RADIO = RadioConfig()
 
@@ -66,7 +66,7 @@ def test_a_file_of_another_room_is_refused(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(ROOMS))
+@pytest.mark.parametrize("name", sorted(shipped_rooms()))
 def test_every_shipped_room_there_and_back(tmp_path, name):
     """As written against Sionna's solver; and read back with its scene file, against itself, to the last bit."""
     room = load_scene(name)

@@ -235,3 +235,29 @@ def test_a_delay_at_the_edge_of_the_window_passes(table: Table, spec: PipelineSp
     rows = {**table, "delay_s": [0.0] * len(table["time_s"])}
     given = inputs_of(rows, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
     assert max(one.tau.max(initial=0.0) for one in given.measurements) == 0.0
+
+
+def test_a_start_told_wrong_is_said_where_nobody_knows_the_truth(
+    table: Table, recorded: tuple[Inputs, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A speed wrong by 1 m/s, in a second's measurements: on the screen and in the table of cycles; told right, not."""
+    inputs, _ = recorded
+    file, rows = tmp_path / "mine.csv", sum(time < inputs.time[10] for time in table["time_s"])
+    with file.open("w", newline="") as lines:
+        writer = csv.writer(lines)
+        writer.writerow(table)
+        writer.writerows(list(zip(*table.values(), strict=True))[:rows])
+    start, tx, rx = (
+        ",".join(map(repr, map(float, value)))
+        for value in (inputs.start.position, inputs.body.tx_offset, inputs.body.rx_offset)
+    )
+    for off in (0.0, 1.0):
+        speed = inputs.start.velocity + off * np.eye(3)[0]
+        command(
+            file, find_pipeline("trace_then_slam"), set_=CHANGES, start=start, tx=tx, rx=rx,
+            velocity=",".join(map(repr, map(float, speed))), out=tmp_path / f"out{off}",
+        )  # fmt: skip
+        with (tmp_path / f"out{off}" / "estimate.csv").open() as lines:
+            said = [row["outcome"] for row in csv.DictReader(lines)].count("diverged")
+        assert (said > 0) == (off > 0.0)
+        assert f"cycles_diverged: {said}\n" in capsys.readouterr().out

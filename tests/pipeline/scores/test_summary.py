@@ -138,3 +138,16 @@ def test_steps_over_budget_are_named():
     seconds = {"optimise": 0.2, "communicate": 0.0, "measure": 0.01, "localise": 0.02}
     budget = {"optimise_s": 0.1, "communicate_s": 0.1, "measure_s": 0.1, "localise_s": 0.01}
     assert over_budget(seconds, budget) == ["optimise", "localise"]
+
+
+def test_a_run_whose_start_is_told_wrong_is_lost_and_says_so(run_short):
+    """A hundred times the start's deviations: a metre and a metre a second. The same start told right is neither."""
+    settings = ("cycles=10", "depth=1", 'schemes=["no_ris"]')
+    wrong, right = (
+        summarise(run_short(*settings, f"told.start_scale={scale}"))["schemes"]["no_ris"] for scale in (100.0, 1.0)
+    )
+    assert wrong["diverged"] is True
+    assert right["diverged"] is False
+    assert wrong["outcomes"].get("diverged", 0) >= 1  # by the filter's own word, which knows no truth
+    assert "diverged" not in right["outcomes"]
+    assert sum(wrong["outcomes"].values()) == 10

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from built_in_rooms.parts import box_walls
 
-from rislam_rt.scene.built_in_rooms.shapes import block, box_walls, joined
+from rislam_rt.scene.shapes import block, joined
 
 SIZE = (5.0, 4.0, 2.6)
 Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])

@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from built_in_rooms.parts import box_walls
 
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Scene
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.built_in_rooms.shapes import block, box_walls, joined
 from rislam_rt.scene.importing import ImportOptions, import_room
+from rislam_rt.scene.shapes import block, joined
 
 SIZE, NOISE = np.array([3.2, 2.6, 2.4]), 0.005
 YAW = 0.35

@@ -10,8 +10,8 @@ from rislam_rt.cli.new import is_xml
 from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.model import Material
 from rislam_rt.scene import check_scene, load_scene
-from rislam_rt.scene.built_in_rooms import ROOMS
 from rislam_rt.scene.xml import new_from_xml, read_xml, write_xml
+from rislam_rt.shipped import shipped_rooms
 
 
 def same(a, b) -> bool:
@@ -28,7 +28,7 @@ def same(a, b) -> bool:
     return meshes and walls and agent and landmarks
 
 
-@pytest.mark.parametrize("name", sorted(ROOMS.keys() - {"large_hall"}))
+@pytest.mark.parametrize("name", sorted(shipped_rooms().keys() - {"large_hall"}))
 def test_there_and_back_is_the_same_room(tmp_path, name):
     room = load_scene(name)
     write_xml(room, tmp_path / "out")

@@ -21,10 +21,9 @@ SCHEMES = [
 
 
 @pytest.mark.parametrize(("scheme", "config"), SCHEMES)
-def test_a_short_walk_stays_within_bounds(scheme: Any, config: Any) -> None:
-    """Delays alone never tell how map and course are turned: no worse than three times dead reckoning.
-
-    That is 0.01 m of start and 0.01 m/s over the walk, on two axes.
+def test_a_short_walk_keeps_to_the_line_that_was_told(scheme: Any, config: Any) -> None:
+    """Delays alone do not tell how map and course are turned. How well they tell the way along it stands in
+    `tests/studies/unseen/test_every_estimator.py`.
     """
     room, rng = build_room(40, 1), np.random.default_rng(2)
     state = scheme.init(room.start, BODY, None, SensorModel(RADIO), config, rng=rng)
@@ -32,8 +31,6 @@ def test_a_short_walk_stays_within_bounds(scheme: Any, config: Any) -> None:
         dt = CYCLE if cycle else 0.0
         state, info = scheme.step(state, measurement, None, dt, HEADING, config, rng=rng)
         belief = scheme.estimate(state, config)
-        reckoned = np.sqrt(2.0) * np.hypot(0.01, 0.01 * CYCLE * cycle)
-        assert np.linalg.norm(belief.position - room.position[cycle]) < 3.0 * reckoned
         assert np.linalg.eigvalsh(belief.covariance)[0] > -1e-12
         assert len(info.landmark) == len(measurement)
         assert np.isfinite([info.nis, info.log_evidence, info.ess]).all()

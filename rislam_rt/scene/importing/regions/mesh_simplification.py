@@ -1,4 +1,4 @@
-"""Fewer triangles: flat regions by their outlines, clutter by cells, each with how far it is off [m]."""
+"""Simplification of meshes: flat regions by their outlines, clutter by cells, each with how far it is off [m]."""
 
 import numpy as np
 
@@ -41,7 +41,7 @@ def region_mesh(facets: FlatRegions, regions: Integers, kept: Booleans, toleranc
 
 
 def _onto(points: Floats, normal: Floats, offset: float) -> Floats:
-    """Points in a plane, moved only where rounding does not explain that they are off it."""
+    """Points of a simplified mesh in a plane, moved only where rounding does not explain that they are off."""
     height = points @ normal - offset
     return points - height[:, None] * normal if np.abs(height).max() > 1e-6 else points
 
@@ -75,19 +75,19 @@ def _filled(
 
 
 def _off_loop(corners: Floats, loop: Floats) -> float:
-    """Largest distance [m] of corners (n, 3) from a closed loop (m, 3)."""
+    """Largest distance [m] of corners (n, 3) from a simplified closed loop (m, 3)."""
     edges = np.stack([loop, np.roll(loop, -1, axis=0)], axis=1)
     return float(distance_to_edges(corners, edges).max())
 
 
 def _around(hole: Floats, outers: list[Floats]) -> int | None:
-    """The smallest outer loop around a hole."""
+    """Smallest outer loop around a hole, for simplification."""
     around = [k for k, outer in enumerate(outers) if _holds(outer, hole)]
     return min(around, key=lambda k: signed_area(outers[k])) if around else None
 
 
 def _holds(outer: Floats, hole: Floats) -> bool:
-    """Whether a loop (n, 2) holds the middle of another's first edge."""
+    """Whether a loop (n, 2) to simplify holds the middle of another's first edge."""
     return inside_loop(outer, 0.5 * (hole[0] + hole[1]))
 
 

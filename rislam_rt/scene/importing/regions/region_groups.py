@@ -88,7 +88,7 @@ def _continues(facets: FlatRegions, regions: Integers, shell: Integers) -> bool:
 
 
 def _touching(facets: FlatRegions, things: list[Integers]) -> list[Integers]:
-    """Things whose boxes touch, together: a seat and its legs are a chair."""
+    """Regions whose boxes touch, as groups: a seat and its legs are a chair."""
     if not things:
         return []
     low, high = np.stack([bounds_of(facets, regions) for regions in things], axis=1)
@@ -100,7 +100,7 @@ def _touching(facets: FlatRegions, things: list[Integers]) -> list[Integers]:
 
 
 def plain_name(name: str) -> str:
-    """A node's name as a wall's name: `Office Chair.002` is `office_chair_002`; empty if it says nothing."""
+    """Name of a region's group from a node's name: `Office Chair.002` is `office_chair_002`; or empty."""
     if _NAMELESS.fullmatch(name):
         return ""
     plain = re.sub(r"[^\w.\-]+", "_", name.strip(), flags=re.UNICODE).strip("_.-").lower()
@@ -108,13 +108,13 @@ def plain_name(name: str) -> str:
 
 
 def place_free_name(name: str) -> str:
-    """The same, empty too where it says no more than that it is a wall, floor or ceiling."""
+    """Name of a region's group, empty too where it says no more than wall, floor or ceiling."""
     plain = plain_name(name)
     return "" if re.fullmatch(r"(walls?|floors?|ceilings?|roof|wand|boden|decke)?[_\d]*", plain) else plain
 
 
 def kind_by_shape(bounds: Floats, room: Floats) -> str:
-    """What a thing is called by its size and place; a name, nothing that is computed with."""
+    """Name of a group of regions by its size and place; nothing that is computed with."""
     size, floor = bounds[1] - bounds[0], float(room[0, 2])
     bottom, top = float(bounds[0, 2]) - floor, float(bounds[1, 2]) - floor
     longest, shortest = float(size[:2].max()), float(size[:2].min())
@@ -144,7 +144,7 @@ def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
 
 
 def numbered(names: list[str]) -> list[str]:
-    """Names made different: the second of one name gets `_2`, and so on."""
+    """Names of region groups made different: the second of one name gets `_2`, and so on."""
     taken: set[str] = set()
     found = []
     for name in names:

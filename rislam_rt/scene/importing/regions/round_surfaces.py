@@ -6,9 +6,9 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import unit
-from rislam_rt.scene.built_in_rooms.shapes import joined, quad
 from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions, crease_groups
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.shapes import joined, quad
 
 CREASE = np.radians(35.0)
 """Facets that meet at more than this are an edge: a round thing is drawn with eleven sides or more."""
@@ -50,7 +50,7 @@ def sides_for(radius: float, sagitta: float, arc: float) -> int:
 
 
 def prism(found: RoundPatch, sagitta: float) -> tuple[Mesh, float]:
-    """A cylinder's flat sides, without ends, and how far they are off it [m].
+    """A round surface as a prism: a cylinder's flat sides, without ends, and how far they are off it [m].
 
     All the way round the girth is the true one, so that its shadow is (Cauchy); an arc has its corners on the circle.
     """
@@ -70,7 +70,7 @@ def prism(found: RoundPatch, sagitta: float) -> tuple[Mesh, float]:
 
 
 def across(axis: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors across an axis, and each other."""
+    """Two unit vectors across a round surface's axis, and each other."""
     u = unit(np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
     return u, np.cross(axis, u)
 

@@ -7,12 +7,12 @@ from scipy.ndimage import binary_closing, binary_fill_holes, label
 from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Booleans, Floats
-from rislam_rt.scene.built_in_rooms.shapes import joined
 from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
 from rislam_rt.scene.importing.regions.round_surfaces import across
 from rislam_rt.scene.importing.scans.point_cloud import PointCloud
 from rislam_rt.scene.importing.scans.scan_planes import ScanPlane
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.shapes import joined
 
 CELL = 0.1
 """[m] Of the grid in which a plane's points are counted."""
@@ -124,7 +124,7 @@ def _to_corner(flat: Floats, near: Booleans, other_flat: Floats, other_near: Boo
 
 
 def _closed(there: Booleans, ridges: Booleans, fill: float) -> tuple[Booleans, float]:
-    """Occupied cells with gaps bridged and small holes filled; also the area [m^2] of the holes."""
+    """Outline of a scan's plane with gaps bridged and small holes filled; also the area [m^2] of the holes."""
     solid = binary_closing(there, iterations=BRIDGE)
     walled = solid | ridges
     holes, count = label(binary_fill_holes(walled) & ~walled)
@@ -138,7 +138,7 @@ def _closed(there: Booleans, ridges: Booleans, fill: float) -> tuple[Booleans, f
 
 
 def _loops(there: Booleans) -> list[list[Floats]]:
-    """Outer loop and holes (n, 2) [cells] of each connected part, thinned."""
+    """Outer outline and holes (n, 2) [cells] of each connected part of a scan's plane, thinned."""
     shape = (there.shape[0] + 1, there.shape[1] + 1)
     corners = np.arange(shape[0] * shape[1]).reshape(shape)
     points = np.moveaxis(np.indices(shape), 0, -1).reshape(-1, 2).astype(np.float64)
@@ -157,7 +157,7 @@ def _loops(there: Booleans) -> list[list[Floats]]:
 
 
 def _snapped(loop: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats) -> Floats:
-    """A loop whose edges lie where planes meet, its corners where its edges meet."""
+    """Outline of a scan's plane whose edges lie where planes meet, its corners where its edges meet."""
     plane, edges = planes[number], []
     for start, end in zip(loop, np.roll(loop, -1, axis=0), strict=True):
         edges.append(_edge(start, end, number, planes, trees, frame, plane))
@@ -181,7 +181,7 @@ def _snapped(loop: Floats, number: int, planes: list[ScanPlane], trees: list[cKD
 
 
 def _converged(corners: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats) -> Floats:
-    """Corners that nearly lie on other planes put there: on two at most, the nearest first."""
+    """Corners of a scan's outline that nearly lie on other planes put there: on two at most."""
     plane, moved = planes[number], corners.copy()
     for k, corner in enumerate(corners):
         place = frame @ corner + plane.offset * plane.normal
@@ -207,7 +207,7 @@ def _converged(corners: Floats, number: int, planes: list[ScanPlane], trees: lis
 
 
 def _same(a: _Edge, b: _Edge) -> bool:
-    """Whether two edges lie on the line of one plane."""
+    """Whether two edges of a scan's outline lie on the line of one plane."""
     parallel = abs(float(a.normal @ b.normal)) > 0.999
     return bool(a.met and b.met and parallel and abs(abs(a.offset) - abs(b.offset)) < 1e-9)
 
@@ -216,7 +216,7 @@ def _edge(
     start: Floats, end: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats,
     plane: ScanPlane,
 ) -> _Edge:  # fmt: skip
-    """The line of an edge: where the nearest other plane cuts this one, if it is near all along the edge."""
+    """Line of an outline's edge: where the nearest other plane of the scan cuts this one, if near all along."""
     along = end - start
     length = float(np.linalg.norm(along))
     normal = np.array([along[1], -along[0]]) / length

@@ -96,7 +96,7 @@ def _remarks(kept: list[tuple[ScanPlane, Outline]], noise: float) -> list[str]:
 
 
 def _unexplained(mesh: Welded, surfaces: list[Surface], reach: float) -> Booleans:
-    """Triangles with a corner farther from every clean plane than a reach [m]."""
+    """Triangles of a scan with a corner farther from every clean plane than a reach [m]."""
     walls = np.concatenate([s.mesh.vertices[s.mesh.faces] for s in surfaces])
     distance = np.full(len(mesh.vertices), np.inf)
     for normal, offset in ((s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in surfaces):

@@ -39,14 +39,14 @@ class Whitened(NamedTuple):
 
 
 def moments(weight: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Weighted mean (D,) and covariance (D, D) of values (N, D)."""
+    """Weighted mean (D,) and covariance (D, D) of agent particles (N, D)."""
     mean = weight @ values
     centred = values - mean
     return mean, (centred * weight[:, None]).T @ centred
 
 
 def whiten(weight: Floats, values: Floats) -> Whitened:
-    """Weighted values (N, D) made standard."""
+    """Weighted agent particles (N, D) in coordinates of mean zero and unit covariance."""
     mean, covariance = moments(weight, values)
     # a constant's rounding errors must not become a direction of their own
     scale = np.maximum(np.sqrt(np.diag(covariance)), ROUNDING * (1.0 + np.abs(mean)))
@@ -58,7 +58,8 @@ def whiten(weight: Floats, values: Floats) -> Whitened:
 
 
 def standardise(weight: Floats, values: Floats) -> Floats:
-    """Values (N, K) corrected to weighted mean zero and, where N allows, unit covariance, by the least movement."""
+    """Agent particles (N, K) corrected to weighted mean zero and, where N allows, unit covariance, by least
+    movement."""
     values = values - weight @ values
     if values.shape[1] == 0 or 1.0 / np.sum(weight**2) < ROOM * values.shape[1]:
         return values
@@ -67,7 +68,7 @@ def standardise(weight: Floats, values: Floats) -> Floats:
 
 
 def exact_noise(values: Floats, dims: int, *, rng: np.random.Generator) -> Floats:
-    """(N, dims) standard normal noise that has no correlation with values (N, D) and exact moments in this sample.
+    """(N, dims) motion noise for agent particles (N, D): uncorrelated with them, with exact moments in this sample.
 
     Weights do not count here: `posterior` corrects for what they do.
     """
@@ -82,7 +83,7 @@ def exact_noise(values: Floats, dims: int, *, rng: np.random.Generator) -> Float
 
 
 def posterior(log_weight: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Mean (D,) and covariance (D, D) of weighted values (N, D).
+    """Mean (D,) and covariance (D, D) of weighted agent particles (N, D).
 
     The weighted sample's own moments err by a standard deviation over sqrt(N) even in directions that the weights do
     not depend on at all: the sample correlates by chance. Here the weights are taken for a Gaussian likelihood, plus
@@ -102,7 +103,7 @@ def posterior(log_weight: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _likelihood(log_weight: Floats, known: Floats) -> tuple[Floats, Floats] | None:
-    """Slope b (K,) and posterior precision I + C of weights `exp(a + b y - y C y / 2)` of standard values y (N, K).
+    """Gaussian that fits agent particles' weights: slope b (K,), precision I + C of `exp(a + b y - y C y / 2)`.
 
     Poisson regression with a logarithmic link: its solution gives the sample the same mean and second moment as the
     weights do, and noise on the weights only costs accuracy. None where it does not exist or is no Gaussian.
@@ -132,7 +133,7 @@ def _likelihood(log_weight: Floats, known: Floats) -> tuple[Floats, Floats] | No
 
 
 def resample(log_weight: Floats, values: Floats, count: int, *, rng: np.random.Generator) -> tuple[Integers, Floats]:
-    """Ancestors (count,) and the values (count, D) of their children, of equal weight.
+    """Resampled agent particles: ancestors (count,), and the values (count, D) of their children, of equal weight.
 
     Systematic resampling and a smooth kernel about every survivor (Liu and West, 2001) on all of the values together,
     so that what they have in common stays in common; then the mean and covariance of `posterior` are given to them.
@@ -149,7 +150,7 @@ def resample(log_weight: Floats, values: Floats, count: int, *, rng: np.random.G
 
 
 def square_root(covariance: Floats, near: Floats) -> Floats:
-    """A factor (D, K) of a covariance, close to that (D, K) of a covariance much like it."""
+    """Factor (D, K) of the agent particles' covariance, close to that (D, K) of one much like it."""
     back = np.linalg.pinv(near)
     values, vectors = np.linalg.eigh(back @ covariance @ back.T)
     return near @ (vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)

@@ -1,4 +1,4 @@
-"""Agent particles, each with a cloud of landmark particles for every landmark (eqs. `landmarkRenew`, `agentRenew`)."""
+"""The belief: agent particles, each with a cloud of landmark particles (eqs. `landmarkRenew`, `agentRenew`)."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -94,7 +94,7 @@ def draw_start(mean: Floats, std: Floats, count: int, window: int, *, rng: np.ra
 
 
 def propagate(belief: Nested, dt: float, accelerate: Floats, turn: float, *, rng: np.random.Generator) -> Nested:
-    """Discrete white-noise acceleration: constant over the cycle, standard deviations `accelerate` (3,) [m/s^2].
+    """Belief after white acceleration, constant over the cycle, of deviations `accelerate` (3,) [m/s^2].
 
     `turn` [rad] is that of a random step of the heading.
     """
@@ -106,7 +106,7 @@ def propagate(belief: Nested, dt: float, accelerate: Floats, turn: float, *, rng
 
 
 def absorb(belief: Nested, owner: int, sightings: Sequence[Sighting], engine: CloudEngine) -> tuple[Nested, float]:
-    """Weights after returns that speak of landmark `owner`, and the log evidence of what was measured.
+    """Belief's weights after returns that speak of landmark `owner`, and the log evidence of what was measured.
 
     The previous weight enters once, however many returns there are. If no particle can explain them, the belief stays
     as it was and the evidence is minus infinity.
@@ -191,7 +191,7 @@ def initialise_landmark(
 
 
 def drop(belief: Nested, keep: Booleans) -> Nested:
-    """Only some of the landmarks."""
+    """Belief with only some of the landmarks."""
     rows = np.flatnonzero(keep)
     return belief._replace(
         clouds=tuple(belief.clouds[row] for row in rows),
@@ -215,7 +215,7 @@ def gaussian(belief: Nested) -> Moments:
 
 
 def mean_covariances(belief: Nested) -> Floats:
-    """(F, 3, 3) [m^2] of every landmark given the agent's trajectory, on average."""
+    """(F, 3, 3) [m^2] of every landmark given the agent's trajectory, averaged over the belief."""
     return np.einsum("n,nfij->fij", belief.weight, belief.covariance)
 
 
@@ -230,7 +230,7 @@ def num_particles(belief: Nested) -> int:
 
 
 def joint(belief: Nested) -> Floats:
-    """(N, 7 + 3F) position, velocity, heading, and the clouds' means."""
+    """(N, 7 + 3F) the belief's agent particles with their clouds: position, velocity, heading, clouds' means."""
     count = len(belief.log_weight)
     pose = [belief.position, belief.velocity, belief.heading[:, None]]
     return np.concatenate([*pose, belief.mean.reshape(count, -1)], axis=1)

@@ -1,4 +1,4 @@
-"""Landmark particles of one landmark for all agent particles: M points about a centre, shared through indices.
+"""The cloud of one landmark's particles for all agent particles: M points about a centre, shared through indices.
 
 Points are stored as offsets from a centre in float64, in single precision (numpy) or as numbers of 21 bits (Dr.Jit,
 `grid.py`), which costs nothing: an offset of 0.1 m is exact to 1e-7 m. An agent particle finds its points in block
@@ -111,7 +111,7 @@ def combine(lanes: Floats) -> CloudSums:
 
 
 def restoring_map(wanted: Floats, found: Floats) -> Floats:
-    """Linear maps (N, 3, 3) that give offsets of covariance `found` the covariance `wanted`.
+    """Linear maps (N, 3, 3) that give clouds' offsets of covariance `found` the covariance `wanted`.
 
     Of all such maps that which moves particles least, if the two covariances are alike. A cloud that has collapsed is
     opened to `LEAST_STD`.
@@ -127,6 +127,6 @@ def restoring_map(wanted: Floats, found: Floats) -> Floats:
 
 
 def kernel_width(size: int, dims: int) -> float:
-    """Silverman's kernel width for `size` Gaussian samples in `dims` dimensions, in standard deviations."""
+    """Silverman's kernel width for a cloud of `size` Gaussian samples in `dims` dimensions, in deviations."""
     width = (4.0 / (dims + 2.0)) ** (1.0 / (dims + 4.0)) * size ** (-1.0 / (dims + 4.0))
     return float(min(width, LARGEST_WIDTH))

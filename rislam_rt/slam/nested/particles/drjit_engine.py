@@ -169,7 +169,7 @@ class DrJitEngine:
         return ancestors
 
     def _draw(self, cloud: Cloud, ancestors: Any, size: int, stride: int) -> Any:
-        """Points of the ancestors, children of one parent put far apart."""
+        """Points of the ancestors in Dr.Jit, children of one parent put far apart."""
         dr, count = self._dr, len(cloud.block)
         agent, place, lanes = self._lanes(count, size)
         packets, block = size // PACKET, self._look_up(cloud.block, agent) * cloud.size
@@ -238,7 +238,7 @@ class DrJitEngine:
         return moved
 
     def _packet(self, points: Any, at: Any) -> list[Any]:
-        """x, y and z of four neighbouring points, in steps."""
+        """x, y and z in Dr.Jit of four neighbouring points, in steps."""
         a, b = (self._dr.gather(self._four_int, points, at // 2 + k) for k in range(2))
         parts = split(self._four_int(a[0], a[2], b[0], b[2]), self._four_int(a[1], a[3], b[1], b[3]))
         return [self._four(self._dr.reinterpret_array(self._four_signed, part) >> 11) for part in parts]
@@ -256,7 +256,7 @@ class DrJitEngine:
         return agent, lane - agent * lanes, lanes
 
     def _known(self, constants: Floats, agent: Any) -> list[Any]:
-        """Constants (K, N) as each lane sees them."""
+        """Constants (K, N) in Dr.Jit as each lane sees them."""
         table, count = self._upload(constants), constants.shape[1]
         return [self._dr.gather(self._float, table, agent + k * count) for k in range(len(constants))]
 
@@ -264,7 +264,7 @@ class DrJitEngine:
         return self._dr.gather(self._int, self._int(table.astype(np.uint32)), agent)
 
     def _pick(self, part: Any, four: Any, blocks: Integers, packets: int) -> Any:
-        """Blocks of so many packets of the type `four`."""
+        """Blocks in Dr.Jit of so many packets of the type `four`."""
         dr = self._dr
         index = dr.arange(self._int, len(blocks) * packets)
         block = index // packets

@@ -79,19 +79,19 @@ def _residuals(belief: Nested, birth: Birth, body: Body, feature: Floats) -> tup
 
 
 def _parent_covariance(belief: Nested, birth: Birth) -> Floats:
-    """(3, 3) [m^2], zero without a parent."""
+    """(3, 3) [m^2] of a new landmark's parent, zero without one."""
     parent = birth.verdict.parent
     return np.zeros((3, 3)) if parent < 0 else mean_covariances(belief)[parent]
 
 
 def _prior(belief: Nested, birth: Birth) -> Sighting:
-    """What is known before: a floor is level."""
+    """What is known of a new landmark before: a floor is level."""
     offset = belief.centre[:, -1] - birth.verdict.fit.feature
     return Sighting((linear_sightline(offset, np.zeros(3)),), np.zeros(3), birth.prior)
 
 
 def _past_sighting(belief: Nested, birth: Birth, body: Body, row: int, noise: Floats) -> Sighting:
-    """A past measurement as the new cloud sees it."""
+    """A past measurement as the new landmark's cloud sees it."""
     parent, kind = birth.verdict.parent, birth.verdict.kind
     past = belief.trail[birth.slots[row]]
     poses = poses_of(past[:, :3], past[:, 3], body)
@@ -102,7 +102,7 @@ def _past_sighting(belief: Nested, birth: Birth, body: Body, row: int, noise: Fl
 
 
 def _past_uncertainty(belief: Nested, birth: Birth, body: Body, kind: Returns, row: int) -> Floats:
-    """(3, 3) share of the parent's error in a past measurement, counted as often as it repeats itself."""
+    """(3, 3) share of the parent's error in a new landmark's past measurement, counted as often as it repeats."""
     covariance = _parent_covariance(belief, birth)
     if not covariance.any():
         return covariance

@@ -1,4 +1,4 @@
-"""What the cycle asks of the belief: begin, move, update, one more landmark, fewer, resample. Pure functions."""
+"""Operations of the cycle on the belief: begin, move, update, one more landmark, fewer, resample. Pure functions."""
 
 from typing import NamedTuple
 
@@ -34,7 +34,7 @@ class PointParticles(NamedTuple):
 
     @property
     def engine(self) -> CloudEngine:
-        """Where the heavy passes run."""
+        """The backend on which the cycle's heavy operations run."""
         return pick_engine(self.config.engine)
 
     @property
@@ -67,7 +67,7 @@ def begin(start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) ->
 
 
 def set_prior_map(particles: PointParticles, features: Floats, covariance: Floats) -> PointParticles:
-    """F landmarks (F, 3) known beforehand, with a covariance (3F, 3F)."""
+    """The cycle sets a prior map: F landmarks (F, 3) known beforehand, with a covariance (3F, 3F)."""
     known = place_known(particles.belief, features, covariance, particles.config, particles.engine)
     return particles._replace(belief=known)
 
@@ -82,7 +82,7 @@ def propagate(
     *,
     rng: np.random.Generator,
 ) -> PointParticles:
-    """Discrete white-noise acceleration over `dt` [s]; the new pose is kept in row `slot` of the trail."""
+    """The cycle moves the particles over `dt` [s] by white acceleration; the new pose is kept in trail row `slot`."""
     turn = config.turn_std * np.sqrt(dt) if config.heading == "estimated" else 0.0
     moved = belief.propagate(particles.belief, dt, accelerate, turn, rng=rng)
     if config.heading == "known":
@@ -97,12 +97,12 @@ def propagate(
 
 
 def moments(particles: PointParticles) -> Moments:
-    """Mean and covariance over pose and features."""
+    """The cycle asks for mean and covariance over pose and features."""
     return belief.gaussian(particles.belief)
 
 
 def trail(particles: PointParticles, slots: Integers) -> tuple[Floats, Floats]:
-    """Mean positions (K, 3) and headings (K,) of past poses."""
+    """The cycle asks for mean positions (K, 3) and headings (K,) of past poses."""
     past = np.einsum("n,knj->kj", particles.belief.weight, particles.belief.trail[slots])
     return past[:, :3], past[:, 3]
 
@@ -118,7 +118,7 @@ def update(
     *,
     rng: np.random.Generator,
 ) -> ParticleUpdate:
-    """Update by A associated returns: lengths [m] and cosines `seen` (A, 3) with standard deviations `std`."""
+    """The cycle updates by A associated returns: lengths [m] and cosines `seen` (A, 3) with deviations `std`."""
     if not len(seen):
         return ParticleUpdate(particles, 0.0, np.zeros((0, 3)), 0.0)
     visibility = Seen(returns, twin, anchor, body, seen, std**2 + FLOOR**2)
@@ -134,7 +134,7 @@ def update(
 def initialise_landmark(
     particles: PointParticles, new: Birth, body: Body, *, rng: np.random.Generator
 ) -> PointParticles:
-    """One more landmark, from the history of a track."""
+    """The cycle adds one landmark to the particles, from the history of a track."""
     moved = history.initialise_landmark(
         particles.belief, new, body, particles.spans, particles.config, particles.engine, rng=rng
     )
@@ -142,7 +142,7 @@ def initialise_landmark(
 
 
 def drop(particles: PointParticles, keep: Booleans) -> PointParticles:
-    """Only the landmarks (F,) that are kept."""
+    """The cycle keeps only the landmarks (F,) that are marked."""
     return particles._replace(belief=belief.drop(particles.belief, keep))
 
 

@@ -16,7 +16,7 @@ SEED = 7
 def set_prior_map(
     belief: Nested, features: Floats, covariance: Floats, config: NestedConfig, engine: CloudEngine
 ) -> Nested:
-    """F landmarks (F, 3) with a joint covariance (3F, 3F).
+    """Particles given a prior map: F landmarks (F, 3) with a joint covariance (3F, 3F).
 
     What landmarks have in common is spread over the agent particles, the rest over their clouds. A known map fixes the
     place of everything, so that the common shift is no longer kept aside but sampled as well.
@@ -39,7 +39,7 @@ def set_prior_map(
 
 
 def _own_part(covariance: Floats) -> Floats:
-    """The largest share of each landmark's own block that leaves a covariance."""
+    """Largest share of each prior landmark's own block that leaves a covariance."""
     own = np.zeros_like(covariance)
     for row in range(0, len(covariance), 3):
         own[row : row + 3, row : row + 3] = covariance[row : row + 3, row : row + 3] + 1e-12 * np.eye(3)
@@ -51,6 +51,6 @@ def _own_part(covariance: Floats) -> Floats:
 
 
 def _root(covariance: Floats) -> Floats:
-    """Symmetric square root, negative rounding taken for zero."""
+    """Symmetric square root of a prior map's covariance, negative rounding taken for zero."""
     values, vectors = np.linalg.eigh(covariance)
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)

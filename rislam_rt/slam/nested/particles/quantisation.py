@@ -1,4 +1,4 @@
-"""Points as 21-bit numbers, three of them in 8 bytes: the passes over particles wait for memory, not for arithmetic.
+"""Quantisation of points as 21-bit numbers, three in 8 bytes: passes over particles wait for memory, not arithmetic.
 
 A step is one millionth of a block's largest offset, as fine as single precision is there: x in the upper 21 bits of the
 first word, y in those of the second, and z in what both have left, its upper 11 bits in the first word.
@@ -33,28 +33,28 @@ class Quantisation(NamedTuple):
 
 
 def steps(reach: Floats) -> Floats:
-    """Steps [m] that hold offsets up to `reach` [m]."""
+    """Quantisation steps [m] that hold offsets up to `reach` [m]."""
     return np.maximum(reach / TOP, FINEST)
 
 
 def encode(points: Floats, step: Floats) -> Words:
-    """Words (B, M, 2) of points (B, M, 3), with a step [m] for each block (B,)."""
+    """Quantised words (B, M, 2) of points (B, M, 3), with a step [m] for each block (B,)."""
     whole = np.clip(np.rint(points / step[:, None, None]), -TOP, TOP).astype(np.int32).view(np.uint32)
     first, second = join(whole[..., 0], whole[..., 1], whole[..., 2])
     return np.stack([first, second], axis=-1).astype(np.uint32)
 
 
 def decode(words: Words, step: Floats) -> Floats:
-    """Points (B, M, 3) [m]; undoes `encode`."""
+    """Points (B, M, 3) [m] of quantised words; undoes `encode`."""
     parts = split(words[..., 0], words[..., 1])
     return np.stack([part.astype(np.uint32).view(np.int32) >> 11 for part in parts], axis=-1) * step[:, None, None]
 
 
 def join(x: Any, y: Any, z: Any) -> tuple[Any, Any]:
-    """Two words of three signed numbers of 21 bits, in plain arithmetic for numpy and Dr.Jit alike."""
+    """Two quantised words of three signed numbers of 21 bits, in arithmetic for numpy and Dr.Jit alike."""
     return (x << 11) | ((z >> 10) & LOW), (y << 11) | ((z & 1023) << 1)
 
 
 def split(first: Any, second: Any) -> tuple[Any, Any, Any]:
-    """The three numbers in the upper 21 bits of a word each; what is below them goes by an arithmetic shift by 11."""
+    """Three quantised numbers in the upper 21 bits of a word each; what is below goes by an arithmetic shift of 11."""
     return first, second, (first << 21) | ((second & LOW) << 10)

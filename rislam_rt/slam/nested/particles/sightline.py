@@ -1,4 +1,4 @@
-"""One return as the particles of one landmark see it: the formula that both engines share.
+"""Sightline of one return as the particles of one landmark see it: the formula that both engines share.
 
 An agent particle sees a return over a Tx leg and an Rx leg. Of all features on these legs one, the owner, is a cloud;
 the others stand at the agent particle's own mean. Whatever lies before the owner on a leg is a fixed base, and whatever
@@ -129,7 +129,7 @@ def log_likelihood(
 
 
 def _predict(kind: Kind, take: Iterator[Any], x: Any, y: Any, z: Any, rsqrt: Callable[[Any], Any]) -> list[Any]:
-    """Length and two cosines."""
+    """Length and two cosines of a landmark particle along its sightline."""
     if kind.tx == Leg.LINEAR:
         offset = [next(take) for _ in range(3)]
         for _ in range(NUM_AXES):
@@ -156,7 +156,7 @@ def _predict(kind: Kind, take: Iterator[Any], x: Any, y: Any, z: Any, rsqrt: Cal
 
 
 def _square(dx: Any, dy: Any, dz: Any) -> Any:
-    """Squared length, kept off zero: a landmark on top of the device is improbable, not undefined."""
+    """Squared length of a sightline, kept off zero: a landmark on the device is improbable, not undefined."""
     return dx * dx + dy * dy + dz * dz + 1e-12
 
 
@@ -199,7 +199,7 @@ def trace_sightline(
 def _trace_leg(
     leg: Sequence[int], owner: int, features: Floats, anchor: Floats, source: Floats, device: Floats, axes: Floats
 ) -> tuple[Leg, Floats, Floats]:
-    """Kind of a leg, its constants (the whole offset where it is fixed), and the axes as mirrored along."""
+    """Kind of a sightline's leg, its constants (the whole offset where fixed), and the axes as mirrored along it."""
     base, walls = int(leg[0]), [int(wall) for wall in leg[1:] if wall != NONE]
     start = source if base == TX else features[:, base]
     place = 0 if base == owner and base != TX else walls.index(owner) + 1 if owner in walls else None
@@ -222,7 +222,7 @@ def _mirror(axes: Floats, normal: Floats) -> Floats:
 
 
 def linear_sightline(centre: Floats, agent: Floats) -> Sightline:
-    """The offset (N, 3) from agent to landmark itself, for checks against theory."""
+    """Sightline of the offset (N, 3) from agent to landmark itself, for checks against theory."""
     return Sightline(
         Kind(Leg.LINEAR, Leg.LINEAR), np.zeros((len(centre), 0)), centre - agent, np.zeros((len(centre), 6))
     )

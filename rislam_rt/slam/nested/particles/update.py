@@ -47,7 +47,7 @@ class LinearPrediction(NamedTuple):
 
 
 def look(moments: Moments, seen: Seen) -> LinearPrediction:
-    """Innovations and their derivatives at the mean belief."""
+    """Innovations and derivatives of the returns at the mean belief, for the update of the particles."""
     poses = poses_of(moments.position, np.asarray(moments.heading), seen.body)
     gap, by_state = seen.seen.copy(), np.zeros((*seen.seen.shape, len(moments.mean)))
     for side in (seen.returns, seen.twin):
@@ -60,7 +60,7 @@ def look(moments: Moments, seen: Seen) -> LinearPrediction:
 
 
 def whitened(moments: Moments, predicted: LinearPrediction, noise: Floats) -> tuple[Floats, float]:
-    """Innovation (A, 3) of each return by itself, whitened, and the squared one of all together, normalised."""
+    """Whitened innovation (A, 3) of each return by itself for the update, and the normalised square of all together."""
     gap, rows = predicted.gap, np.arange(len(predicted.gap))
     flat = predicted.by_state.reshape(-1, len(moments.mean))
     total = flat @ moments.covariance @ flat.T + np.diag(noise.ravel())
@@ -70,19 +70,19 @@ def whitened(moments: Moments, predicted: LinearPrediction, noise: Floats) -> tu
 
 
 def trusted(noise: Floats, white: Floats) -> Floats:
-    """Variances (A, 3), larger where a return lies far off its prediction."""
+    """Variances (A, 3) that the update uses, larger where a return lies far off its prediction."""
     return noise * np.maximum(1.0, (TAIL + np.sum(white**2, axis=1)) / (TAIL + 3.0))[:, None]
 
 
 def owners(returns: Returns) -> Integers:
-    """(A,) the landmark that a return speaks of: its point if it is direct, else the wall next to the point."""
+    """(A,) landmark that a return updates: its point if it is direct, else the wall next to the point."""
     walls = returns.legs[:, 1]
     first = np.where(walls[returns.rx] != NONE, walls[returns.rx], walls[returns.tx])
     return np.where(first == NONE, returns.point, first)
 
 
 def update(belief: Nested, seen: Seen, config: NestedConfig, engine: CloudEngine) -> tuple[Nested, float]:
-    """The belief after all returns, and the log evidence of those that it could explain."""
+    """Particles updated by all returns, and the log evidence of those that the belief could explain."""
     owner = owners(seen.returns)
     direct = seen.returns.legs[:, 1]
     over_wall = (direct[seen.returns.rx] != NONE) | (direct[seen.returns.tx] != NONE)
@@ -102,7 +102,8 @@ def update(belief: Nested, seen: Seen, config: NestedConfig, engine: CloudEngine
 def _sightings(
     belief: Nested, owner: int, rows: Integers, seen: Seen, rho: Floats, config: NestedConfig
 ) -> list[Sighting]:
-    """Returns `rows` as the clouds of one landmark see them, in the order of their kinds, so that kernels recur."""
+    """Returns `rows` as the clouds of one landmark see them in the update, in the order of their kinds, so that kernels
+    recur."""
     poses = poses_of(belief.position, belief.heading, seen.body)
     features = belief.mean.copy()
     features[:, owner] = belief.centre[:, owner]
@@ -122,13 +123,13 @@ def _sightings(
 
 
 def _sides(seen: Seen, row: int) -> list[Returns]:
-    """The return, and its twin if it has one."""
+    """The return that updates, and its twin if it has one."""
     legs = [(side.legs[side.tx[row]].tolist(), side.legs[side.rx[row]].tolist()) for side in (seen.returns, seen.twin)]
     return [seen.returns] if legs[0] == legs[1] else [seen.returns, seen.twin]
 
 
 def _uncertainties(belief: Nested, owner: int, seen: Seen) -> Floats:
-    """(A, 3, 3) covariance that the other features' errors, given the trajectory, add to each return.
+    """(A, 3, 3) covariance that other features' errors, given the trajectory, add to each return of the update.
 
     They err the same way every cycle, and their share must not average out: what the n-th measurement of the owner
     carries of it counts n times.

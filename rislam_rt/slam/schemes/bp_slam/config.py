@@ -1,4 +1,4 @@
-"""Settings of BP-SLAM by delays, both ends moving."""
+"""Configuration of BP-SLAM by delays, both ends moving."""
 
 from dataclasses import dataclass
 
@@ -74,5 +74,5 @@ class BpSlamConfig:
 
     @property
     def axes(self) -> Floats:
-        """(3,) ones for the axes that are filtered."""
+        """(3,) ones for the axes that BP-SLAM filters."""
         return axes_filtered(self.height)

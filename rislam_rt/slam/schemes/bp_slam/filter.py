@@ -1,4 +1,4 @@
-"""BP-SLAM for an agent that carries both ends: ranges `|p_T - a| + |a - p_R|`, heading known.
+"""The filter of BP-SLAM for an agent that carries both ends: ranges `|p_T - a| + |a - p_R|`, heading known.
 
 Same functions, inputs and outputs as the package's own filter, so that a run can lead either. The panel and its code
 mean nothing to it, and angles of arrival are not used.
@@ -55,24 +55,24 @@ def init(
     start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: BpSlamConfig, *,
     rng: np.random.Generator,
 ) -> BpSlamState:  # fmt: skip
-    """The start prior, and no features. `ris` is taken for the interface and not used; nothing is drawn."""
+    """BP-SLAM's state at the start: the start prior, and no features. `ris` is not used; nothing is drawn."""
     agent = begin_agent(start, int(config.axes.sum()), body, sensor)
     return BpSlamState(agent, no_sums(len(agent.course.mean)), config.initial_features, 0)
 
 
 def assumed_odds(config: BpSlamConfig, sensor: SensorModel) -> Odds:
-    """What a range is weighed against, with the false ranges that the agent is told of its receiver."""
+    """What BP-SLAM weighs a range against, with the false ranges that the agent is told of its receiver."""
     rate = max(sensor.false_alarms, FEWEST_FALSE)
     return Odds(config.detection_probability, rate, SPEED_OF_LIGHT * sensor.window[1])
 
 
 def predict(state: BpSlamState, dt: float, config: BpSlamConfig) -> SlamEstimate:
-    """The belief carried over `dt` [s] without noise."""
+    """BP-SLAM's belief carried over `dt` [s] without noise."""
     return ahead_of(estimate(state, config), dt)
 
 
 def _move(state: BpSlamState, dt: float, config: BpSlamConfig) -> BpSlamState:
-    """Agent and features after `dt` [s]; the past state of every `course_stride` cycles is kept."""
+    """BP-SLAM's agent and features after `dt` [s]; the past state of every `course_stride` cycles is kept."""
     if dt == 0.0:
         return state
     agent, step = move_agent(state.agent, dt, config.sigma_a, config.course_stride)
@@ -87,7 +87,7 @@ def step(
     state: BpSlamState, measurement: Measurement, code: RisCode | None, dt: float, heading: float,
     config: BpSlamConfig, *, rng: np.random.Generator,
 ) -> tuple[BpSlamState, StepInfo]:  # fmt: skip
-    """Advance by one cycle: `dt` [s] since the last, `heading` [rad]. `code` and `rng` are there for the interface.
+    """Advance BP-SLAM by one cycle: `dt` [s] since the last, `heading` [rad]. `code` and `rng` are not used.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def _give_birth(
 
 
 def estimate(state: BpSlamState, config: BpSlamConfig) -> SlamEstimate:
-    """Mean and covariance of the pose, samples of it, and the detected features as points of the map."""
+    """BP-SLAM's pose (mean, covariance, samples), and its detected features as points of the map."""
     found = known_points(state.sums, config.detection_threshold)
     return reported(state.agent, found, config.num_samples)
 
@@ -138,7 +138,8 @@ def estimate(state: BpSlamState, config: BpSlamConfig) -> SlamEstimate:
 def _claimed(
     state: BpSlamState, sight: PredictedRanges, scan: Scan, found: Association, config: BpSlamConfig
 ) -> tuple[Integers, float]:
-    """Feature number of each range (`UNUSED` for none), and the NIS over those claimed, of the features' mixtures."""
+    """BP-SLAM's feature number of each range (`UNUSED` for none), and the NIS over those claimed, of the features'
+    mixtures."""
     sums, numbers = state.sums, np.full(len(scan.length), UNUSED)
     feature, shown = np.nonzero((found.feature[:, :-1] > 0.5) & (sums.existence > config.detection_threshold)[:, None])
     numbers[shown] = sums.ident[feature]

@@ -63,7 +63,7 @@ def expect_scan(
     sensor: SensorModel,
     config: BpSlamAoaConfig,
 ) -> View:
-    """Detection probabilities, pulls of neighbours, and the pairs worth weighing."""
+    """What association expects of features: detection probabilities, pulls of neighbours, pairs worth weighing."""
     variance = features.strength_variance + config.fading**2
     loud = predicted.log_amplitude[:, None] + np.sqrt(variance)[:, None] * HERMITE[0]
     snr = sensor.radio.integrated_snr(np.exp(np.clip(loud, -60.0, 5.0)))
@@ -89,7 +89,8 @@ def expect_scan(
 def _neighbours(
     features: GaussianFeatures, predicted: PredictedReturns, detection: Floats, sensor: SensorModel
 ) -> tuple[Floats, ...]:
-    """Probability (C,) of coming out as part of a louder return; mean (C, 3) and covariance of the pull of others."""
+    """Probability (C,) that a return merges into a louder one before association; mean (C, 3), covariance of the
+    pull."""
     weight = features.existence[features.owner] * features.share * detection
     sure = np.flatnonzero(weight > 0.1)
     weight = weight[sure]
@@ -107,12 +108,13 @@ def _neighbours(
 
 
 def spread_of(predicted: PredictedReturns, course: AgentTrajectory) -> Floats:
-    """Covariance (C, 3, 3) of predicted returns."""
+    """Covariance (C, 3, 3) of returns predicted for association."""
     return predicted.own + spread_over(predicted.by_course, course)
 
 
 def likelihoods(view: View, spread: Floats, scan: ComponentScan, more: Floats | None = None) -> Floats:
-    """Densities (N,) of the pairs times detection; `more` (3, 3) is added to the covariance of the agent's position."""
+    """Densities (N,) of the pairs to associate, times detection; `more` (3, 3) is added to the covariance of the
+    agent's position."""
     gaussian, component, noise, _, log_loudness = view.pairs
     total = (spread + view.disturbance)[gaussian]
     if more is not None:
@@ -124,7 +126,7 @@ def likelihoods(view: View, spread: Floats, scan: ComponentScan, more: Floats | 
 
 
 def log_density(miss: Floats, precision: Floats) -> Floats:
-    """Log normal densities (N,) of innovations (N, 3) with precisions (N, 3, 3); none beyond the gate."""
+    """Log normal densities (N,) of the innovations (N, 3) of pairs to associate; none beyond the gate."""
     square = np.einsum("ni,nij,nj->n", miss, precision, miss)
     log = 0.5 * (np.log(np.maximum(np.linalg.det(precision), 1e-300)) - square - 3.0 * np.log(2.0 * np.pi))
     return np.asarray(np.where(square < GATE, log, -np.inf), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""What a component may be the first sight of, how often, and where it would then be."""
+"""Births: what a component may be the first sight of, how often, and where it would then be."""
 
 from typing import NamedTuple
 
@@ -54,12 +54,12 @@ class BirthHypotheses(NamedTuple):
 
 
 def log_normal(miss: Floats, variance: Floats) -> Floats:
-    """Logarithm of a scalar normal density."""
+    """Logarithm of a scalar normal density, by which births are weighed."""
     return -0.5 * (miss**2 / variance + np.log(2.0 * np.pi * variance))
 
 
 def elevations(radial: float, std: float) -> tuple[Floats, Floats, Floats]:
-    """Elevations (E,) [rad], their deviations, and the integral of each slice over solid angle and likelihood.
+    """Elevations (E,) [rad] that a feature may be born at, deviations, and each slice's weight by its likelihood.
 
     The horizontal part of an arrival tells its elevation by the cosine: well from above, badly near the horizon.
     """
@@ -75,7 +75,7 @@ def elevations(radial: float, std: float) -> tuple[Floats, Floats, Floats]:
 def hypothesise(
     scan: ComponentScan, row: int, rotation: Floats, free: float, window: float, config: BpSlamAoaConfig
 ) -> BirthHypotheses:
-    """All that component `row` may be of; `window` is the longest length that is reported [m]."""
+    """Hypotheses of what feature component `row` may be born of; `window` is the longest length reported [m]."""
     length, level = float(scan.seen[row, 0]), scan.seen[row, 1:]
     std, turn = float(scan.std[row, 1:].mean()), rotation[:2, :2] @ level
     radial = float(np.clip(np.hypot(*turn), min(std, 1.0), 1.0))
@@ -120,7 +120,7 @@ def born(
     first: int,
     config: BpSlamAoaConfig,
 ) -> GaussianFeatures:
-    """One new feature for each set of hypotheses."""
+    """Features that are born, one for each set of hypotheses."""
     owner = np.repeat(np.arange(len(found)), [len(each.kind) for each in found])
     parts = BirthHypotheses._make(np.concatenate(column) for column in zip(*found, strict=True))
     place, by_agent, by_polar = _placed(parts.kind, parts.polar, course.mean[:3], ends)
@@ -138,7 +138,7 @@ def born(
 
 
 def _placed(kind: Integers, polar: Floats, agent: Floats, ends: Ends) -> tuple[Floats, Floats, Floats]:
-    """Places (G, 3) and their derivatives (G, 3, 3) by the agent's position and by length, azimuth and elevation."""
+    """Places (G, 3) of features at birth, and derivatives (G, 3, 3) by agent, and by length, azimuth and elevation."""
     tx, rx, is_wall = agent + ends.tx, agent + ends.rx, (kind == WALL)[:, None]
     length, azimuth, elevation = (polar + NUDGE * np.concatenate([np.zeros((1, 3)), np.eye(3)])[:, None]).T
     flat = np.cos(elevation)

@@ -1,4 +1,4 @@
-"""Settings of BP-SLAM by delays, angles and amplitudes."""
+"""Configuration of BP-SLAM by delays, angles and amplitudes."""
 
 from dataclasses import dataclass
 

@@ -83,7 +83,7 @@ class PredictedReturns(NamedTuple):
 
 
 def no_features(size: int) -> GaussianFeatures:
-    """None yet, of a course of `size` numbers."""
+    """No features yet of BP-SLAM with angles, of a course of `size` numbers."""
     none, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
     return GaussianFeatures(
         none, whole, whole, whole, none, np.zeros((0, 3)), np.zeros((0, 3, size)), np.zeros((0, 3, 3)), none, none, none
@@ -91,7 +91,7 @@ def no_features(size: int) -> GaussianFeatures:
 
 
 def carry(features: GaussianFeatures, step: Step, drift: float) -> GaussianFeatures:
-    """The same beliefs about a new course; wanderers widen by a standard deviation `drift` [m]."""
+    """Features' beliefs about a new course; wanderers widen by a standard deviation `drift` [m]."""
     missed = features.slope[:, :, : len(step.residual)]
     covariance = features.covariance + missed @ step.residual @ missed.swapaxes(1, 2)
     covariance[features.kind == WANDERER] += drift**2 * np.eye(3)
@@ -103,7 +103,7 @@ def carry(features: GaussianFeatures, step: Step, drift: float) -> GaussianFeatu
 
 
 def returns_of(kind: Integers, place: Floats, agent: Floats, ends: Ends) -> Floats:
-    """(..., C, 5) length [m], two cosines, height cosine of the arrival, log amplitude of the kind's law."""
+    """Returns of Gaussian features (..., C, 5): length [m], two cosines, height cosine of arrival, log amplitude."""
     tx, rx = agent + ends.tx, agent + ends.rx
     size = np.maximum(length_of(place), NEAREST)
     normal = place / size[..., None]
@@ -119,7 +119,7 @@ def returns_of(kind: Integers, place: Floats, agent: Floats, ends: Ends) -> Floa
 
 
 def look(features: GaussianFeatures, course: AgentTrajectory, ends: Ends, free: float) -> PredictedReturns:
-    """Returns of all Gaussians from the present mean position; `free` is the log amplitude of 1 m in free space."""
+    """Returns of all features' Gaussians from the mean position; `free` is the log amplitude of 1 m in free space."""
     kind, mean, agent = features.kind, features.mean, course.mean[:3]
     spread = features.covariance + spread_over(features.slope, course)
     value, vector = np.linalg.eigh(spread)
@@ -145,12 +145,12 @@ def through(rows: Floats, matrix: Floats) -> Floats:
 
 
 def spread_over(rows: Floats, course: AgentTrajectory) -> Floats:
-    """Covariance (C, 3, 3) that rows (C, 3, n) make of the course's."""
+    """Covariance (C, 3, 3) that features' rows (C, 3, n) make of the course's."""
     return through(rows, course.covariance) @ rows.swapaxes(1, 2)
 
 
 def join(one: GaussianFeatures, other: GaussianFeatures) -> GaussianFeatures:
-    """Both."""
+    """Old and new features together."""
     moved = other._replace(owner=other.owner + len(one.ident))
     return GaussianFeatures._make(np.concatenate(pair) for pair in zip(one, moved, strict=True))
 

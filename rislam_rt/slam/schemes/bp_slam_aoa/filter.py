@@ -69,7 +69,8 @@ def init(
     start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: BpSlamAoaConfig, *,
     rng: np.random.Generator,
 ) -> BpSlamAoaState:  # fmt: skip
-    """The start prior, and no features. `ris` is taken for the interface and not used; nothing is drawn."""
+    """State of BP-SLAM with angles at the start: the start prior, and no features. `ris` is not used; nothing is
+    drawn."""
     std = np.concatenate([np.zeros(3), start.velocity_std * np.array([1.0, 1.0, 0.0])])
     mean = np.concatenate([np.zeros(3), start.velocity])
     course = AgentTrajectory(mean, np.diag(std**2), mean, 3, np.diag(std**2), 0.0)
@@ -80,7 +81,7 @@ def init(
 
 
 def predict(state: BpSlamAoaState, dt: float, config: BpSlamAoaConfig) -> SlamEstimate:
-    """The belief carried over `dt` [s] without noise."""
+    """Belief of BP-SLAM with angles carried over `dt` [s] without noise."""
     return ahead_of(estimate(state, config), dt)
 
 
@@ -88,7 +89,7 @@ def step(
     state: BpSlamAoaState, measurement: Measurement, code: RisCode | None, dt: float, heading: float,
     config: BpSlamAoaConfig, *, rng: np.random.Generator,
 ) -> tuple[BpSlamAoaState, StepInfo]:  # fmt: skip
-    """Advance by one cycle: `dt` [s] since the last, `heading` [rad]. `code` and `rng` are there for the interface.
+    """Advance BP-SLAM with angles by one cycle: `dt` [s] since the last, `heading` [rad]. `code`, `rng` are not used.
 
     Raises
     ------
@@ -125,14 +126,14 @@ def step(
 
 
 def estimate(state: BpSlamAoaState, config: BpSlamAoaConfig) -> SlamEstimate:
-    """Mean and covariance of the pose, samples of it, points and walls of the map."""
+    """Pose, samples of it, points and walls of the map by BP-SLAM with angles."""
     position, velocity, covariance, samples = pose_moments(state.course, state.start, config.num_samples)
     known = known_map(state.features, state.course, state.start, config.detection_threshold)
     return SlamEstimate(position, velocity, state.heading, covariance, samples, state.body, known)
 
 
 def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConfig) -> tuple[ComponentScan, Integers]:
-    """The components without the direct path (and wall returns that are set aside), and their rows."""
+    """Components that BP-SLAM with angles uses (no direct path, no wall returns set aside), and their rows."""
     sensor = state.sensor
     observed = observations_of(measurement, sensor.radio)
     aside = is_los(observed, state.body) | is_strong(observed.ratio, None if config.use_vt else config.specular_ratio)
@@ -145,14 +146,14 @@ def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConf
 
 
 def _levels(config: BpSlamAoaConfig) -> Floats:
-    """(4, 3) standard deviations of the acceleration of a calm, a lively, a fast and a climbing step [m/s^2]."""
+    """(4, 3) acceleration deviations of BP-SLAM's motion modes: calm, lively, fast, climbing [m/s^2]."""
     calm, lively, fast = config.sigma_a, config.lively_std, FAST * config.lively_std
     up = min(VERTICAL_STD, calm)
     return np.array([[calm, calm, up], [lively, lively, up], [fast, fast, up], [calm, calm, lively]])
 
 
 def _mode_changes(config: BpSlamAoaConfig) -> Floats:
-    """(4, 4) probabilities of the motion mode of a step after that of the step before."""
+    """(4, 4) probabilities of BP-SLAM's motion mode of a step after that of the step before."""
     calm = config.calm_again
     move = np.full((4, 4), CHANGE * (1.0 - calm))
     move[0], move[:, 0] = CALM_ENDS * calm / 3.0, calm
@@ -164,7 +165,7 @@ def _mode_changes(config: BpSlamAoaConfig) -> Floats:
 def _predict(
     state: BpSlamAoaState, dt: float, scan: ComponentScan, config: BpSlamAoaConfig
 ) -> tuple[BpSlamAoaState, View, Ends]:  # fmt: skip
-    """Agent and features carried to this cycle, by the motion mode that explains what is heard best."""
+    """BP-SLAM's agent and features carried to this cycle, by the motion mode that explains best what is heard."""
     turn = rotation_z(np.asarray(state.heading))
     upper = state.sensor.radio.array.pattern == "upper"
     ends = Ends(turn @ state.body.tx_offset, turn @ state.body.rx_offset, turn, upper)
@@ -208,7 +209,8 @@ def _survive(features: GaussianFeatures, carried: Step, config: BpSlamAoaConfig)
 def _claimed(
     state: BpSlamAoaState, view: View, scan: ComponentScan, found: Association, config: BpSlamAoaConfig
 ) -> tuple[Integers, float]:
-    """Feature number of each component (`UNUSED` for none), and the NIS of those claimed, by the likeliest Gaussian."""
+    """BP-SLAM's feature number of each component (`UNUSED` for none), and the NIS of those claimed, by the likeliest
+    Gaussian."""
     features, numbers, nis = state.features, np.full(len(scan.seen), UNUSED), 0.0
     sure = (features.existence > config.detection_threshold)[:, None]
     for row, shown in zip(*np.nonzero((found.feature[:, :-1] > 0.5) & sure), strict=True):

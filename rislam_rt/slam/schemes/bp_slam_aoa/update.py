@@ -1,4 +1,4 @@
-"""Loopy association of components to Gaussian sums, and the messages between features and the agent's course.
+"""Update of Gaussian sums by components: messages between features and the agent's course.
 
 Source: Leitinger, Grebien and Witrisal, "Multipath-based SLAM exploiting AoA and amplitude information" (2019), on the
 factor graph of Leitinger et al., arXiv 1801.04463: delays, angles and amplitudes in the likelihood, a detection
@@ -34,7 +34,7 @@ def absorb(
     found: Association,
     fresh: Floats,
 ) -> tuple[GaussianFeatures, AgentTrajectory]:
-    """GaussianFeatures and course after the components, feature by feature, the surest first."""
+    """Update features and course by the components, feature by feature, the surest first."""
     ref, predicted = course.mean.copy(), view.predicted
     edges = np.searchsorted(features.owner, np.arange(len(features.ident) + 1))
     pair_edges = np.searchsorted(view.pairs.gaussian, np.arange(len(features.owner) + 1))
@@ -110,7 +110,7 @@ class Learnt(NamedTuple):
 
 
 def learn(heard: Heard, seen: Floats, spread: Floats, features: GaussianFeatures) -> Learnt:
-    """Moments over the components and "missed", for each Gaussian."""
+    """What the update makes of each Gaussian of a feature: moments over the components and "missed"."""
     view, scan, part = heard.view, heard.scan, heard.part
     gaussian, component, noise, loudness, log_loudness = (column[heard.pairs] for column in view.pairs)
     mine = gaussian - part.start
@@ -146,7 +146,7 @@ def _sum(row: Integers, values: Floats, count: int) -> Floats:
 
 
 def _as_one(mean: Floats, after: Floats, before: Floats) -> tuple[Floats, Floats]:
-    """Innovation (G, 3) and covariance (G, 3, 3) of one component that takes `before` to these moments.
+    """The one component, innovation (G, 3) and covariance (G, 3, 3), whose update takes `before` to these moments.
 
     Along axes in which components contradict each other, so that nothing is learnt, its variance is `NO_VARIANCE`.
     """
@@ -163,7 +163,7 @@ def _as_one(mean: Floats, after: Floats, before: Floats) -> tuple[Floats, Floats
 
 
 def _mix(course: AgentTrajectory, gain: Floats, spread: Floats, learnt: Learnt, weight: Floats) -> AgentTrajectory:
-    """Course after one feature's message: moments over its Gaussians; the rest of the weight changes nothing."""
+    """Course updated by one feature's message: moments over its Gaussians; the rest of the weight changes nothing."""
     rows = np.flatnonzero(weight > LEAST_WEIGHT)
     if not len(rows):
         return course

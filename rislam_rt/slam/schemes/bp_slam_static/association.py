@@ -23,7 +23,7 @@ class RangeEvaluation(NamedTuple):
 
 
 def evaluate_ranges(reach: Floats, scan: Scan, config: BpSlamStaticConfig) -> RangeEvaluation:
-    """Likelihood ratios of one feature, from the ranges (S, N) of its pairs."""
+    """Likelihood ratios for associating ranges with one static feature, from the ranges (S, N) of its pairs."""
     low, high = reach.min(), reach.max()
     near = np.flatnonzero((scan.length > low - GATE * scan.std) & (scan.length < high + GATE * scan.std))
     scaled = (reach - scan.length[near, None, None]) / scan.std[near, None, None]
@@ -45,6 +45,6 @@ def associate_anchor(
 
 
 def pair_message(seen: RangeEvaluation, to_feature: Floats, config: BpSlamStaticConfig) -> Floats:
-    """(S, N) factor of every pair: missed, or made one of the measurements; never zero."""
+    """(S, N) association's factor of every pair of particles: missed, or made one of the ranges; never zero."""
     weight = to_feature[seen.measurement]
     return (1.0 - config.detection_probability) + np.einsum("g,gsn->sn", weight, seen.ratio)

@@ -1,4 +1,4 @@
-"""Settings of BP-SLAM as published: anchors in known places."""
+"""Configuration of BP-SLAM as published: anchors in known places."""
 
 from dataclasses import dataclass
 
@@ -64,10 +64,10 @@ class BpSlamStaticConfig:
 
     @property
     def odds(self) -> Odds:
-        """What a range is weighed against."""
+        """What static BP-SLAM weighs a range against."""
         return Odds(self.detection_probability, self.clutter_mean, self.max_range)
 
     @property
     def clutter_density(self) -> float:
-        """Expected false ranges per metre."""
+        """Expected false ranges per metre in static BP-SLAM."""
         return self.odds.clutter_density

@@ -1,4 +1,4 @@
-"""What an agent and a feature that it has seen have in common.
+"""Coupling: what an agent and a feature that it has seen have in common.
 
 Belief propagation keeps one belief a variable. But the error of a feature is, to a large part, the agent's error when
 it was seen; a filter that forgets so takes the feature for independent evidence of where the agent is, again and again,
@@ -18,7 +18,7 @@ FLOOR_STD = 1e-3
 
 
 def carry(features: Features, before: Floats, after: Floats) -> Features:
-    """The same beliefs about the agent's states (N, 2D) after a motion, particle by particle."""
+    """Beliefs of features coupled to the agent's new states (N, 2D) after a motion, particle by particle."""
     rows = np.flatnonzero(features.slope.any(axis=(1, 2)))
     if not len(rows):
         return features
@@ -33,7 +33,7 @@ def carry(features: Features, before: Floats, after: Floats) -> Features:
 
 
 def correct_slopes(features: Features, gains: Floats, state: Floats, shifts: Integers, thickness: float) -> Floats:
-    """Slopes (K, 2D, D) after every pair of particles was weighted with its factor.
+    """Slopes (K, 2D, D) that couple features to the agent, after every pair of particles had its factor.
 
     Before, residual and agent are independent; what the factors make of that is added to the slope. It is taken cell by
     cell of the residual's cloud, each with the inverse of its covariance: along an arc a feature is unknown, across it
@@ -66,7 +66,7 @@ def correct_slopes(features: Features, gains: Floats, state: Floats, shifts: Int
 
 
 def _met_states(gains: Floats, lean: Floats, shifts: Integers) -> Floats:
-    """Mean (K, N, 2D) of factor times state over the agents that each particle met."""
+    """Mean (K, N, 2D) of factor times state over the agents that each coupled particle met."""
     twice, count = np.concatenate([lean, lean]), len(lean)
     total = np.zeros((len(gains), count, lean.shape[1]))
     for row, shift in enumerate(shifts):
@@ -75,7 +75,7 @@ def _met_states(gains: Floats, lean: Floats, shifts: Integers) -> Floats:
 
 
 def _agent_moments(gains: Floats, weight: Floats, lean: Floats, shifts: Integers) -> Floats:
-    """Covariance (K, 2D, 2D) of the agent's scaled state under the factors of each feature."""
+    """Covariance (K, 2D, 2D) of the agent's scaled state under the factors of each coupled feature."""
     count, width = lean.shape
     products = np.concatenate(
         [np.ones((count, 1)), lean, (lean[:, :, None] * lean[:, None]).reshape(count, -1)], axis=1
@@ -90,7 +90,7 @@ def _agent_moments(gains: Floats, weight: Floats, lean: Floats, shifts: Integers
 
 
 def _cell_count(cloud: Floats, weight: Floats, thickness: float) -> Integers:
-    """Levels (K,) of the split that make a cell of each cloud as straight as it is thick."""
+    """Levels (K,) of the split that make a cell of each cloud as straight as it is thick, for its slope."""
     dims, most = cloud.shape[2], cell_levels(cloud.shape[1])
     centre = np.einsum("kn,knd->kd", weight, cloud)
     spread = np.sqrt(np.einsum("kn,knd->k", weight, (cloud - centre[:, None]) ** 2))
@@ -100,7 +100,7 @@ def _cell_count(cloud: Floats, weight: Floats, thickness: float) -> Integers:
 
 
 def _cell_change(cloud: Floats, weight: Floats, gain: Floats, factor: Floats, chance: Floats, cells: int) -> Floats:
-    """Covariance (K, 2D, D) of state and residual, over cells weighted by their inverse covariances."""
+    """Covariance (K, 2D, D) of agent's state and feature's residual, over cells weighted by their precision."""
     count, dims, width = len(cloud), cloud.shape[2], factor.shape[2]
     r = cloud.reshape(count, cells, -1, dims)
     before, after = (x.reshape(count, cells, -1, 1) for x in (weight, weight * gain))
@@ -117,7 +117,7 @@ def _cell_change(cloud: Floats, weight: Floats, gain: Floats, factor: Floats, ch
 
 
 def _cross(state: Floats, weight: Floats, r: Floats) -> Floats:
-    """Covariance (K, C, 2D, D) in every cell, from weighted sums of states (K, C, N, 2D)."""
+    """Covariance (K, C, 2D, D) of state and residual in every cell, from weighted sums of states (K, C, N, 2D)."""
     mass = np.maximum(weight.sum(axis=2, keepdims=True), 1e-300)
     mean = np.sum(weight * r, axis=2, keepdims=True) / mass
     return np.swapaxes(state, 2, 3) @ (r - mean) / mass

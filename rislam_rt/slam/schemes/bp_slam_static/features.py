@@ -71,7 +71,7 @@ def make_features(cloud: Floats, existence: Floats, anchor: Integers, ident: Int
 
 
 def no_features(num_particles: int, dims: int) -> Features:
-    """None yet."""
+    """No features of static BP-SLAM yet."""
     whole = np.zeros(0, dtype=np.int64)
     return make_features(np.zeros((0, num_particles, dims)), np.zeros(0), whole, whole)
 
@@ -85,7 +85,7 @@ def known_anchors(anchors: Floats, std: float, num_particles: int, *, rng: np.ra
 
 
 def predict_features(features: Features, config: BpSlamStaticConfig, *, rng: np.random.Generator) -> Features:
-    """Survival, and a small random walk."""
+    """Static features one step on: survival, and a small random walk."""
     walk = config.feature_std * rng.standard_normal(features.cloud.shape)
     existence = config.survival_probability * features.existence
     return features._replace(
@@ -125,17 +125,17 @@ def refresh(features: Features, *, rng: np.random.Generator) -> Features:
 
 
 def join(parts: list[Features]) -> Features:
-    """All of them in one."""
+    """All sets of features in one."""
     return Features._make(np.concatenate(columns) for columns in zip(*parts, strict=True))
 
 
 def select(features: Features, rows: Booleans | Integers) -> Features:
-    """Some of them."""
+    """Some of the features of static BP-SLAM."""
     return Features._make(column[rows] for column in features)
 
 
 def prune(features: Features, config: BpSlamStaticConfig) -> Features:
-    """Without the improbable ones, and without the least probable beyond the number allowed per anchor."""
+    """Static features without improbable ones, and without the least probable beyond the number allowed per anchor."""
     order = np.lexsort([-features.existence, ~features.known, features.anchor])
     anchor = features.anchor[order]
     rank = np.arange(len(order)) - np.searchsorted(anchor, anchor)

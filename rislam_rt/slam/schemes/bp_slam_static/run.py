@@ -1,4 +1,4 @@
-"""BP-SLAM in its published setting: static anchors of known position, one set of ranges per anchor and step."""
+"""A run of BP-SLAM in its published setting: static anchors of known position, ranges per anchor and step."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -32,7 +32,7 @@ class FeatureTable(NamedTuple):
     """(R,) probability."""
 
     def at(self, step: int) -> "FeatureTable":
-        """Rows of one step."""
+        """Rows of the features of one step of the run."""
         return FeatureTable(*(column[self.step == step] for column in self))
 
 
@@ -54,7 +54,7 @@ def run_static(
     anchors: ArrayLike, ranges: Sequence[Sequence[ArrayLike]], start: ArrayLike, start_std: ArrayLike,
     config: BpSlamStaticConfig | None = None, *, dt: float = 1.0, anchor_std: float = 0.001, rng: np.random.Generator,
 ) -> StaticResult:  # fmt: skip
-    """Agent and features from ranges alone.
+    """Run static BP-SLAM: agent and features from ranges alone.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def _checked(
     anchors: ArrayLike, ranges: Sequence[Sequence[ArrayLike]], start: ArrayLike, start_std: ArrayLike,
     config: BpSlamStaticConfig,
 ) -> tuple[Floats, Floats, Floats, list[tuple[Scan, ...]]]:  # fmt: skip
-    """The arguments as arrays."""
+    """The run's arguments as arrays."""
     points = np.asarray(anchors, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] not in (2, 3) or not np.isfinite(points).all():
         raise ConfigError(f"anchors: shape {points.shape} received; give finite positions (A, 2) or (A, 3)")

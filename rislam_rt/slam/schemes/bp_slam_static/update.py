@@ -76,7 +76,7 @@ class UpdateInfo(NamedTuple):
 def predict_belief(
     belief: FactorGraphBelief, dt: float, accelerate: Floats, config: BpSlamStaticConfig, *, rng: np.random.Generator
 ) -> FactorGraphBelief:
-    """Discrete white-noise acceleration of standard deviations `accelerate` (D,) [m/s^2]; features survive or not."""
+    """Agent's states after white acceleration of deviations `accelerate` (D,) [m/s^2]; features survive or not."""
     before = rng.permutation(belief.state)
     position, velocity = np.split(before, 2, axis=1)
     push = accelerate * rng.standard_normal(position.shape)
@@ -98,7 +98,8 @@ def update_belief(
     *,
     rng: np.random.Generator,
 ) -> tuple[FactorGraphBelief, UpdateInfo]:
-    """One scan of every anchor into the belief; the agent's message to features is its prediction, as published."""
+    """Update static BP-SLAM's belief by one scan of every anchor; the agent's message to features is its prediction, as
+    published."""
     state, features = rng.permutation(belief.state), belief.features
     dims = belief.position.shape[1]
     shifts = (np.arange(config.num_pairings) * len(state)) // config.num_pairings
@@ -144,7 +145,7 @@ def update_belief(
 
 
 def _reach(state: Floats, features: Features, shifts: Integers, model: RangeModel) -> Floats:
-    """Ranges (K, S, N): feature particle n meets agent particle n + shift, round the end."""
+    """Ranges (K, S, N) in the update: feature particle n meets agent particle n + shift, round the end."""
     count, dims = state.shape[0], state.shape[1] // 2
     lean = (state - state.mean(axis=0)) @ features.slope
     twice, lean_twice = np.concatenate([state, state]), np.concatenate([lean, lean], axis=1)
@@ -156,14 +157,14 @@ def _reach(state: Floats, features: Features, shifts: Integers, model: RangeMode
 
 
 def _predicted(reach: Floats, weight: Floats) -> Floats:
-    """Mean and standard deviation (K, 2) of the ranges (K, S, N)."""
+    """Mean and standard deviation (K, 2) of the ranges (K, S, N) that the update predicts."""
     mean = np.einsum("kn,ksn->k", weight, reach) / reach.shape[1]
     square = np.einsum("kn,ksn->k", weight, (reach - mean[:, None, None]) ** 2) / reach.shape[1]
     return np.stack([mean, np.sqrt(square)], axis=1)
 
 
 def _to_agent(gains: Floats, weight: Floats, existence: Floats, shifts: Integers) -> Floats:
-    """Log weights (N,) of the agent: of every feature, the mean factor over the particles that each agent met."""
+    """Messages to the agent as log weights (N,): of every feature, the mean factor over the particles met."""
     mean, total = np.zeros(weight.shape), np.zeros(weight.shape)
     for row, shift in enumerate(shifts):
         mean += np.roll(weight * gains[:, row], shift, axis=1)
@@ -191,7 +192,7 @@ def _resample_agent(state: Floats, log_weight: Floats, *, rng: np.random.Generat
 
 
 def _patience(features: Features, state: Floats, noise: float) -> Floats:
-    """Powers (K,) of the factors that a feature learns from, one where it is known well.
+    """Powers (K,) of the factors that the update of a feature learns from, one where it is known well.
 
     A factor holds the noise of its own step and the agent's error `e`, which the next steps share. Over `n` steps the
     feature may learn `1 / (noise^2 / n + var e)`, and not n times the first step's share; the power
@@ -212,7 +213,7 @@ def _update_features(
     features: Features, gains: Floats, state: Floats, shifts: Integers, mean_after: Floats, thickness: float,
     config: BpSlamStaticConfig, *, rng: np.random.Generator,
 ) -> Features:  # fmt: skip
-    """Weights by the mean factor of every particle; line through the agent's states by one pair a particle."""
+    """Features updated: weights by the mean factor of every particle, slope by one pair a particle."""
     kept = features.known | (features.existence >= config.pruning_threshold)
     features, gains = select(features, kept), gains[kept]
     free = ~features.known[:, None]

@@ -1,4 +1,4 @@
-"""Settings of Channel-SLAM."""
+"""Configuration of Channel-SLAM."""
 
 from dataclasses import dataclass
 
@@ -72,7 +72,7 @@ class ChannelSlamConfig:
 
     @property
     def axes(self) -> Floats:
-        """(3,) ones for the axes that are filtered."""
+        """(3,) ones for the axes that Channel-SLAM filters."""
         return axes_filtered(self.height)
 
     @property

@@ -1,4 +1,4 @@
-"""Channel-SLAM, delay only: a tracker's labels, and a virtual transmitter a path.
+"""The filter of Channel-SLAM, delay only: a tracker's labels, and a virtual transmitter a path.
 
 Source: Gentner et al., "Multipath assisted positioning with simultaneous localization and mapping", IEEE TWC 2016. As
 there, labels are taken as known, there is no model of detection, and a path that ends takes its virtual transmitter
@@ -60,13 +60,13 @@ def init(
     start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: ChannelSlamConfig, *,
     rng: np.random.Generator,
 ) -> ChannelSlamState:  # fmt: skip
-    """The start prior, and no paths. `ris` is taken for the interface and not used; nothing is drawn."""
+    """Channel-SLAM's state at the start: the start prior, and no paths. `ris` is not used; nothing is drawn."""
     agent = begin_agent(start, int(config.axes.sum()), body, sensor)
     return ChannelSlamState(agent, no_sums(len(agent.course.mean)), no_tracks(), {}, 0)
 
 
 def predict(state: ChannelSlamState, dt: float, config: ChannelSlamConfig) -> SlamEstimate:
-    """The belief carried over `dt` [s] without noise."""
+    """Channel-SLAM's belief carried over `dt` [s] without noise."""
     return ahead_of(estimate(state, config), dt)
 
 
@@ -74,7 +74,7 @@ def step(
     state: ChannelSlamState, measurement: Measurement, code: RisCode | None, dt: float, heading: float,
     config: ChannelSlamConfig, *, rng: np.random.Generator,
 ) -> tuple[ChannelSlamState, StepInfo]:  # fmt: skip
-    """Advance by one cycle: `dt` [s] since the last, `heading` [rad]. `code` and `rng` are there for the interface.
+    """Advance Channel-SLAM by one cycle: `dt` [s] since the last, `heading` [rad]. `code` and `rng` are not used.
 
     Raises
     ------
@@ -98,14 +98,15 @@ def step(
 
 
 def estimate(state: ChannelSlamState, config: ChannelSlamConfig) -> SlamEstimate:
-    """Mean and covariance of the pose, samples of it, and virtual transmitters that are no longer anywhere."""
+    """Channel-SLAM's pose (mean, covariance, samples), and its virtual transmitters whose place is known."""
     found = known_points(state.sums, 0.5)
     clear = np.trace(found.covariance, axis1=1, axis2=2) < config.shown_std**2
     return reported(state.agent, found.keep(clear), config.num_samples)
 
 
 def _move(state: ChannelSlamState, dt: float, config: ChannelSlamConfig) -> ChannelSlamState:
-    """Agent and virtual transmitters after `dt` [s]; the past state of every `course_stride` cycles is kept."""
+    """Channel-SLAM's agent and virtual transmitters after `dt` [s]; the past state of every `course_stride` cycles is
+    kept."""
     if dt == 0.0:
         return state
     agent, step = move_agent(state.agent, dt, config.sigma_a, config.course_stride)
@@ -116,7 +117,7 @@ def _move(state: ChannelSlamState, dt: float, config: ChannelSlamConfig) -> Chan
 def _label(
     state: ChannelSlamState, scan: Scan, dt: float, config: ChannelSlamConfig
 ) -> tuple[ChannelSlamState, Integers]:
-    """Tracks after this cycle's ranges, and the label (M,) of each range; virtual transmitters of ended tracks go."""
+    """Channel-SLAM's tracks after this cycle's ranges, and each range's label (M,); ended tracks' transmitters go."""
     tracks = tracker.advance(state.tracks, dt, config.range_acceleration)
     found = assign(tracks, scan.length, scan.std, config.gate)
     speed = float(np.linalg.norm(state.agent.pose[1]))
@@ -129,7 +130,7 @@ def _label(
 
 
 def _keep(state: ChannelSlamState, rows: Booleans, config: ChannelSlamConfig) -> ChannelSlamState:
-    """With some of the virtual transmitters, and without Gaussians of small share."""
+    """Channel-SLAM's state with some of its virtual transmitters, and without Gaussians of small share."""
     sums = state.sums._replace(existence=np.where(rows, 1.0, 0.0))
     sums = prune(sums, 0.5, config.share_threshold, config.max_paths)
     present = set(sums.ident.tolist())
@@ -140,7 +141,7 @@ def _keep(state: ChannelSlamState, rows: Booleans, config: ChannelSlamConfig) ->
 def _correct(
     state: ChannelSlamState, label: Integers, scan: Scan, model: Bistatic, config: ChannelSlamConfig
 ) -> tuple[ChannelSlamState, Floats]:
-    """Course and virtual transmitters after their ranges; those that do not fit their path for long are dropped."""
+    """Channel-SLAM's course and virtual transmitters after their ranges; those that do not fit for long are dropped."""
     agent = state.agent
     sight = look(state.sums, agent.course, agent.pose[0], model)
     own = (state.sums.ident[:, None] == label).astype(float)
@@ -159,7 +160,7 @@ def _correct(
 def _squares(
     sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, hit: Integers, shown: Integers
 ) -> Floats:  # fmt: skip
-    """Squared innovations over their variances, both of the whole sum of each virtual transmitter that was seen."""
+    """Squared normalised innovations of Channel-SLAM's virtual transmitters that were seen, each of its whole sum."""
     mean, variance = range_moments(sums, sight, course)
     return (scan.length[shown] - mean[hit]) ** 2 / (variance[hit] + scan.std[shown] ** 2)
 
@@ -167,7 +168,7 @@ def _squares(
 def _give_birth(
     state: ChannelSlamState, label: Integers, scan: Scan, strong: Booleans, config: ChannelSlamConfig
 ) -> ChannelSlamState:
-    """A virtual transmitter for confirmed tracks that were seen and have none, up to `max_paths`."""
+    """Channel-SLAM's new virtual transmitters, for confirmed tracks seen now that have none, up to `max_paths`."""
     ready = state.tracks.label[(state.tracks.hits >= config.confirm_hits) & (state.tracks.misses == 0)]
     rows = np.flatnonzero(np.isin(label, ready) & ~np.isin(label, state.sums.ident))
     rows = rows[np.argsort(label[rows])][: config.max_paths - len(state.sums.ident)]

@@ -35,13 +35,13 @@ class RangeTracks(NamedTuple):
 
 
 def no_tracks() -> RangeTracks:
-    """None yet."""
+    """No tracks of ranges yet."""
     whole = np.zeros(0, dtype=np.int64)
     return RangeTracks(np.zeros((0, 2)), np.zeros((0, 2, 2)), whole, whole, whole)
 
 
 def advance(tracks: RangeTracks, dt: float, acceleration: float) -> RangeTracks:
-    """Predict over `dt` [s], the rate drifting with white acceleration of standard deviation [m/s^2]."""
+    """Range tracks over `dt` [s], the rate drifting with white acceleration of standard deviation [m/s^2]."""
     transition = np.array([[1.0, dt], [0.0, 1.0]])
     noise = acceleration**2 * np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
     covariance = transition @ tracks.covariance @ transition.T + noise

@@ -58,14 +58,14 @@ class Step(NamedTuple):
 
 
 def begin(position: Floats, velocity: Floats, position_std: float, velocity_std: float) -> AgentTrajectory:
-    """The start prior; position and velocity (A,)."""
+    """The agent's trajectory at its start: the start prior; position and velocity (A,)."""
     std = np.concatenate([np.full(len(position), position_std), np.full(len(velocity), velocity_std)])
     mean = np.concatenate([position, velocity])
     return AgentTrajectory(mean, np.diag(std**2), mean, len(position), np.diag(std**2), position_std**2)
 
 
 def advance(course: AgentTrajectory, dt: float, accelerate: Floats, keep: bool) -> tuple[AgentTrajectory, Step]:
-    """Discrete white-noise acceleration of standard deviations `accelerate` (A,) [m/s^2] over `dt` [s].
+    """The agent's trajectory after `dt` [s] of white acceleration of standard deviations `accelerate` (A,) [m/s^2].
 
     With `keep` the former present state stays as a past one, and nothing is missed. Without, it is left out: what
     hangs on it is handed to the states around it (Rauch, Tung and Striebel's gain) with a small error.
@@ -90,7 +90,7 @@ def advance(course: AgentTrajectory, dt: float, accelerate: Floats, keep: bool) 
 
 
 def _regress(course: AgentTrajectory, move: Floats, noise: Floats) -> Step:
-    """Former course on the new one, where the former present state is left out."""
+    """The agent's former trajectory regressed on the new one, where the former present state is left out."""
     width, size = course.width, len(course.mean)
     scale = np.sqrt(np.maximum(np.diag(course.covariance), 1e-18))
     scaled = course.covariance / np.outer(scale, scale)

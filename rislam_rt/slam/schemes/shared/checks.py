@@ -12,14 +12,14 @@ HEIGHTS = ("known", "estimated")
 
 
 def check_counts(section: str, config: Any, names: Iterable[str], least: int = 1) -> None:
-    """Whole numbers of at least `least`."""
+    """Check that a scheme's settings are whole numbers of at least `least`."""
     for name in names:
         if getattr(config, name) < least:
             raise ConfigError(f"{section}.{name}: {getattr(config, name)} received; give at least {least}")
 
 
 def check_inside(section: str, config: Any, names: Iterable[str], below: float, wanted: str) -> None:
-    """Numbers above zero and below a limit; None, where a setting may be left out, passes."""
+    """Check that a scheme's settings are above zero and below a limit; None, where one may be left out, passes."""
     for name in names:
         value = getattr(config, name)
         if value is not None and not (np.isfinite(value) and 0.0 < value < below):
@@ -27,13 +27,13 @@ def check_inside(section: str, config: Any, names: Iterable[str], below: float, 
 
 
 def check_not_negative(section: str, config: Any, names: Iterable[str]) -> None:
-    """Finite numbers of zero or more."""
+    """Check that a scheme's settings are finite numbers of zero or more."""
     for name in names:
         if not 0.0 <= getattr(config, name) < np.inf:
             raise ConfigError(f"{section}.{name}: {getattr(config, name)} received; give a number that is not negative")
 
 
 def check_height(section: str, height: str) -> None:
-    """One of `HEIGHTS`."""
+    """Check a scheme's setting of the height: one of `HEIGHTS`."""
     if height not in HEIGHTS:
         raise ConfigError(f"{section}.height: '{height}' received; give 'known' or 'estimated'")

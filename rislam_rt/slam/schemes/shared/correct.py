@@ -1,4 +1,4 @@
-"""Loopy association of ranges to Gaussian sums, and the messages between the features and the agent's course.
+"""Correction by loopy association of ranges to Gaussian sums, and messages between features and the agent's course.
 
 Source: Leitinger et al., arXiv 1801.04463, section V, with messages as Gaussian sums. A feature's message to the agent
 is a mixture over its Gaussians, over the ranges that it may have made, over "missed" and "does not exist"; it is
@@ -37,7 +37,7 @@ class Pull(NamedTuple):
 def claims(
     sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, fresh: Floats, odds: Odds
 ) -> Association:
-    """Marginals of the association of K features and M ranges."""
+    """Marginals of the association of K features with M ranges, by which all are corrected."""
     pair = np.zeros((len(sums.ident), len(scan.length)))
     np.add.at(pair, sums.owner, sums.share[:, None] * _ratios(sight.length, spread_of(sight, course), scan, odds))
     missed = 1.0 - sums.existence * odds.detection_probability
@@ -45,7 +45,7 @@ def claims(
 
 
 def _ratios(length: Floats, spread: Floats, scan: Scan, odds: Odds) -> Floats:
-    """Likelihood ratios (C, M) `p_d f(z) / clutter`."""
+    """Likelihood ratios (C, M) of features and ranges for the correction, `p_d f(z) / clutter`."""
     variance = spread[:, None] + scan.std**2
     square = (scan.length - length[:, None]) ** 2 / variance
     peak = odds.detection_probability / (odds.clutter_density * np.sqrt(2.0 * np.pi * variance))
@@ -55,7 +55,7 @@ def _ratios(length: Floats, spread: Floats, scan: Scan, odds: Odds) -> Floats:
 def absorb(
     sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, found: Association, odds: Odds
 ) -> tuple[Sums, AgentTrajectory]:
-    """Features and course after the ranges, feature by feature, the surest first."""
+    """Features and course corrected by the ranges, feature by feature, the surest first."""
     ref, edges = course.mean.copy(), np.searchsorted(sums.owner, np.arange(len(sums.ident) + 1))
     existence, share = sums.existence.copy(), sums.share.copy()
     pulls = np.zeros((2, len(sums.owner)))
@@ -92,7 +92,7 @@ def absorb(
 
 
 def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds) -> Pull:
-    """What C Gaussians of one feature learn: moments over the ranges and "missed", as one range."""
+    """Correction of C Gaussians of one feature: moments over the ranges and "missed", as one range."""
     ratio = _ratios(seen, spread, scan, odds) * message
     none = 1.0 - odds.detection_probability
     total = none + ratio.sum(axis=1)
@@ -109,7 +109,7 @@ def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds)
 
 
 def _mix(course: AgentTrajectory, gain: Floats, variance: Floats, miss: Floats, weight: Floats) -> AgentTrajectory:
-    """Course after one feature's message: moments over its Gaussians; the rest of the weight changes nothing."""
+    """Course corrected by one feature's message: moments over its Gaussians; the rest of the weight changes nothing."""
     rows = np.flatnonzero(weight > 1e-4)
     if not len(rows):
         return course
@@ -122,12 +122,12 @@ def _mix(course: AgentTrajectory, gain: Floats, variance: Floats, miss: Floats, 
 
 
 def newborn(found: Association, fresh: Floats, birth_threshold: float) -> tuple[Integers, Floats]:
-    """Rows of the ranges that start a feature, and its probability of existing."""
+    """Rows of the ranges that no feature claims and that start one, and its probability of existing."""
     alive = found.unclaimed * (fresh - 1.0) / fresh
     rows = np.flatnonzero(alive >= birth_threshold)
     return rows, alive[rows]
 
 
 def is_strong(ratio: Floats, specular_ratio: float | None) -> Booleans:
-    """(M,) whether a component is as strong as only a wall return is."""
+    """(M,) whether a range is of a component as strong as only a wall return is."""
     return ratio > (np.inf if specular_ratio is None else specular_ratio)

@@ -53,7 +53,7 @@ class DelayAgent(NamedTuple):
 
     @property
     def pose(self) -> Floats:
-        """(2, 3) position [m] and velocity [m/s] that the filter works at."""
+        """(2, 3) position [m] and velocity [m/s] of the agent that the filter of delays works at."""
         return lift(self.course.mean[: self.course.width], self.height)
 
     def strained(self, nis: float, dof: int, rate: float) -> "DelayAgent":

@@ -1,4 +1,4 @@
-"""What delays tell of the agent, and what they leave as it was told: the belief that is reported.
+"""The gauge, what delays cannot tell of the agent and leave as it was told: the belief that is reported.
 
 Ranges to places that nobody knows are the same for every course and map that are moved, turned about the vertical or
 mirrored in a vertical plane together. (With both ends at one point they are exactly so; a baseline b adds b^2 / 4r.)
@@ -31,7 +31,7 @@ class Reported(NamedTuple):
 
 
 def over_all_turns(course: AgentTrajectory) -> Reported:
-    """Moments over turns and mirror images of the course about the start.
+    """Moments of the course over what ranges leave free (the gauge): turns and mirror images about the start.
 
     The displacement is `L (cos t, sin t)` off the direction told, `L` as filtered, `t` normal with zero mean and the
     standard deviation that dead reckoning gives: `E cos t = exp(-v / 2)`, `var cos t = (1 - exp(-v))^2 / 2`. The
@@ -63,14 +63,15 @@ def over_all_turns(course: AgentTrajectory) -> Reported:
 
 
 def _frame(ahead: Floats, axes: int) -> Floats:
-    """(2A, 2A) from room axes to along, across (and up), for position and velocity."""
+    """(2A, 2A) turn of the gauge's axes: from room axes to along, across (and up), for position and velocity."""
     turn = np.eye(axes)
     turn[:2, :2] = [[ahead[0], ahead[1]], [-ahead[1], ahead[0]]]
     return np.asarray(np.kron(np.eye(2), turn), dtype=np.float64)
 
 
 def _of_shape(course: AgentTrajectory, along: Floats, ahead: Floats) -> Floats:
-    """Covariance (2A, 2A) of distance from the start and speed, in the places of "along"; of heights; zeros across."""
+    """Covariance (2A, 2A) of what the gauge leaves: distance and speed in the places of "along", heights; zeros
+    across."""
     axes, width = course.axes, course.width
     rows = np.zeros((width, len(course.mean)))
     rows[0, :2] = along

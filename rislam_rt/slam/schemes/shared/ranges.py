@@ -35,15 +35,15 @@ class Direct(NamedTuple):
     """Whether features lie above the agent only."""
 
     def ranges(self, agent: Floats, feature: Floats) -> Floats:
-        """|x - a|."""
+        """Range from agent to feature, |x - a|."""
         return length_of(agent - feature)
 
     def invert(self, agent: Floats, direction: Floats, length: Floats) -> Floats:
-        """x + r u."""
+        """Feature at a range, x + r u."""
         return agent + length[..., None] * direction
 
     def shell(self, length: Floats, dims: int) -> Floats:
-        """Circle or sphere of the radius, or the half of it."""
+        """Circle or sphere of features of one range, or the half of it."""
         full = 2.0 * np.pi * length if dims == 2 else 4.0 * np.pi * length**2
         return full * (0.5 if self.upper_half else 1.0)
 
@@ -58,7 +58,7 @@ class Bistatic(NamedTuple):
     upper_half: bool = False
 
     def ranges(self, agent: Floats, feature: Floats) -> Floats:
-        """|p_T - a| + |a - p_R|."""
+        """Range over both ends, |p_T - a| + |a - p_R|."""
         offset = feature - agent
         return length_of(offset - self.tx) + length_of(offset - self.rx)
 

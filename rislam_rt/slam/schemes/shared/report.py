@@ -1,4 +1,4 @@
-"""What both rivals hand on: the pose over all turns and mirror images, and their features as points of a map."""
+"""What both rivals report: the pose over all turns and mirror images, and their features as points of a map."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -19,7 +19,7 @@ NIS_LIMIT = 3.0
 
 
 def outcome_of(num_measurements: int, num_features: int, strain: float) -> StepOutcome:
-    """How a cycle went; `strain` is the running mean of the NIS per degree of freedom."""
+    """Reported outcome of a cycle; `strain` is the running mean of the NIS per degree of freedom."""
     if num_measurements == 0:
         return StepOutcome.NO_MEASUREMENTS
     if num_features == 0:
@@ -38,18 +38,19 @@ class Points(NamedTuple):
     """(V, 3, 3) [m^2]."""
 
     def keep(self, rows: Booleans) -> "Points":
-        """Some of them."""
+        """Some of the points to report."""
         return Points._make(column[rows] for column in self)
 
 
 def lift(known: Floats, height: Floats) -> Floats:
-    """(2, 3) position and velocity of the numbers (4,) or (6,) that are filtered, and `height` (2,) if they lack it."""
+    """Pose to report, (2, 3) position and velocity, of the numbers (4,) or (6,) that are filtered, and `height` (2,) if
+    they lack it."""
     known = known.reshape(2, -1)
     return known if known.shape[1] == 3 else np.concatenate([known, height[:, None]], axis=1)
 
 
 def ahead_of(now: SlamEstimate, dt: float) -> SlamEstimate:
-    """The belief carried over `dt` [s] without noise."""
+    """An estimate carried over `dt` [s] without noise, as it is reported to the designer."""
     move, way = np.eye(6), dt * now.velocity
     move[:3, 3:] = dt * np.eye(3)
     covariance = move @ now.covariance @ move.T
@@ -57,7 +58,7 @@ def ahead_of(now: SlamEstimate, dt: float) -> SlamEstimate:
 
 
 def known_points(sums: Sums, threshold: float) -> Points:
-    """Features that exist and are rather points than walls or wanderers, with the moments of their sums."""
+    """Features to report as points of the map: those that exist and are rather points than walls or wanderers."""
     count, point = len(sums.ident), sums.kind == POINT
     held = np.bincount(sums.owner[point], sums.share[point], minlength=count)
     shown = np.flatnonzero((sums.existence > threshold) & (held > 0.5))

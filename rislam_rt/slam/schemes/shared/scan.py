@@ -1,4 +1,4 @@
-"""Ranges of one step, and how likely each is the first of a feature never seen."""
+"""A scan, the ranges of one step, and how likely each is the first of a feature never seen."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ class Scan(NamedTuple):
     """(M,) standard deviations [m]."""
 
     def take(self, rows: Integers) -> "Scan":
-        """Some of the ranges."""
+        """Some of the ranges of a scan."""
         return Scan(self.length[rows], self.std[rows])
 
 

@@ -87,7 +87,7 @@ class PredictedRanges(NamedTuple):
 
 
 def no_sums(size: int) -> Sums:
-    """None yet."""
+    """No Gaussian sums yet."""
     none, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
     rows, slopes = np.zeros((0, 3)), np.zeros((0, 3, size))
     return Sums(
@@ -172,7 +172,7 @@ def look(sums: Sums, course: AgentTrajectory, place: Floats, model: Bistatic) ->
 
 
 def spread_of(sight: PredictedRanges, course: AgentTrajectory) -> Floats:
-    """Variance (C,) of predicted ranges [m^2]."""
+    """Variance (C,) of ranges predicted from Gaussian sums [m^2]."""
     return np.asarray(sight.own + np.sum((sight.by_course @ course.covariance) * sight.by_course, axis=1))
 
 
@@ -180,7 +180,8 @@ def born(
     length: Floats, std: Floats, kinds: Floats, existence: Floats, course: AgentTrajectory, place: Floats, turns: int,
     first: int,
 ) -> Sums:  # fmt: skip
-    """One new feature a range, over all directions of the upper half space; `kinds` (M, 3) are shares of the kinds."""
+    """Births of delay-only filters: a new feature a range, over the upper half space; `kinds` (M, 3) are kinds'
+    shares."""
     count, size = len(length), len(course.mean)
     speed = np.zeros(3)
     speed[: course.axes] = course.mean[course.axes : 2 * course.axes]
@@ -210,7 +211,7 @@ def born(
 
 
 def join(one: Sums, other: Sums) -> Sums:
-    """Both."""
+    """Both sets of Gaussian sums as one."""
     moved = other._replace(owner=other.owner + len(one.ident))
     return Sums._make(np.concatenate(pair) for pair in zip(one, moved, strict=True))
 

@@ -1,4 +1,4 @@
-"""Tracks that are understood: their components are explained, by a new feature or by those that there are."""
+"""Births of features from tracks that are understood: by a new feature or by those that there are."""
 
 import numpy as np
 
@@ -220,9 +220,8 @@ def _enter(
     new = len(context.landmarks.ident)
     holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))
     window = window_gaussian.add_feature(context.window, verdict.place, holds)
-    landmarks = enter(
-        context.landmarks, verdict.is_wall, histories.middle, len(at), CONSTANTS.log_born, verdict.identity
-    )
+    odds = CONSTANTS.log_born
+    landmarks = enter(context.landmarks, verdict.is_wall, histories.middle, len(at), odds, verdict.identity)
     forms = np.full((2, 5), UNKNOWN)
     forms[0] = [new if part == NEW else part for part in verdict.form]
     if verdict.kind == BESIDE:

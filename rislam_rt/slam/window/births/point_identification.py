@@ -1,10 +1,12 @@
 """Points that tracks may be: each as a scatterer and as a panel, by amplitudes and silence over the whole history."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.model import RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import even_draws, poses_of
 from rislam_rt.slam.observations import OTHER, UNTOLD
@@ -79,18 +81,43 @@ def _history(context: WindowState, at: Integers, table: Hypotheses, fits: Fits, 
     first = context.cycle - window.num_poses + 1
     heard = {int(log.cycle[row] - first): row for row in at}
     found = unknown(count, scene.num_panels)
-    for slot in range(min(heard), window.num_poses):
-        row = heard.get(slot, -1)
-        amplitude, side = (np.exp(log.log_amplitude[row]), log.side[row]) if row >= 0 else (1.0, UNTOLD)
-        tx, rx = (end[slot] @ turn[:, leg] + shift[:, leg] for leg, end in enumerate((ends.tx, ends.rx)))
+    told = [code is not None for code in context.codes]
+    for slots in _blocks(min(heard), told, max(1, LOOKS // count)):
+        row = np.array([heard.get(slot, -1) for slot in slots])
+        amplitude, side = np.exp(log.log_amplitude[row]), np.where(row >= 0, log.side[row], UNTOLD)
+        tx, rx = (
+            (end[slots, None, None] @ turn[:, leg]).reshape(len(slots), count, 3) + shift[:, leg]
+            for leg, end in enumerate((ends.tx, ends.rx))
+        )
         sight = PanelObservation(
-            spots, tx, rx, ratio, np.full(count, amplitude), np.full(count, side), np.full(count, row >= 0)
+            np.tile(spots, (len(slots), 1, 1)), tx.reshape(-1, 3), rx.reshape(-1, 3), np.tile(ratio, len(slots)),
+            np.repeat(amplitude, count), np.repeat(side, count), np.repeat(row >= 0, count),
         )  # fmt: skip
-        gain = gains(sight, scene.ris, context.codes[slot], scene.radio)
+        gain = gains(sight, scene.ris, _codes([context.codes[slot] for slot in slots], count), scene.radio)
         if gain is not None:
-            gain[:, -1] = anywhere
+            gain[:, count - 1 :: count] = anywhere
         found = weigh(found, sight, gain, scene.sensor)
     return found
+
+
+LOOKS = 60
+"""At so many places at a time: numpy's calls cost no more than the numbers then, which stay in the cache."""
+
+
+def _blocks(first: int, told: list[bool], most: int) -> Iterator[list[int]]:
+    """Slots of the window from the first on, in blocks of at most so many, of all or none of which a code is told."""
+    slots = list(range(first, len(told)))
+    while slots:
+        count = next((at for at, slot in enumerate(slots) if told[slot] != told[slots[0]]), len(slots))
+        yield slots[: min(count, most)]
+        slots = slots[min(count, most) :]
+
+
+def _codes(codes: list[RisCode | None], count: int) -> RisCode | None:
+    """The codes of some cycles, each for so many places; None where none is told."""
+    index = [code.index for code in codes if code is not None]
+    levels = next((code.levels for code in codes if code is not None), 0)
+    return RisCode(np.repeat(np.stack(index), count, axis=0)[:, None], levels) if index else None
 
 
 def _ratio(table: Hypotheses, landmarks: WindowTable, rows: Integers) -> Floats:

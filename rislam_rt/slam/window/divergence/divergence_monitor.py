@@ -1,4 +1,4 @@
-"""Lost or not, and what to do about it: a chain of two hidden states, jumps, and a start that was told wrong.
+"""Monitor of divergence, lost or not: a chain of two hidden states, jumps, and a start that was told wrong.
 
 While the agent is tracked, the map foresees what is heard; once it is lost, all is strangers'. The log likelihood of a
 cycle under the one against the other (`look`) moves the log odds of a hidden chain, which passes from tracked to lost

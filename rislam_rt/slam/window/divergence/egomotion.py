@@ -1,4 +1,4 @@
-"""Does the picture move as the agent is told that it moves? Asked of the first tracks, before anything is born of them.
+"""Egomotion: does the picture move as the agent is told that it moves? Asked of the first tracks, before any birth.
 
 Whatever throws it, a wall, a point, or two walls at right angles, a return grows shorter by twice the way that the
 agent goes towards it: `rate = -2 u . v`, with `u` the direction of arrival. What goes to and fro between opposite walls

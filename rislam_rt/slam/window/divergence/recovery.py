@@ -1,4 +1,4 @@
-"""What becomes of the belief once it may be lost: another start, another place, or a new beginning."""
+"""Recovery of a belief that may be lost: another start, another place, or a new beginning."""
 
 import numpy as np
 
@@ -28,7 +28,7 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
             )
         return state, False
     told = None if state.asked else divergence_monitor.ask_tracks(state.window, state.log, state.heading, baseline)
-    if told is None or not divergence_monitor.is_lost(told.log_odds):
+    if told is None or told.log_odds <= 0.0:
         return state, False
     state = state._replace(asked=True)
     if not told.is_compass:

@@ -1,4 +1,4 @@
-"""What is known of each feature besides its place: kind, existence, strength, and whether something hides it."""
+"""The landmark table, what is known besides the place: kind, existence, strength, and whether something hides it."""
 
 from typing import Any, NamedTuple
 

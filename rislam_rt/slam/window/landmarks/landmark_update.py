@@ -1,4 +1,4 @@
-"""What a cycle teaches about the features themselves: strength, walls' losses, the panel, and what hides a path."""
+"""Update of landmarks by a cycle: strength, walls' losses, the panel, and what hides a path."""
 
 from typing import NamedTuple
 

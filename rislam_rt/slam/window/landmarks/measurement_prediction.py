@@ -1,4 +1,4 @@
-"""Which returns of the believed map should show now, where, how strong, and which of them come out as one."""
+"""Prediction of measurements: which returns of the believed map should show now, where, how strong, which as one."""
 
 from typing import NamedTuple
 

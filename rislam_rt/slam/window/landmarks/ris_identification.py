@@ -1,4 +1,4 @@
-"""Which point is which panel? Bayes from amplitudes under the codes applied, and from silence; for features and tracks.
+"""Identification of the RIS, which point is which panel: Bayes from amplitudes under the codes, and from silence.
 
 "Is the panel" predicts the amplitude with no free parameter; "is a scatterer" has one unknown cross-section for all
 cycles, integrated out. Silence under a code that would have made it loud speaks against the panel; what is blocked is
@@ -105,7 +105,10 @@ def spread_places(mean: Floats, covariance: Floats) -> Floats:
 
 
 def gains(sight: PanelObservation, ris: DataSheet | None, code: RisCode | None, radio: RadioConfig) -> Complexes | None:
-    """Gains (Q, N, S) of each panel, were it at each of the places; None without a panel."""
+    """Gains (Q, N, S) of each panel, were it at each of the places; None without a panel.
+
+    The code is the same for all places, or one for each of them, (N, 1, ...).
+    """
     if ris is None or code is None:
         return None
     ends, ratio = (sight.tx[:, None], sight.rx[:, None]), sight.ratio[:, None]
@@ -114,33 +117,52 @@ def gains(sight: PanelObservation, ris: DataSheet | None, code: RisCode | None, 
 
 
 def weigh(before: PanelIdentity, sight: PanelObservation, gain: Complexes | None, sensor: SensorModel) -> PanelIdentity:
-    """The identities (N,) after one more cycle, in which the panels have one of the gains (Q, N, S)."""
-    radio, count = sensor.radio, len(sight.place)
-    if not count:
+    """The identities (N,) after one more cycle, or after several: `sight` then holds N rows a cycle, one after the
+    other. The panels have one of the gains (Q, K N, S).
+    """
+    if not len(sight.place):
         return before
+    heard = sight.seen.reshape(-1, len(before.log_ris))
+    scatterer, panel = (
+        each.reshape(*heard.shape, -1) for each in _log_likelihoods(sight, gain, before.log_ris.shape[1], sensor)
+    )
+    own = sight.side.reshape(*heard.shape, 1) == PANEL + np.arange(panel.shape[2])
+    log_grid, log_ris, hidden = before.log_grid.copy(), before.log_ris.copy(), before.hidden.copy()
+    for cycle, seen in enumerate(heard):
+        at, silent = seen.nonzero()[0], (~seen).nonzero()[0]
+        if len(at):
+            log_grid[at], log_ris[at] = add_evidence(log_grid[at], log_ris[at], scatterer[cycle, at], panel[cycle, at])
+            log_ris[at] += np.where(own[cycle, at], CONSTANTS.doubt, 0.0)
+            hidden[at] = 0.0
+        if len(silent) and gain is not None:
+            grid = log_grid[silent] - np.logaddexp.reduce(log_grid[silent], axis=1, keepdims=True)
+            lone = np.logaddexp.reduce(grid + scatterer[cycle, silent], axis=1)
+            missed = np.concatenate([panel[cycle, silent], lone[:, None]], axis=1)
+            hidden[silent], surplus = weigh_silence(hidden[silent], np.exp(missed))
+            log_ris[silent] += surplus
+    return PanelIdentity(log_grid, log_ris, hidden)
+
+
+def _log_likelihoods(
+    sight: PanelObservation, gain: Complexes | None, panels: int, sensor: SensorModel
+) -> tuple[Floats, Floats]:
+    """Of each of L looks, heard or silent: under every strength of a scatterer (L, G), and under every panel (L, Q)."""
+    radio, count = sensor.radio, len(sight.place)
     noise = amplitude_std(radio)
     threshold = float(np.sqrt(2.0 * sensor.threshold) * noise)
     middle, std = sight.place.mean(axis=1), np.full(count, noise)
     first, second = (np.maximum(np.linalg.norm(middle - end, axis=1), 0.05) for end in (sight.tx, sight.rx))
     first = first / sight.ratio  # what walls take, a longer way takes as well
-    log_grid, log_ris, hidden = before.log_grid.copy(), before.log_ris.copy(), before.hidden.copy()
+    scatterer, panel = np.zeros((count, len(STRENGTHS))), np.full((count, panels), -np.inf)
     at, silent = sight.seen.nonzero()[0], (~sight.seen).nonzero()[0]
     if len(at):
-        amplitude, own = sight.amplitude[at], sight.side[at, None] == PANEL + np.arange(log_ris.shape[1])
-        panel = np.full(own.shape, -np.inf)
+        amplitude, side = sight.amplitude[at], sight.side[at, None]
+        scatterer[at] = log_scatterer(amplitude, std[at], first[at], second[at], radio)
         if gain is not None:
             each = np.stack([log_panel(amplitude, std[at], of_panel[at]) for of_panel in gain], axis=1)
-            panel = np.where(own | (sight.side[at, None] == UNTOLD), each, -np.inf)
-        scatterer = log_scatterer(amplitude, std[at], first[at], second[at], radio)
-        log_grid[at], log_ris[at] = add_evidence(log_grid[at], log_ris[at], scatterer, panel)
-        log_ris[at] += np.where(own, CONSTANTS.doubt, 0.0)
-        hidden[at] = 0.0
+            panel[at] = np.where((side == PANEL + np.arange(panels)) | (side == UNTOLD), each, -np.inf)
     if len(silent) and gain is not None:
-        each = log_scatterer_missed(std[silent], first[silent], second[silent], radio, threshold)
-        grid = log_grid[silent] - np.logaddexp.reduce(log_grid[silent], axis=1, keepdims=True)
-        scatterer = np.logaddexp.reduce(grid + each, axis=1)
-        panels = [log_panel_missed(std[silent], of_panel[silent], threshold) for of_panel in gain]
-        missed = np.stack([*panels, scatterer], axis=1)
-        hidden[silent], surplus = weigh_silence(hidden[silent], np.exp(missed))
-        log_ris[silent] += surplus
-    return PanelIdentity(log_grid, log_ris, hidden)
+        scatterer[silent] = log_scatterer_missed(std[silent], first[silent], second[silent], radio, threshold)
+        for number, of_panel in enumerate(gain):
+            panel[silent, number] = log_panel_missed(std[silent], of_panel[silent], threshold)
+    return scatterer, panel

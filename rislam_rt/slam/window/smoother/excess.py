@@ -1,4 +1,4 @@
-"""How much farther off the agent may be than its calm motion makes it, where nothing measures how lively it is.
+"""Excess of motion, how much farther off the agent may be than when calm, where nothing measures how lively it is.
 
 The window's estimate takes each step by its expected precision: that of the calmest motion mode that may be. It is
 the better estimate, but the covariance of its error hangs on the expected variance, that of the liveliest. What the

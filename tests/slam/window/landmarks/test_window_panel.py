@@ -38,6 +38,28 @@ def _code(rng):
     return RisCode(rng.integers(4, size=(6, 6)), 4)
 
 
+def test_several_cycles_at_once_are_one_after_the_other():
+    rng, cycles = np.random.default_rng(2), 7
+    places = np.array([[3.0, 3.0, 3.0], [3.3, 2.8, 3.0]])
+    spots = spread_places(places, np.tile(1e-8 * np.eye(3), (2, 1, 1)))
+    codes, before = [_code(rng) for _ in range(cycles)], unknown(2)
+    one_by_one, each = before, []
+    for cycle, code in enumerate(codes):
+        ends = (np.tile(end + 0.01 * cycle, (2, 1)) for end in (TX, RX))
+        seen, side = np.array([cycle % 3 > 0, cycle % 2 > 0]), np.array([UNTOLD, PANEL if cycle < 4 else OTHER])
+        sight = PanelObservation(spots, *ends, np.ones(2), rng.uniform(1e-6, 1e-5, 2), side, seen)
+        each.append((sight, gains(sight, SPEC, code, SENSOR.radio)))
+        one_by_one = weigh(one_by_one, *each[-1], SENSOR)
+    every = PanelObservation(*(np.concatenate(fields) for fields in zip(*(sight for sight, _ in each), strict=True)))
+    index = np.repeat(np.stack([code.index for code in codes]), 2, axis=0)[:, None]
+    gain = gains(every, SPEC, RisCode(index, 4), SENSOR.radio)
+    np.testing.assert_allclose(gain, np.concatenate([one for _, one in each], axis=1), rtol=1e-12)
+    for whole, part in zip(weigh(before, every, gain, SENSOR), one_by_one, strict=True):
+        np.testing.assert_allclose(whole, part, rtol=1e-9, atol=1e-12)
+    assert (one_by_one.hidden > 0.0).any()
+    assert abs(np.diff(one_by_one.log_ris, axis=0)).min() > 1.0
+
+
 def test_one_amplitude_tells_what_quadrature_tells():
     code, radio, noise = _code(np.random.default_rng(1)), SENSOR.radio, amplitude_std(SENSOR.radio)
     sight = _sight(3.0 * noise)

@@ -1,7 +1,6 @@
-"""Meshes of simple solids and surfaces. Corners that two faces share are the same numbers in both."""
+"""Meshes of simple shapes, solids and surfaces. Corners that two faces share are the same numbers in both."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -33,13 +32,6 @@ def box_corners(low: Sequence[float], high: Sequence[float]) -> Floats:
     return np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)
 
 
-def box_walls(x: float, y: float, z: float) -> dict[str, Mesh]:
-    """Floor, ceiling and four walls of a room from the origin; `wall_x6` is the wall at x = 6 m."""
-    faces = hexahedron(box_corners([0.0, 0.0, 0.0], [x, y, z]))
-    names = {"wall_x1": f"wall_x{x:g}", "wall_y1": f"wall_y{y:g}"}
-    return {names.get(name, name): mesh for name, mesh in faces.items()}
-
-
 def block(low: Sequence[float], high: Sequence[float], without: Sequence[str] = ()) -> Mesh:
     """An axis-aligned object, normals outwards; faces named in `without` (as in `hexahedron`) are left out."""
     faces = hexahedron(box_corners(low, high))
@@ -52,21 +44,3 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
-
-
-def grid(origin: Sequence[float], along: Sequence[float], across: Sequence[float], columns: int, rows: int) -> Mesh:
-    """A parallelogram from `origin`, spanned by two edges, cut into `columns` by `rows` cells of two triangles."""
-    u, v = np.meshgrid(np.arange(columns + 1) / columns, np.arange(rows + 1) / rows)
-    vertices = np.array(origin) + u.reshape(-1, 1) * np.array(along) + v.reshape(-1, 1) * np.array(across)
-    first = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).reshape(-1, 1)
-    cells = np.concatenate([first, first + 1, first + columns + 2, first + columns + 1], axis=1)
-    return Mesh(vertices, np.stack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]], axis=1).reshape(-1, 3))
-
-
-def refined(mesh: Mesh) -> Mesh:
-    """Every triangle cut into four."""
-    import trimesh
-
-    remesh: Any = trimesh.remesh  # untyped
-    vertices, faces = remesh.subdivide(mesh.vertices, mesh.faces)
-    return Mesh(np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64))

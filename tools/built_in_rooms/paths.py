@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.scene.built_in_rooms.room import BASELINE, CYCLES
+from rislam_rt.scene.room_files import BASELINE, CYCLES
 from rislam_rt.scene.write import TRAJECTORY_FILE, tum_bytes
 
 SPEED = 0.1

@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from built_in_rooms.parts import sphere
+from built_in_rooms.paths import curved_agent
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
-from rislam_rt.scene.built_in_rooms.paths import curved_agent
-from rislam_rt.scene.built_in_rooms.room import RoomFiles, panel, reflector, sphere
-from rislam_rt.scene.built_in_rooms.shapes import hexahedron, quad
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.room_files import RoomFiles, panel, reflector
+from rislam_rt.scene.shapes import hexahedron, quad
 
 TILTED_PLANES: dict[str, tuple[list[float], list[float]]] = {
     "floor": ([0.021, -0.034, 1.0], [3.0, 2.5, 0.0]),

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 
-from rislam_rt.scene.built_in_rooms.angled import l_room, tilted_room
-from rislam_rt.scene.built_in_rooms.furnished import imported_glb, office
-from rislam_rt.scene.built_in_rooms.hall import large_hall
-from rislam_rt.scene.built_in_rooms.plain import empty_box, itu_room, paper_room, two_panels, two_scatterers
-from rislam_rt.scene.built_in_rooms.room import RoomFiles
-from rislam_rt.scene.built_in_rooms.shaded import shaded_room
+from built_in_rooms.angled import l_room, tilted_room
+from built_in_rooms.furnished import imported_glb, office
+from built_in_rooms.hall import large_hall
+from built_in_rooms.plain import empty_box, itu_room, paper_room, two_panels, two_scatterers
+from built_in_rooms.shaded import shaded_room
+from rislam_rt.scene.room_files import RoomFiles
 
 ROOMS: dict[str, Callable[[], RoomFiles]] = {
     room.__name__: room

@@ -4,12 +4,13 @@ from typing import Any
 
 import numpy as np
 
+from built_in_rooms.parts import box_walls, sphere
+from built_in_rooms.paths import curved_agent
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.scene.built_in_rooms.paths import curved_agent
-from rislam_rt.scene.built_in_rooms.room import RoomFiles, panel, reflector, sphere
-from rislam_rt.scene.built_in_rooms.shapes import block, box_walls, joined, quad
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.room_files import RoomFiles, panel, reflector
+from rislam_rt.scene.shapes import block, joined, quad
 
 GLB_FILE = "room.glb"
 

@@ -1,9 +1,12 @@
-"""What a room's builder returns, and the tables that most rooms share."""
+"""A room as the files of its scene folder, and the tables of `scene.toml` that most rooms share."""
 
 from dataclasses import dataclass, field
+from textwrap import fill
 from typing import Any
 
-from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.load import SCENE_FILE
+from rislam_rt.scene.meshes import Mesh, ply_bytes
+from rislam_rt.toml import toml_bytes
 
 PAPER_MATERIAL = {"reflection": 0.85}
 
@@ -24,19 +27,14 @@ class RoomFiles:
 
 
 def reflector(name: str, material: dict[str, Any] | None = None) -> dict[str, Any]:
-    """The table of a reflector with a PLY mesh of its own."""
+    """Table in a room's file of a reflector with a PLY mesh of its own."""
     return {"name": name, "mesh": f"meshes/{name}.ply", "material": material or PAPER_MATERIAL}
-
-
-def sphere(name: str, position: list[float], radius: float = 0.05) -> dict[str, Any]:
-    """The table of a spherical scatterer; the paper's radius by default."""
-    return {"name": name, "position": position, "radius": radius}
 
 
 def panel(
     center: list[float], normal: list[float], up: list[float], host: str = "ceiling", size: int = 6
 ) -> dict[str, Any]:
-    """The table of a panel like the paper's, anywhere."""
+    """Table in a room's file of a panel like the paper's, anywhere."""
     return {
         "center": center,
         "normal": normal,
@@ -48,3 +46,10 @@ def panel(
         "element": "tang",
         "host": host,
     }
+
+
+def room_files(room: RoomFiles, origin: str) -> dict[str, bytes]:
+    """The files of a scene folder: relative name -> content. `origin` says where the room comes from."""
+    files = {f"meshes/{name}.ply": ply_bytes(mesh.vertices, mesh.faces) for name, mesh in room.meshes.items()}
+    readme = f"# {room.table['name']}\n\n{fill(room.readme, 110)}\n\n{origin}\n"
+    return files | room.files | {SCENE_FILE: toml_bytes(room.table), "README.md": readme.encode()}

@@ -1,8 +1,8 @@
 """A room with round objects that hide things."""
 
-from rislam_rt.scene.built_in_rooms.paths import curved_agent
-from rislam_rt.scene.built_in_rooms.room import RoomFiles, panel, reflector, sphere
-from rislam_rt.scene.built_in_rooms.shapes import box_walls
+from built_in_rooms.parts import box_walls, sphere
+from built_in_rooms.paths import curved_agent
+from rislam_rt.scene.room_files import RoomFiles, panel, reflector
 
 
 def shaded_room() -> RoomFiles:

@@ -1,8 +1,8 @@
 """Box-shaped rooms: the paper's, and its variants."""
 
-from rislam_rt.scene.built_in_rooms.paths import curved_agent
-from rislam_rt.scene.built_in_rooms.room import BASELINE, CYCLES, RoomFiles, panel, reflector, sphere
-from rislam_rt.scene.built_in_rooms.shapes import box_walls
+from built_in_rooms.parts import box_walls, sphere
+from built_in_rooms.paths import curved_agent
+from rislam_rt.scene.room_files import BASELINE, CYCLES, RoomFiles, panel, reflector
 
 DOWN, NORTH = [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]
 
