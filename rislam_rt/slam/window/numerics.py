@@ -27,8 +27,6 @@ STRIDE = 3
 """Cycles between two examinations."""
 NEARBY = 2.0
 """Distance [m] beyond which two places are not compared."""
-ASIDE = 10.0
-"""Log evidence behind a track's best from which on a hypothesis is not weighed for others, or as the panel."""
 LATELY = 5
 """Last steps that may all have been as lively as can be: what began within half a second."""
 MISSED = 1.5
@@ -37,8 +35,6 @@ DRAWS = 12
 """Places of the belief over which the panel's predicted gain is averaged."""
 CERTAIN = 30.0
 """Log odds beyond which an identity is no longer in question."""
-SETTLED = 12.0
-"""Log odds of existence that a feature gathers at most, so that it can be taken back."""
 FEWEST = 15
 """Measurements of a feature within the window from which on their residuals speak against it."""
 RECENT = 5

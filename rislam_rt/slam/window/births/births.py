@@ -85,7 +85,7 @@ def _missing_legs(context: WindowState, histories: TrackSummary, mean: Floats) -
     length, shine = histories.mean[0][:, 0], histories.log_amplitude + np.log(histories.mean[0][:, 0])
     old = every.hits >= 3
     away, reach = _bearings(context, old, mean)
-    bright = (every.log_amplitude[old] + np.log(reach))[None] > shine[:, None] - CONSTANTS.fading
+    bright = (every.log_amplitude[old] + np.log(reach))[None] > shine[:, None] - 0.3
     walls = context.landmarks.walls
     if len(walls):
         place, anchor = mean[HEAD:].reshape(-1, 3)[walls], context.landmarks.anchor[walls]
@@ -220,8 +220,7 @@ def _enter(
     new = len(context.landmarks.ident)
     holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))
     window = window_gaussian.add_feature(context.window, verdict.place, holds)
-    odds = CONSTANTS.log_born
-    landmarks = enter(context.landmarks, verdict.is_wall, histories.middle, len(at), odds, verdict.identity)
+    landmarks = enter(context.landmarks, verdict.is_wall, histories.middle, len(at), 5.0, verdict.identity)
     forms = np.full((2, 5), UNKNOWN)
     forms[0] = [new if part == NEW else part for part in verdict.form]
     if verdict.kind == BESIDE:
@@ -233,7 +232,7 @@ def _enter(
     if not np.isfinite(window.head).all():
         return context, False
     fresh = np.isin(left.row, at)
-    if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > CONSTANTS.against:
+    if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > 3.0 * CONSTANTS.fit:
         return context, False
     square = float(np.mean(histories.scatter[row] ** 2))
     grown = grown._replace(window=window, visibility=seed(context.visibility, forms[:1], landmarks, square))

@@ -92,6 +92,8 @@ def try_all(trials: Trials, digest: TrackSummary) -> Fits:
             cost[lost] = np.inf
     evidence = -0.5 * cost - 0.5 * log_det + 1.5 * np.log(2.0 * np.pi)
     share = np.where(trials.mixed, CONSTANTS.weaker * (1.0 + error[:, -1]), 0.0)
+    # a component lies between the two that it is made of
+    evidence -= 20.0 * (np.maximum(-share, 0.0) + np.maximum(share - 1.0, 0.0))
     return Fits(place, covariance, held, cost, share, evidence)
 
 

@@ -21,9 +21,12 @@ from rislam_rt.slam.window.landmarks.ris_identification import (
     unknown,
     weigh,
 )
-from rislam_rt.slam.window.numerics import ASIDE, CERTAIN
+from rislam_rt.slam.window.numerics import CERTAIN
 from rislam_rt.slam.window.smoother.window_gaussian import poses
 from rislam_rt.slam.window.state import WindowState
+
+ASIDE = 12.0
+"""Log evidence behind a track's best point from which on another place is not asked whether it is the panel's."""
 
 
 class Identified(NamedTuple):

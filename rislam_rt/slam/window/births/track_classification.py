@@ -11,10 +11,12 @@ from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
     BESIDE,
     IMAGE,
+    LEVEL_TURN,
     OVER_SAME,
     OVER_TX,
     POINT,
     TWO_WALLS,
+    WALL,
     WALLS,
     Hypotheses,
     KnownFeatures,
@@ -26,14 +28,14 @@ from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
-from rislam_rt.slam.window.numerics import ASIDE, NEARBY
+from rislam_rt.slam.window.numerics import NEARBY
 from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors, no_holds
 from rislam_rt.slam.window.state import WindowState
 
-MORE_WALLS = np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 0])
-"""Walls in a path of each kind beyond what its one new feature needs."""
-LOG_ONE = -np.log(4.0)
-"""Log prior of what needs no more walls: a wall, a point, an image of a known point or a return of the map, alike."""
+LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 0.2]))
+"""Log prior of each kind; over known walls, of all walls together; of known points in walls, of all points together."""
+LOG_NONE = np.log(0.05)
+"""Of a path of no kind here: over walls that the map lacks."""
 
 
 class TrackDecision(NamedTuple):
@@ -97,8 +99,7 @@ def judge(
     Of these `told` gives track, log evidence, and the number of the panel that they run over, -1 for none.
 
     `ats` are the tracks' rows of the log; `lonely` (T,) is the log probability that two walls throw so few single
-    returns beside it, `beside` (T,) are the log odds that its direction speaks for a path over
-    unknown walls. A path is the less often heard by the power that each wall more takes of it.
+    returns beside it, `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
     """
     landmarks, scene = context.landmarks, context.scene
     table = hypotheses(digest, known, landmarks, scene.use_vt)
@@ -107,9 +108,9 @@ def judge(
     rivals = np.where(table.known >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
     rivals[table.kind == IMAGE] = np.log(max(len(landmarks.points), 1))
     evidence = fits.log_evidence + log_place(table, fits.place, digest.middle)
-    evidence += LOG_ONE + MORE_WALLS[table.kind] * 2.0 * CONSTANTS.wall_ratio - rivals
-    evidence += np.where(table.trials.is_pair, lonely[track], 0.0)
+    evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair, lonely[track], 0.0)
     evidence += _amplitudes(table, fits, digest, landmarks, scene) + _opacity(table, fits, digest, known, landmarks)
+    evidence += _beside(table, digest, known, landmarks, scene)
     gain = _upright(table, fits, digest, known, landmarks)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
     over = identify(context, ats, table, fits, evidence)
@@ -120,8 +121,7 @@ def judge(
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
-    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - CONSTANTS.log_volume + beside
-    none += LOG_ONE + 2.0 * CONSTANTS.wall_ratio
+    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - CONSTANTS.log_volume + LOG_NONE + beside
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
     none += np.logaddexp(np.log1p(-CONSTANTS.panels), np.log(CONSTANTS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
@@ -177,6 +177,30 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
     )
 
 
+def _beside(
+    table: Hypotheses, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, scene: KnownEnvironment
+) -> Floats:
+    """(H,) log probability that a wall's return comes out by itself, or as one with its edge at a level wall.
+
+    It hangs on how far apart the two would be.
+    """
+    track, found = table.trials.track, np.zeros(len(table.kind))
+    length, cell = digest.mean[0][track, 0], float(scene.sensor.cell_length[0])
+    for wall in landmarks.walls[np.abs(known.turn[landmarks.walls, 2, 2]) > LEVEL_TURN]:
+        rise = float(np.linalg.norm(known.place[wall] - digest.middle))
+        gap = np.hypot(length, rise) - length
+        found += np.where((table.kind == WALL) & (gap < CLOSE * cell), LOG_ALONE, 0.0)
+        found += np.where((table.kind == BESIDE) & (table.known == wall) & (gap > cell), LOG_APART, 0.0)
+    return found
+
+
+CLOSE = 0.8
+"""Gap in cells below which two paths come out as one beyond doubt."""
+LOG_ALONE, LOG_APART = np.log(0.1), np.log(1e-4)
+"""Log probability that two of one cell come out as one of them alone (the other is hidden), and that two that lie apart
+come out as one."""
+
+
 def _shared(
     table: Hypotheses, fits: Fits, evidence: Floats, none: Floats, explained: list[tuple[int, float]], middle: Floats
 ) -> Floats:
@@ -213,6 +237,8 @@ def _shared(
     return gain
 
 
+ASIDE = 10.0
+"""Log evidence behind a track's best from which on a hypothesis does not speak for others."""
 COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(4 + 3) log(1 + chi^2 / 4)` for chi^2 with 3 degrees of freedom."""
 
@@ -231,7 +257,8 @@ def _amplitudes(
     )
     mirror = free + ratio + CONSTANTS.wall_ratio
     spread = variance + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
-    wall = -0.5 * (level - mirror) ** 2 / spread - 0.5 * np.log(spread)
+    surplus = np.maximum(level - free - 0.2, 0.0)  # a mirror does not amplify
+    wall = -0.5 * (level - mirror) ** 2 / spread - 0.5 * np.log(spread) - 20.0 * surplus**2
     reach = np.linalg.norm(fits.place - rx, axis=1)
     far = np.where(np.isin(table.kind, (POINT, OVER_TX)), reach, 0.5 * seen[:, 0])
     far = np.clip(far, 0.05, np.maximum(seen[:, 0] - 0.05, 0.06))
@@ -241,7 +268,7 @@ def _amplitudes(
     spread = CONSTANTS.strength_std**2 + variance * bounces**2 + CONSTANTS.fading**2
     point = -0.5 * (level - mean) ** 2 / spread - 0.5 * np.log(spread)
     double, wide = free + 2.0 * CONSTANTS.wall_ratio, 2.0 * CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
-    pair = -0.5 * (level - double) ** 2 / wide - 0.5 * np.log(wide)
+    pair = -0.5 * (level - double) ** 2 / wide - 0.5 * np.log(wide) - 20.0 * surplus**2
     amplitude = np.where(table.trials.is_wall, wall, np.where(table.trials.is_pair, pair, point))
     image = (table.kind == IMAGE).nonzero()[0]
     amplitude[image] = _image_amplitudes(table, image, digest, landmarks, scene)

@@ -19,6 +19,9 @@ from rislam_rt.slam.window.numerics import POINTS
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window, now, pose_covariance, poses
 
+TOGETHER = 10.0
+"""Measurements over which the pull of neighbours keeps its sign."""
+
 
 class TrackSummary(NamedTuple):
     """T tracks, B normal points each; where `weight` is 0 there is none."""
@@ -72,13 +75,13 @@ def summarise_tracks(
     scatter = np.array([
         scatter_of(track, log.std[at], time[slot]) for track, at, slot in zip(seen, rows, slots, strict=True)
     ])  # fmt: skip
-    # what the others show is what a short history has yet to show; it counts as much as one run of neighbours' pull
+    # what the others show is what a short history has yet to show; it counts as much as four measurements
     crowd = max(CONSTANTS.crowd, float(np.mean(np.minimum(scatter, 10.0) ** 2)))
     number = np.array([len(at) for at in rows])[:, None]
     # the difference of two alternated codes holds the panel's paths and nothing of the others
     pure = np.array([bool((log.side[at] >= PANEL).all()) for at in rows])[:, None]
     around = np.where(pure, 1.0, crowd)
-    scatter = np.sqrt((CONSTANTS.memory * around + number * scatter**2) / (CONSTANTS.memory + number))
+    scatter = np.sqrt((4.0 * around + number * scatter**2) / (4.0 + number))
     count = len(rows)
     found = TrackSummary(
         np.zeros((count, POINTS, 3)), np.zeros((count, POINTS, 3)), np.zeros((count, POINTS)),
@@ -92,7 +95,7 @@ def summarise_tracks(
         bins = np.arange(len(at)) * min(POINTS, len(at)) // len(at)
         start = np.searchsorted(bins, np.arange(bins[-1] + 1))
         used, many = len(start), np.diff(start, append=len(at)).astype(np.float64)[:, None]
-        alone = max(len(at) / CONSTANTS.memory, 1.0) / used  # how many of a point's errors are its own
+        alone = max(len(at) / TOGETHER, 1.0) / used  # how many of a point's errors are its own
         inside = log.std[at] ** -2.0
         own = np.add.reduceat(log.std[at] ** 2, start) / many
         found.seen[row, :used] = np.add.reduceat(inside * seen[row], start) / np.add.reduceat(inside, start)

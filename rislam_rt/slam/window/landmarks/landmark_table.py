@@ -122,5 +122,5 @@ def learn_ratio(landmarks: WindowTable, wall: int, log_ratio: float) -> WindowTa
     gain = landmarks.ratio_variance[wall] / (landmarks.ratio_variance[wall] + CONSTANTS.fading**2)
     ratio, variance = landmarks.ratio.copy(), landmarks.ratio_variance.copy()
     ratio[wall] += gain * (log_ratio - ratio[wall])
-    variance[wall] = (1.0 - gain) * variance[wall]
+    variance[wall] = max((1.0 - gain) * variance[wall], CONSTANTS.fading**2 / 10.0)
     return landmarks._replace(ratio=ratio, ratio_variance=variance)

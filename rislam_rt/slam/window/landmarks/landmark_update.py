@@ -16,7 +16,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     UnresolvedClusters,
 )
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, weigh
-from rislam_rt.slam.window.numerics import SCATTER_RATE, SETTLED
+from rislam_rt.slam.window.numerics import SCATTER_RATE
 from rislam_rt.slam.window.smoother.steps import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 
@@ -125,7 +125,7 @@ def _existence(
             direct = (form[0] >= 0 and bounce == 0) or (form[0] == TX and bounce == 1)
             if tell:
                 for name in names:
-                    odds[name] = min(odds[name] + 1.0, SETTLED)
+                    odds[name] = min(odds[name] + (1.0 if direct else 0.3), 12.0)
                     hits[name] += 1
             elif direct:
                 odds[names[0]] += np.log1p(-show)
@@ -139,7 +139,8 @@ def _strengths(
 ) -> WindowTable:  # fmt: skip
     """Walls' losses, and who the points are, from components that came out alone."""
     lead, alone = groups.leader[row], groups.partner[row] < 0
-    for place in alone.nonzero()[0]:
+    quiet = (groups.disturbance[row] < 0.25 * scene.sensor.cell_length**2).all(axis=1)
+    for place in (alone & quiet).nonzero()[0]:
         form = expected.forms[lead[place]]
         walls = [part for part in form[1:] if part != NONE]
         if len(walls) == 1 and (form[0] == TX or expected.log_amplitude_std[lead[place]] < 0.5):

@@ -65,8 +65,8 @@ def predict_returns(
     code: RisCode | None,
 ) -> ExpectedComponents:
     """All forms that are possible at the mean belief, arrive from above, and may be detected."""
-    points, walls = tuple(landmarks.points.tolist()), tuple(landmarks.walls.tolist())
-    returns, bounces = enumerate_forms(points, walls, scene.max_bounces)
+    legs = enumerate_forms(tuple(landmarks.points.tolist()), tuple(landmarks.walls.tolist()), scene.max_bounces, True)
+    returns, bounces = legs.returns, legs.bounces
     fine = possible_legs(returns.legs, features, landmarks.anchor, poses)
     rows = (fine[returns.tx] & fine[returns.rx]).nonzero()[0]
     returns, bounces = compact(returns, rows), bounces[rows]
@@ -186,6 +186,8 @@ def cluster(
     both = mate >= 0
     ratio = np.where(both, np.exp(strength[mate] - strength[leader]), 0.0)
     uncertainty = np.where(both, np.hypot(expected.log_amplitude_std[mate], expected.log_amplitude_std[leader]), 0.0)
+    twins = both & (expected.forms[leader] == reciprocal(expected.forms[mate])).all(axis=1)
+    uncertainty[twins] = TWIN_STD
     # a ratio r leaves a mean share of 0 below one and 1 above, of variance r^2/2: averaged over the uncertainty about r
     lean = _above(np.log(np.maximum(ratio, 1e-9)) / np.maximum(uncertainty, 1e-3))
     share = np.where(both, lean, 0.0)
@@ -194,7 +196,8 @@ def cluster(
         np.minimum(0.5 * ratio**2, 0.25) + lean * (1.0 - lean) * np.exp(-np.abs(np.log(np.maximum(ratio, 1e-9)))),
         0.0,
     )
-    fade = np.where(both, np.sqrt(0.5) * np.minimum(ratio, 1.0), 0.0)
+    share[twins], spread[twins] = 0.5, TWIN_STD**2
+    fade = np.where(both, 0.7 * np.minimum(ratio, 1.0), 0.0)
     return UnresolvedClusters(
         leader,
         mate,
@@ -250,6 +253,15 @@ def _taken_in(
     return taken, partner, by_itself, total
 
 
+TWIN_STD = 0.03
+"""Relative difference of a return and its reciprocal in amplitude: a baseline of 0.1 m at some metres."""
+
+
+def reciprocal(forms: Integers) -> Integers:
+    """Forms (R, 5) with their legs exchanged."""
+    return forms[:, [0, 3, 4, 1, 2]]
+
+
 def _above(z: Floats) -> Floats:
     return np.asarray(1.0 / (1.0 + np.exp(-1.7 * np.clip(z, -20.0, 20.0))))
 
@@ -275,7 +287,8 @@ def conditioned_share(
     uncertainty = (first * expected.log_amplitude_std[lead]) ** 2 + (second * expected.log_amplitude_std[mate]) ** 2
     uncertainty = uncertainty / whole**2 + (0.5 * (1.0 - 2.0 * told) * 2.0 * log_amplitude_std[both]) ** 2 + 1e-4
     prior = variance[both]
-    gain = prior / (prior + uncertainty)
+    twins = prior <= TWIN_STD**2
+    gain = np.where(twins, 0.0, prior / (prior + uncertainty))
     share[both] = np.clip(share[both] + gain * (told - share[both]), 0.0, 1.0)
     variance[both] = (1.0 - gain) * prior
     return share, variance

@@ -6,7 +6,8 @@ how that moves with pose and features, is `slam.returns`.
 """
 
 from functools import lru_cache
-from itertools import permutations, product
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,14 @@ from rislam_rt.slam.window.numerics import IN_WALL
 
 UNKNOWN = -9
 """In a form's base: it is not known."""
+
+
+class FormLegs(NamedTuple):
+    """Forms, joined from legs that many of them share."""
+
+    returns: Returns
+    bounces: Integers
+    """(R,) on both legs together."""
 
 
 def compile_forms(forms: Integers) -> Returns:
@@ -33,14 +42,22 @@ def forms_of(returns: Returns) -> Integers:
 
 
 @lru_cache(maxsize=64)
-def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces: int) -> tuple[Returns, Integers]:
-    """Every point over every pair of legs, and the images of the Tx; with the bounces (R,) on both legs together."""
-    ways = [((NONE, NONE), 0), *(((wall, NONE), 1) for wall in walls), *((pair, 2) for pair in permutations(walls, 2))]
-    ways = [way for way in ways if way[1] <= max_bounces]
-    both = [(*tx, *rx) for (tx, first), (rx, second) in product(ways, repeat=2) if first + second <= max_bounces]
-    found = [(point, *way) for point in points for way in both] + [(TX, NONE, NONE, *way) for way, _ in ways[1:]]
+def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces: int, use_vt: bool) -> FormLegs:
+    """Every point over every pair of legs, and with `use_vt` the images of the Tx."""
+    single = [(w, NONE) for w in walls] if max_bounces >= 1 else []
+    double = [(a, b) for a, b in product(walls, walls) if a != b] if max_bounces >= 2 else []
+    ways = [(NONE, NONE), *single, *double]
+    order = [0] + [1] * len(single) + [2] * len(double)
+    found = [
+        (point, *ways[i], *ways[j])
+        for point in points
+        for i, j in product(range(len(ways)), repeat=2)
+        if order[i] + order[j] <= max_bounces
+    ]
+    if use_vt:
+        found += [(TX, NONE, NONE, *way) for way in ways[1:]]
     forms = np.array(found, dtype=np.int64).reshape(-1, 5)
-    return compile_forms(forms), (forms[:, 1:] != NONE).sum(axis=1)
+    return FormLegs(compile_forms(forms), (forms[:, 1:] != NONE).sum(axis=1))
 
 
 def possible_legs(legs: Integers, features: Floats, anchor: Floats, poses: Poses) -> Booleans:
