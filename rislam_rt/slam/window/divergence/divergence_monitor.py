@@ -25,6 +25,8 @@ CELL = 0.01
 """Distance [m] within which two places are one: as far as a cycle's returns tell."""
 FEWEST = 3
 """Pairs without which nothing is told of a jump."""
+CUT, END = 0.7, 0.1
+"""Shares of the tracks that end with a jump, and else."""
 PAIRS = 60
 """Pairs of returns and components of which a jump is asked."""
 ALIKE = 0.1
@@ -36,8 +38,7 @@ def advance(log_odds: float, score: float, followed: int, kept: int) -> float:
 
     Of `followed` tracks `kept` ones go on. They need no pose: if many end at once, the agent may be elsewhere.
     """
-    # a track goes on as often as a path is reported; after a jump nothing tells which do
-    burst = followed * np.log(0.5) - (followed - kept) * np.log(1.0 - CONSTANTS.shown) - kept * np.log(CONSTANTS.shown)
+    burst = (followed - kept) * np.log(CUT / END) + kept * np.log((1.0 - CUT) / (1.0 - END))
     rate = 1.0 / (1.0 + np.exp(-CONSTANTS.log_lost - max(burst, 0.0)))
     lost = 1.0 / (1.0 + np.exp(-log_odds))
     lost = min(lost + (1.0 - lost) * rate, 1.0 - 1e-9)
