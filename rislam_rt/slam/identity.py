@@ -82,7 +82,7 @@ def add_evidence(log_grid: Floats, log_ris: Floats, scatterer: Floats, panel: Fl
     grid = log_grid + scatterer
     after = np.logaddexp.reduce(grid, axis=1)
     surplus = (after - before).reshape(len(panel), *np.ones(panel.ndim - 1, dtype=np.int64))
-    ratio = np.clip(panel - surplus, -CONSTANTS.doubt, CONSTANTS.doubt)
+    ratio = np.clip(panel - surplus, -CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio)
     return grid - after[:, None], log_ris + ratio
 
 
@@ -96,7 +96,7 @@ def weigh_silence(hidden: Floats, missed: Floats) -> tuple[Floats, Floats]:
     before = hidden + CONSTANTS.rare * (1.0 - hidden)
     silence = before + (1.0 - before) * missed
     surplus = np.log(silence[:, :-1]) - np.log(silence[:, -1:])
-    return before / silence, np.clip(surplus, -CONSTANTS.doubt, CONSTANTS.doubt)
+    return before / silence, np.clip(surplus, -CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio)
 
 
 def panel_probabilities(log_ris: Floats) -> Floats:

@@ -74,7 +74,7 @@ class ModelConstants(NamedTuple):
         return 2.0 * self.log_rare
 
     @property
-    def doubt(self) -> float:
+    def max_log_ratio(self) -> float:
         """Most that one observation may add to log odds: what was observed is a rare thing of another kind."""
         return -self.log_rare
 

@@ -112,7 +112,7 @@ def test_posterior_equals_brute_force_bayes(seed):
     """Float rounding only: the trapezoidal rule over a period is exact to it. No cycle's ratio may be clipped."""
     data = _data(seed)
     steps = np.diff([_filtered(data[0][:k], data[1][:k], *data[2:]) for k in range(5)], axis=0)
-    assert np.abs(steps).max() < CONSTANTS.doubt
+    assert np.abs(steps).max() < CONSTANTS.max_log_ratio
     expected = _brute_force(*data)
     assert panel_probabilities(_filtered(*data)) == pytest.approx(expected, rel=1e-8)
 

@@ -233,7 +233,7 @@ def _shared(
     other = track[good[second]]
     odds = np.full((len(good), count), -np.inf)
     np.logaddexp.at(odds, (first, other), evidence[good[second]] + log_same - total[other])
-    gain[good] = np.minimum(np.logaddexp(0.0, odds), CONSTANTS.doubt).sum(axis=1)
+    gain[good] = np.minimum(np.logaddexp(0.0, odds), CONSTANTS.max_log_ratio).sum(axis=1)
     return gain
 
 

@@ -132,7 +132,7 @@ def weigh(before: PanelIdentity, sight: PanelObservation, gain: Complexes | None
         at, silent = seen.nonzero()[0], (~seen).nonzero()[0]
         if len(at):
             log_grid[at], log_ris[at] = add_evidence(log_grid[at], log_ris[at], scatterer[cycle, at], panel[cycle, at])
-            log_ris[at] += np.where(own[cycle, at], CONSTANTS.doubt, 0.0)
+            log_ris[at] += np.where(own[cycle, at], CONSTANTS.max_log_ratio, 0.0)
             hidden[at] = 0.0
         if len(silent) and gain is not None:
             grid = log_grid[silent] - np.logaddexp.reduce(log_grid[silent], axis=1, keepdims=True)
