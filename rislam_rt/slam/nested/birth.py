@@ -126,11 +126,8 @@ class Birth(NamedTuple):
         table = enter(table, self.verdict.kind is not POINT, self.anchor, parent)
         if self.verdict.kind is not POINT or self.log_grid is None:
             return table
-        log_grid, log_ris = table.log_grid.copy(), table.log_ris.copy()
-        log_grid[-1], log_ris[-1] = (
-            self.log_grid,
-            np.clip(self.log_ris, -CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio),
-        )
+        log_grid, log_ris, most = table.log_grid.copy(), table.log_ris.copy(), CONSTANTS.max_log_ratio
+        log_grid[-1], log_ris[-1] = self.log_grid, np.clip(self.log_ris, -most, most)
         return table._replace(log_grid=log_grid, log_ris=log_ris)
 
 
