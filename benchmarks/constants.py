@@ -1,6 +1,6 @@
 """Does the window filter hang on a constant? Each at half and at twice its value, over recorded rooms.
 
-Probabilities have their odds halved and doubled. Every constant of `slam.window.model_constants` is changed by itself,
+Probabilities have their odds halved and doubled. Every constant of `slam.model_constants` is changed by itself,
 and the same recorded measurements are filtered again. The table says by how much the median error relative to the start
 changes, and, as a median over a dozen rooms jitters by more than most constants do, the spread of the change room by
 room. The first line says what chance alone does: the same constants, delays moved by a billionth of a deviation.
@@ -20,7 +20,7 @@ import numpy as np
 import rislam_rt.slam.window  # noqa: F401  every module that reads the table
 from rislam_rt import read_recording, replay
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.window.model_constants import CONSTANTS, ModelConstants
+from rislam_rt.slam.model_constants import CONSTANTS, ModelConstants
 
 PROBABILITIES = ("rare", "cleared", "shown", "square", "upright", "born")
 """Constants whose odds are halved and doubled."""
@@ -40,7 +40,7 @@ def changed(name: str, factor: float) -> ModelConstants:
 def use(levels: ModelConstants) -> None:
     """Every module of the filter reads these from now on."""
     for name, module in sys.modules.items():
-        if name.startswith("rislam_rt.slam.window") and hasattr(module, "CONSTANTS"):
+        if name.startswith("rislam_rt.slam") and hasattr(module, "CONSTANTS"):
             module.CONSTANTS = levels  # type: ignore[attr-defined]
 
 

@@ -11,17 +11,10 @@ import scipy
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.model import RadioConfig
 from rislam_rt.ris.path_gain import point_amplitude
+from rislam_rt.slam.model_constants import CONSTANTS
 
 STRENGTHS = np.linspace(np.log(1e-3), np.log(3.0), 81)
 """Grid of log sqrt(cross-section / m^2): 1 mm to 3 m in steps of 10 %."""
-MODEL_ERROR = 0.05
-"""Relative error of predicted amplitudes: geometry, and what the amplitude law leaves out."""
-DOUBT = 4.0
-"""Largest log-likelihood ratio that one cycle may add, so that one freak amplitude decides nothing."""
-SHOWN = 0.9
-"""Probability that a path above the threshold is reported at all: others may shade it or merge with it."""
-BLOCKED = 0.02
-"""Probability that in a cycle something comes to stand in the way of a path; it stays until the path shows again."""
 BEYOND = 8.0
 """Standard deviations above the threshold from which on no amplitude stays below it."""
 
@@ -41,7 +34,7 @@ def log_missed(mean: Floats, std: Floats, threshold: float) -> Floats:
     """
     level = threshold / std
     below = scipy.special.chndtr(level**2, 2.0, np.minimum(mean / std, level + BEYOND) ** 2)
-    return np.asarray(np.log(1.0 - SHOWN * (1.0 - below)))
+    return np.asarray(np.log(1.0 - CONSTANTS.shown * (1.0 - below)))
 
 
 def log_panel(amplitude: Floats, std: Floats, gain: Complexes) -> Floats:
@@ -89,7 +82,7 @@ def add_evidence(log_grid: Floats, log_ris: Floats, scatterer: Floats, panel: Fl
     grid = log_grid + scatterer
     after = np.logaddexp.reduce(grid, axis=1)
     surplus = (after - before).reshape(len(panel), *np.ones(panel.ndim - 1, dtype=np.int64))
-    ratio = np.clip(panel - surplus, -DOUBT, DOUBT)
+    ratio = np.clip(panel - surplus, -CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio)
     return grid - after[:, None], log_ris + ratio
 
 
@@ -100,10 +93,10 @@ def weigh_silence(hidden: Floats, missed: Floats) -> tuple[Floats, Floats]:
     is, the scatterer's last. What is blocked is silent whatever it is: a gap tells as much as its first cycles, not
     more with each. Returns the new `hidden`, and what to add to the log odds (P, Q).
     """
-    before = hidden + BLOCKED * (1.0 - hidden)
+    before = hidden + CONSTANTS.rare * (1.0 - hidden)
     silence = before + (1.0 - before) * missed
     surplus = np.log(silence[:, :-1]) - np.log(silence[:, -1:])
-    return before / silence, np.clip(surplus, -DOUBT, DOUBT)
+    return before / silence, np.clip(surplus, -CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio)
 
 
 def panel_probabilities(log_ris: Floats) -> Floats:
@@ -155,4 +148,4 @@ def _log_ways(table: Floats) -> Floats:
 
 def _spread(std: Floats, mean: Floats) -> Floats:
     """Standard deviation (P, N) of amplitudes about predicted means (P, N), from noise (P,) and model."""
-    return np.asarray(np.hypot(std[:, None], MODEL_ERROR * mean))
+    return np.asarray(np.hypot(std[:, None], CONSTANTS.law * mean))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.returns import AXES, reflect
+from rislam_rt.slam.returns import AXES, by_wall, reflect
 
 MAX_LEAN = np.radians(1.0)
 """RMS angle [rad] between a wall's normal and its mean above which the belief does not know how the wall stands, and it
@@ -29,15 +29,12 @@ def images_in(
     point, wall, anchor = mean[points], mean[walls], anchors[walls]
     span = wall - anchor
     square = np.vecdot(span, span)[:, None, None]
-    image = reflect(point, wall, anchor)
-    depth = np.vecdot(span, point - 0.5 * (wall + anchor))[:, None, None] / square
     by_point = AXES - 2.0 * span[:, :, None] * span[:, None, :] / square
-    by_wall = -2.0 * (depth * AXES + span[:, :, None] * (image - wall)[:, None, :] / square)
     axes = np.arange(3)
     index = np.concatenate([3 * points[:, None] + axes, 3 * walls[:, None] + axes], axis=1)
-    jacobian = np.concatenate([by_point, by_wall], axis=2)
+    jacobian = np.concatenate([by_point, by_wall(point, wall, anchor)], axis=2)
     inner = covariance[index[:, :, None], index[:, None, :]]
-    return image, jacobian @ inner @ np.swapaxes(jacobian, 1, 2)
+    return reflect(point, wall, anchor), jacobian @ inner @ np.swapaxes(jacobian, 1, 2)
 
 
 def diagonal_blocks(covariance: Floats, rows: Integers) -> Floats:

@@ -7,13 +7,12 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, Measurement, RadioConfig, SensorModel
+from rislam_rt.slam.model_constants import CONSTANTS
 
 LOS_MARGIN = 0.1
 """Length [m] beyond the baseline below which a component is the direct path: no landmark can be that near."""
 FAR = 1e5
 """Length [m], and standard deviation of anything, that stands for an infinite one."""
-SIDED = 3.0
-"""Log odds beyond which a component is held for the panel's, or for another's: 19 in 20."""
 UNTOLD, OTHER, PANEL = -1, 0, 1
 """Which side a component is on, where the receiver sets the panel's paths apart by alternating codes; `PANEL` + q for
 panel q of several."""
@@ -104,7 +103,11 @@ def side_of(probability: Floats | None, panel: Integers | None = None) -> tuple[
     if probability is None:
         return None, None
     odds = np.log(probability / (1.0 - probability))
-    return np.where(odds > SIDED, PANEL + (0 if panel is None else panel), np.where(odds < -SIDED, OTHER, UNTOLD)), odds
+    return np.where(
+        odds > CONSTANTS.log_born,
+        PANEL + (0 if panel is None else panel),
+        np.where(odds < -CONSTANTS.log_born, OTHER, UNTOLD),
+    ), odds
 
 
 def free_space(radio: RadioConfig) -> float:

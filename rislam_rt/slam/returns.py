@@ -67,6 +67,15 @@ def reflect(point: Floats, wall: Floats, anchor: Floats) -> Floats:
     return point - 2.0 * depth[..., None] * span
 
 
+def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
+    """Derivatives (..., 3, 3) of the mirror images of points (..., 3) by the walls (..., 3)."""
+    span = wall - anchor
+    scaled = span / np.vecdot(span, span)[..., None]
+    depth = np.vecdot(scaled, point - 0.5 * (wall + anchor))[..., None]
+    mirrored = point - 2.0 * depth * span
+    return np.asarray(-2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]))
+
+
 def bounced(legs: Integers, column: int) -> tuple[Integers, Integers]:
     """Rows of the legs (G, 3) that meet a wall in column 1 or 2, and the feature rows of those walls."""
     rows = (legs[:, column] != NONE).nonzero()[0]

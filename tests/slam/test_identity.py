@@ -8,10 +8,6 @@ import pytest
 from rislam_rt.model import RadioConfig, RisCode, RisSpec
 from rislam_rt.ris.path_gain import panel_path_gain, point_amplitude
 from rislam_rt.slam.identity import (
-    BLOCKED,
-    DOUBT,
-    MODEL_ERROR,
-    SHOWN,
     STRENGTHS,
     add_evidence,
     log_missed,
@@ -23,6 +19,7 @@ from rislam_rt.slam.identity import (
     panel_probabilities,
     weigh_silence,
 )
+from rislam_rt.slam.model_constants import CONSTANTS
 
 RADIO = RadioConfig()
 PANEL = RisSpec(6, 6, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
@@ -45,7 +42,7 @@ def test_densities_integrate_to_one(mean):
     """Midpoint rule to 12 deviations above the mean, steps of 0.002: error below 1e-5 for a density this smooth."""
     std, step = 0.8, 2e-3
     high = 1.1 * mean + 0.2
-    x = np.arange(0.5 * step, high + 12.0 * np.hypot(std, MODEL_ERROR * high), step)
+    x = np.arange(0.5 * step, high + 12.0 * np.hypot(std, CONSTANTS.law * high), step)
     assert np.exp(log_rice(x, np.array(mean), np.array(std))).sum() * step == pytest.approx(1.0, abs=1e-5)
     spread = np.full(len(x), std)
     gain = np.broadcast_to(np.array([mean, 1.1 * mean + 0.2]) * np.exp(0.3j), (len(x), 2))
@@ -54,12 +51,12 @@ def test_densities_integrate_to_one(mean):
 
 @pytest.mark.parametrize("mean", [0.0, 0.5, 2.0, 6.0, 50.0, 1e6])
 def test_a_miss_is_what_the_density_leaves(mean):
-    """Seen or not: SHOWN times the mass above the threshold, and the miss, make one (midpoint rule, 1e-5)."""
+    """Seen or not: CONSTANTS.shown times the mass above the threshold, and the miss, make one (midpoint rule, 1e-5)."""
     std, threshold, step = 0.8, 2.5, 1e-3
     x = np.arange(threshold + 0.5 * step, max(mean, threshold) + 12.0 * std, step) if mean < 100.0 else None
     above = 1.0 if x is None else np.exp(log_rice(x, np.array(mean), np.array(std))).sum() * step
     missed = np.exp(log_missed(np.array(mean), np.array(std), threshold))
-    assert missed + SHOWN * above == pytest.approx(1.0, abs=1e-5)
+    assert missed + CONSTANTS.shown * above == pytest.approx(1.0, abs=1e-5)
 
 
 def test_misses_speak_for_who_should_be_faint():
@@ -101,10 +98,10 @@ def _brute_force(amplitude, gain, tx, rx, std):
     for p in range(points):
         for strength in np.exp(STRENGTHS):
             mean = point_amplitude(strength, tx[p], rx[p], RADIO)
-            spread = np.hypot(std[p], MODEL_ERROR * mean)
+            spread = np.hypot(std[p], CONSTANTS.law * mean)
             as_scatterer[p] += np.prod([rice(a, mean, spread) for a in amplitude[:, p]]) / len(STRENGTHS)
         for a, means in zip(amplitude[:, p], np.abs(gain[:, p]), strict=True):
-            as_panel[p] *= np.mean([rice(a, mean, np.hypot(std[p], MODEL_ERROR * mean)) for mean in means])
+            as_panel[p] *= np.mean([rice(a, mean, np.hypot(std[p], CONSTANTS.law * mean)) for mean in means])
     whole = np.prod(as_scatterer)
     joint = np.array([whole / as_scatterer[p] * as_panel[p] for p in range(points)] + [whole])
     return (joint / joint.sum())[:-1]
@@ -115,7 +112,7 @@ def test_posterior_equals_brute_force_bayes(seed):
     """Float rounding only: the trapezoidal rule over a period is exact to it. No cycle's ratio may be clipped."""
     data = _data(seed)
     steps = np.diff([_filtered(data[0][:k], data[1][:k], *data[2:]) for k in range(5)], axis=0)
-    assert np.abs(steps).max() < DOUBT
+    assert np.abs(steps).max() < CONSTANTS.max_log_ratio
     expected = _brute_force(*data)
     assert panel_probabilities(_filtered(*data)) == pytest.approx(expected, rel=1e-8)
 
@@ -155,7 +152,7 @@ def test_a_long_gap_tells_no_more_than_its_beginning():
     for _ in range(200):
         hidden, surplus = weigh_silence(hidden, missed)
         odds.append(odds[-1] + float(surplus[0, 0]))
-    assert odds[1] == pytest.approx(-np.log(BLOCKED + (1.0 - BLOCKED) * 0.1))
+    assert odds[1] == pytest.approx(-np.log(CONSTANTS.rare + (1.0 - CONSTANTS.rare) * 0.1))
     assert odds[100] == pytest.approx(odds[-1], abs=1e-6)
-    assert odds[-1] < -np.log(BLOCKED)
+    assert odds[-1] < -np.log(CONSTANTS.rare)
     assert weigh_silence(np.zeros((1, 2)), np.array([[0.3, 0.3]]))[1][0, 0] == pytest.approx(0.0)

@@ -13,7 +13,7 @@ from rislam_rt.model import Measurement, Paths, RadioConfig, RisCode, RisLegs, S
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior, StepInfo, StepOutcome, estimate, init, step
-from rislam_rt.slam.window.model_constants import CONSTANTS
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import motion as model
 
 ROOM = Path(__file__).parents[2] / "scenes" / "paper_room"

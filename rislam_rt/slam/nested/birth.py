@@ -9,7 +9,7 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Body
 from rislam_rt.slam.associate import squared_distance
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.identity import DOUBT
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import poses_of, square_root
 from rislam_rt.slam.nested.birth_scheduling import PARALLEL, due_tracks
 from rislam_rt.slam.nested.candidates import PredictedMeasurements, explained
@@ -126,8 +126,8 @@ class Birth(NamedTuple):
         table = enter(table, self.verdict.kind is not POINT, self.anchor, parent)
         if self.verdict.kind is not POINT or self.log_grid is None:
             return table
-        log_grid, log_ris = table.log_grid.copy(), table.log_ris.copy()
-        log_grid[-1], log_ris[-1] = self.log_grid, np.clip(self.log_ris, -DOUBT, DOUBT)
+        log_grid, log_ris, most = table.log_grid.copy(), table.log_ris.copy(), CONSTANTS.max_log_ratio
+        log_grid[-1], log_ris[-1] = self.log_grid, np.clip(self.log_ris, -most, most)
         return table._replace(log_grid=log_grid, log_ris=log_ris)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.slam.associate import Candidates, cheapest, pair_costs
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import TX, Poses
@@ -131,7 +132,7 @@ def _associate(
     spread[:, [0, 1, 2], [0, 1, 2]] += extra[near]
     odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))
     side = np.full(len(lead), UNTOLD) if sides is None else sides[lead]
-    level, doubt = groups.log_amplitude[near], np.hypot(groups.log_amplitude_std[near], 0.15)
+    level, doubt = groups.log_amplitude[near], np.hypot(groups.log_amplitude_std[near], 0.5 * CONSTANTS.fading)
     candidates = Candidates(seen, spread, level, doubt, odds, side)
     cost = pair_costs(candidates, observed, GATE, strangers)
     rows, columns = cheapest(cost)

@@ -9,6 +9,7 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.inputs import check_sides, check_step
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations, is_los, observations_of, stranger_density
 from rislam_rt.slam.returns import TX
 from rislam_rt.slam.start_prior import StartPrior
@@ -28,8 +29,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
 )
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, empty_log, renew
-from rislam_rt.slam.window.model_constants import CONSTANTS
-from rislam_rt.slam.window.numerics import DAMPING, LADDER, REFRESH
+from rislam_rt.slam.window.numerics import DAMPING, LATELY, MISSED, REFRESH
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.excess import grow, take_in
@@ -57,7 +57,7 @@ def init(
         0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels),
         no_observations(),
         motion_mode, motion_mode,
-        np.array([start.heading]), start.position_std * free, scene, divergence_monitor.SURE, False, 0.0,
+        np.array([start.heading]), start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
         (None,), np.zeros((6, 6)), np.zeros((0, 3)),
     )  # fmt: skip
 
@@ -164,12 +164,6 @@ def smoothed(state: WindowState) -> Floats:
     return np.concatenate([state.passed, window_gaussian.poses(state.window)[:, :3]])
 
 
-LATELY = 5
-"""Last steps that may all have been as lively as can be: what began within half a second."""
-MISSED = 1.5
-"""Standard deviations by which fewer returns show than should, from which on a jump is looked for."""
-
-
 def _notice(
     state: WindowState, heading: float, code: RisCode | None, observed: Observations, strangers: Floats
 ) -> tuple[WindowState, CycleAssociation]:
@@ -188,7 +182,7 @@ def _notice(
     if state.config.motion == "learnt" and len(calm.groups.leader) and len(state.window.step):
         precision = state.window.precision.copy()
         lively = COLUMNS[: precision.shape[1]] != 1
-        precision[-LATELY:, lively] = np.minimum(precision[-LATELY:, lively], LADDER[-1] ** -2.0)
+        precision[-LATELY:, lively] = np.minimum(precision[-LATELY:, lively], CONSTANTS.liveliest**-2.0)
         trial = window_gaussian.solve(state.window._replace(precision=precision))
         score = score_again(calm, trial, state.landmarks, observed, strangers)
         if score + CONSTANTS.log_rare > calm.score:
@@ -198,7 +192,7 @@ def _notice(
     if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
         by = divergence_monitor.jump(best, observed)
         view = view_of(divergence_monitor.shifted(state.window, by)) if by.any() else best
-        if view.score + divergence_monitor.LOG_JUMP > max(best.score, divergence_monitor.SURE):
+        if view.score + divergence_monitor.log_jump() > max(best.score, CONSTANTS.log_lost):
             return recovery.landed(state, by), view
     return state._replace(window=window), best
 

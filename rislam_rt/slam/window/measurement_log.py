@@ -6,12 +6,12 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.returns import linearise
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother.steps import POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, poses
 

@@ -1,6 +1,6 @@
 """Numerics: steps of the solver and limits of what is worth a look.
 
-Some belong to the model and are not in its table: `LADDER`, `SHORTER`, `BEARING`, `ALIGNED`.
+Some belong to the model and are not in its table: `EDGE`, `LEVEL`, `IN_WALL`, `SHORTER`, `BEARING`, `ALIGNED`.
 """
 
 import numpy as np
@@ -27,8 +27,10 @@ STRIDE = 3
 """Cycles between two examinations."""
 NEARBY = 2.0
 """Distance [m] beyond which two places are not compared."""
-MOST_SHARED = 4.0
-"""Log odds that one more track may add, so that no chance coincidence decides alone."""
+LATELY = 5
+"""Last steps that may all have been as lively as can be: what began within half a second."""
+MISSED = 1.5
+"""Standard deviations by which fewer returns show than should, from which on a jump is looked for."""
 DRAWS = 12
 """Places of the belief over which the panel's predicted gain is averaged."""
 CERTAIN = 30.0
@@ -45,8 +47,8 @@ EDGE = 1.15
 """Distance in cells up to which a weaker path moves a stronger one: cells have no sharp edge."""
 IN_WALL = 0.05
 """Distance [m] from a wall below which a point is held to lie in it."""
-LADDER = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0])
-"""Standard deviations [m/s^2] of a step's acceleration: from a rail car to a person who turns on the spot."""
+MODES = 6
+"""Motion modes, half a decade apart."""
 SCATTER_RATE = 0.1
 """Share of the latest residual in its running mean square."""
 BEARING = 0.01

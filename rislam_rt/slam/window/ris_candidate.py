@@ -5,6 +5,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import PanelCandidate, RisCode
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import even_draws
 from rislam_rt.slam.observations import OTHER
 from rislam_rt.slam.returns import Poses, reflect
@@ -12,7 +13,6 @@ from rislam_rt.slam.ris_candidate import DEEP, DISMISSAL, PATIENCE, places
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, weigh
-from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import DRAWS
 from rislam_rt.slam.window.smoother.steps import HEAD
 from rislam_rt.slam.window.tracks import WindowTracks

@@ -6,9 +6,9 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.associate import Candidates, cheapest, pair_costs
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
-from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import GATE
 
 WANDER = 1.0
@@ -88,7 +88,7 @@ def match(
     spread = np.zeros((count, 3, 3))
     spread[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
     share = np.minimum((tracks.hits + 1.0) / (cycle - tracks.born + 2.0), 1.0)
-    odds = np.log(share / (1.02 - share))
+    odds = np.log(share / (1.0 + CONSTANTS.rare - share))
     candidates = Candidates(
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
     )
@@ -133,7 +133,7 @@ def alive(tracks: WindowTracks, cycle: int) -> Booleans:
     What is likelier the panel than not may be silent for long: its codes make it so.
     """
     share = (tracks.hits + 1.0) / (tracks.last - tracks.born + 3.0)
-    patience = np.where(tracks.hits >= 4, np.log(0.01) / np.log(np.clip(1.0 - share, 1e-6, 0.999)), 3.0)
+    patience = np.where(tracks.hits >= 4, CONSTANTS.log_rare / np.log(np.clip(1.0 - share, 1e-6, 0.999)), 3.0)
     patience = np.where((tracks.log_ris > 0.0).any(axis=1) & (tracks.hits >= 2), CONSTANTS.window, patience)
     return np.asarray(cycle - tracks.last <= np.clip(patience, 3.0, CONSTANTS.window))
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.returns import TX, linearise
 from rislam_rt.slam.ris_candidate import rays
@@ -15,7 +16,6 @@ from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
 from rislam_rt.slam.window.landmarks.landmark_update import seed
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, UnresolvedClusters
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER, STRIDE
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.steps import HEAD

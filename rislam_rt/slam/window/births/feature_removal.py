@@ -3,13 +3,13 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import NONE, TX
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, remove_features
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log, Residuals, renew
-from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import FEWEST, RECENT
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.state import WindowState

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window.births.track_summary import TrackSummary
-from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import HOPELESS, RIDGE, STEPS
 
 

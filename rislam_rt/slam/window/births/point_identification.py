@@ -7,6 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RisCode
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import even_draws, poses_of
 from rislam_rt.slam.observations import OTHER, UNTOLD
 from rislam_rt.slam.window.births.hypotheses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
@@ -20,7 +21,6 @@ from rislam_rt.slam.window.landmarks.ris_identification import (
     unknown,
     weigh,
 )
-from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import CERTAIN
 from rislam_rt.slam.window.smoother.window_gaussian import poses
 from rislam_rt.slam.window.state import WindowState

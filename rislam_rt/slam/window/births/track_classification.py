@@ -6,6 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
     BESIDE,
@@ -27,8 +28,7 @@ from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
-from rislam_rt.slam.window.model_constants import CONSTANTS
-from rislam_rt.slam.window.numerics import MOST_SHARED, NEARBY
+from rislam_rt.slam.window.numerics import NEARBY
 from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors, no_holds
 from rislam_rt.slam.window.state import WindowState
 
@@ -233,7 +233,7 @@ def _shared(
     other = track[good[second]]
     odds = np.full((len(good), count), -np.inf)
     np.logaddexp.at(odds, (first, other), evidence[good[second]] + log_same - total[other])
-    gain[good] = np.minimum(np.logaddexp(0.0, odds), MOST_SHARED).sum(axis=1)
+    gain[good] = np.minimum(np.logaddexp(0.0, odds), CONSTANTS.max_log_ratio).sum(axis=1)
     return gain
 
 

@@ -9,29 +9,20 @@ a jump to where the map's returns and what is heard agree.
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.divergence.egomotion import Rates
 from rislam_rt.slam.window.measurement_log import Log
-from rislam_rt.slam.window.model_constants import CONSTANTS
-from rislam_rt.slam.window.numerics import LADDER
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.factor import inverse
 from rislam_rt.slam.window.smoother.steps import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.tracks import CYCLE
 
-RATE = 1e-4
-"""Probability that a cycle is the one in which the agent is lost: once in 1000 s."""
-SURE = float(np.log(RATE))
-"""Log odds of an agent that is tracked for certain, but for the last cycle."""
-JUMP = egomotion.WALK
-"""Standard deviation [m] of an agent's place after it was lost, and of a jump: as far as it walks in a second."""
 CELL = 0.01
 """Distance [m] within which two places are one: as far as a cycle's returns tell."""
-LOG_JUMP = np.log(RATE) + 2.0 * np.log(CELL / JUMP)
-"""Log probability of a jump to one certain place."""
 FEWEST = 3
 """Pairs without which nothing is told of a jump."""
 CUT, END = 0.7, 0.1
@@ -48,10 +39,10 @@ def advance(log_odds: float, score: float, followed: int, kept: int) -> float:
     Of `followed` tracks `kept` ones go on. They need no pose: if many end at once, the agent may be elsewhere.
     """
     burst = (followed - kept) * np.log(CUT / END) + kept * np.log((1.0 - CUT) / (1.0 - END))
-    rate = 1.0 / (1.0 + np.exp(-SURE - max(burst, 0.0)))
+    rate = 1.0 / (1.0 + np.exp(-CONSTANTS.log_lost - max(burst, 0.0)))
     lost = 1.0 / (1.0 + np.exp(-log_odds))
     lost = min(lost + (1.0 - lost) * rate, 1.0 - 1e-9)
-    return float(np.clip(np.log(lost / (1.0 - lost)) - score, SURE, -SURE))
+    return float(np.clip(np.log(lost / (1.0 - lost)) - score, CONSTANTS.log_lost, -CONSTANTS.log_lost))
 
 
 def jump(view: CycleAssociation, observed: Observations) -> Floats:
@@ -71,6 +62,11 @@ def jump(view: CycleAssociation, observed: Observations) -> Floats:
     return egomotion.agreed(found)
 
 
+def log_jump() -> float:
+    """Log probability of a jump to one certain place, as far as the agent walks in a second."""
+    return CONSTANTS.log_lost + 2.0 * float(np.log(CELL / CONSTANTS.walk))
+
+
 def shifted(window: Window, by: Floats) -> Window:
     """The window with the last pose elsewhere, its velocity as it was: for a look, not for a solution."""
     accel, dt = window.accel.copy(), window.step[-2:]
@@ -82,13 +78,13 @@ def shifted(window: Window, by: Floats) -> Window:
 
 
 def landed(window: Window, by: Floats) -> Window:
-    """The window after a jump: its last pose alone, elsewhere within `JUMP`; velocity and map as they were."""
+    """The window after a jump: its last pose alone, elsewhere within a second's walk; velocity and map as they were."""
     while window.num_poses > 1:
         window = window_gaussian.slide(window)
     head, size = window.head.copy(), len(window.head)
     head[:3] += by
     covariance = inverse(window.prior.hessian)
-    covariance[[0, 1], [0, 1]] += JUMP**2
+    covariance[[0, 1], [0, 1]] += CONSTANTS.walk**2
     slots = window.slots._replace(middle=np.concatenate([head[[0, 1, 2, 6]], head[HEAD:]])[None])
     prior = Quadratic(inverse(covariance), np.zeros(size), head)
     return window._replace(head=head, prior=prior, slots=slots, covariance=covariance)
@@ -122,7 +118,7 @@ def ask_picture(window: Window, log: Log, heading: Floats, baseline: float, live
     place = window_gaussian.poses(window)[-PAST - 1 :, :3]
     # what a clock that stands still does not allow for was not foreseen
     std = passed / time * np.sqrt(np.diag(window_gaussian.now(window)[1])[3:6] + (lively * time) ** 2) + 1e-6
-    return egomotion.weigh(found, (place[-1] - place[0]) / time, std).log_odds - egomotion.LOG_WRONG
+    return egomotion.weigh(found, (place[-1] - place[0]) / time, std).log_odds - CONSTANTS.log_rare
 
 
 PAST = 10
@@ -141,7 +137,7 @@ def with_free_compass(window: Window, std: float) -> Window:
     """Before anything is born: with an offset of the compass within `std` [rad], which turns as little as may be."""
     hessian, still = window.prior.hessian.copy(), ((0, 0), (0, 1))
     hessian[6, 6] = std**-2.0
-    precision = np.pad(window.precision, still, constant_values=LADDER[0] ** -2.0)
+    precision = np.pad(window.precision, still, constant_values=CONSTANTS.calmest**-2.0)
     return _begun(window._replace(accel=np.pad(window.accel, still), precision=precision), window.head, hessian)
 
 
@@ -151,4 +147,4 @@ def _begun(window: Window, head: Floats, hessian: Floats) -> Window:
 
 def is_lost(log_odds: float) -> bool:
     """Whether the map is given up."""
-    return log_odds > np.log(CONSTANTS.born / (1.0 - CONSTANTS.born))
+    return log_odds > CONSTANTS.log_born

@@ -13,16 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, unique_forms
-from rislam_rt.slam.window.model_constants import CONSTANTS
 
-WALK = 1.0
-"""Standard deviation [m/s] of a velocity of which nothing is known."""
-APART = 0.5
-"""Share of paths that do not shorten as the agent nears where they come from; a quarter of them keep their length."""
-LOG_WRONG = np.log(0.01)
-"""Log odds beforehand that a start was told wrong."""
 MEASURED = 6
 """Measurements of a track from which on it has a rate: as many as births ask for."""
 FEWEST = 5
@@ -98,7 +92,7 @@ def rates(log: Log, heading: Floats, step: float, baseline: float) -> Rates:
 
 def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
     """The velocity `told` (3,) within `std` (3,), against any other, and against the same one turned by any angle."""
-    near, anywhere = np.diag(std[:2] ** 2), np.diag(std[:2] ** 2 + WALK**2)
+    near, anywhere = np.diag(std[:2] ** 2), np.diag(std[:2] ** 2 + CONSTANTS.walk**2)
     # the told velocity has a maximum of its own near it, which others, if louder, would draw to themselves
     starts = _starts(found, told)
     right = float(_find_modes(found, starts, told, near).evidence.max())
@@ -116,14 +110,14 @@ def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
     turn = float(np.arctan2(told[1], told[0]) - np.arctan2(velocity[1], velocity[0]))
     variance = spread[best] if is_compass else every.covariance[best]
     return StartCheck(
-        max(float(speed.max()), float(compass.max())) - right + LOG_WRONG, is_compass, velocity,
+        max(float(speed.max()), float(compass.max())) - right + CONSTANTS.log_rare, is_compass, velocity,
         float(np.sqrt(np.trace(variance) / 2.0)), float((turn + np.pi) % (2.0 * np.pi) - np.pi),
     )  # fmt: skip
 
 
 def agreed(found: Rates) -> Floats:
     """(3,) level velocity, or way, that most agree on; near to nothing if it may be."""
-    every = _find_modes(found, _starts(found, np.zeros(3)), np.zeros(3), WALK**2 * np.eye(2))
+    every = _find_modes(found, _starts(found, np.zeros(3)), np.zeros(3), CONSTANTS.walk**2 * np.eye(2))
     return np.append(every.velocity[int(np.argmax(every.evidence))], 0.0)
 
 
@@ -148,7 +142,7 @@ def _starts(found: Rates, told: Floats) -> Floats:
     fine = np.abs(det) > 0.5
     x = (aim[:, 0] * pair[:, 1, 1] - aim[:, 1] * pair[:, 0, 1])[fine] / det[fine]
     y = (aim[:, 1] * pair[:, 0, 0] - aim[:, 0] * pair[:, 1, 0])[fine] / det[fine]
-    every = np.stack([x, y], axis=1)[np.hypot(x, y) < 3.0 * WALK]
+    every = np.stack([x, y], axis=1)[np.hypot(x, y) < 3.0 * CONSTANTS.walk]
     level, cell = _agreement(found, every, told[2])[0].sum(axis=1), np.round(every / NEAR)
     order = np.argsort(-level, kind="stable")
     _, first = np.unique(cell[order], axis=0, return_index=True)
@@ -163,9 +157,10 @@ def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Fl
     """Log likelihoods (S, T) of tracks under level velocities (S, 2), and the weights (S, T) with which they agree."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
-    close = np.log1p(-APART) - 0.5 * left**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
+    # as many paths as not shorten while the agent nears where they come from: nothing is known of it
+    close = np.log(0.5) - 0.5 * left**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
     kept = -0.5 * found.rate**2 / found.variance - 0.5 * np.log(2.0 * np.pi * found.variance)
-    either = np.logaddexp(close, np.log(APART / 4.0) + np.logaddexp(kept, np.log(3.0 / (4.0 * WALK))))
+    either = np.logaddexp(close, np.log(0.5 / 4.0) + np.logaddexp(kept, np.log(3.0 / (4.0 * CONSTANTS.walk))))
     return either, np.exp(close - either) / variance
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.divergence import divergence_monitor
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
@@ -23,9 +24,7 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
             lively = float(np.sqrt(motion.expected_variance(state.level[0])))
             odds = divergence_monitor.ask_picture(state.window, state.log, state.heading, baseline, lively)
             state = state._replace(
-                lost_log_odds=float(
-                    np.clip(state.lost_log_odds + odds, divergence_monitor.SURE, -divergence_monitor.SURE)
-                )
+                lost_log_odds=float(np.clip(state.lost_log_odds + odds, CONSTANTS.log_lost, -CONSTANTS.log_lost))
             )
         return state, False
     if state.asked or len(state.heading) > divergence_monitor.PAST + 1:  # by then the speed may be another
@@ -51,7 +50,7 @@ def restart(state: WindowState) -> WindowState:
     mean, covariance = window_gaussian.now(window)
     lively = np.sqrt(motion.expected_variance(state.level))[[0, 0, 1]]
     std = np.sqrt(np.concatenate([np.full(3, 1e-10), np.diag(covariance)[3:6] + lively**2, [covariance[6, 6]]]))
-    away = divergence_monitor.JUMP * np.array([1.0, 1.0, float(state.config.height == "estimated")])
+    away = CONSTANTS.walk * np.array([1.0, 1.0, float(state.config.height == "estimated")])
     fresh = window_gaussian.begin(mean[:3], mean[3:6], std, turns=window.turns)
     fresh = fresh._replace(head=mean[:HEAD], prior=fresh.prior._replace(middle=mean[:HEAD]))
     return state._replace(

@@ -6,8 +6,8 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.identity import STRENGTHS, panel_rows, ris_probabilities, strength_moments
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity
-from rislam_rt.slam.window.model_constants import CONSTANTS
 
 
 class WindowTable(NamedTuple):

@@ -6,6 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RisCode
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import UNTOLD, Observations
 from rislam_rt.slam.returns import NONE, TX, Poses
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, learn_ratio
@@ -15,7 +16,6 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     UnresolvedClusters,
 )
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, weigh
-from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import SCATTER_RATE
 from rislam_rt.slam.window.smoother.steps import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
@@ -56,7 +56,7 @@ def recall(
         known = visibility.code[place] == code
         first = np.where(known, visibility.clear[place], first)
         scatter = np.where(known, visibility.scatter[place], scatter)
-    return np.asarray(first * (1.0 - CONSTANTS.blocked) + (1.0 - first) * CONSTANTS.cleared), scatter
+    return np.asarray(first * (1.0 - CONSTANTS.rare) + (1.0 - first) * CONSTANTS.cleared), scatter
 
 
 def seed(

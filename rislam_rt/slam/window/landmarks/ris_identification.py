@@ -16,7 +16,6 @@ from rislam_rt.information import amplitude_std
 from rislam_rt.model import DataSheet, RadioConfig, RisCode, SensorModel
 from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.identity import (
-    DOUBT,
     STRENGTHS,
     add_evidence,
     log_panel,
@@ -25,9 +24,9 @@ from rislam_rt.slam.identity import (
     log_scatterer_missed,
     weigh_silence,
 )
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import even_draws, square_root
 from rislam_rt.slam.observations import PANEL, UNTOLD
-from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import CERTAIN, DRAWS
 
 
@@ -133,7 +132,7 @@ def weigh(before: PanelIdentity, sight: PanelObservation, gain: Complexes | None
         at, silent = seen.nonzero()[0], (~seen).nonzero()[0]
         if len(at):
             log_grid[at], log_ris[at] = add_evidence(log_grid[at], log_ris[at], scatterer[cycle, at], panel[cycle, at])
-            log_ris[at] += np.where(own[cycle, at], DOUBT, 0.0)
+            log_ris[at] += np.where(own[cycle, at], CONSTANTS.max_log_ratio, 0.0)
             hidden[at] = 0.0
         if len(silent) and gain is not None:
             grid = log_grid[silent] - np.logaddexp.reduce(log_grid[silent], axis=1, keepdims=True)

@@ -1,6 +1,6 @@
 """Motion that is learnt: how lively each step was, by a Markov chain over a ladder of accelerations.
 
-Each step's acceleration has a standard deviation from `LADDER`; the level stays with a probability and else jumps
+Each step's acceleration has a standard deviation from a `ladder`; the level stays with a probability and else jumps
 anywhere. What the measurements tell of a step's acceleration without its own prior (the cavity of expectation
 propagation, Minka 2001) gives each level a likelihood; forward-backward gives its posterior, and the expected precision
 is the step's prior in the next solution.
@@ -11,20 +11,31 @@ from functools import lru_cache
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.window.numerics import LADDER
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.window.numerics import MODES
+
+
+def ladder() -> Floats:
+    """(L,) standard deviations [m/s^2] of the modes."""
+    return _ladder(CONSTANTS.calmest, CONSTANTS.liveliest)
+
+
+@lru_cache(maxsize=4)
+def _ladder(calmest: float, liveliest: float) -> Floats:
+    return np.geomspace(calmest, liveliest, MODES)
 
 
 def first_motion_mode(sigma_a: float) -> Floats:
     """The level nearest to the acceleration told is the likeliest, one three times as far off a third as likely."""
-    nearest = int(np.argmin(np.abs(np.log(LADDER / max(sigma_a, LADDER[0])))))
-    weight = 3.0 ** -np.abs(np.arange(len(LADDER)) - nearest).astype(np.float64)
+    nearest = int(np.argmin(np.abs(np.log(ladder() / max(sigma_a, CONSTANTS.calmest)))))
+    weight = 3.0 ** -np.abs(np.arange(MODES) - nearest).astype(np.float64)
     return np.asarray(weight / weight.sum())
 
 
 @lru_cache(maxsize=4)
 def transition(stay: float) -> Floats:
     """(L, L): a step is as lively as the one before, or else more often a little different than much."""
-    count = len(LADDER)
+    count = MODES
     gap = np.abs(np.arange(count)[:, None] - np.arange(count))
     jump = np.where(gap > 0, 3.0**-gap, 0.0)
     return stay * np.eye(count) + (1.0 - stay) * jump / jump.sum(axis=1, keepdims=True)
@@ -36,7 +47,7 @@ def log_likelihood(accel: Floats, spread: Floats, precision: Floats) -> Floats:
     along = (np.swapaxes(vector, 1, 2) @ accel[..., None])[..., 0] / spread
     # N(m; 0, C + s^2 I) through the cavity's information C^-1, which may be singular
     value = np.maximum(1.0 / spread - precision[:, None], 0.0)
-    variance = LADDER**2
+    variance = ladder() ** 2
     total = 1.0 + value[:, None] * variance[:, None]
     gain = (along**2)[:, None] * variance[:, None] / total
     return np.asarray(0.5 * (gain - np.log(total)).sum(axis=-1))
@@ -69,7 +80,7 @@ def smooth(before: Floats, log_like: Floats, stay: float) -> tuple[Floats, Float
 
 def expected_precision(posterior: Floats) -> Floats:
     """(...,) [s^4/m^2]."""
-    return np.asarray(posterior @ LADDER**-2.0)
+    return np.asarray(posterior @ ladder() ** -2.0)
 
 
 def prior_precision(posterior: Floats, is_turn: bool) -> Floats:
@@ -79,4 +90,4 @@ def prior_precision(posterior: Floats, is_turn: bool) -> Floats:
 
 def expected_variance(posterior: Floats) -> Floats:
     """(...,) [m^2/s^4]."""
-    return np.asarray(posterior @ LADDER**2)
+    return np.asarray(posterior @ ladder() ** 2)

@@ -4,13 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import NONE, TX
 from rislam_rt.slam.window.births import births, track_classification
 from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, POINT, WALL, WALL_KNOWN
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import empty_log
-from rislam_rt.slam.window.model_constants import CONSTANTS
 
 
 def _table(kind, pair=None):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence import divergence_monitor, egomotion
 from rislam_rt.slam.window.divergence.egomotion import Rates
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
@@ -94,23 +95,23 @@ def test_rates_are_those_of_walls_points_and_square_corners(heading):
 
 def test_the_chain_is_that_of_two_states():
     """Against the forward filter of the hidden chain, in probabilities."""
-    rng, odds = np.random.default_rng(4), divergence_monitor.SURE
-    least = 1.0 / (1.0 + 1.0 / divergence_monitor.RATE)
+    rng, odds = np.random.default_rng(4), CONSTANTS.log_lost
+    least = 1.0 / (1.0 + 1.0 / CONSTANTS.rare**2)
     lost = least
     for score in rng.normal(-0.3, 1.0, 60):
         odds = divergence_monitor.advance(odds, score, 0, 0)
         passed = lost + (1.0 - lost) * least
         lost = np.clip(passed / (passed + (1.0 - passed) * np.exp(score)), least, 1.0 - least)
         assert odds == pytest.approx(np.log(lost / (1.0 - lost)), abs=1e-6)
-    assert not divergence_monitor.is_lost(divergence_monitor.SURE)
+    assert not divergence_monitor.is_lost(CONSTANTS.log_lost)
 
 
 def test_tracks_that_end_at_once_make_a_loss_likelier_and_a_map_that_explains_does_not():
-    torn = divergence_monitor.advance(divergence_monitor.SURE, -3.0, 20, 3)
-    assert torn > 3.0 > divergence_monitor.advance(divergence_monitor.SURE, -3.0, 20, 18)
+    torn = divergence_monitor.advance(CONSTANTS.log_lost, -3.0, 20, 3)
+    assert torn > 3.0 > divergence_monitor.advance(CONSTANTS.log_lost, -3.0, 20, 18)
     assert divergence_monitor.is_lost(torn)
-    assert not divergence_monitor.is_lost(divergence_monitor.advance(divergence_monitor.SURE, 40.0, 20, 3))
-    assert divergence_monitor.advance(torn, 30.0, 5, 5) == pytest.approx(divergence_monitor.SURE)
+    assert not divergence_monitor.is_lost(divergence_monitor.advance(CONSTANTS.log_lost, 40.0, 20, 3))
+    assert divergence_monitor.advance(torn, 30.0, 5, 5) == pytest.approx(CONSTANTS.log_lost)
 
 
 def _window(rng):
@@ -132,7 +133,7 @@ def test_after_a_jump_all_but_the_place_is_as_it_was():
     after, spread = window_gaussian.now(divergence_monitor.landed(window, by))
     np.testing.assert_allclose(after, mean + np.concatenate([by, np.zeros(len(mean) - 3)]), atol=1e-6)
     wide = covariance.copy()
-    wide[[0, 1], [0, 1]] += divergence_monitor.JUMP**2
+    wide[[0, 1], [0, 1]] += CONSTANTS.walk**2
     free = np.delete(np.arange(len(mean)), 6)  # the compass is held
     np.testing.assert_allclose(spread[np.ix_(free, free)], wide[np.ix_(free, free)], atol=1e-5)
 

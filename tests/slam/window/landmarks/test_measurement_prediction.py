@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, cluster
-from rislam_rt.slam.window.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import EDGE
 
 CELL = np.array([0.3, 0.5, 0.5])

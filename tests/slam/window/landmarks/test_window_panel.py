@@ -16,13 +16,12 @@ from rislam_rt.ris import rephase
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
-from rislam_rt.slam.identity import MODEL_ERROR
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.returns import TX as MOVING
 from rislam_rt.slam.window.cycle_association import return_sides
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, unknown, weigh
-from rislam_rt.slam.window.model_constants import CONSTANTS
 
 SENSOR = SensorModel(RadioConfig(noise_psd=3.52e-12))
 SPEC = RisSpec(6, 6, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
@@ -68,13 +67,13 @@ def test_one_amplitude_tells_what_quadrature_tells():
     sight = sight._replace(amplitude=abs(gain[0]).mean(axis=1) + noise)
     found = weigh(unknown(1), sight, gain, SENSOR).log_ris[0, 0] - np.log(CONSTANTS.panels)
     loud = abs(gain[0, 0])
-    spread = np.hypot(noise, MODEL_ERROR * loud)
+    spread = np.hypot(noise, CONSTANTS.law * loud)
     panel = np.mean(rice.pdf(sight.amplitude[0], loud / spread, scale=spread))
     # the root of the cross-section is log-normal; far beyond the filter's own grid
     log = np.linspace(np.log(1e-4), np.log(30.0), 4001)
     prior = np.exp(-0.5 * ((log - np.log(CONSTANTS.strength)) / CONSTANTS.strength_std) ** 2)
     level = point_amplitude(np.exp(log), np.linalg.norm(PLACE - TX), np.linalg.norm(PLACE - RX), radio)
-    width = np.hypot(noise, MODEL_ERROR * level)
+    width = np.hypot(noise, CONSTANTS.law * level)
     other = np.sum(prior * rice.pdf(sight.amplitude[0], level / width, scale=width)) / prior.sum()
     # the filter's grid ends 2.5 deviations above the median: 1 % of the prior
     np.testing.assert_allclose(found, np.log(panel / other), atol=0.03)

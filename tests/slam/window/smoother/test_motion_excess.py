@@ -41,7 +41,7 @@ def test_it_never_grows_by_a_measurement():
 
 
 def test_nothing_is_added_where_the_expected_precision_tells_all():
-    sure = np.eye(len(motion.LADDER))
+    sure = np.eye(len(motion.ladder()))
     surplus = motion.expected_variance(sure) - 1.0 / motion.expected_precision(sure)
     np.testing.assert_allclose(surplus, 0.0, atol=1e-15)
     assert not grow(np.zeros((6, 6)), DT, np.zeros(3)).any()

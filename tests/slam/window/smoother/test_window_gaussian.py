@@ -104,11 +104,11 @@ def test_a_belief_about_a_wall_gives_way_to_what_contradicts_it():
 
 def test_levels_of_acceleration_are_those_of_all_sequences_weighed():
     rng = np.random.default_rng(5)
-    log_like = rng.standard_normal((4, len(motion.LADDER)))
-    before = rng.dirichlet(np.ones(len(motion.LADDER)))
+    log_like = rng.standard_normal((4, len(motion.ladder())))
+    before = rng.dirichlet(np.ones(len(motion.ladder())))
     move = motion.transition(0.9)
     total = np.zeros(log_like.shape)
-    for path in np.ndindex(*(4 * (len(motion.LADDER),))):
+    for path in np.ndindex(*(4 * (len(motion.ladder()),))):
         weight = sum(before * move[:, path[0]]) * np.exp(log_like[0, path[0]])
         for step in range(1, 4):
             weight *= move[path[step - 1], path[step]] * np.exp(log_like[step, path[step]])
@@ -132,7 +132,7 @@ def test_the_likelihood_of_a_level_is_that_of_the_measured_acceleration():
     mean = posterior @ np.linalg.solve(noise, seen)
     found = motion.log_likelihood(mean[None], posterior[None], np.array([precision]))[0]
     wanted = []
-    for level in motion.LADDER:
+    for level in motion.ladder():
         spread = noise + level**2 * np.eye(2)
         wanted.append(-0.5 * seen @ np.linalg.solve(spread, seen) - 0.5 * np.linalg.slogdet(spread)[1])
     np.testing.assert_allclose(found - found[0], np.array(wanted) - wanted[0], atol=1e-8)

@@ -48,6 +48,8 @@ class ModelConstants(NamedTuple):
     """Distance [m] beyond a wall from which on a thing is behind it, and not on it: furniture, frames."""
     shown: float = 0.95
     """Probability that a path above the threshold with nothing in its way is reported by itself."""
+    law: float = 0.05
+    """Relative error of predicted amplitudes: geometry, and what the amplitude law leaves out."""
 
     @property
     def stay(self) -> float:
@@ -58,6 +60,28 @@ class ModelConstants(NamedTuple):
     def dead(self) -> float:
         """Probability of existence below which a feature is taken back."""
         return self.rare
+
+    walk: float = 1.0
+    """Standard deviation [m/s] of a velocity of which nothing is known; as far [m] an agent goes astray."""
+    calmest: float = 0.003
+    """Standard deviation [m/s^2] of the acceleration in the calmest motion mode: a rail car..."""
+    liveliest: float = 1.0
+    """...and in the liveliest: a person who turns on the spot."""
+
+    @property
+    def log_lost(self) -> float:
+        """Log probability that a cycle is the one in which the agent is lost: two rare things at once."""
+        return 2.0 * self.log_rare
+
+    @property
+    def max_log_ratio(self) -> float:
+        """Most that one observation may add to log odds: what was observed is a rare thing of another kind."""
+        return -self.log_rare
+
+    @property
+    def log_born(self) -> float:
+        """Log odds from which on a thing is held for true."""
+        return float(np.log(self.born / (1.0 - self.born)))
 
     @property
     def log_rare(self) -> float:
@@ -73,11 +97,6 @@ class ModelConstants(NamedTuple):
     def steady(self) -> float:
         """Probability that nothing stands in the way of a leg that was not looked for before."""
         return self.cleared / (self.cleared + self.rare)
-
-    @property
-    def blocked(self) -> float:
-        """Probability that in a cycle something comes to stand in the way of a path."""
-        return self.rare
 
     @property
     def against(self) -> float:
