@@ -63,10 +63,12 @@ class ModelConstants(NamedTuple):
 
     walk: float = 1.0
     """Standard deviation [m/s] of a velocity of which nothing is known; as far [m] an agent goes astray."""
+    level: float = 0.0003
+    """Standard deviation [m/s^2] of the vertical acceleration in the calmest motion mode: wheels on a level floor."""
     calmest: float = 0.003
-    """Standard deviation [m/s^2] of the acceleration in the calmest motion mode: a rail car..."""
+    """The same of the horizontal one: a rail car..."""
     liveliest: float = 1.0
-    """...and in the liveliest: a person who turns on the spot."""
+    """...and in the liveliest mode: a person who turns on the spot."""
 
     @property
     def log_lost(self) -> float:

@@ -209,12 +209,14 @@ def _likelihoods(window: Window, count: int) -> Floats:
     every = np.arange(count)
     inside = window.covariance[size : size + count * free, size : size + count * free]
     block = inside.reshape(count, free, count, free)[every, :, every]
-    return np.stack([
+    found = np.stack([
         motion.log_likelihood(
             window.accel[:count, group], block[:, group[:, None], group], window.precision[:count, group[0]]
         )
         for group in GROUPS[: free - 1]
     ])  # fmt: skip
+    found[0, :, motion.is_level_only()] = -np.inf
+    return found
 
 
 def _precisions(levels: Floats) -> Floats:

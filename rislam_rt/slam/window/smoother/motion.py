@@ -10,14 +10,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.numerics import MODES
 
 
 def ladder() -> Floats:
     """(L,) standard deviations [m/s^2] of the modes."""
-    return _ladder(CONSTANTS.calmest, CONSTANTS.liveliest)
+    return _ladder(CONSTANTS.level, CONSTANTS.liveliest)
 
 
 @lru_cache(maxsize=4)
@@ -25,9 +25,14 @@ def _ladder(calmest: float, liveliest: float) -> Floats:
     return np.geomspace(calmest, liveliest, MODES)
 
 
+def is_level_only() -> Booleans:
+    """(L,) modes that are for the height alone: a floor is level, but nothing that moves keeps its speed so well."""
+    return ladder() < CONSTANTS.calmest
+
+
 def first_motion_mode(sigma_a: float) -> Floats:
     """The level nearest to the acceleration told is the likeliest, one three times as far off a third as likely."""
-    nearest = int(np.argmin(np.abs(np.log(ladder() / max(sigma_a, CONSTANTS.calmest)))))
+    nearest = int(np.argmin(np.abs(np.log(ladder() / max(sigma_a, CONSTANTS.level)))))
     weight = 3.0 ** -np.abs(np.arange(MODES) - nearest).astype(np.float64)
     return np.asarray(weight / weight.sum())
 
