@@ -1,7 +1,7 @@
 """The whole filter in the paper's room, 120 cycles near the panel: what it finds, and what it does not depend on."""
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -37,6 +37,8 @@ class Course(NamedTuple):
 
     estimates: list[SlamEstimate]
     infos: list[StepInfo]
+    state: Any
+    """The filter's, at the end."""
 
 
 def hear(receiver: ReceiverConfig, noise_psd: float, depth: int, seed: int) -> Heard:
@@ -78,7 +80,7 @@ def go(heard: Heard, measurements: list[Measurement] | None = None, cycles: int 
         state, info = step(state, measurement, code, 0.1 if cycle else 0.0, heading, CONFIG, rng=rng)
         estimates.append(estimate(state, CONFIG))
         infos.append(info)
-    return Course(estimates, infos)
+    return Course(estimates, infos, state)
 
 
 @pytest.fixture(scope="module")
@@ -185,6 +187,15 @@ def test_labels_are_idents_of_the_map(clear: tuple[Heard, Course]) -> None:
             if ident in place:
                 assert np.linalg.norm(position - place[ident]) < 1.0
             place[ident] = position
+
+
+def test_only_the_height_of_a_wheeled_agent_is_calmer_than_its_way(clear: tuple[Heard, Course]) -> None:
+    """The agent of this run keeps its height: the modes below the calmest of the way hold it, and never the way."""
+    across, upwards = clear[1].state.level[:2]
+    below = model.ladder() < CONSTANTS.calmest
+    assert 0 < below.sum() < len(below)
+    assert across[below].sum() < 1e-9
+    assert upwards[below].sum() > 0.5
 
 
 def motion_prior(level: float) -> float:
