@@ -63,7 +63,7 @@ class ModelConstants(NamedTuple):
 
     walk: float = 1.0
     """Standard deviation [m/s] of a velocity of which nothing is known; as far [m] an agent goes astray."""
-    level: float = 0.0003
+    level: float = 0.001
     """Standard deviation [m/s^2] of the vertical acceleration in the calmest motion mode: wheels on a level floor."""
     calmest: float = 0.003
     """The same of the horizontal one: a rail car..."""

@@ -47,7 +47,7 @@ EDGE = 1.15
 """Distance in cells up to which a weaker path moves a stronger one: cells have no sharp edge."""
 IN_WALL = 0.05
 """Distance [m] from a wall below which a point is held to lie in it."""
-MODES = 8
+MODES = 7
 """Motion modes, half a decade apart."""
 SCATTER_RATE = 0.1
 """Share of the latest residual in its running mean square."""
