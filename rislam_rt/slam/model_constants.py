@@ -1,4 +1,7 @@
-"""Constants of the window filter's model: physical quantities and stated levels, each with its source."""
+"""Constants of the filters' model: physical quantities and stated levels, each with its source.
+
+The window filter's; the nested filter shares those of a landmark's identity.
+"""
 
 from typing import NamedTuple
 
@@ -50,6 +53,14 @@ class ModelConstants(NamedTuple):
     """Probability that a path above the threshold with nothing in its way is reported by itself."""
     law: float = 0.05
     """Relative error of predicted amplitudes: geometry, and what the amplitude law leaves out."""
+    walk: float = 1.0
+    """Standard deviation [m/s] of a velocity of which nothing is known; as far [m] an agent goes astray."""
+    level: float = 0.001
+    """Standard deviation [m/s^2] of the vertical acceleration in the calmest motion mode: wheels on a level floor."""
+    calmest: float = 0.003
+    """The same of the horizontal one: a rail car..."""
+    liveliest: float = 1.0
+    """...and in the liveliest mode: a person who turns on the spot."""
 
     @property
     def stay(self) -> float:
@@ -60,15 +71,6 @@ class ModelConstants(NamedTuple):
     def dead(self) -> float:
         """Probability of existence below which a feature is taken back."""
         return self.rare
-
-    walk: float = 1.0
-    """Standard deviation [m/s] of a velocity of which nothing is known; as far [m] an agent goes astray."""
-    level: float = 0.001
-    """Standard deviation [m/s^2] of the vertical acceleration in the calmest motion mode: wheels on a level floor."""
-    calmest: float = 0.003
-    """The same of the horizontal one: a rail car..."""
-    liveliest: float = 1.0
-    """...and in the liveliest mode: a person who turns on the spot."""
 
     @property
     def log_lost(self) -> float:

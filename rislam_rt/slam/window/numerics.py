@@ -1,6 +1,7 @@
 """Numerics: steps of the solver and limits of what is worth a look.
 
-Some belong to the model and are not in its table: `EDGE`, `LEVEL`, `IN_WALL`, `SHORTER`, `BEARING`, `ALIGNED`.
+Some belong to the model and are not in its table: `EDGE`, `LEVEL`, `IN_WALL`, `SHORTER`, `BEARING`, `ALIGNED`,
+`LATELY`, `MISSED`.
 """
 
 import numpy as np

@@ -157,7 +157,7 @@ def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Fl
     """Log likelihoods (S, T) of tracks under level velocities (S, 2), and the weights (S, T) with which they agree."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
-    # as many paths as not shorten while the agent nears where they come from: nothing is known of it
+    # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
     close = np.log(0.5) - 0.5 * left**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
     kept = -0.5 * found.rate**2 / found.variance - 0.5 * np.log(2.0 * np.pi * found.variance)
     either = np.logaddexp(close, np.log(0.5 / 4.0) + np.logaddexp(kept, np.log(3.0 / (4.0 * CONSTANTS.walk))))
