@@ -2,13 +2,17 @@
 
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from rislam_rt.cli.output_files import OUTPUT
 from rislam_rt.shipped import find_pipeline, find_room
+
+if TYPE_CHECKING:
+    from rislam_rt.pipeline.specification.spec import Settings as RunSettings
 
 
 def pipeline_file(name: str) -> Path:
@@ -74,6 +78,20 @@ def parse_numbers(option: str, text: str) -> list[float]:
         return [float(word) for word in text.split(",")] if text.strip() else []
     except ValueError:
         raise ConfigError(f"{option}: '{text[:60]}' received; give numbers parted by commas") from None
+
+
+def settings_of(pipeline: Path, changed: Sequence[str]) -> "RunSettings":
+    """Radio, receiver and the rest as a pipeline has them, with settings changed (`KEY=VALUE`).
+
+    Raises
+    ------
+    ConfigError
+        The pipeline or a setting is unusable.
+    """
+    from rislam_rt.pipeline import load_spec
+    from rislam_rt.pipeline.specification.spec import build_settings
+
+    return build_settings(load_spec(pipeline, changed))
 
 
 def write_json(file: Path | None, content: dict[str, Any]) -> None:

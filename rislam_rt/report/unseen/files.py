@@ -60,7 +60,7 @@ def unseen_content(runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Ma
 
 
 def _brief(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """A class's card with what its table shows; numbers with six digits."""
+    """A class's card for the JSON file: what the page's table shows, numbers with six digits."""
     kept = {name: value for name, value in entry.items() if name in SHOWN}
     return {name: float(_six(value)) if isinstance(value, float) else value for name, value in kept.items()}
 
