@@ -35,7 +35,7 @@ class Odds(NamedTuple):
 def birth_ratio(length: Floats, undetected: float, odds: Odds) -> Floats:
     """(M,) expected density of first detections over that of clutter, for ranges (M,) [m].
 
-    `undetected` features are uniform over the sphere (or half of it) of `odds.max_range`; a range has its shell's share.
+    `undetected` features are uniform over the sphere of `odds.max_range`, or half of it; a range has its shell's share.
     """
     inside = (length > 0.0) & (length <= odds.max_range)
     shell = 4.0 * np.pi * np.where(inside, length, 0.5 * odds.max_range) ** 2
