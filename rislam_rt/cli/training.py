@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING
 import typer
 
 from rislam_rt.cli.options import write_json
+from rislam_rt.cli.output_files import study_folder
 
 if TYPE_CHECKING:
     from rislam_rt.cli.study import StudyOptions
     from rislam_rt.studies.classifier.spec import ClassifierSpec
 
 PAGE, SCORES, IMPORTANCE = "classifier", "figures/classifier_scores.png", "figures/classifier_features.png"
-PANEL = "figures/classifier_panel.png"
+PANEL, WEIGHTS = "figures/classifier_panel.png", "weights.npz"
 
 
 def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
     """Train the classifier of components and score it; weights, page, data and figures."""
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.cli.study import output_folder
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
@@ -43,20 +43,21 @@ def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
     radio, beside = build_radio(spec.radio), given.pipeline.parent
     scenes = [open_scene(Path(os.path.normpath(beside / room.scene)), radio).scene for room in spec.rooms]
     record = study_record(spec, scenes)
-    folder = output_folder(given.out, f"{spec.name}-{spec.seed}", record)
+    files = (f"{PAGE}.md", f"{PAGE}.json", WEIGHTS, *((SCORES, IMPORTANCE, PANEL) if given.page else ()))
+    folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record, files)
     prepare_channel(spec.channel)
     with show_progress() as progress:
         found = run_training(scenes, spec, progress=progress)
     content = {**record, **classifier_table(found)}
-    files = {
+    contents = {
         f"{PAGE}.md": classifier_page(found, spec, (SCORES, IMPORTANCE, PANEL) if given.page else None).encode(),
         f"{PAGE}.json": (json.dumps(content, indent=1, allow_nan=False) + "\n").encode(),
-        "weights.npz": weights_file(found),
+        WEIGHTS: weights_file(found),
     }
     if given.page:
-        files |= {SCORES: to_png(draw_scores(found)), IMPORTANCE: to_png(draw_importance(found))}
-        files |= {PANEL: to_png(draw_panel(found))}
-    for name, data in files.items():
+        contents |= {SCORES: to_png(draw_scores(found)), IMPORTANCE: to_png(draw_importance(found))}
+        contents |= {PANEL: to_png(draw_panel(found))}
+    for name, data in contents.items():
         write_atomic(folder / name, data)
     typer.echo(f"F1 on all test rooms: {found.scores[ALL]['network'].f1:.4f}")
     typer.echo(f"page: {folder / PAGE}.md")

@@ -53,12 +53,12 @@ def write_swept(
         return None
     shape = shape_of(groups, spec)
     figure = f"figures/{spec.name}.png" if figures else None
+    page = folder / f"{spec.name}.md"  # first: the others are known as the program's by it
+    write_atomic(page, shape.page(about_lines(groups, spec, record, len(rows)), figure).encode())
     if figure is not None:
         write_atomic(folder / figure, to_png(shape.draw()))
     write_atomic(folder / f"{spec.name}.csv", csv_text(shape.content["entries"]).encode())
     write_atomic(folder / f"{spec.name}.json", json_bytes(plain_result({**record, **shape.content})))
-    page = folder / f"{spec.name}.md"
-    write_atomic(page, shape.page(about_lines(groups, spec, record, len(rows)), figure).encode())
     return page
 
 
