@@ -76,8 +76,7 @@ def _move(state: BpSlamState, dt: float, config: BpSlamConfig) -> BpSlamState:
     if dt == 0.0:
         return state
     agent, step = move_agent(state.agent, dt, config.sigma_a, config.course_stride)
-    wander = np.array([config.drift_length_std, config.drift_angle_std, 0.0])
-    sums = carry(state.sums, step, wander)
+    sums = carry(state.sums, step, config.wander)
     sums = sums._replace(existence=config.survival_probability * sums.existence)
     unseen = config.survival_probability * (1.0 - config.detection_probability) * state.undetected
     return state._replace(agent=agent, sums=sums, undetected=unseen + config.birth_mean)
