@@ -99,7 +99,7 @@ def step(
     state = _move(state, dt, config)
     agent = state.agent._replace(heading=float(heading))
     rows, scan, strong, model = hear_ranges(agent, measurement, config)
-    fresh = 1.0 + birth_ratio(scan, state.undetected, model, 3, odds._replace(detection_probability=FIRST_DETECTION))
+    fresh = 1.0 + birth_ratio(scan.length, state.undetected, odds._replace(detection_probability=FIRST_DETECTION))
     sight = look(state.sums, agent.course, agent.pose[0], model)
     found = claims(state.sums, sight, agent.course, scan, fresh, odds)
     landmark = np.full(len(measurement), REMOVED)

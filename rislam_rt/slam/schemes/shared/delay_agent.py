@@ -87,8 +87,8 @@ def hear_ranges(
     strong, free = is_strong(observed.ratio, config.specular_ratio), ~is_los(observed, agent.body)
     rows = np.flatnonzero(free if config.planes else free & ~strong)
     scan = Scan(observed.seen[rows, 0], np.maximum(observed.std[rows, 0], config.smallest_std))
-    turn, upper = rotation_z(np.asarray(agent.heading)), agent.sensor.radio.array.pattern == "upper"
-    return rows, scan, strong[rows], Bistatic(turn @ agent.body.tx_offset, turn @ agent.body.rx_offset, upper)
+    turn = rotation_z(np.asarray(agent.heading))
+    return rows, scan, strong[rows], Bistatic(turn @ agent.body.tx_offset, turn @ agent.body.rx_offset)
 
 
 def reported(agent: DelayAgent, points: Points, num_samples: int) -> SlamEstimate:
