@@ -34,7 +34,7 @@ def _run(heard: list[int]) -> int:
     import typer
 
     from rislam_rt.cli.app import app
-    from rislam_rt.cli.interrupts import EXIT_CODE
+    from rislam_rt.cli.interrupts import EXIT_CODE, Interrupted
     from rislam_rt.cli.verbosity import reset
     from rislam_rt.errors import RislamError
 
@@ -50,6 +50,8 @@ def _run(heard: list[int]) -> int:
     except Exception as error:
         # Wrong usage: the parser's exceptions have no public base class, but all can say what is wrong.
         if not hasattr(error, "format_message"):
+            if heard and not isinstance(error, Interrupted):  # what was being imported took it for a fault of its own
+                return _say("interrupted", EXIT_CODE)
             raise
         return _say(f"error: {error.format_message().rstrip('.')}; see rislam-rt --help", 2)
     if code == EXIT_CODE:  # an interrupt that no command has answered
