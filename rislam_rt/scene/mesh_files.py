@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from rislam_rt.scene.mesh_containers import too_many_faces
-from rislam_rt.scene.mesh_placement import UNITS, place_mesh
+from rislam_rt.scene.mesh_placement import UNITS, place_points
 from rislam_rt.scene.meshes import MAX_COORDINATE, MAX_MESH_BYTES, Mesh, MeshReader, read_inside
 from rislam_rt.scene.schema import (
     LimitsSection,
@@ -38,4 +38,4 @@ class MeshFiles:
         if self.faces > most:
             raise too_many_faces(self.faces, most)
         origin = self.lying.origin if section.origin is None else section.origin
-        return place_mesh(mesh, up, unit, np.array(origin))
+        return Mesh(place_points(mesh.vertices, up, unit, np.array(origin)), mesh.faces)

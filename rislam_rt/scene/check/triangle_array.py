@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.triangles import triangle_heights
 from rislam_rt.model import Scene
 from rislam_rt.scene.findings import Finding
 
@@ -60,7 +61,4 @@ def build_triangle_array(scene: Scene, file: str) -> TriangleArray:
 
 def without_area(triangles: Floats) -> Booleans:
     """Which triangles (T, 3, 3) are no more than a line."""
-    edges = np.roll(triangles, -1, axis=1) - triangles
-    longest = np.linalg.norm(edges, axis=-1).max(axis=1)
-    double_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
-    return double_area <= MIN_ALTITUDE * longest
+    return triangle_heights(triangles) <= MIN_ALTITUDE

@@ -10,12 +10,12 @@ from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.floor_plan import FloorPlan, Opening
 from rislam_rt.scene.importing.materials import MaterialAssignment
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.polygons import inside_loop, triangulate
 from rislam_rt.scene.importing.regions.mesh_simplification import as_mesh
 from rislam_rt.scene.importing.regions.region_groups import numbered, plain_name
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.wall_lines import SAME_LINE, Line, Spans, wall_lines, without_span
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.polygons import inside_loop, triangulate
 from rislam_rt.scene.shapes import joined, quad
 
 THICKEST = 0.6
@@ -58,7 +58,7 @@ def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft
     levels: list[Entry] = []
     for name, level in (("floor", 0.0), ("ceiling", height)):
         mesh = joined([_at_height(flat, level), *thresholds[level]])
-        levels.append((name, as_mesh(mesh.vertices[mesh.faces]), None))
+        levels.append((name, as_mesh(mesh.triangles), None))
     return _named([*levels, *walls, *entries], plan, options)
 
 

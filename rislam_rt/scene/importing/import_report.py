@@ -17,8 +17,7 @@ def summarise_import(
 ) -> list[str]:  # fmt: skip
     """Report of an import: what became of the mesh, in numbers."""
     walls = sum(
-        len(planar_regions(mesh.vertices[mesh.faces], COPLANAR_ANGLE, COPLANAR_OFFSET).offset)
-        for mesh, _ in reflectors.values()
+        len(planar_regions(mesh.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET).offset) for mesh, _ in reflectors.values()
     )
     total, waves = float(facets.area.sum()), found.narrow / options.wavelength
     triangles = sum(len(mesh.faces) for mesh in occluders.values())

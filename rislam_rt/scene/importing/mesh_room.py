@@ -77,12 +77,12 @@ def _seen(found: SortedSurfaces) -> tuple[list[Surface], float]:
     """Surfaces of a mesh that an agent inside the room can see, and the area [m^2] of the others: outer skins, insides
     of boards."""
     triangles = np.concatenate([
-        *(s.mesh.vertices[s.mesh.faces] for s in found.surfaces), *(c.triangles for c in found.clutter)
+        *(s.mesh.triangles for s in found.surfaces), *(c.triangles for c in found.clutter)
     ])  # fmt: skip
     free = find_free(triangles, float(triangles[..., 2].min()))
     if free is None:
         return found.surfaces, 0.0
-    seen = is_seen(free.stations, [s.mesh.vertices[s.mesh.faces] for s in found.surfaces], triangles)
+    seen = is_seen(free.stations, [s.mesh.triangles for s in found.surfaces], triangles)
     hidden = sum(surface.area for surface, visible in zip(found.surfaces, seen, strict=True) if not visible)
     kept = [surface for surface, visible in zip(found.surfaces, seen, strict=True) if visible]
     return (kept, hidden) if kept else (found.surfaces, 0.0)
@@ -98,7 +98,7 @@ def _reflectors(
     uses = [place_free_name(parts[s.part].node) for s in shell]
     entries: list[tuple[str, Mesh, int]] = []
     for surface, node in zip(shell, uses, strict=True):
-        middle = surface.mesh.vertices[surface.mesh.faces].mean(axis=(0, 1))
+        middle = surface.mesh.triangles.mean(axis=(0, 1))
         place = wall_name(surface.normal, middle, room)
         if itu_by_word(parts[surface.part].material) == "glass":
             place = place.replace("wall", "window")

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault, one_line
-from rislam_rt.scene.importing.polygons import triangulate
+from rislam_rt.scene.polygons import signed_area, triangulate
 
 
 class _Reading(NamedTuple):
@@ -75,7 +75,7 @@ def _split(corners: Floats) -> Floats:
     middle = corners.mean(axis=0)
     normal = np.linalg.svd(corners - middle)[2] if np.isfinite(corners).all() else np.eye(3)
     flat = (corners - middle) @ normal[:2].T
-    turned = 0.5 * float(np.sum(flat[:, 0] * np.roll(flat[:, 1], -1) - flat[:, 1] * np.roll(flat[:, 0], -1))) < 0.0
+    turned = signed_area(flat) < 0.0
     order = np.arange(len(corners))[::-1] if turned else np.arange(len(corners))
     found = triangulate(flat[order], [])
     if found is None:  # a polygon that crosses itself

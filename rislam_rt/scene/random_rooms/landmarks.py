@@ -78,7 +78,7 @@ def draw_scatterer(
 def hidden_share(point: Floats, way: Floats, pieces: list[FurniturePiece]) -> float:
     """Share of a way (K, 3) from which furniture hides a random landmark (3,), every tenth of it looked at."""
     seen_from = way[::10]
-    triangles = [mesh.vertices[mesh.faces] for mesh in (piece.mesh() for piece in pieces)]
+    triangles = [mesh.triangles for mesh in (piece.mesh() for piece in pieces)]
     if not triangles:
         return 0.0
     cycles, _ = crossings(seen_from, np.broadcast_to(point, seen_from.shape), np.concatenate(triangles))

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.scene.polygons import inside_loop, signed_area
 
 SHAPES = ("convex", "l", "t", "u")
 """Shapes of a plan."""
@@ -34,19 +35,13 @@ def extent(outline: Floats) -> float:
     return float(np.linalg.norm(outline[:, None] - outline, axis=-1).max())
 
 
-def area(outline: Floats) -> float:
-    """[m^2] of a random room's plan, positive where the corners run counter-clockwise."""
-    x, y = outline.T
-    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-
-
 def depth_inside(outline: Floats, points: Floats) -> Floats:
     """Distance (...,) [m] of points (..., 2) from the outline of a plan, negative outside."""
     start, along = outline, np.roll(outline, -1, axis=0) - outline
     offset = points[..., None, :] - start
     share = np.clip(np.sum(offset * along, axis=-1) / np.sum(along**2, axis=-1), 0.0, 1.0)
     gap = np.linalg.norm(offset - share[..., None] * along, axis=-1).min(axis=-1)
-    return np.where(_inside(outline, points), gap, -gap)
+    return np.where(inside_loop(outline, points), gap, -gap)
 
 
 def triangulate(outline: Floats) -> Integers:
@@ -104,20 +99,10 @@ def _horseshoe(sides: Floats, rng: np.random.Generator) -> Floats:
     )
 
 
-def _inside(outline: Floats, points: Floats) -> Booleans:
-    """Whether a point lies in a plan: a ray towards +x crosses the outline an odd number of times."""
-    a, b = outline, np.roll(outline, -1, axis=0)
-    y = points[..., None, 1]
-    straddles = (a[:, 1] > y) != (b[:, 1] > y)
-    rise = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
-    x = a[:, 0] + (y - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
-    return np.asarray(np.sum(straddles & (points[..., None, 0] < x), axis=-1) % 2 == 1)
-
-
 def _is_ear(outline: Floats, left: list[int], place: int) -> bool:
     before, here, after = left[place - 1], left[place], left[(place + 1) % len(left)]
     corners = outline[[before, here, after]]
-    if area(corners) <= 0.0:
+    if signed_area(corners) <= 0.0:
         return False
     others = [corner for corner in left if corner not in (before, here, after)]
     edges = np.roll(corners, -1, axis=0) - corners

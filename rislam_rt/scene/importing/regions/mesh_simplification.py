@@ -3,11 +3,11 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.geometry.triangles import distance_to_edges
-from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
+from rislam_rt.geometry.planes import plane_tangents
+from rislam_rt.geometry.triangles import distance_to_edges, triangle_heights
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions
-from rislam_rt.scene.importing.regions.round_surfaces import across
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
 
 
 def corners_kept(facets: FlatRegions, label: Integers) -> Booleans:
@@ -50,8 +50,7 @@ def _filled(
     faces: Integers, points: Floats, normal: Floats, kept: Booleans, tolerance: float
 ) -> tuple[Mesh | None, float]:
     """The thinned outlines as a mesh, and how far the farthest corner is off them [m]."""
-    u, v = across(normal)
-    flat = points @ np.stack([u, v], axis=-1)
+    flat = points @ np.stack(plane_tangents(normal), axis=-1)
     drawn = outline_loops(faces)
     loops = [simplify_loop(loop, points, kept, tolerance) for loop in drawn]
     moved = max(_off_loop(points[a], points[b]) for a, b in zip(drawn, loops, strict=True)) if drawn else 0.0
@@ -88,7 +87,7 @@ def _around(hole: Floats, outers: list[Floats]) -> int | None:
 
 def _holds(outer: Floats, hole: Floats) -> bool:
     """Whether a loop (n, 2) to simplify holds the middle of another's first edge."""
-    return inside_loop(outer, 0.5 * (hole[0] + hole[1]))
+    return bool(inside_loop(outer, 0.5 * (hole[0] + hole[1])))
 
 
 def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:
@@ -112,9 +111,7 @@ def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:
 
 def has_area(triangles: Floats) -> Booleans:
     """Which triangles (T, 3, 3) are more than a line: higher than a tenth of a millimetre."""
-    edge = np.roll(triangles, -1, axis=1) - triangles
-    height = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
-    return np.asarray(height > 1e-4 * np.linalg.norm(edge, axis=-1).max(axis=1))
+    return np.asarray(triangle_heights(triangles) > 1e-4)
 
 
 def as_mesh(triangles: Floats) -> Mesh:

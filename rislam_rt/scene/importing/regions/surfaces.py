@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
-from rislam_rt.geometry.triangles import distance_to_triangles
+from rislam_rt.geometry.triangles import distance_to_triangles, triangle_areas
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions
 from rislam_rt.scene.importing.regions.mesh_simplification import clustered, corners_kept, has_area, region_mesh
@@ -169,7 +169,7 @@ def _with_clutter(
             area = float(facets.area[found.regions].sum())
             surfaces.append(Surface(thing, int(part[first]), facets.normal[first], mesh, area, error))
         else:
-            prisms.append(ClutterMesh(thing, mesh.vertices[mesh.faces]))
+            prisms.append(ClutterMesh(thing, mesh.triangles))
     gone = float(facets.area[resting].sum())
     raw, planes = [], _shell_planes(surfaces)
     for number, piece in enumerate(pieces):
@@ -181,7 +181,7 @@ def _with_clutter(
             gone += float(facets.area[regions].sum())
             rest[regions] = False
     thin, error, cell = in_cells(raw, wavelength)
-    shading = float(facets.area[rest].sum()) + sum(surface_area(clutter.triangles) for clutter in prisms)
+    shading = float(facets.area[rest].sum()) + sum(float(triangle_areas(clutter.triangles).sum()) for clutter in prisms)
     thin = [ClutterMesh(c.piece, off_planes(c.triangles, planes)) for c in (*prisms, *thin)]
     thin = [clutter for clutter in thin if len(clutter.triangles)]
     return SortedSurfaces(surfaces, thin, error, cell, narrow, shading, gone, cylinders)
@@ -210,9 +210,3 @@ def off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats:
     for normal, offset in planes:
         keep &= np.abs(triangles @ normal - offset).max(axis=1) > RESTING
     return triangles[keep]
-
-
-def surface_area(triangles: Floats) -> float:
-    """Area [m^2] of triangles (T, 3, 3)."""
-    edge = triangles[:, 1:] - triangles[:, :1]
-    return 0.5 * float(np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1).sum())
