@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 
-from rislam_rt.cli.options import write_json
+from rislam_rt.cli.options import beside, write_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -41,7 +41,7 @@ def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'compare_channels' names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
-    opened = [open_scene(_beside(given.pipeline, room.scene), radio) for room in spec.rooms]
+    opened = [open_scene(beside(given.pipeline, room.scene), radio) for room in spec.rooms]
     scenes = [one.scene for one in opened]
     record = study_record(spec, scenes)
     folder = output_folder(given.out, f"{spec.name}-{spec.seed}", record)
@@ -121,13 +121,10 @@ def run_cells(
     from rislam_rt.cli.progress import show_sweep
     from rislam_rt.sweeps import SweepOptions, run_sweep
 
-    def grow(rows: "Sequence[Row]") -> None:
-        write(rows)
-
     effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, limit)
     try:
         with show_sweep() as tell:
-            report = run_sweep(sweep, cells, effort, tell=tell, grow=grow)
+            report = run_sweep(sweep, cells, effort, tell=tell, grow=write)
     except KeyboardInterrupt:
         raise Interrupted("interrupted: what is done is kept; the same command goes on from there") from None
     if show is not None:
@@ -147,7 +144,7 @@ def run_claims(spec: "ClaimsSpec", given: StudyOptions) -> None:
 
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'claims' runs in no room; leave it out")
-    results = read_results(_beside(given.pipeline, spec.results))
+    results = read_results(beside(given.pipeline, spec.results))
     found = judge(results)
     names = ("seed", "scenes", "versions")
     sources = {study: {name: content[name] for name in names} for study, content in results.items()}
@@ -156,11 +153,6 @@ def run_claims(spec: "ClaimsSpec", given: StudyOptions) -> None:
         typer.echo(f"{claim.verdict}: {claim.claim}")
     typer.echo(f"page: {write_claims(found, spec.name, sources, folder)}")
     write_json(given.json, {"claims": [claim._asdict() for claim in found]})
-
-
-def _beside(pipeline: Path, scene: str) -> Path:
-    """A scene folder that a study's pipeline file names."""
-    return Path(os.path.normpath(pipeline.parent / scene))
 
 
 def output_folder(out: Path | None, name: str, record: "Mapping[str, Any]") -> Path:

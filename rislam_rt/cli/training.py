@@ -1,20 +1,18 @@
 """What `rislam-rt run` does with a pipeline that trains the classifier."""
 
 import json
-import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
-from rislam_rt.cli.options import write_json
+from rislam_rt.cli.options import beside, write_json
 
 if TYPE_CHECKING:
     from rislam_rt.cli.study import StudyOptions
     from rislam_rt.studies.classifier.spec import ClassifierSpec
 
-PAGE, SCORES, IMPORTANCE = "classifier", "figures/classifier_scores.png", "figures/classifier_features.png"
-PANEL = "figures/classifier_panel.png"
+PAGE = "classifier"
+SCORES, IMPORTANCE, PANEL = (f"figures/classifier_{name}.png" for name in ("scores", "features", "panel"))
 
 
 def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
@@ -40,8 +38,8 @@ def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
 
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'train_classifier' names its rooms; set 'rooms'")
-    radio, beside = build_radio(spec.radio), given.pipeline.parent
-    scenes = [open_scene(Path(os.path.normpath(beside / room.scene)), radio).scene for room in spec.rooms]
+    radio = build_radio(spec.radio)
+    scenes = [open_scene(beside(given.pipeline, room.scene), radio).scene for room in spec.rooms]
     record = study_record(spec, scenes)
     folder = output_folder(given.out, f"{spec.name}-{spec.seed}", record)
     prepare_channel(spec.channel)
@@ -54,8 +52,8 @@ def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
         "weights.npz": weights_file(found),
     }
     if given.page:
-        files |= {SCORES: to_png(draw_scores(found)), IMPORTANCE: to_png(draw_importance(found))}
-        files |= {PANEL: to_png(draw_panel(found))}
+        pictures = {SCORES: draw_scores, IMPORTANCE: draw_importance, PANEL: draw_panel}
+        files |= {name: to_png(draw(found)) for name, draw in pictures.items()}
     for name, data in files.items():
         write_atomic(folder / name, data)
     typer.echo(f"F1 on all test rooms: {found.scores[ALL]['network'].f1:.4f}")

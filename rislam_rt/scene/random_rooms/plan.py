@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.scene.polygons import inside_loop, signed_area
+from rislam_rt.scene.polygons import inside_loop
 
 SHAPES = ("convex", "l", "t", "u")
 """Shapes of a plan."""
@@ -33,6 +33,15 @@ def draw_plan(shape: str, *, rng: np.random.Generator) -> Floats:
 def extent(outline: Floats) -> float:
     """Largest distance [m] between two corners of a random room's plan."""
     return float(np.linalg.norm(outline[:, None] - outline, axis=-1).max())
+
+
+def area(outline: Floats) -> float:
+    """[m^2] of a random room's plan, positive where the corners run counter-clockwise.
+
+    Its rounding decides which of two flat ears is cut off, and so the meshes of every room that was ever drawn.
+    """
+    x, y = outline.T
+    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
 def depth_inside(outline: Floats, points: Floats) -> Floats:
@@ -102,7 +111,7 @@ def _horseshoe(sides: Floats, rng: np.random.Generator) -> Floats:
 def _is_ear(outline: Floats, left: list[int], place: int) -> bool:
     before, here, after = left[place - 1], left[place], left[(place + 1) % len(left)]
     corners = outline[[before, here, after]]
-    if signed_area(corners) <= 0.0:
+    if area(corners) <= 0.0:
         return False
     others = [corner for corner in left if corner not in (before, here, after)]
     edges = np.roll(corners, -1, axis=0) - corners

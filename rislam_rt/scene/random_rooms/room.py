@@ -10,7 +10,6 @@ from rislam_rt.errors import SceneError
 from rislam_rt.model import Material, Reflector, RisPanel, Scatterer, Scene, Trajectory
 from rislam_rt.scene.check import find_errors
 from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.polygons import signed_area
 from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_pieces
 from rislam_rt.scene.random_rooms.landmarks import (
     MOST,
@@ -22,7 +21,7 @@ from rislam_rt.scene.random_rooms.landmarks import (
     make_scatterer,
 )
 from rislam_rt.scene.random_rooms.motion import MOTIONS, draw_motion, draw_motion_profile
-from rislam_rt.scene.random_rooms.plan import SHAPES, draw_plan, extent
+from rislam_rt.scene.random_rooms.plan import SHAPES, area, draw_plan, extent
 from rislam_rt.scene.random_rooms.shell import CEILINGS, build_shell, draw_roof
 
 SHAPE_SHARES = (0.4, 0.2, 0.2, 0.2)
@@ -96,7 +95,7 @@ def _attempt(seed: int, shape: str, ceiling: str, motion: str, panel: str, *, rn
     roof = draw_roof(outline, ceiling, rng=rng)
     agent = draw_motion(outline, roof, draw_motion_profile(motion, rng=rng), rng=rng)
     ground = PlacementLimits(outline, roof, agent.position)
-    most = min(MAX_PIECES, int(signed_area(outline) / PER_PIECE))
+    most = min(MAX_PIECES, int(area(outline) / PER_PIECE))
     pieces = draw_pieces(ground, int(rng.integers(0, most + 1)), rng=rng)
     landmarks, ris = _landmarks(ground, pieces, panel, rng)
     shell = build_shell(outline, roof)

@@ -6,11 +6,10 @@ import pytest
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene import check_scene
-from rislam_rt.scene.polygons import signed_area
 from rislam_rt.scene.random_rooms import MOTIONS, SHAPES, RandomRoom, draw_room
 from rislam_rt.scene.random_rooms.landmarks import MOST
 from rislam_rt.scene.random_rooms.motion import CLIMB, CORNER, CYCLE, OFF_WALLS, SPIN
-from rislam_rt.scene.random_rooms.plan import depth_inside, draw_plan, triangulate
+from rislam_rt.scene.random_rooms.plan import area, depth_inside, draw_plan, triangulate
 
 MEANT = ("below the array", "more than a perfect plate", "more than 1/B", "never in front", "a wavelength or more")
 """Warnings of the scene check about what is drawn on purpose."""
@@ -118,9 +117,9 @@ def test_plans_are_simple_polygons(shape: str) -> None:
     for _ in range(20):
         outline = draw_plan(shape, rng=rng)
         faces = triangulate(outline)
-        parts = np.array([signed_area(outline[face]) for face in faces])
+        parts = np.array([area(outline[face]) for face in faces])
         assert (parts > 0.0).all()
-        assert parts.sum() == pytest.approx(signed_area(outline))
+        assert parts.sum() == pytest.approx(area(outline))
         middle = outline[faces].mean(axis=1)
         assert (depth_inside(outline, middle) > 0.0).all()
         assert (depth_inside(outline, outline + 1e-6 * (outline - outline.mean(axis=0))) < 1e-5).all()
