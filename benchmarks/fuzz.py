@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.errors import RislamError
-from rislam_rt.scene.meshes import parse_mesh
+from rislam_rt.scene.meshes import MeshReader
 from rislam_rt.scene.motion import parse_tum
 from rislam_rt.scene.schema import parse_spec
 
@@ -146,7 +146,7 @@ def mesh_reader(suffix: str) -> Callable[[bytes], object]:
     """Reads a mesh and looks at its numbers."""
 
     def read(content: bytes) -> object:
-        mesh = parse_mesh(content, f"a.{suffix}")
+        mesh = MeshReader().parse(content, f"a.{suffix}")
         assert len(mesh.faces) > 0
         assert mesh.faces.min() >= 0
         assert mesh.faces.max() < len(mesh.vertices)

@@ -26,11 +26,24 @@ class StudyOptions(NamedTuple):
     page: bool
 
 
+def refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
+    """Refuse `--scene` for a study that has rooms of its own, or none.
+
+    Raises
+    ------
+    ConfigError
+        It was given.
+    """
+    from rislam_rt.errors import ConfigError
+
+    if given.scene is not None:
+        raise ConfigError(f"--scene {given.scene}: a pipeline of kind '{kind}' {why}")
+
+
 def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
     """Compare both channels in all rooms; exit code 1 if a difference is unexplained or beyond its limit."""
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.studies.files import write_comparison
@@ -38,8 +51,7 @@ def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
     from rislam_rt.studies.compare import comparison_table, run_comparison
     from rislam_rt.studies.spec import study_record
 
-    if given.scene is not None:
-        raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'compare_channels' names its rooms; set 'rooms'")
+    refuse_scene(given, "compare_channels", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     opened = [open_scene(beside(given.pipeline, room.scene), radio) for room in spec.rooms]
     scenes = [one.scene for one in opened]
@@ -121,10 +133,13 @@ def run_cells(
     from rislam_rt.cli.progress import show_sweep
     from rislam_rt.sweeps import SweepOptions, run_sweep
 
+    def grow(rows: "Sequence[Row]") -> None:
+        write(rows)
+
     effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, limit)
     try:
         with show_sweep() as tell:
-            report = run_sweep(sweep, cells, effort, tell=tell, grow=write)
+            report = run_sweep(sweep, cells, effort, tell=tell, grow=grow)
     except KeyboardInterrupt:
         raise Interrupted("interrupted: what is done is kept; the same command goes on from there") from None
     if show is not None:
@@ -138,12 +153,10 @@ def run_cells(
 
 def run_claims(spec: "ClaimsSpec", given: StudyOptions) -> None:
     """The claims' table, from what other studies left behind."""
-    from rislam_rt.errors import ConfigError
     from rislam_rt.report.studies.claims import write_claims
     from rislam_rt.studies.claims import judge, read_results
 
-    if given.scene is not None:
-        raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'claims' runs in no room; leave it out")
+    refuse_scene(given, "claims", "runs in no room; leave it out")
     results = read_results(beside(given.pipeline, spec.results))
     found = judge(results)
     names = ("seed", "scenes", "versions")

@@ -19,8 +19,7 @@ def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
     """Train the classifier of components and score it; weights, page, data and figures."""
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.cli.study import output_folder
-    from rislam_rt.errors import ConfigError
+    from rislam_rt.cli.study import output_folder, refuse_scene
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.studies.classifier import (
@@ -36,8 +35,7 @@ def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
     from rislam_rt.studies.classifier.run import ALL, run_training
     from rislam_rt.studies.spec import study_record
 
-    if given.scene is not None:
-        raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'train_classifier' names its rooms; set 'rooms'")
+    refuse_scene(given, "train_classifier", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     scenes = [open_scene(beside(given.pipeline, room.scene), radio).scene for room in spec.rooms]
     record = study_record(spec, scenes)

@@ -38,7 +38,8 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     rows = [["agent", *(_metres(s["rmse_m"]) for s in schemes)]]
     for name in first["landmarks"]:
         rows.append([f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)])
-    heard = [name for name in first["walls"] if any(_is_heard(s["walls"][name]) for s in schemes)]
+    known = ("bound_m", "rmse_m")  # the paths tell anything of it, or something was made of it
+    heard = [wall for wall in first["walls"] if any(s["walls"][wall][k] is not None for s in schemes for k in known)]
     for name in heard:
         rows.append([f"wall {name}", *(_wall(s["walls"][name]) for s in schemes)])
     if len(first["walls"]) > len(heard):
@@ -203,11 +204,6 @@ def _metres(value: float | None) -> str:
     if value is None:
         return "not found"
     return f"{100.0 * value:.1f} cm" if value < 1.0 else f"{value:.2f} m"
-
-
-def _is_heard(score: Mapping[str, Any]) -> bool:
-    """Whether a wall belongs in the table: the paths tell anything of it, or something was made of it."""
-    return score["bound_m"] is not None or score["rmse_m"] is not None
 
 
 def _wall(score: Mapping[str, Any]) -> str:

@@ -19,7 +19,6 @@ from rislam_rt.scene.motion import build_motion
 from rislam_rt.scene.schema import (
     MAX_SCENE_BYTES,
     MaterialSection,
-    ReflectorSection,
     RisSection,
     ScattererSection,
     SceneSpec,
@@ -123,7 +122,11 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
                 findings.append(fault.at(str(file), field))
         return found
 
-    reflectors = made("reflector", spec.reflector, lambda one: _reflector(one, shelf))
+    reflectors = made(
+        "reflector",
+        spec.reflector,
+        lambda one: Reflector(one.name, *shelf.mesh(one.mesh, one), _material(one.material)),
+    )
     scatterers = made("scatterer", spec.scatterer, lambda one: _scatterer(one, shelf))
     occluders = made("shade", spec.shade, lambda one: Occluder(*shelf.mesh(one.mesh, one), one.name))
     panels = made("ris", spec.ris, build_panel)
@@ -146,10 +149,6 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
 def _surfaces(reflectors: Sequence[Reflector], occluders: Sequence[Occluder]) -> Floats:
     """(T, 3, 3) [m] of all loaded surfaces that stand in an agent's way."""
     return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in occluders)])
-
-
-def _reflector(section: ReflectorSection, shelf: MeshFiles) -> Reflector:
-    return Reflector(section.name, *shelf.mesh(section.mesh, section), _material(section.material))
 
 
 def _material(section: MaterialSection) -> Material:

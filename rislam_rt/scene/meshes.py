@@ -74,17 +74,6 @@ def read_inside(folder: Path, name: str, limit: int) -> bytes:
     return content
 
 
-def parse_mesh(content: bytes, name: str, node: str | None = None) -> Mesh:
-    """Triangles of a mesh file's content; `node` picks one named node of a GLB file.
-
-    Raises
-    ------
-    Fault
-        The content is not a mesh of that format, or it is damaged, empty or too large.
-    """
-    return MeshReader().parse(content, name, node)
-
-
 class MeshReader:
     """Reads meshes, and keeps the last file unfolded: a scene picks many nodes of one GLB file, one after the other."""
 
@@ -101,8 +90,15 @@ class MeshReader:
         max_nodes: int = MAX_NODES,
         reach: float = MAX_COORDINATE,
     ) -> Mesh:
-        """See `parse_mesh`. What is too large is refused before it is unfolded: a GLB file may name one mesh in
-        thousands of nodes. `reach` is the largest coordinate in the file's unit.
+        """Triangles of a mesh file's content; `node` picks one named node of a GLB file.
+
+        What is too large is refused before it is unfolded: a GLB file may name one mesh in thousands of nodes. `reach`
+        is the largest coordinate in the file's unit.
+
+        Raises
+        ------
+        Fault
+            The content is not a mesh of that format, or it is damaged, empty or too large.
         """
         suffix = PurePosixPath(name).suffix.lower()
         if suffix not in FORMATS:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from rislam_rt.errors import SceneError
 from rislam_rt.scene import check_scene, load_scene
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.meshes import FORMATS, parse_mesh, ply_bytes
+from rislam_rt.scene.meshes import FORMATS, MeshReader, ply_bytes
 from rislam_rt.scene.schema import parse_spec, validate_spec
 
 Damage = Callable[[str, str], Path]
@@ -302,7 +302,7 @@ def test_a_flipped_mesh_is_refused_or_sound(data: st.DataObject, suffix: str) ->
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
     content = content[: data.draw(st.integers(0, len(content)) | st.just(len(content)))]
     with contextlib.suppress(Fault):
-        mesh = parse_mesh(bytes(content), "a" + suffix)
+        mesh = MeshReader().parse(bytes(content), "a" + suffix)
         assert len(mesh.faces) > 0
         assert mesh.faces.min() >= 0
         assert mesh.faces.max() < len(mesh.vertices)

@@ -38,7 +38,7 @@ def fig4b_content(groups: Sequence[Group], spec: Fig4bSpec) -> dict[str, Any]:
             "snr_db": group.point[SNR],
             "paper_snr_db": group.mean("paper_snr_db"),
             **{name: value for name, value in scheme_entry(group, scheme).items() if name not in group.point},
-            "each_m": _each(group, scheme),
+            "each_m": [None if np.isnan(rmse) else float(rmse) for rmse in group.column(scheme, "rmse_m")],
         }
         for group in groups
         for scheme in group.schemes
@@ -149,7 +149,3 @@ def _budget_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     95 % of the components are taken for what they are, else the filter. NEES is that of the position per degree of
     freedom: 1 if the estimator knows how wrong it is."""
     return [*paragraph(text), "", *table_lines(head, rows)]
-
-
-def _each(group: Group, scheme: str) -> list[float | None]:
-    return [None if np.isnan(value) else float(value) for value in group.column(scheme, "rmse_m")]

@@ -29,7 +29,11 @@ TITLE = "Error against the panel's size: Fig. 4(c)"
 def fig4c_content(groups: Sequence[Group], spec: Fig4cSpec) -> dict[str, Any]:
     """Plain data: one entry a size and scheme, and how much lower the largest panel's error is than the smallest's."""
     return {
-        "entries": [_entry(group, scheme) for group in groups for scheme in group.schemes],
+        "entries": [
+            {**scheme_entry(group, scheme), **interval_entry("panel", spread(panel_error(group, scheme)), "_m")}
+            for group in groups
+            for scheme in group.schemes
+        ],
         "falls": [_fall(groups, scheme) for scheme in groups[0].schemes] if groups else [],
     }
 
@@ -86,11 +90,6 @@ def panel_error(group: Group, scheme: str) -> Any:
     """(R,) distance [m] of the panel's estimate at the end, for Fig. 4(c); NaN where the map has none."""
     name = panel_of(group, scheme)
     return np.full(len(group.results), np.nan) if name is None else group.column(scheme, "landmarks", name, "final_m")
-
-
-def _entry(group: Group, scheme: str) -> dict[str, Any]:
-    panel = interval_entry("panel", spread(panel_error(group, scheme)), "_m")
-    return {**scheme_entry(group, scheme), **panel}
 
 
 def _fall(groups: Sequence[Group], scheme: str) -> dict[str, Any]:

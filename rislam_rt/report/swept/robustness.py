@@ -42,8 +42,9 @@ def robustness_content(groups: Sequence[Group], spec: RobustnessSpec) -> dict[st
     for group in groups:
         mismatch, level = levels.get(str(group.point["variant"]), (None, None))
         for scheme in group.schemes:
-            known = mismatch is not None and reference is not None
-            change = rmse_change(group, scheme, reference.column(scheme, "rmse_m")) if known else None
+            change = None
+            if mismatch is not None and reference is not None:
+                change = rmse_change(group, scheme, reference.column(scheme, "rmse_m"))
             about_it = {
                 "mismatch": mismatch.name if mismatch else "",
                 "level": str(level) if mismatch else "",

@@ -80,14 +80,9 @@ def _off_loop(corners: Floats, loop: Floats) -> float:
 
 
 def _around(hole: Floats, outers: list[Floats]) -> int | None:
-    """Smallest outer loop around a hole, for simplification."""
-    around = [k for k, outer in enumerate(outers) if _holds(outer, hole)]
+    """Smallest outer loop around a hole, by the middle of its first edge, for simplification."""
+    around = [k for k, outer in enumerate(outers) if inside_loop(outer, 0.5 * (hole[0] + hole[1]))]
     return min(around, key=lambda k: signed_area(outers[k])) if around else None
-
-
-def _holds(outer: Floats, hole: Floats) -> bool:
-    """Whether a loop (n, 2) to simplify holds the middle of another's first edge."""
-    return bool(inside_loop(outer, 0.5 * (hole[0] + hole[1])))
 
 
 def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:

@@ -92,7 +92,7 @@ def sort_regions(
         mesh, error = region_mesh(facets, regions, kept, OUTLINE * options.wavelength)
         area = float(facets.area[regions].sum())
         surfaces.append(Surface(int(owner[first]), int(part[first]), facets.normal[first], mesh, area, error))
-    return _with_clutter(facets, pieces, rounds, surfaces, mirror, resting, narrow, options)
+    return _with_clutter(facets, pieces, rounds, surfaces, owner, part, mirror, resting, narrow, options)
 
 
 def _mirrors(facets: FlatRegions, rounded: Booleans, options: ImportOptions) -> tuple[Booleans, float]:
@@ -147,22 +147,19 @@ def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Inte
 
 
 def _with_clutter(
-    facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], surfaces: list[Surface], mirror: Booleans,
-    resting: Booleans, narrow: float, options: ImportOptions,
+    facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], surfaces: list[Surface], owner: Integers,
+    part: Integers, mirror: Booleans, resting: Booleans, narrow: float, options: ImportOptions,
 ) -> SortedSurfaces:  # fmt: skip
     """Cylinders as prisms and all else that does not reflect in cells."""
     wavelength, cylinders, prisms = options.wavelength, [], []
     rest = ~mirror & ~resting
-    owner = {int(region): number for number, piece in enumerate(pieces) for region in piece.regions}
-    part = np.zeros(len(mirror), dtype=np.int64)
-    part[facets.region] = facets.mesh.part
     for found in rounds:
         if found.radius < wavelength or found.along[1] - found.along[0] < narrow or resting[found.regions].all():
             continue
         sagitta = SAGITTA * wavelength * (0.5 if options.curved == "planes" else 1.0)
         mesh, error = prism(found, sagitta)
         first = int(found.regions[0])
-        thing = owner[first]
+        thing = int(owner[first])
         cylinders.append((found.radius, len(mesh.faces) // 2, error))
         rest[found.regions] = False
         if options.curved == "planes":
