@@ -77,8 +77,8 @@ class MaterialSection(SceneSection):
 
 
 class MeshSection(SceneSection):
-    """How a mesh file lies. `up_axis = "y"` turns a file whose y axis points up (as glTF's standard says) into the room's
-    frame with z up, `units` and `origin` are those of `[meshes]`, for this mesh alone.
+    """How one mesh file lies. `up_axis = "y"` turns a file whose y axis points up (as glTF's standard says) into the
+    room's frame with z up, `units` and `origin` are those of `[meshes]`, for this mesh alone.
     """
 
     up_axis: Literal["y", "z"] | None = None

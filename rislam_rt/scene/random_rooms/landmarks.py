@@ -43,7 +43,7 @@ _TRIES = 60
 def draw_scatterer(
     place: str, ground: PlacementLimits, pieces: list[FurniturePiece], landmarks: Floats, *, rng: np.random.Generator
 ) -> tuple[Floats, list[FurniturePiece]] | None:
-    """A place (3,) of one of `PLACES` for a scatterer, and the screen that hides it, if any; None where there is none."""
+    """A place (3,) of one of `PLACES` for a scatterer, and the screen that hides it, if any; None without one."""
     low, high = ground.outline.min(axis=0), ground.outline.max(axis=0)
     lowest = float(ground.way[:, 2].min())
     for _ in range(_TRIES):
