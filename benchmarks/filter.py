@@ -1,11 +1,10 @@
-"""How fast are the filters, what does the nested one need, and how does it grow?
+"""How fast is the nested filter, what does it need, and how does it grow?
 
-Four questions: time of the default filter for 600 cycles of the paper's room, against those 60 s; particle updates a
-second of the nested one against plain numpy (in blocks that fit the cache) and against the machine's copy bandwidth;
-its time and memory in a run at the paper's scale (2000 agent particles, 6000 of each landmark for each of them), from
-a stated number of measured cycles; and the time of its cycle against each of the three numbers, as a figure. But for
-the first, times are of the processor, over all threads, so that other programs on the machine count little; with `t`
-threads and an idle machine the clock shows about one t-th.
+Three questions: particle updates a second against plain numpy (in blocks that fit the cache) and against the machine's
+copy bandwidth; time and memory in a run at the paper's scale (2000 agent particles, 6000 of each landmark for each of
+them), from a stated number of measured cycles; and the time of a cycle against each of the three numbers, as a figure.
+Times are of the processor, over all threads, so that other programs on the machine count little; with `t` threads and
+an idle machine the clock shows about one t-th.
 Run: `RISLAM_RT_THREADS=2 python benchmarks/filter.py`.
 """
 
@@ -24,9 +23,6 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.backend import prepare_backend
 from rislam_rt.model import Body
-from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.run import prepare_setup, run_scheme
-from rislam_rt.scene import load_scene
 from rislam_rt.slam import NestedConfig, SlamConfig, StartPrior
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.particles import belief, operations
@@ -64,28 +60,6 @@ def copy_seconds(size: int) -> float:
     source = np.ones(size * BYTES // 8, dtype=np.float32)
     target = np.ones_like(source)
     return float(seconds(lambda: np.copyto(target, source))[0])
-
-
-def default_run(seeds: int) -> None:
-    """Time of the default filter, step and estimate, in the main job: random codes, sphere at 13 dB, image sources."""
-    settings = [
-        "receiver.estimator=bound",
-        "channel=image_source",
-        "motion.sigma_a_m_s2=0.01",
-        "radio.reference_snr_db=13.0",
-    ]
-    spec, room = (
-        load_spec(HOME / "pipelines" / "trace_then_slam.toml", settings),
-        load_scene(HOME / "scenes" / "paper_room"),
-    )
-    for seed in range(seeds):
-        stage = prepare_setup(room, spec, rng=np.random.default_rng(seed))
-        motion = float(stage.scene.agent.time[-1])
-        spent = run_scheme("random", stage, spec, lambda *_: None).seconds[:, 3]
-        print(
-            f"default filter, seed {seed}: {spent.sum():.1f} s on the clock for {motion:.0f} s of motion "
-            f"({spent.sum() / motion:.2f}); a cycle {1e3 * spent.mean():.1f} ms, longest {1e3 * spent.max():.0f} ms"
-        )
 
 
 def compare_engines(agents: int, points: int) -> None:
@@ -216,14 +190,12 @@ def draw_growth(cycles: int) -> None:
 
 
 def main() -> None:
-    """Answer all four, or some."""
+    """Answer all three, or some."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--parts", nargs="+", default=["default", "engines", "paper", "growth"])
+    parser.add_argument("--parts", nargs="+", default=["engines", "paper", "growth"])
     parser.add_argument("--cycles", type=int, default=20)
     parser.add_argument("--landmarks", type=int, default=10)
     arguments = parser.parse_args()
-    if "default" in arguments.parts:
-        default_run(3)
     if "engines" in arguments.parts:
         compare_engines(2000, 6000)
     if "paper" in arguments.parts:

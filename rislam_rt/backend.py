@@ -13,13 +13,16 @@ import ctypes
 import os
 import platform
 import re
+import signal
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from glob import glob
 from importlib import import_module, metadata
 from pathlib import Path
+from threading import current_thread, main_thread
 
 from rislam_rt.errors import SetupError
 
@@ -79,8 +82,28 @@ def prepare_backend() -> BackendInfo:
     path, version = ("", "") if device == "cuda" else _choose_llvm()
     if path:
         os.environ["DRJIT_LIBLLVM_PATH"] = path
-    import_module("drjit").set_thread_count(threads)
+    with uninterrupted():
+        import_module("drjit").set_thread_count(threads)
     return BackendInfo(f"{device}_ad_mono_polarized", threads, path, version)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Hold interrupts back while the libraries behind the tracer are loaded: their extensions take an exception in the
+    middle for a fault of theirs, and some abort the process at it. What came meanwhile comes at the end."""
+    came: list[int] = []
+    kept = {}
+    if current_thread() is main_thread():  # no other is interrupted
+        for one in (signal.SIGINT, signal.SIGTERM):
+            if callable(signal.getsignal(one)):
+                kept[one] = signal.signal(one, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        for one, answer in kept.items():
+            signal.signal(one, answer)
+        for number in came[:1]:
+            signal.raise_signal(number)
 
 
 def check_python(version: tuple[int, ...]) -> None:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, SceneFolder, Settings, pipeline_file, write_json
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, SceneFolder, Settings, pipeline_file, settings_of, write_json
 from rislam_rt.cli.output_files import OUTPUT
 
 if TYPE_CHECKING:
@@ -39,7 +39,6 @@ def command(
 
     Example: rislam-rt check myroom --set radio.reference_snr_db=0 --picture coverage.png
     """
-    from rislam_rt.cli.scenes import settings_of
     from rislam_rt.scene import check_scene
 
     changed = list(set_ or ())

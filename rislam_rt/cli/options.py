@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -12,6 +13,7 @@ from rislam_rt.shipped import find_pipeline, find_room
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
+    from rislam_rt.pipeline.specification.spec import Settings as RunSettings
 
 FARTHEST = 1e5
 """Largest coordinate [m], as in a scene."""
@@ -106,6 +108,20 @@ def parse_point(option: str, text: str) -> "Floats":
 def beside(pipeline: Path, name: str) -> Path:
     """A folder that an option's pipeline file names, relative to the file."""
     return Path(os.path.normpath(pipeline.parent / name))
+
+
+def settings_of(pipeline: Path, changed: Sequence[str]) -> "RunSettings":
+    """Radio, receiver and the rest as a pipeline has them, with settings changed (`KEY=VALUE`).
+
+    Raises
+    ------
+    ConfigError
+        The pipeline or a setting is unusable.
+    """
+    from rislam_rt.pipeline import load_spec
+    from rislam_rt.pipeline.specification.spec import build_settings
+
+    return build_settings(load_spec(pipeline, changed))
 
 
 def write_json(file: Path | None, content: dict[str, Any]) -> None:

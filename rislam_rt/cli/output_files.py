@@ -1,7 +1,8 @@
 """Files that a command is asked to write: one that is there and not of this program's making stays."""
 
 import inspect
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +13,8 @@ from rislam_rt.cli.verbosity import with_switches
 
 OUTPUT = "a file to write"
 """Marks, in an option's annotation, the file that the command writes."""
+PAGE_MARK = re.compile(rb"ritten\s+by\s+`rislam-rt\b")
+"""Stands in the head of every study's page."""
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that this program did not make.")]
 
 _may_overwrite = False
@@ -52,3 +55,44 @@ def check_output(file: Path | None, option: str = "") -> Path | None:
             f"{option}{file}: is there already, and not of this program's making; give another name, or --overwrite"
         )
     return file
+
+
+def page_files(name: str, *, figure: bool = False) -> tuple[str, ...]:
+    """Names of what a study leaves behind: its page first, the table, the data, and the figure if there is one."""
+    return (f"{name}.md", f"{name}.csv", f"{name}.json", *([f"figures/{name}.png"] if figure else []))
+
+
+def study_folder(out: Path | None, name: str, record: Mapping[str, Any], files: Sequence[str]) -> Path:
+    """Where a study's files go: `--out`, shared with others, or `runs/<name>-<hash of the record>`.
+
+    `files`: what it will write there, its page first; this is the program's own if its page is.
+
+    Raises
+    ------
+    ConfigError
+        There is a file of that name; or one of the study's files is there, not empty, and not the program's, which was
+        not told to overwrite it.
+    """
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.pipeline.store.identity import short_name
+    from rislam_rt.storage.seal import checksum
+
+    folder = out or Path("runs") / short_name(name, checksum(record))
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError(f"--out {folder}: is a file; give a folder")
+    if _may_overwrite or _is_page(folder / files[0]):
+        return folder
+    for file in (folder / one for one in files):
+        if file.is_file() and file.stat().st_size:
+            raise ConfigError(
+                f"--out {folder}: {file} is there already, and not of this program's making; give another folder, or "
+                "--overwrite"
+            )
+    return folder
+
+
+def _is_page(file: Path) -> bool:
+    try:
+        return PAGE_MARK.search(file.read_bytes()) is not None
+    except OSError:
+        return False

@@ -7,12 +7,9 @@ from rislam_rt.cli.options import beside, parse_point
 from rislam_rt.cli.verbosity import warn
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rislam_rt.arrays import Floats
     from rislam_rt.model import RadioConfig, Scene
     from rislam_rt.pipeline import PipelineSpec
-    from rislam_rt.pipeline.specification.spec import Settings
     from rislam_rt.studies import Fig4aSpec
 
 
@@ -42,20 +39,6 @@ def open_scene(path: Path, radio: "RadioConfig | None" = None) -> OpenedScene:
     findings = check_scene(path, radio)
     raise_errors(findings)
     return OpenedScene(load_scene(path), tuple(f.line for f in findings if f.severity == "warning"))
-
-
-def settings_of(pipeline: Path, changed: "Sequence[str]") -> "Settings":
-    """Radio, receiver and the rest as a pipeline has them, with settings changed (`KEY=VALUE`).
-
-    Raises
-    ------
-    ConfigError
-        The pipeline or a setting is unusable.
-    """
-    from rislam_rt.pipeline import load_spec
-    from rislam_rt.pipeline.specification.spec import build_settings
-
-    return build_settings(load_spec(pipeline, changed))
 
 
 def scene_of(option: Path | None, spec: "PipelineSpec | Fig4aSpec", pipeline: Path) -> Path:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, Depth, SceneFolder, Settings, pipeline_file
+from rislam_rt.cli.options import MAIN_JOB, Depth, SceneFolder, Settings, pipeline_file, settings_of
 from rislam_rt.cli.output_files import OUTPUT, check_output
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def command(
     Example: rislam-rt show office --html office.html --depth 2
     """
     from rislam_rt.cli.progress import show_progress
-    from rislam_rt.cli.scenes import open_scene, settings_of
+    from rislam_rt.cli.scenes import open_scene
     from rislam_rt.report.tables import print_scene
     from rislam_rt.scene.file_names import safe_name
 

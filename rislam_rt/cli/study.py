@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import typer
 
 from rislam_rt.cli.options import beside, write_json
+from rislam_rt.cli.output_files import page_files, study_folder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -46,7 +47,7 @@ def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
-    from rislam_rt.report.studies.files import write_comparison
+    from rislam_rt.report.studies.files import CERTIFICATE, COMPARISON, write_comparison
     from rislam_rt.report.tables import print_validation
     from rislam_rt.studies.compare import comparison_table, run_comparison
     from rislam_rt.studies.spec import study_record
@@ -56,7 +57,8 @@ def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
     opened = [open_scene(beside(given.pipeline, room.scene), radio) for room in spec.rooms]
     scenes = [one.scene for one in opened]
     record = study_record(spec, scenes)
-    folder = output_folder(given.out, f"{spec.name}-{spec.seed}", record)
+    files = (f"{COMPARISON}.md", f"{COMPARISON}.json", *([CERTIFICATE] if given.page else []))
+    folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record, files)
     prepare_channel("traced")
     for one in opened:
         one.warn()
@@ -80,7 +82,7 @@ def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.studies.fig4a import fig4a_table, findings_of
-    from rislam_rt.report.studies.files import write_fig4a
+    from rislam_rt.report.studies.files import CURVES, write_fig4a
     from rislam_rt.scene.file_names import safe_name
     from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
     from rislam_rt.studies.spec import study_record
@@ -89,7 +91,8 @@ def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
     scene = opened.scene
     check_fig4a(scene, spec)
     record = study_record(spec, [scene])
-    folder = output_folder(given.out, f"{spec.name}-{safe_name(scene.name)}-{spec.seed}", record)
+    files = page_files(CURVES, figure=given.page)
+    folder = study_folder(given.out, f"{spec.name}-{safe_name(scene.name)}-{spec.seed}", record, files)
     prepare_channel(spec.channel)
     opened.warn()
     with show_progress() as progress:
@@ -113,7 +116,8 @@ def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
     sweep = build_sweep(spec, given.pipeline, given.scene)
     found = build_cells(sweep)
     record, cells = swept_record(spec, sweep, given.pipeline), Path("sweeps") / spec.name
-    folder = output_folder(given.out, f"{spec.name}-{spec.seed}", record)
+    files = page_files(spec.name, figure=given.page)
+    folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record, files)
     check_folder(cells)
     for kind in {cell.depends["config"]["channel"] for cell in found}:
         prepare_channel(kind)
@@ -154,33 +158,14 @@ def run_cells(
 def run_claims(spec: "ClaimsSpec", given: StudyOptions) -> None:
     """The claims' table, from what other studies left behind."""
     from rislam_rt.report.studies.claims import write_claims
-    from rislam_rt.studies.claims import judge, read_results
+    from rislam_rt.studies.claims import SOURCE, judge, read_results
 
     refuse_scene(given, "claims", "runs in no room; leave it out")
     results = read_results(beside(given.pipeline, spec.results))
     found = judge(results)
-    names = ("seed", "scenes", "versions")
-    sources = {study: {name: content[name] for name in names} for study, content in results.items()}
-    folder = output_folder(given.out, spec.name, results)
+    sources = {study: {name: content[name] for name in SOURCE} for study, content in results.items()}
+    folder = study_folder(given.out, spec.name, results, page_files(spec.name))
     for claim in found:
         typer.echo(f"{claim.verdict}: {claim.claim}")
     typer.echo(f"page: {write_claims(found, spec.name, sources, folder)}")
     write_json(given.json, {"claims": [claim._asdict() for claim in found]})
-
-
-def output_folder(out: Path | None, name: str, record: "Mapping[str, Any]") -> Path:
-    """Where a study's files go: `--out`, shared with others, or `runs/<name>-<hash of the record>`.
-
-    Raises
-    ------
-    ConfigError
-        There is a file of that name.
-    """
-    from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.store.identity import short_name
-    from rislam_rt.storage.seal import checksum
-
-    folder = out or Path("runs") / short_name(name, checksum(record))
-    if folder.exists() and not folder.is_dir():
-        raise ConfigError(f"--out {folder}: is a file; give a folder")
-    return folder

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 import typer
 
 from rislam_rt.cli.options import beside, write_json
+from rislam_rt.cli.output_files import study_folder
 
 if TYPE_CHECKING:
     from rislam_rt.cli.study import StudyOptions
     from rislam_rt.studies.classifier.spec import ClassifierSpec
 
-PAGE = "classifier"
+PAGE, WEIGHTS = "classifier", "weights.npz"
 SCORES, IMPORTANCE, PANEL = (f"figures/classifier_{name}.png" for name in ("scores", "features", "panel"))
 
 
@@ -19,7 +20,7 @@ def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
     """Train the classifier of components and score it; weights, page, data and figures."""
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.cli.study import output_folder, refuse_scene
+    from rislam_rt.cli.study import refuse_scene
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.studies.classifier import (
@@ -39,20 +40,21 @@ def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
     radio = build_radio(spec.radio)
     scenes = [open_scene(beside(given.pipeline, room.scene), radio).scene for room in spec.rooms]
     record = study_record(spec, scenes)
-    folder = output_folder(given.out, f"{spec.name}-{spec.seed}", record)
+    files = (f"{PAGE}.md", f"{PAGE}.json", WEIGHTS, *((SCORES, IMPORTANCE, PANEL) if given.page else ()))
+    folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record, files)
     prepare_channel(spec.channel)
     with show_progress() as progress:
         found = run_training(scenes, spec, progress=progress)
     content = {**record, **classifier_table(found)}
-    files = {
+    contents = {
         f"{PAGE}.md": classifier_page(found, spec, (SCORES, IMPORTANCE, PANEL) if given.page else None).encode(),
         f"{PAGE}.json": (json.dumps(content, indent=1, allow_nan=False) + "\n").encode(),
-        "weights.npz": weights_file(found),
+        WEIGHTS: weights_file(found),
     }
     if given.page:
         pictures = {SCORES: draw_scores, IMPORTANCE: draw_importance, PANEL: draw_panel}
-        files |= {name: to_png(draw(found)) for name, draw in pictures.items()}
-    for name, data in files.items():
+        contents |= {name: to_png(draw(found)) for name, draw in pictures.items()}
+    for name, data in contents.items():
         write_atomic(folder / name, data)
     typer.echo(f"F1 on all test rooms: {found.scores[ALL]['network'].f1:.4f}")
     typer.echo(f"page: {folder / PAGE}.md")

@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rislam_rt.cli.study import StudyOptions, output_folder, refuse_scene, run_cells
+from rislam_rt.cli.output_files import page_files, study_folder
+from rislam_rt.cli.study import StudyOptions, refuse_scene, run_cells
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,7 +26,8 @@ def run_unseen(spec: "UnseenSpec", given: StudyOptions) -> None:
     refuse_scene(given, "unseen", "draws its rooms; leave it out")
     cells = Path("sweeps") / spec.name
     record = unseen_record(spec)
-    folder = output_folder(given.out, f"{spec.name}-{spec.first}", record)
+    files = page_files(spec.name, figure=given.page)
+    folder = study_folder(given.out, f"{spec.name}-{spec.first}", record, files)
     check_folder(cells)
     sweep = build_unseen(spec, given.pipeline, Path("sweeps") / f"{spec.name}_data")
     for kind in {cell.depends["config"]["channel"] for cell in build_cells(sweep)}:

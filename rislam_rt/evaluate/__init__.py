@@ -10,13 +10,12 @@ from rislam_rt.evaluate.confidence_intervals import (
     rms_over_runs,
     share_interval,
 )
-from rislam_rt.evaluate.consistency import Consistency, chi_square_bounds, consistency, normalised_squares
+from rislam_rt.evaluate.consistency import normalised_squares
 from rislam_rt.evaluate.errors import TrajectoryError, align, position_errors, rmse, root_mean_square, trajectory_error
 from rislam_rt.evaluate.set_distances import Gospa, gospa, match_points
 
 __all__ = [
     "AssociationScore",
-    "Consistency",
     "Gospa",
     "Interval",
     "TrajectoryError",
@@ -25,8 +24,6 @@ __all__ = [
     "association_score",
     "bootstrap",
     "bootstrap_ratio",
-    "chi_square_bounds",
-    "consistency",
     "gospa",
     "label_switches",
     "match_points",

@@ -88,12 +88,17 @@ def near_pairs(
     No distance is less than that along one axis alone, so that few pairs need a matrix.
     """
     own, other = (np.diagonal(spread, axis1=1, axis2=2) for spread in (first_spread, second_spread))
-    gap = first.T[..., None] - second.T[:, None]
-    close = gap**2 <= gate * (own.T[..., None] + other.T[:, None])
-    row, column = (allowed & close.all(axis=0)).nonzero()
+    row, column = (allowed & within(first[:, 0], own[:, 0], second[:, 0], other[:, 0], gate)).nonzero()
+    close = ((first[row] - second[column]) ** 2 <= gate * (own[row] + other[column])).all(axis=1)
+    row, column = row[close], column[close]
     distance, log_det = squared_distance(first[row] - second[column], first_spread[row] + second_spread[column])
     inside = distance < gate
     return Pairs(row[inside], column[inside], distance[inside], log_det[inside])
+
+
+def within(first: Floats, variance: Floats, second: Floats, other: Floats, gate: float) -> Booleans:
+    """(A, B) whether the gaps between (A,) and (B,), with these variances, lie in the gate."""
+    return np.asarray((first[:, None] - second) ** 2 <= gate * (variance[:, None] + other))
 
 
 def squared_distance(gap: Floats, covariance: Floats) -> tuple[Floats, Floats]:

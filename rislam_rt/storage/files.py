@@ -24,9 +24,12 @@ def is_own(path: Path) -> bool:
     """Whether nothing of the user's is lost by writing to a path: no file, an empty one, or one with our mark."""
     if not path.is_file() or path.stat().st_size == 0 or _is_device(path):
         return True
-    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
-        head, application = RECORDING
-        return content.find(MARK.encode()) >= 0 or (content[:3] == head and content.find(application) >= 0)
+    try:
+        with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
+            head, application = RECORDING
+            return content.find(MARK.encode()) >= 0 or (content[:3] == head and content.find(application) >= 0)
+    except OSError:  # not to be read, so not known to be ours
+        return False
 
 
 def write_atomic(path: Path, content: bytes) -> None:

@@ -10,6 +10,8 @@ from rislam_rt.errors import ConfigError
 
 FILES = ("fig4a.json", "fig4b.json", "fig4b_lively.json", "fig4c.json")
 """What the studies leave behind, in the folder of the results."""
+SOURCE = ("seed", "scenes", "versions")
+"""Of each study's record, what the claims repeat."""
 LEAST_GAIN, LEAST_FALL = 0.31, 0.1
 """The paper: error lower than every benchmark's by this share; and than without a panel by this many metres."""
 OURS, RIVALS = "optimized", ("random", "no_ris", "bp_slam", "channel_slam")
@@ -44,8 +46,14 @@ def read_results(folder: Path) -> dict[str, Mapping[str, Any]]:
             continue
         try:
             found[file.stem] = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise ConfigError(f"results: {file} cannot be read ({error}); run its pipeline again") from None
+            judge(found)  # each is held against its own form as it is read, so that what is wrong has a name
+            if not all(key in found[file.stem] for key in SOURCE):
+                raise ValueError(f"{', '.join(SOURCE)}: not all there")
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+            cause = " ".join(f"{type(error).__name__}: {error}".split())[:80]
+            raise ConfigError(
+                f"results: {file} is not what its study writes ({cause}); run pipelines/{file.stem}.toml again"
+            ) from None
     if not found:
         raise ConfigError(f"results: {folder} has none of {', '.join(FILES)}; run pipelines/fig4b.toml and the others")
     return found

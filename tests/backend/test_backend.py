@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -167,3 +168,33 @@ def test_the_doctor_reports_what_is_missing_instead_of_raising(monkeypatch):
 
     monkeypatch.setattr(backend, "prepare_backend", fails)
     assert [row.value for row in backend.diagnose() if not row.ok] == ["no libLLVM found"]
+
+
+def test_an_interrupt_waits_until_the_tracers_libraries_are_loaded(monkeypatch):
+    from rislam_rt.channel.traced import tracer_startup
+
+    loaded = []
+
+    class Library:
+        def set_thread_count(self, threads):
+            loaded.append("drjit")
+
+        def set_variant(self, variant):
+            loaded.append("mitsuba")
+
+    def load(name):
+        signal.raise_signal(signal.SIGINT)
+        loaded.append(name)  # an extension that an exception reaches here aborts the process
+        return Library()
+
+    for module, work in ((backend, backend.prepare_backend), (tracer_startup, tracer_startup.start_tracer)):
+        loaded.clear()
+        with monkeypatch.context() as patch:
+            patch.setattr(tracer_startup, "prepare_backend", backend.prepare_backend)
+            patch.setattr(module, "import_module", load)
+            before = signal.getsignal(signal.SIGINT)
+            with pytest.raises(KeyboardInterrupt):
+                work.__wrapped__()
+            assert signal.getsignal(signal.SIGINT) is before
+        wanted = ["drjit", "drjit"] if module is backend else ["mitsuba", "mitsuba", "sionna.rt"]
+        assert loaded == wanted

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rislam_rt.channel.doppler import advance_paths, advance_trajectory
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.model import PathKind, RadioConfig, RisCode, RisPanel, RisSpec, Trajectory, join_panels
+from rislam_rt.model import PathKind, RadioConfig, RisCode, RisPanel, RisSpec, join_panels
 
 RADIO = RadioConfig()
 
@@ -52,18 +51,3 @@ def test_each_panel_has_the_paths_that_it_has_alone(room, rooms):
             assert paths.panel[here] == (number if over else -1)
             met += over
     assert met == np.sum(paths.panel >= 0) > 3
-
-
-def test_a_moment_later_every_panel_is_where_a_new_trace_finds_it(room):
-    time = np.array([0.0, 0.1])
-    motion = Trajectory(
-        time, np.array([[1.0, 1.2, 0.8], [1.1, 1.2, 0.8]]), np.tile([1.0, 0.5, 0.0], (2, 1)), np.zeros(2),
-        room.agent.body,
-    )  # fmt: skip
-    channel, rng = ImageSourceChannel(room, RADIO, 1), np.random.default_rng(0)
-    code = RisCode(rng.integers(4, size=(1, room.ris.spec.num_elements)), 4)
-    moved = advance_paths(channel.paths(motion), room, RADIO, motion, 2e-3, code)
-    fresh = channel.respond(channel.paths(advance_trajectory(motion, 2e-3)), code)
-    over = fresh.panel >= 0
-    assert {0, 1, 2} <= set(fresh.panel.tolist())
-    np.testing.assert_allclose(moved.gain[:, over], fresh.gain[:, over], rtol=1e-9, atol=1e-15)

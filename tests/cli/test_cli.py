@@ -217,6 +217,22 @@ def test_a_run_interrupted_at_once_says_that_nothing_was_kept(run, monkeypatch):
     assert err.splitlines()[-1] == "interrupted: nothing was kept"
 
 
+def test_an_interrupt_that_an_import_took_for_a_fault_is_one_line(run, monkeypatch):
+    import signal
+
+    from rislam_rt.pipeline import run as module
+
+    def broken(*_, **__):
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except KeyboardInterrupt:
+            raise ImportError("Encountered an error while initializing the extension.") from None
+
+    monkeypatch.setattr(module, "check_run", broken)
+    code, out, err = run("run", "trace_then_slam", "--scene", "empty_box", "--set", "channel=image_source")
+    assert (code, out, err) == (130, "", "interrupted\n")
+
+
 @pytest.mark.parametrize("blow", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_run_goes_on(run, tmp_path, monkeypatch, blow):
     import rislam_rt.pipeline.run as module

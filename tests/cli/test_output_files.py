@@ -1,8 +1,12 @@
 """A command replaces the files that the program made, and no others unless it is told to."""
 
+from pathlib import Path
+
 import pytest
 
 from rislam_rt.storage.files import is_own, write_atomic
+
+ROOT = Path(__file__).parents[2]
 
 VIEW = ("show", "empty_box", "-q", "--depth", 0)
 
@@ -54,3 +58,48 @@ def test_what_loses_nothing_is_free(tmp_path):
     for content, own in ((b"RRF2\0\0rislam_rt", True), (b"RRF2\0\0other", False), (b"rislam_rt", False)):
         write_atomic(tmp_path / "run.rrd", content)
         assert is_own(tmp_path / "run.rrd") is own
+
+
+@pytest.mark.parametrize(
+    ("pipeline", "file"),
+    [
+        ("fig4a", "fig4a.csv"),
+        ("fig4b", "fig4b.md"),
+        ("compare_channels", "figures/path_certificate.png"),
+        ("unseen", "unseen.json"),
+        ("train_classifier", "weights.npz"),
+    ],
+)
+def test_a_studys_page_takes_no_others_place(run, tmp_path, pipeline, file):
+    theirs = tmp_path / "results" / file
+    theirs.parent.mkdir(parents=True)
+    theirs.write_text("mine")
+    code, out, err = run("run", ROOT / f"pipelines/{pipeline}.toml", "--out", "results")
+    assert code == 2
+    assert not out
+    assert err == (
+        f"error: --out results: results/{file} is there already, and not of this program's making; give another "
+        "folder, or --overwrite\n"
+    )
+    assert [path.read_text() for path in tmp_path.rglob("*") if path.is_file()] == ["mine"]  # nothing was begun
+
+
+def test_a_studys_own_page_is_written_anew(run, tmp_path):
+    words = ("run", ROOT / "pipelines/claims.toml", "--set", f"results={ROOT}/docs/results", "--out", ".")
+    (tmp_path / "claims.csv").write_text("mine")
+    assert run(*words)[0] == 2
+    assert (tmp_path / "claims.csv").read_text() == "mine"
+    assert run(*words, "--overwrite")[0] == 0
+    made = (tmp_path / "claims.csv").read_text()
+    assert made != "mine"
+    assert run(*words)[0] == 0  # now it is the program's own
+    assert (tmp_path / "claims.csv").read_text() == made
+
+
+def test_every_page_that_is_there_is_known_as_the_programs(run, tmp_path):
+    from rislam_rt.cli.output_files import study_folder
+
+    pages = sorted((ROOT / "docs/results").glob("*.md"))
+    assert len(pages) > 10
+    for page in pages:
+        assert study_folder(page.parent, "", {}, [page.name]) == page.parent

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rislam_rt.channel.doppler import advance_paths, doppler_shift
+from rislam_rt.channel.doppler import doppler_shift, turn_rate
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import ReceiverConfig, measure
 from rislam_rt.measurement.config import ORDERS
@@ -42,17 +42,23 @@ def test_weights_are_those_of_the_paths_a_moment_later() -> None:
     scene = load_scene(ROOM)
     assert scene.ris is not None
     motion = scene.agent[::60]
-    paths = ImageSourceChannel(scene, RADIO, 2).paths(motion)
+    channel = ImageSourceChannel(scene, RADIO, 2)
+    paths = channel.paths(motion)
     config = replace(SPLIT, slot=0.012)
-    quarters = (np.arange(4) - 1.5) * config.slot / 4.0
-    later = np.array([advance_paths(paths, scene, RADIO, motion, float(t)).gain for t in quarters])
+    later = []
+    for time in (np.arange(4) - 1.5) * config.slot / 4.0:
+        position, heading = motion.position + time * motion.velocity, motion.heading + time * turn_rate(motion)
+        moved_paths = channel.paths(replace(motion, position=position, heading=heading))
+        for own in ("kind", "landmark", "tx_walls", "rx_walls"):  # the same paths in the same columns
+            np.testing.assert_array_equal(getattr(moved_paths, own), getattr(paths, own))
+        later.append(moved_paths.gain)
     shift = doppler_shift(paths, motion, RADIO.wavelength)
     for order in ("AB", "ABBA"):
         signs = np.repeat(code_signs(order, 1)[1], 4 // len(order))
-        moved = np.einsum("q,qkp->kp", signs, later) / 4.0
+        moved = np.einsum("q,qkp->kp", signs, np.array(later)) / 4.0
         for cycle in range(len(motion)):
             # in the sidelobes of a panel under a fixed code the gain itself changes within millimetres
-            heard = paths.valid[cycle] & (paths.gain[cycle] != 0.0) & (paths.kind < PathKind.RIS)
+            heard = paths.valid[cycle] & (np.array(later)[:, cycle] != 0.0).all(axis=0) & (paths.kind < PathKind.RIS)
             _, signed = slot_weights(shift[cycle], replace(config, order=order))
             ratio = moved[cycle, heard] / paths.gain[cycle, heard]
             # and the turning within a quarter, 0.06 rad, which the moments leave out: its square over 24

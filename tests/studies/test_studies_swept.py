@@ -199,6 +199,18 @@ def test_claims_from_a_folder(tmp_path, monkeypatch, capsys):
     assert "# The paper's claims" in Path("out/claims.md").read_text()
 
 
+@pytest.mark.parametrize(
+    "content", ["{}", "[]", '"text"', '{"gains": [{}], "entries": []}', '{"gains": [], "entries": []}', "{"]
+)
+def test_results_of_another_form_are_one_line(tmp_path, content):
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.studies.claims import read_results
+
+    (tmp_path / "fig4b.json").write_text(content)
+    with pytest.raises(ConfigError, match=r"^results: .*/fig4b\.json .*run pipelines/fig4b\.toml again$"):
+        read_results(tmp_path)
+
+
 def test_rows_of_a_point_stay_together():
     from rislam_rt.sweeps.store import Row
 

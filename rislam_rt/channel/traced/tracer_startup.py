@@ -3,7 +3,7 @@
 from functools import cache
 from importlib import import_module
 
-from rislam_rt.backend import BackendInfo, prepare_backend
+from rislam_rt.backend import BackendInfo, prepare_backend, uninterrupted
 
 
 @cache
@@ -16,6 +16,7 @@ def start_tracer() -> BackendInfo:
         The machine lacks something that the tracer needs.
     """
     info = prepare_backend()
-    import_module("mitsuba").set_variant(info.variant)
-    import_module("sionna.rt")
+    with uninterrupted():
+        import_module("mitsuba").set_variant(info.variant)
+        import_module("sionna.rt")
     return info

@@ -16,7 +16,9 @@ from rislam_rt.measurement.estimation.refine import (
     Accuracy,
     LeastSquaresFit,
     accuracy,
+    amplitude_variance,
     fit_amplitudes,
+    information_matrix,
     refine,
     refine_some,
     residual,
@@ -103,9 +105,9 @@ def _finish(
 ) -> Estimate:
     """The estimate refined to the end, without the paths that others can stand in for."""
     fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
-    fit, bound = prune(sounding, drop(sounding, fit, samples, threshold, window), samples, threshold)
-    final = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
-    return Estimate(final, bound if final is fit else accuracy(final))
+    fit = prune(sounding, drop(sounding, fit, samples, threshold, window), samples, threshold)
+    fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
+    return Estimate(fit, accuracy(fit))
 
 
 def _touched(fit: LeastSquaresFit, fresh: int, num_samples: int) -> Booleans:
@@ -135,18 +137,17 @@ def drop(
     return fit if keep.all() else subset_fit(sounding, fit, keep, samples)
 
 
-def prune(
-    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float
-) -> tuple[LeastSquaresFit, Accuracy]:
-    """The estimate without paths that their refined neighbours can stand in for; and the bound of what is left.
+def prune(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float) -> LeastSquaresFit:
+    """The estimate without paths that their refined neighbours can stand in for.
 
     Noise alone lowers the cost by its highest peak when a path is added, so the threshold is the one of the search.
     Only paths whose amplitude is uncertain by more than that are tried, the most uncertain first.
     """
     tried = np.zeros((0, 3))
     while True:
-        bound = accuracy(fit)
-        certainty = np.abs(fit.amplitude) ** 2 / bound.amplitude**2
+        information = 2.0 * information_matrix(fit.inner, fit.covariance, fit.amplitude)
+        variance = amplitude_variance(fit.inner, fit.covariance, fit.amplitude, information)
+        certainty = np.abs(fit.amplitude) ** 2 / variance
         doubtful = np.flatnonzero((certainty < threshold) & ~_among(fit.parameters, tried))
         for row in doubtful[np.argsort(certainty[doubtful])]:
             rest = _neighbours_instead(sounding, fit, samples, int(row), fit.cost + threshold)
@@ -155,7 +156,7 @@ def prune(
                 break
             tried = np.concatenate([tried, fit.parameters[row : row + 1]])
         else:
-            return fit, bound
+            return fit
 
 
 def _neighbours_instead(

@@ -14,7 +14,9 @@ def inverse(matrix: Floats) -> Floats:
     if not len(matrix):
         return matrix
     scale, factor = _factor(matrix)
-    lower = scipy.linalg.lapack.dpotri(factor, lower=1)[0] * scale * scale[:, None]
+    lower = scipy.linalg.lapack.dpotri(factor, lower=1, overwrite_c=1)[0].T
+    lower *= scale
+    lower *= scale[:, None]
     full = lower + lower.T
     full.flat[:: len(scale) + 1] *= 0.5
     return np.asarray(full)
@@ -28,13 +30,22 @@ def solve(matrix: Floats, right: Floats) -> Floats:
     return np.asarray(scale * scipy.linalg.lapack.dpotrs(factor, scale * right, lower=1)[0])
 
 
+def whitened(matrix: Floats, right: Floats) -> Floats:
+    """`W right` (n, k), the inverse of a positive definite matrix being `W^T W`."""
+    if not len(matrix):
+        return right
+    scale, factor = _factor(matrix)
+    return np.asarray(scipy.linalg.lapack.dtrtrs(factor, scale[:, None] * right, lower=1)[0])
+
+
 def _factor(matrix: Floats) -> tuple[Floats, Floats]:
     """Scale (n,) and Cholesky factor, zero above, of the scaled matrix; the ridge grows until it is positive."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(matrix), np.finfo(np.float64).tiny))
-    scaled, ridge = matrix * scale * scale[:, None], RIDGE
+    scale, ridge = 1.0 / np.sqrt(np.maximum(np.diagonal(matrix), np.finfo(np.float64).tiny)), RIDGE
     while True:
+        scaled = matrix * scale
+        scaled *= scale[:, None]
         scaled.flat[:: len(scale) + 1] += ridge
-        factor, failed = scipy.linalg.lapack.dpotrf(scaled, lower=1, clean=1)
+        factor, failed = scipy.linalg.lapack.dpotrf(scaled.T, lower=1, clean=1, overwrite_a=1)
         if not failed:
             return scale, factor
-        ridge *= 100.0
+        ridge = 100.0 * ridge + RIDGE

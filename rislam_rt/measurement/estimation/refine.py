@@ -12,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.measurement.estimation.inner_products import InnerProducts, PathSignals, inner_of, waves_at
-from rislam_rt.measurement.estimation.positive_definite import RIDGE, inverse, solve
+from rislam_rt.measurement.estimation.positive_definite import RIDGE, inverse, solve, whitened
 from rislam_rt.measurement.estimation.sounding import Sounding
 from rislam_rt.measurement.estimation.spherical_waves import correlate_waves, wave_signals
 
@@ -87,10 +87,16 @@ def _fit(waves: PathSignals, inner: InnerProducts, seen: Complexes, energy: floa
     energy."""
     count, matched = len(waves.parameters), seen[0]
     covariance = inverse(inner.signal)
-    amplitude = covariance @ matched
-    cost = energy - np.vdot(amplitude, 2.0 * matched - inner.signal @ amplitude).real
-    slopes = seen[1:] - (amplitude @ inner.mixed.reshape(count, 3 * count)).reshape(3, count)
+    amplitude = _times(covariance, matched)
+    cost = energy - np.vdot(amplitude, 2.0 * matched - _times(inner.signal, amplitude)).real
+    slopes = seen[1:] - _times(inner.mixed.reshape(count, 3 * count).T, amplitude).reshape(3, count)
     return LeastSquaresFit(waves, inner, None, seen, covariance, amplitude, slopes, energy, float(cost))
+
+
+def _times(matrix: Floats, vector: Complexes) -> Complexes:
+    """A real matrix (n, m) times amplitudes (m,), which need not make the matrix complex for that."""
+    parts = np.ascontiguousarray(vector).view(np.float64).reshape(-1, 2)
+    return np.asarray((matrix @ parts).view(np.complex128)[:, 0])
 
 
 def _exact_fit(
@@ -124,10 +130,10 @@ def residual_fit(
         return fit_amplitudes(sounding, fit.parameters[rows], local), local
     inner, own = fit.inner.take(rows), fit.amplitude[rows]
     # what the residual shows of a path, and what the path itself does: `a^H r + a^H a alpha`
-    rest = fit.seen[0] - fit.inner.signal @ fit.amplitude
+    rest = fit.seen[0] - _times(fit.inner.signal, fit.amplitude)
     seen = np.concatenate([rest[None], fit.slopes])[:, rows]
-    seen[0] += inner.signal @ own
-    seen[1:] += (own @ inner.mixed.reshape(len(rows), -1)).reshape(3, -1)
+    seen[0] += _times(inner.signal, own)
+    seen[1:] += _times(inner.mixed.reshape(len(rows), -1).T, own).reshape(3, -1)
     return _fit(fit.waves.take(rows), inner, seen, float(np.vdot(local, local).real)), local
 
 
@@ -213,23 +219,30 @@ def _along(sounding: Sounding, fit: LeastSquaresFit, chosen: Booleans) -> Intege
 def accuracy(fit: LeastSquaresFit) -> Accuracy:
     """Accuracy of refined paths: joint bound of parameters and amplitudes; enormous where paths cannot be told
     apart."""
-    covariance, variance = joint_bound(fit.inner, fit.amplitude, fit.covariance)
-    deviations = np.sqrt(np.maximum(np.diagonal(covariance), 0.0)).reshape(3, -1).T
-    return Accuracy(deviations, np.sqrt(variance))
+    information = 2.0 * information_matrix(fit.inner, fit.covariance, fit.amplitude)
+    deviations = np.sqrt((whitened(information, np.eye(len(information))) ** 2).sum(axis=0)).reshape(3, -1).T
+    return Accuracy(deviations, np.sqrt(amplitude_variance(fit.inner, fit.covariance, fit.amplitude, information)))
 
 
-def joint_bound(inner: InnerProducts, amplitude: Complexes, known: Floats | None = None) -> tuple[Floats, Floats]:
+def joint_bound(inner: InnerProducts, amplitude: Complexes) -> tuple[Floats, Floats]:
     """Covariance (3P, 3P) of the parameters, parameter by parameter, and variance (P,) of the complex amplitudes.
 
-    At unit noise, everything unknown; `known` is the amplitudes' covariance (P, P) at known parameters, if at hand.
+    At unit noise, everything unknown.
+    """
+    known = inverse(inner.signal)
+    information = 2.0 * information_matrix(inner, known, amplitude)
+    return inverse(information), amplitude_variance(inner, known, amplitude, information)
+
+
+def amplitude_variance(inner: InnerProducts, known: Floats, amplitude: Complexes, information: Floats) -> Floats:
+    """Variance (P,) of the complex amplitudes: what is `known` (P, P) at given parameters, and by these' information.
+
+    That information is the full one (3P, 3P); of the parameters' covariance no more is worked out than is asked for.
     """
     count = len(amplitude)
-    known = inverse(inner.signal) if known is None else known
-    covariance = inverse(2.0 * information_matrix(inner, known, amplitude))
-    coupling = known @ (inner.mixed * amplitude).reshape(count, 3 * count)
-    real, imaginary = coupling.real, coupling.imag
-    spread = np.diagonal(known) + ((real @ covariance) * real + (imaginary @ covariance) * imaginary).sum(axis=1)
-    return covariance, np.maximum(spread, 0.0)
+    follow = (known @ inner.mixed.reshape(count, 3 * count)).reshape(count, 3, count)
+    parts = np.concatenate([follow * amplitude.real, follow * amplitude.imag]).reshape(2 * count, 3 * count)
+    return np.asarray(np.diagonal(known) + (whitened(information, parts.T) ** 2).sum(axis=0).reshape(2, -1).sum(axis=0))
 
 
 def without_idle(fit: LeastSquaresFit, threshold: float) -> Booleans:
@@ -257,12 +270,13 @@ def information_matrix(inner: InnerProducts, covariance: Floats, amplitude: Comp
     With the amplitudes unknown; `covariance` (P, P) is theirs at known parameters.
     """
     count = len(amplitude)
-    power = np.real(np.multiply.outer(amplitude.conj(), amplitude))
     mixed = inner.mixed.reshape(count, 3 * count)
-    shared = inner.slope - (mixed.T @ (covariance @ mixed)).reshape(3, count, 3, count)
-    information = (shared * power[:, None]).reshape(3 * count, 3 * count)
+    shared = (mixed.T @ (covariance @ mixed)).reshape(3, count, 3, count)
+    np.subtract(inner.slope, shared, out=shared)
+    shared *= np.real(np.multiply.outer(amplitude.conj(), amplitude))[:, None]
+    information = shared.reshape(3 * count, 3 * count)
     information.flat[:: 3 * count + 1] += np.repeat(PRIOR, count)
-    return np.asarray(information)
+    return information
 
 
 def _limited(step: Floats) -> Floats:

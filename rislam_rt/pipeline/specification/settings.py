@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import is_dataclass, replace
 from functools import cache
+from itertools import pairwise
 from typing import Any, Literal, NamedTuple, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -108,10 +109,12 @@ def _owner(model: type[BaseModel], name: str) -> tuple[type, type | None]:
 
 @cache
 def _meanings(declared: type) -> dict[str, str]:
-    """Meanings of settings: the docstrings under a class's fields, in one line each, by name."""
-    body = _classes(declared.__module__)[declared.__name__]
-    found = {}
-    for field, doc in zip(body.body, body.body[1:], strict=False):
+    """Meanings of settings: the docstrings under a class's fields and its parents', in one line each, by name."""
+    found: dict[str, str] = {}
+    for parent in declared.__bases__:
+        found |= _meanings(parent) if is_dataclass(parent) else {}
+    body = _classes(declared.__module__)[declared.__name__].body
+    for field, doc in pairwise(body):
         if isinstance(field, ast.AnnAssign) and isinstance(doc, ast.Expr) and isinstance(doc.value, ast.Constant):
             assert isinstance(field.target, ast.Name)
             found[field.target.id] = " ".join(str(doc.value.value).split())

@@ -20,6 +20,8 @@ def write_claims(claims: Sequence[Claim], name: str, sources: Mapping[str, Any],
     StoreError
         The disk refused.
     """
+    page = folder / f"{name}.md"  # first: the others are known as the program's by it
+    write_atomic(page, claims_page(claims, sources).encode())
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(Claim._fields)
@@ -28,8 +30,6 @@ def write_claims(claims: Sequence[Claim], name: str, sources: Mapping[str, Any],
     write_atomic(
         folder / f"{name}.json", json_bytes({"sources": dict(sources), "claims": [c._asdict() for c in claims]})
     )
-    page = folder / f"{name}.md"
-    write_atomic(page, claims_page(claims, sources).encode())
     return page
 
 

@@ -108,7 +108,7 @@ def draw_panel(found: Training) -> Figure:
 
 
 def classifier_table(found: Training) -> dict[str, Any]:
-    """All scores of the classifier as plain data."""
+    """All scores of the classifier's study as plain data, for the JSON beside its page."""
     tested, drawn, judges = found.sets.tested, found.sets.all_drawn, rules(found.network)
     return {
         "scores": {

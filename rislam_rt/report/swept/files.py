@@ -68,15 +68,15 @@ def write_swept(
     layout = LAYOUTS[type(spec)]
     content = layout.content(groups, spec)
     figure = f"figures/{spec.name}.png" if figures else None
+    failures = hardware.failed_cells(groups) if _of_receiver(spec) else failure_notes(groups)
+    lines = [f"# {layout.title}", "", *about_lines(groups, spec, record, len(rows)), "",
+             *layout.body(content, spec, figure), "", "## Failures", "", *failures]  # fmt: skip
+    page = folder / f"{spec.name}.md"  # first: the others are known as the program's by it
+    write_atomic(page, ("\n".join(lines) + "\n").encode())
     if figure is not None:
         write_atomic(folder / figure, to_png(layout.draw(content, spec)))
     write_atomic(folder / f"{spec.name}.csv", csv_text(content["entries"]).encode())
     write_atomic(folder / f"{spec.name}.json", json_bytes(plain_result({**record, **content})))
-    failures = hardware.failed_cells(groups) if _of_receiver(spec) else failure_notes(groups)
-    lines = [f"# {layout.title}", "", *about_lines(groups, spec, record, len(rows)), "",
-             *layout.body(content, spec, figure), "", "## Failures", "", *failures]  # fmt: skip
-    page = folder / f"{spec.name}.md"
-    write_atomic(page, ("\n".join(lines) + "\n").encode())
     return page
 
 

@@ -40,14 +40,14 @@ def write_unseen(
         return None
     content = unseen_content(runs, timings)
     figure = f"figures/{spec.name}.png" if figures else None
+    there = sum(row.state == "done" for row in rows)
+    about = about_lines(spec, record, tests, there, len(rows))
+    page = folder / f"{spec.name}.md"  # first: the others are known as the program's by it
+    write_atomic(page, unseen_page(content, runs, spec, about, figure).encode())
     if figure is not None:
         write_atomic(folder / figure, to_png(draw_unseen(runs)))
     write_atomic(folder / f"{spec.name}.csv", csv_bytes(run_entries(runs)))
     write_atomic(folder / f"{spec.name}.json", json_bytes(plain_result({**record, "tests": tests, **content})))
-    there = sum(row.state == "done" for row in rows)
-    about = about_lines(spec, record, tests, there, len(rows))
-    page = folder / f"{spec.name}.md"
-    write_atomic(page, unseen_page(content, runs, spec, about, figure).encode())
     return page
 
 
@@ -60,7 +60,7 @@ def unseen_content(runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Ma
 
 
 def _brief(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """A class's card with what its table shows; numbers with six digits."""
+    """A class's card for the JSON file: what the page's table shows, numbers with six digits."""
     kept = {name: value for name, value in entry.items() if name in SHOWN}
     return {name: float(_six(value)) if isinstance(value, float) else value for name, value in kept.items()}
 

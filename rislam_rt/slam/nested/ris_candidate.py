@@ -25,7 +25,7 @@ DRAWS = 12
 
 
 def weigh_tracks(tracks: LandmarkTracks, belief: MapBelief, code: RisCode | None) -> LandmarkTracks:
-    """Tracks weighed as RIS candidates by what this cycle tells: is each one of the panels?"""
+    """Tracks of the nested filter weighed as RIS candidates by this cycle: is each one of the panels?"""
     rows = np.flatnonzero(~tracks.specular)
     if belief.ris is None or code is None or not len(rows):
         return tracks

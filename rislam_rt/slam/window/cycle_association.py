@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
-from rislam_rt.slam.associate import Candidates, cheapest, pair_costs
+from rislam_rt.slam.associate import Candidates, cheapest, pair_costs, within
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
@@ -124,16 +124,17 @@ def _associate(
     extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
     extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(observed.std, axis=0) ** 2
     most = np.abs(expected.jacobian) @ np.sqrt(np.diagonal(covariance))  # no correlation makes a deviation larger
-    near = _within_reach(seen, (most[lead] + share * (most[mate] - most[lead])) ** 2 + extra, observed)
+    most = (most[lead] + share * (most[mate] - most[lead])) ** 2 + extra
+    level, doubt = groups.log_amplitude, np.hypot(groups.log_amplitude_std, 0.5 * CONSTANTS.fading)
+    side = np.full(len(lead), UNTOLD) if sides is None else sides[lead]
+    near = _within_reach(seen, most, level, doubt, side, observed)
     lead, mate, share, seen, every, shows = lead[near], mate[near], share[near], seen[near], shows, shows[near]
     jacobian = expected.jacobian[lead] + share[..., None] * (expected.jacobian[mate] - expected.jacobian[lead])
     spread = (jacobian.reshape(-1, jacobian.shape[-1]) @ covariance).reshape(jacobian.shape)
     spread = spread @ np.swapaxes(jacobian, 1, 2)
     spread[:, [0, 1, 2], [0, 1, 2]] += extra[near]
     odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))
-    side = np.full(len(lead), UNTOLD) if sides is None else sides[lead]
-    level, doubt = groups.log_amplitude[near], np.hypot(groups.log_amplitude_std[near], 0.5 * CONSTANTS.fading)
-    candidates = Candidates(seen, spread, level, doubt, odds, side)
+    candidates = Candidates(seen, spread, level[near], doubt[near], odds, side[near])
     cost = pair_costs(candidates, observed, GATE, strangers)
     rows, columns = cheapest(cost)
     # the cost counts what is missed: seen against missed, both against strangers
@@ -143,10 +144,13 @@ def _associate(
     return rows, columns, gain + float(np.log1p(-every[missed]).sum())
 
 
-def _within_reach(seen: Floats, variance: Floats, observed: Observations) -> Integers:
+def _within_reach(
+    seen: Floats, variance: Floats, level: Floats, doubt: Floats, side: Integers, observed: Observations
+) -> Integers:
     """Rows of the clusters at (C, 3), each axis with at most that variance, that lie in the gate of any component."""
-    near = np.ones((len(seen), len(observed.seen)), dtype=np.bool_)
-    for axis in range(3):
-        gap = seen[:, axis, None] - observed.seen[:, axis]
-        near &= gap**2 <= GATE * (variance[:, axis, None] + observed.std[:, axis] ** 2)
-    return np.flatnonzero(near.any(axis=1))
+    row, column = within(seen[:, 0], variance[:, 0], observed.seen[:, 0], observed.std[:, 0] ** 2, GATE).nonzero()
+    gap, loudness = seen[row] - observed.seen[column], level[row] - observed.log_amplitude[column]
+    near = (gap**2 <= GATE * (variance[row] + observed.std[column] ** 2)).all(axis=1)
+    near &= loudness**2 < GATE * (doubt[row] ** 2 + observed.log_amplitude_std[column] ** 2)
+    near &= (side[row] == observed.sides[column]) | (side[row] == UNTOLD) | (observed.sides[column] == UNTOLD)
+    return np.unique(row[near])

@@ -1,4 +1,4 @@
-"""Legs at and near the vertical, where a (theta, phi) basis has its pole: a sample of `benchmarks/vertical.py`."""
+"""Legs at and near the vertical, where a (theta, phi) basis has its pole, against image sources."""
 
 import numpy as np
 import pytest

@@ -4,9 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from rislam_rt.arrays import Floats
-from rislam_rt.evaluate import consistency, normalised_squares
+from rislam_rt.evaluate import normalised_squares
 from rislam_rt.model import Body
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.moments import poses_of
@@ -82,8 +83,8 @@ def test_finds_the_truth_within_its_own_covariance(name: str) -> None:
         assert fit is not None
         squares.append(float(normalised_squares(fit.feature - SOUGHT[name], fit.covariance)))
         accepted += plausible(fit, CYCLES, 3)
-    found = consistency(np.array(squares), 3, level=0.999)
-    assert found.lower < found.average < 1.2 * found.upper
+    lower, upper = chi2.interval(0.999, 3 * SEEDS)
+    assert lower < sum(squares) < 1.2 * upper
     # a bound of 2.5 standard deviations turns about one in a hundred of the right ones away, four in forty hardly ever
     assert accepted > SEEDS - 4
 
@@ -100,8 +101,8 @@ def test_floor_is_found_within_its_own_deviation() -> None:
         assert fit is not None
         squares.append((fit.feature[2] - FLOOR[2]) ** 2 / fit.covariance[2, 2])
         np.testing.assert_array_equal(fit.feature[:2], ANCHOR[:2])
-    found = consistency(np.array(squares), 1, level=0.999)
-    assert found.lower < found.average < found.upper
+    lower, upper = chi2.interval(0.999, SEEDS)
+    assert lower < sum(squares) < upper
 
 
 def test_reciprocal_explains_its_own_lengths() -> None:

@@ -9,11 +9,11 @@ from rislam_rt.slam.schemes import bp_slam
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance, begin
 from rislam_rt.slam.schemes.shared.correct import absorb, claims
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
-from rislam_rt.slam.schemes.shared.scan import Odds, Scan
+from rislam_rt.slam.schemes.shared.scan import Odds, Scan, birth_ratio
 from rislam_rt.slam.schemes.shared.sums import Sums, born, carry, look, prune, unit_of
 
 CONFIG = bp_slam.BpSlamConfig(sigma_a=0.01)
-MODEL = Bistatic(np.array([-0.05, 0.0, 0.0]), np.array([0.05, 0.0, 0.0]), True)
+MODEL = Bistatic(np.array([-0.05, 0.0, 0.0]), np.array([0.05, 0.0, 0.0]))
 PUSH = np.array([0.01, 0.01])
 PLACE = np.array([0.5, 0.7, 0.5])
 
@@ -71,7 +71,7 @@ def test_the_range_of_a_gaussian_is_that_of_its_point() -> None:
     agent = PLACE + np.array([0.3, 0.1, 0.0])
     walk, speed = sums.walk[sums.owner], sums.speed[sums.owner]
     point = PLACE + sums.mean[:, :1] * unit_of(sums.mean, walk, speed)
-    wanted = MODEL.ranges(agent, point)
+    wanted = sum(np.linalg.norm(point - agent - end, axis=1) for end in (MODEL.tx, MODEL.rx))
     assert np.allclose(look(sums, course, agent, MODEL).length, wanted, rtol=0.0, atol=5e-4)
 
 
@@ -109,6 +109,32 @@ def test_one_gaussian_and_one_certain_range_are_a_kalman_filter() -> None:
     assert np.allclose(moved.covariance, course.covariance - spread * np.outer(gain, gain), rtol=1e-6, atol=1e-12)
     cross = sums.slope[0] @ course.covariance @ direction + sums.covariance[0] @ sight.by_mean[0]
     assert np.allclose(after.mean[0] - sums.mean[0], 0.01 * cross / spread, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("existence", [0.1, 0.5, 0.99])
+@pytest.mark.parametrize("ranges", [0, 1])
+def test_existence_after_a_cycle(existence: float, ranges: int) -> None:
+    """One feature of one Gaussian, no range or one: clutter, a new feature or this one; Bayes, up to rounding."""
+    odds, course = Odds(0.7, 1.0, 30.0), course_after(4, 2)
+    sums = prune(one_feature(course), 0.0, 0.9, 5)
+    sums = Sums(*sums[:5], np.array([existence]), sums[6], *(column[:1] for column in sums[7:-1]), np.ones(1))
+    sight = look(sums, course, PLACE, MODEL)
+    scan = Scan(sight.length[:ranges] + 0.01, np.full(ranges, 0.02))
+    fresh = 1.0 + birth_ratio(scan.length, 6.0, odds)
+    after, _ = absorb(sums, sight, course, scan, claims(sums, sight, course, scan, fresh, odds), odds)
+    direction = sight.by_course[0]
+    variance = direction @ course.covariance @ direction + sight.own[0] + 0.02**2
+    density = np.exp(-0.5 * 0.01**2 / variance) / np.sqrt(2.0 * np.pi * variance)
+    ratio = ranges * odds.detection_probability * density / odds.clutter_density
+    there = existence * ((1.0 - odds.detection_probability) * np.prod(fresh) + ratio)
+    assert after.existence[0] == pytest.approx(there / (there + (1.0 - existence) * np.prod(fresh)), rel=1e-9)
+
+
+def test_birth_ratio_integrates_to_the_undetected() -> None:
+    """Over all ranges the density of first detections holds `p_d` times the undetected; trapezoids, to 1e-4."""
+    odds, length = Odds(0.7, 1.0, 30.0), np.linspace(1e-6, 30.0, 4001)
+    density = birth_ratio(length, 6.0, odds) * odds.clutter_density
+    assert np.trapezoid(density, length) == pytest.approx(6.0 * odds.detection_probability, rel=1e-4)
 
 
 def test_a_turn_about_the_start_stays_as_unknown_as_it_was() -> None:

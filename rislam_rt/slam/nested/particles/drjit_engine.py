@@ -196,7 +196,7 @@ class DrJitEngine:
         return [keep * a + kernel.width * b for a, b in zip(own, other, strict=True)]
 
     def _mixed_moments(self, children: Any, count: int, size: int, kernel: Kernel) -> tuple[Floats, Floats, Floats]:
-        """Mean (N, 3), second moment (N, 3, 3) and largest coordinate (N,) of the mixed points, in steps."""
+        """By Dr.Jit: mean (N, 3), second moment (N, 3, 3), largest coordinate (N,) of the mixed particles, in steps."""
         dr = self._dr
         agent, place, lanes = self._lanes(count, size)
 

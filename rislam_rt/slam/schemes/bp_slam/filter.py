@@ -76,8 +76,7 @@ def _move(state: BpSlamState, dt: float, config: BpSlamConfig) -> BpSlamState:
     if dt == 0.0:
         return state
     agent, step = move_agent(state.agent, dt, config.sigma_a, config.course_stride)
-    wander = np.array([config.drift_length_std, config.drift_angle_std, 0.0])
-    sums = carry(state.sums, step, wander)
+    sums = carry(state.sums, step, config.wander)
     sums = sums._replace(existence=config.survival_probability * sums.existence)
     unseen = config.survival_probability * (1.0 - config.detection_probability) * state.undetected
     return state._replace(agent=agent, sums=sums, undetected=unseen + config.birth_mean)
@@ -99,7 +98,7 @@ def step(
     state = _move(state, dt, config)
     agent = state.agent._replace(heading=float(heading))
     rows, scan, strong, model = hear_ranges(agent, measurement, config)
-    fresh = 1.0 + birth_ratio(scan, state.undetected, model, 3, odds._replace(detection_probability=FIRST_DETECTION))
+    fresh = 1.0 + birth_ratio(scan.length, state.undetected, odds._replace(detection_probability=FIRST_DETECTION))
     sight = look(state.sums, agent.course, agent.pose[0], model)
     found = claims(state.sums, sight, agent.course, scan, fresh, odds)
     landmark = np.full(len(measurement), REMOVED)

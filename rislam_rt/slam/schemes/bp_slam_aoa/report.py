@@ -6,6 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.model import MapEstimate
 from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, GaussianFeatures, spread_over
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
+from rislam_rt.slam.schemes.shared.report import position_errors
 from rislam_rt.slam.start_prior import StartPrior
 
 
@@ -20,10 +21,7 @@ def pose_moments(course: AgentTrajectory, start: StartPrior, count: int) -> tupl
     covariance[:3, :3] += start_variance(start)
     covariance = 0.5 * (covariance + covariance.T)
     position, velocity = start.position + course.mean[:3], course.mean[3:6]
-    # the same draws in every cycle: the samples move smoothly, and nothing depends on who drew before
-    draws = np.random.default_rng(0).standard_normal((count, 3))
-    value, vector = np.linalg.eigh(covariance[:3, :3])
-    return position, velocity, covariance, position + draws @ (vector * np.sqrt(np.maximum(value, 0.0))).T
+    return position, velocity, covariance, position + position_errors(covariance, count)
 
 
 def known_map(features: GaussianFeatures, course: AgentTrajectory, start: StartPrior, threshold: float) -> MapEstimate:

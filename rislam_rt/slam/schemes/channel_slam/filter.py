@@ -110,8 +110,7 @@ def _move(state: ChannelSlamState, dt: float, config: ChannelSlamConfig) -> Chan
     if dt == 0.0:
         return state
     agent, step = move_agent(state.agent, dt, config.sigma_a, config.course_stride)
-    wander = np.array([config.drift_length_std, config.drift_angle_std, 0.0])
-    return state._replace(agent=agent, sums=carry(state.sums, step, wander))
+    return state._replace(agent=agent, sums=carry(state.sums, step, config.wander))
 
 
 def _label(

@@ -7,9 +7,6 @@ import numpy as np
 
 from rislam_rt.errors import ConfigError
 
-HEIGHTS = ("known", "estimated")
-"""`known` keeps the height and the vertical velocity of the start, `estimated` filters them."""
-
 
 def check_counts(section: str, config: Any, names: Iterable[str], least: int = 1) -> None:
     """Check that a scheme's settings are whole numbers of at least `least`."""
@@ -31,9 +28,3 @@ def check_not_negative(section: str, config: Any, names: Iterable[str]) -> None:
     for name in names:
         if not 0.0 <= getattr(config, name) < np.inf:
             raise ConfigError(f"{section}.{name}: {getattr(config, name)} received; give a number that is not negative")
-
-
-def check_height(section: str, height: str) -> None:
-    """Check a scheme's setting of the height: one of `HEIGHTS`."""
-    if height not in HEIGHTS:
-        raise ConfigError(f"{section}.height: '{height}' received; give 'known' or 'estimated'")

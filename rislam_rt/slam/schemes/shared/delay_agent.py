@@ -1,6 +1,6 @@
 """What the filters that hear delays alone have in common: the agent, what they are told of it, and its ranges."""
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,30 +10,12 @@ from rislam_rt.model import Body, MapEstimate, Measurement, SensorModel, SlamEst
 from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step, advance, begin
 from rislam_rt.slam.schemes.shared.correct import is_strong
+from rislam_rt.slam.schemes.shared.delay_config import DelayConfig
 from rislam_rt.slam.schemes.shared.gauge import over_all_turns
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
-from rislam_rt.slam.schemes.shared.report import Points, lift
+from rislam_rt.slam.schemes.shared.report import Points, lift, position_errors
 from rislam_rt.slam.schemes.shared.scan import Scan
 from rislam_rt.slam.start_prior import StartPrior
-
-
-class DelayConfig(Protocol):
-    """The settings that both filters of delays have."""
-
-    @property
-    def planes(self) -> bool:
-        """Whether wall returns are used, or set aside."""
-        ...
-
-    @property
-    def specular_ratio(self) -> float | None:
-        """Amplitude over that of free space above which a component is a wall return."""
-        ...
-
-    @property
-    def smallest_std(self) -> float:
-        """[m] of a range, the smallest that is believed."""
-        ...
 
 
 class DelayAgent(NamedTuple):
@@ -87,8 +69,8 @@ def hear_ranges(
     strong, free = is_strong(observed.ratio, config.specular_ratio), ~is_los(observed, agent.body)
     rows = np.flatnonzero(free if config.planes else free & ~strong)
     scan = Scan(observed.seen[rows, 0], np.maximum(observed.std[rows, 0], config.smallest_std))
-    turn, upper = rotation_z(np.asarray(agent.heading)), agent.sensor.radio.array.pattern == "upper"
-    return rows, scan, strong[rows], Bistatic(turn @ agent.body.tx_offset, turn @ agent.body.rx_offset, upper)
+    turn = rotation_z(np.asarray(agent.heading))
+    return rows, scan, strong[rows], Bistatic(turn @ agent.body.tx_offset, turn @ agent.body.rx_offset)
 
 
 def reported(agent: DelayAgent, points: Points, num_samples: int) -> SlamEstimate:
@@ -98,10 +80,7 @@ def reported(agent: DelayAgent, points: Points, num_samples: int) -> SlamEstimat
     rows = np.r_[0:axes, 3 : 3 + axes]
     covariance = np.zeros((6, 6))
     covariance[np.ix_(rows, rows)] = belief.covariance
-    # the same draws in every cycle: the samples move smoothly, and nothing depends on who drew before
-    draws = np.random.default_rng(0).standard_normal((num_samples, 3))
-    value, vector = np.linalg.eigh(covariance[:3, :3])
-    samples = position + draws @ (vector * np.sqrt(np.maximum(value, 0.0))).T
+    samples = position + position_errors(covariance, num_samples)
     samples[:, axes:] = position[axes:]
     return SlamEstimate(position, velocity, agent.heading, covariance, samples, agent.body, _map(points))
 

@@ -49,6 +49,16 @@ def lift(known: Floats, height: Floats) -> Floats:
     return known if known.shape[1] == 3 else np.concatenate([known, height[:, None]], axis=1)
 
 
+def position_errors(covariance: Floats, count: int) -> Floats:
+    """(count, 3) [m] errors to report as samples, from the covariance (6, 6) of position and velocity.
+
+    The same draws in every cycle: the samples move smoothly, and nothing depends on who drew before.
+    """
+    draws = np.random.default_rng(0).standard_normal((count, 3))
+    value, vector = np.linalg.eigh(covariance[:3, :3])
+    return np.asarray(draws @ (vector * np.sqrt(np.maximum(value, 0.0))).T)
+
+
 def ahead_of(now: SlamEstimate, dt: float) -> SlamEstimate:
     """An estimate carried over `dt` [s] without noise, as it is reported to the designer."""
     move, way = np.eye(6), dt * now.velocity

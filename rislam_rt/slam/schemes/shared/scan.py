@@ -4,21 +4,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.schemes.shared.ranges import RangeModel
+from rislam_rt.arrays import Floats
 
 
 class Scan(NamedTuple):
-    """What one anchor (or the agent's own receiver) measured in a step."""
+    """What the receiver measured in a step."""
 
     length: Floats
     """(M,) ranges [m], in no particular order."""
     std: Floats
     """(M,) standard deviations [m]."""
-
-    def take(self, rows: Integers) -> "Scan":
-        """Some of the ranges of a scan."""
-        return Scan(self.length[rows], self.std[rows])
 
 
 class Odds(NamedTuple):
@@ -37,13 +32,13 @@ class Odds(NamedTuple):
         return self.clutter_mean / self.max_range
 
 
-def birth_ratio(scan: Scan, undetected: float, model: RangeModel, dims: int, odds: Odds) -> Floats:
-    """(M,) expected density of first detections over that of clutter.
+def birth_ratio(length: Floats, undetected: float, odds: Odds) -> Floats:
+    """(M,) expected density of first detections over that of clutter, for ranges (M,) [m].
 
-    `undetected` features are uniform over the region, whose measure is the integral of the model's shell.
+    `undetected` features are uniform over the sphere of `odds.max_range`, or half of it; a range has its shell's share.
     """
-    inside = (scan.length > 0.0) & (scan.length <= odds.max_range)
-    length = np.where(inside, scan.length, 0.5 * odds.max_range)
-    region = model.shell(np.array(odds.max_range), dims) * odds.max_range / dims
-    density = undetected * odds.detection_probability * model.shell(length, dims) / region
+    inside = (length > 0.0) & (length <= odds.max_range)
+    shell = 4.0 * np.pi * np.where(inside, length, 0.5 * odds.max_range) ** 2
+    region = 4.0 * np.pi * odds.max_range**2 * odds.max_range / 3
+    density = undetected * odds.detection_probability * shell / region
     return np.where(inside, density, 0.0) / odds.clutter_density

@@ -37,11 +37,6 @@ def kinds_of(strong: Booleans, wanderers: float) -> Floats:
     return np.where(strong[:, None], STRONG_KINDS, np.array([1.0 - wanderers, 0.0, wanderers]))
 
 
-def axes_filtered(height: str) -> Floats:
-    """(3,) ones for the axes that a filter filters, with a height that is `known` or `estimated`."""
-    return np.array([1.0, 1.0, 1.0 if height == "estimated" else 0.0])
-
-
 class Sums(NamedTuple):
     """C Gaussians of K potential features, those of one feature side by side; the course has n numbers."""
 

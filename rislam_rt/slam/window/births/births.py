@@ -103,7 +103,7 @@ def _missing_legs(context: WindowState, histories: TrackSummary, mean: Floats) -
 
 
 def _bearings(context: WindowState, rows: Booleans, mean: Floats) -> tuple[Floats, Floats]:
-    """Directions (N, 3) in the room's axes and lengths (N,) of some of the tracks."""
+    """Directions (N, 3) in the room's axes and lengths (N,) of those of the tracks that births are asked about."""
     seen = context.tracks.mean[rows, :, 0]
     return rays(seen, float(context.heading[-1] + mean[6])), np.maximum(seen[:, 0], 0.1)
 

@@ -46,7 +46,7 @@ def advance(log_odds: float, score: float, followed: int, kept: int) -> float:
 
 
 def jump(view: CycleAssociation, observed: Observations) -> Floats:
-    """(3,) [m] by which an agent that hears this is elsewhere than thought: on which most returns agree."""
+    """(3,) [m] by which an agent that hears this is elsewhere than thought: on which most returns agree; 0 for here."""
     lead = view.groups.leader
     expected, heard = view.expected.seen[lead], observed.seen
     off = np.maximum(*(np.abs(heard[:, axis] - expected[:, axis, None]) for axis in (1, 2)))
@@ -59,7 +59,8 @@ def jump(view: CycleAssociation, observed: Observations) -> Floats:
         return np.zeros(3)
     gap = heard[column, 0] - expected[row, 0]
     found = Rates(view.expected.jacobian[lead[row], 0, :3], gap, np.full(len(row), CELL**2), np.zeros(len(row)))
-    return egomotion.agreed(found)
+    by = egomotion.agreed(found)
+    return by if float(by @ by) > CELL**2 else np.zeros(3)
 
 
 def log_jump() -> float:

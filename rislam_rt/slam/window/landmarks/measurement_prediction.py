@@ -218,15 +218,14 @@ def _neighbours(place: Floats, strength: Floats, sides: Integers | None) -> tupl
     """
     pairs = scipy.spatial.cKDTree(place).query_pairs(EDGE, p=np.inf, output_type="ndarray")
     first, second = pairs.T if sides is None else pairs[sides[pairs[:, 0]] == sides[pairs[:, 1]]].T
-    first, second = np.concatenate([first, second]), np.concatenate([second, first])
-    weaker = strength[second] <= strength[first]
-    first, second = first[weaker], second[weaker]
+    ahead, count = strength[first] - strength[second], len(place)
+    pairs = np.concatenate([(first * count + second)[ahead >= 0.0], (second * count + first)[ahead <= 0.0]])
+    pairs.sort()
+    first, second = np.divmod(pairs, count)
     gap = np.abs(place[first, 0] - place[second, 0])
     for axis in place.T[1:]:
         np.maximum(gap, np.abs(axis[first] - axis[second]), out=gap)
-    rows = (gap < EDGE).nonzero()[0]
-    rows = rows[np.argsort(first[rows] * len(place) + second[rows])]
-    return first[rows], second[rows], gap[rows]
+    return first, second, gap
 
 
 def _taken_in(

@@ -1,0 +1,77 @@
+"""Entry point of the command line: a command run, every failure that was foreseen told in a line, an exit code."""
+
+import os
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rislam_rt.errors import RislamError
+
+
+def main() -> None:
+    """Entry point of `rislam-rt`: run a command; a failure that was foreseen is one line and its exit code."""
+    try:
+        import atexit
+
+        from rislam_rt.cli.interrupts import EXIT_CODE, Interrupted, end_quietly, interruptible
+
+        # One thread: the matrices are small, and sums in one order give the same bits on every machine.
+        for library in ("OMP", "OPENBLAS", "MKL"):
+            os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+        with interruptible() as heard:
+            try:
+                code = _run(heard)
+            except Interrupted as told:
+                code = _say(str(told), EXIT_CODE)
+        atexit.register(end_quietly)
+    except KeyboardInterrupt:
+        code = _say("interrupted", 130)
+    sys.exit(code)
+
+
+def _run(heard: list[int]) -> int:
+    """Run the command that was asked for; its exit code. `heard`: signals that came."""
+    import typer
+
+    from rislam_rt.cli.app import app
+    from rislam_rt.cli.interrupts import EXIT_CODE, Interrupted
+    from rislam_rt.cli.verbosity import reset
+    from rislam_rt.errors import RislamError
+
+    reset()
+    try:
+        code = app(sys.argv[1:] or ["--help"], prog_name="rislam-rt", standalone_mode=False)
+    except RislamError as error:
+        if heard:  # it reached the workers too, and the first to die was mourned
+            return _say("interrupted: what is done is kept; the same command goes on from there", EXIT_CODE)
+        return _tell(error)
+    except typer.Abort:
+        return _say("interrupted", EXIT_CODE)
+    except Exception as error:
+        # Wrong usage: the parser's exceptions have no public base class, but all can say what is wrong.
+        if not hasattr(error, "format_message"):
+            if heard and not isinstance(error, Interrupted):  # what was being imported took it for a fault of its own
+                return _say("interrupted", EXIT_CODE)
+            raise
+        return _say(f"error: {error.format_message().rstrip('.')}; see rislam-rt --help", 2)
+    if code == EXIT_CODE:  # an interrupt that no command has answered
+        return _say("interrupted", EXIT_CODE)
+    return code if isinstance(code, int) else 0
+
+
+def _tell(error: "RislamError") -> int:
+    """Every fault of a command on a line of its own; returns the exit code."""
+    from rislam_rt.cli.verbosity import verbosity
+
+    if verbosity().verbose:
+        import traceback
+
+        traceback.print_exception(error)
+    for line in error.lines:
+        _say(f"error: {line}", error.exit_code)
+    return error.exit_code
+
+
+def _say(line: str, code: int) -> int:
+    print(" ".join(line.split()), file=sys.stderr)
+    return code

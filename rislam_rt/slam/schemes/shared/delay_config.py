@@ -1,0 +1,62 @@
+"""Configuration that all filters of delays alone share."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.errors import ConfigError
+from rislam_rt.slam.schemes.shared.checks import check_counts, check_inside, check_not_negative
+
+
+@dataclass(frozen=True, slots=True)
+class DelayConfig:
+    """Agent, features (of Channel-SLAM: virtual transmitters) and their ranges. SI units."""
+
+    sigma_a: float = 0.01
+    """Standard deviation of the white acceleration [m/s^2]."""
+    height: str = "known"
+    """`known` keeps the height and the vertical velocity of the start, `estimated` filters them."""
+    specular_ratio: float | None = 0.35
+    """Amplitude over that of free space of the same length, above which a component is a wall return; None: there are
+    none."""
+    planes: bool = True
+    """Whether wall returns are features (images of the Tx, that move with it), or set aside."""
+    smallest_std: float = 0.003
+    """Smallest standard deviation of a range that is believed [m]."""
+    birth_turns: int = 6
+    """Gaussians of a new feature over the turn about the walk, from horizontal to horizontal."""
+    wanderers: float = 0.5
+    """Probability that a new weak feature is not a point that stays."""
+    drift_length_std: float = 0.003
+    """Random walk of a wandering feature's distance in one step [m]."""
+    drift_angle_std: float = 0.01
+    """Random walk of the cosine of its angle off the walk in one step."""
+    share_threshold: float = 1e-3
+    """Share below which a Gaussian of a feature is dropped."""
+    course_stride: int = 40
+    """Cycles from one past state of the agent that is kept to the next."""
+    num_samples: int = 32
+    """Positions handed to the phase design."""
+
+    def check(self, name: str) -> None:
+        """Check the settings that filters of delays share, in the section `name`."""
+        check_counts(name, self, ("birth_turns", "course_stride", "num_samples"))
+        check_inside(name, self, ("sigma_a", "smallest_std"), np.inf, "a positive number")
+        check_inside(name, self, ("specular_ratio",), np.inf, "a positive number, or none")
+        check_inside(name, self, ("share_threshold",), 1.0, "a number in (0, 1)")
+        check_not_negative(name, self, ("drift_length_std", "drift_angle_std"))
+        if self.height not in ("known", "estimated"):
+            raise ConfigError(f"{name}.height: '{self.height}' received; give 'known' or 'estimated'")
+        if not 0.0 <= self.wanderers < 1.0:
+            raise ConfigError(f"{name}.wanderers: {self.wanderers} received; give a share below 1")
+
+    @property
+    def axes(self) -> Floats:
+        """(3,) ones for the axes that are filtered."""
+        return np.array([1.0, 1.0, 1.0 if self.height == "estimated" else 0.0])
+
+    @property
+    def wander(self) -> Floats:
+        """(3,) standard deviations by which a wanderer's distance, cosine and turn walk in one step."""
+        return np.array([self.drift_length_std, self.drift_angle_std, 0.0])
