@@ -70,7 +70,7 @@ def command(
     from rislam_rt.scene import new_scene, write_scene
 
     _one_origin(source, floorplan, seed, template)
-    if source is not None and is_xml(source):
+    if source is not None and (source.suffix.lower() == ".xml" or str(source).startswith("sionna:")):
         own = {"--units": units, "--up": up, "--origin": origin != "0,0,0", "--material": material}
         _from_xml(source, scene, within, [name for name, value in own.items() if value], overwrite)
         return
@@ -122,11 +122,6 @@ def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, te
     given = [name for name, value in origins.items() if value not in (None, _ROOM)]
     if len(given) > 1:
         raise ConfigError(f"{given[1]}: a room comes from it or from {given[0]}; leave one out")
-
-
-def is_xml(source: Path) -> bool:
-    """Whether `new` makes a room from a scene file of Mitsuba or Sionna RT."""
-    return source.suffix.lower() == ".xml" or str(source).startswith("sionna:")
 
 
 def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overwrite: bool) -> None:

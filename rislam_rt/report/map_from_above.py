@@ -13,7 +13,7 @@ from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.model import Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.summary import landmark_track, match_walls
 from rislam_rt.report.geometry import ellipse, plane_trace, section, wall_edges
-from rislam_rt.report.style import TRUTH, WALL, scheme_colour, styled
+from rislam_rt.report.style import TRUTH, WALL, close_up, scheme_colour, styled
 
 ZOOM = 0.25
 """Half the width [m] of the close-up of the path's end, unless the error is larger."""
@@ -153,15 +153,10 @@ def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) 
     inset.plot(*scheme.position[:, :2].T, color=colour, lw=1.4)
     inset.plot(*estimate, "o", color=colour, ms=5)
     inset.plot(*ellipse(estimate, scheme.covariance[-1, :2, :2]).T, color=colour, lw=1.0)
-    inset.set_xlim(truth[0] - half, truth[0] + half)
-    inset.set_ylim(truth[1] - half, truth[1] + half)
-    inset.set_aspect("equal")
-    inset.set_xticks([])
-    inset.set_yticks([])
+    close_up(inset, truth, half)
     inset.text(0.5, 0.03, f"end, {100.0 * 2.0 * half:.0f} cm wide", fontsize=8.5, ha="center",
                transform=inset.transAxes)  # fmt: skip
     for spine in inset.spines.values():
-        spine.set_visible(True)
         spine.set_color("#555555")
     axis.indicate_inset_zoom(inset, edgecolor="#555555")
 

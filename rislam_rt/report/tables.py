@@ -117,11 +117,16 @@ def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> Non
         )
     _show(title, table)
     for report, numbers in ((raw, "float32"), (refined, "refined")):
-        for path in [p for p in report.one_sided if not p.reason][:10]:
-            print(f"unexplained: {numbers}, cycle {path.cycle}, {path.label}, only {path.side}")
-        for breach in report.breaches[:10]:
-            print(f"beyond its limit: {numbers}, {breach}")
+        _print_faults(report, numbers, "cycle")
     print("agreed" if raw.passed and refined.passed else "NOT agreed")
+
+
+def _print_faults(report: "PathReport", of: str, at: str) -> None:
+    """Beside a table: the first paths that nothing explains, and the first errors beyond their limits."""
+    for path in [p for p in report.one_sided if not p.reason][:10]:
+        print(f"unexplained: {of}, {at} {path.cycle}, {path.label}, only {path.side}")
+    for breach in report.breaches[:10]:
+        print(f"beyond its limit: {of}, {breach}")
 
 
 def _nearest(limits: "Mapping[str, Any]") -> str:
@@ -138,10 +143,7 @@ def print_validation(rows: Sequence["Validation"]) -> None:
         table.add_row(scene, numbers, *map(str, counts), f"{length:.0e}")
     _show("traced against analytic, largest error", table)
     for scene, _, numbers, report in rows:
-        for path in [p for p in report.one_sided if not p.reason][:10]:
-            print(f"unexplained: {scene}, {numbers}, pose {path.cycle}, {path.label}, only {path.side}")
-        for breach in report.breaches[:10]:
-            print(f"beyond its limit: {scene}, {numbers}, {breach}")
+        _print_faults(report, f"{scene}, {numbers}", "pose")
     unexplained, beyond = sum(r.report.unexplained for r in rows), sum(r.report.num_breaches for r in rows)
     print(f"{unexplained} unexplained paths, {beyond} errors beyond their limits")
 

@@ -46,6 +46,12 @@ class Mesh(NamedTuple):
         return self.vertices[self.faces]
 
 
+def as_mesh(triangles: Floats) -> Mesh:
+    """Triangles (T, 3, 3) as a mesh with shared corners."""
+    vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    return Mesh(vertices, index.reshape(-1, 3).astype(np.int64))
+
+
 def read_inside(folder: Path, name: str, limit: int) -> bytes:
     """Content of a file that a scene names, which must lie inside the scene's folder, links followed.
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.geometry.triangles import triangle_areas
-from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.meshes import Mesh, as_mesh
 
 CYLINDER_SIDES = 32
 
@@ -26,7 +26,7 @@ def sphere_mesh(center: Floats, radius: float) -> Mesh:
     for _ in range(2):
         triangles = unit(_quartered(triangles))
     surface = triangle_areas(triangles).sum()
-    return _indexed(center + radius * np.sqrt(4.0 * np.pi / surface) * triangles)
+    return as_mesh(center + radius * np.sqrt(4.0 * np.pi / surface) * triangles)
 
 
 def cylinder_mesh(center: Floats, radius: float, height: float, axis: Floats) -> Mesh:
@@ -65,10 +65,3 @@ def _quartered(triangles: Floats) -> Floats:
     a, b, c = triangles.swapaxes(0, 1)
     ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
     return np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
-
-
-def _indexed(triangles: Floats) -> Mesh:
-    """A solid's triangles with shared corners."""
-    vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    faces: Integers = index.reshape(-1, 3)
-    return Mesh(vertices, faces)

@@ -10,6 +10,7 @@ from built_in_rooms.paths import smooth_path
 from rislam_rt.errors import SceneError
 from rislam_rt.model import Body
 from rislam_rt.scene import load_scene
+from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.meshes import MeshReader, ply_bytes
 from rislam_rt.scene.motion import straight_motion
 from rislam_rt.scene.recorded_poses import parse_tum
@@ -35,6 +36,8 @@ def test_tum_reads_what_it_wrote() -> None:
     again = parse_tum(tum_bytes(time, position, heading))
     for one, other in zip((time, position, heading), again, strict=True):
         assert np.allclose(one, other, rtol=0, atol=1e-8)  # nine digits
+    with pytest.raises(Fault, match="line 1 of the trajectory"):
+        parse_tum(b"\xff\xfe\x00")
 
 
 def test_smooth_path_has_the_arc_length_asked_for() -> None:

@@ -1,5 +1,6 @@
 """All triangles of a scene as one array, and the limits that every part of the check shares."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +38,19 @@ class TriangleArray(NamedTuple):
         """Indices of those points (K, 3) that lie outside the triangles' bounds."""
         low, high = self.bounds
         return np.flatnonzero(((points < low) | (points > high)).any(axis=-1))
+
+    @property
+    def box(self) -> str:
+        """The triangles' bounds in words."""
+        low, high = np.round(self.bounds, 3).tolist()
+        return f"{low} to {high}"
+
+    def degenerate(self, field: str, triangles: Floats) -> Iterator[Finding]:
+        """An error at a mesh, triangles (T, 3, 3), that has faces without area."""
+        bad = without_area(triangles)
+        if bad.any():
+            message = f"{int(bad.sum())} faces without area, the first is face {int(np.argmax(bad))}"
+            yield self.error(field, message, "remove degenerate faces from the mesh")
 
     def error(self, field: str, message: str, mend: str) -> Finding:
         """An error at a key of the scene file."""

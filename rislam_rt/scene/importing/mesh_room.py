@@ -14,7 +14,6 @@ from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.placement import place_parts
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, find_facets
-from rislam_rt.scene.importing.regions.mesh_simplification import as_mesh
 from rislam_rt.scene.importing.regions.region_groups import (
     RegionGroup,
     find_pieces,
@@ -27,7 +26,7 @@ from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface, 
 from rislam_rt.scene.importing.regions.welded_mesh import weld
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.scans.scan_room import looks_scanned, sort_scan
-from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.meshes import Mesh, as_mesh
 from rislam_rt.scene.shapes import joined
 
 
@@ -65,9 +64,7 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
     palette = MaterialAssignment(options.materials, options.rest)
     reflectors = _reflectors(surfaces, pieces, parts, palette)
     occluders = _occluders(found, pieces, list(reflectors))
-    if palette.unused():
-        names = ", ".join([*reflectors, *sorted({p.material for p in parts if p.material})][:12])
-        raise Fault(f"--material {palette.unused()[0]}: nothing has that name", f"give one of: {names}")
+    palette.check_used([*reflectors, *sorted({p.material for p in parts if p.material})])
     said = summarise_import(facets, found, surfaces, unseen, reflectors, occluders, options, scanned=bool(about))
     remarks = [*notes, *about, *said]
     return RoomDraft(reflectors, occluders, remarks + palette.remarks())

@@ -107,9 +107,3 @@ def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:
 def has_area(triangles: Floats) -> Booleans:
     """Which triangles (T, 3, 3) are more than a line: higher than a tenth of a millimetre."""
     return np.asarray(triangle_heights(triangles) > 1e-4)
-
-
-def as_mesh(triangles: Floats) -> Mesh:
-    """Triangles (T, 3, 3) with shared corners."""
-    vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    return Mesh(vertices, index.reshape(-1, 3).astype(np.int64))
