@@ -24,7 +24,8 @@ class Beliefs {
     for (const scheme of data.schemes) {
       if (!state.on[scheme.name]) continue;
       painter.line(scheme.position.slice(0, at + 1), scheme.colour, 2);
-      painter.line(ring(scheme.position[at], scheme.ellipse[at]), scheme.colour, 1.5);
+      const lost = scheme.lost[at] === "1";
+      painter.line(ring(scheme.position[at], scheme.ellipse[at]), scheme.colour, 1.5, 1, lost ? [3, 3] : []);
       painter.point(scheme.position[at], "circle", 3.5, scheme.colour);
       let points = 0, panels = [];
       for (const mark of scheme.landmarks) {
@@ -41,7 +42,7 @@ class Beliefs {
       }
       const [error, sigma] = scheme.error[at];
       lines.push(`${scheme.name}: ${size(error)} off (2σ ${size(2 * sigma)}), ${points} landmark${points === 1 ? "" : "s"}` +
-        (scheme.codes ? knownPanels(panels.length, data.panels.length) : ""));
+        (scheme.codes ? knownPanels(panels.length, data.panels.length) : "") + (lost ? ", holds itself for lost" : ""));
     }
     view.said.textContent = lines.join(" · ");
     this.closeUp(at);

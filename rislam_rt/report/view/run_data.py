@@ -39,6 +39,7 @@ def _scheme(result: SlamResult, scheme: SchemeResult, rows: Integers) -> dict[st
         "position": rounded(scheme.position[rows], FINE),
         "ellipse": [_ellipse(scheme.covariance[row, :2, :2]) for row in rows],
         "error": rounded(np.column_stack([error, sigma]), FINE),
+        "lost": _lost(scheme, rows),
         "landmarks": [mark for column in range(len(scheme.ident)) if (mark := _landmark(scheme, column, rows))],
     }
     spec = result.scene.ris.spec if result.scene.ris is not None else None
@@ -46,6 +47,13 @@ def _scheme(result: SlamResult, scheme: SchemeResult, rows: Integers) -> dict[st
         shapes = [[panel.rows, panel.cols] for panel in spec.panels]
         data |= {"levels": scheme.levels, "shapes": shapes, "codes": [_code(scheme, row, shapes) for row in rows]}
     return data
+
+
+def _lost(scheme: SchemeResult, rows: Integers) -> str:
+    """For each moment of a run's view 1 if the filter held itself for lost at it or since the moment before."""
+    lost = np.array([outcome == "diverged" for outcome in scheme.outcome], dtype=np.int64)
+    begins = np.append(0, rows[:-1] + 1)
+    return "".join("1" if lost[first : last + 1].any() else "0" for first, last in zip(begins, rows, strict=True))
 
 
 def _ellipse(covariance: Floats) -> list[float]:

@@ -169,10 +169,47 @@ def test_a_runs_data_are_its_estimates(result: SlamResult) -> None:
             np.testing.assert_allclose(turn @ np.diag([a**2, b**2]) @ turn.T / 4.0, covariance, rtol=0, atol=2e-6)
         count = sum(place is not None for mark in found["landmarks"] for place in mark["at"])
         assert count == scheme.held.sum()
+        assert found["lost"] == "0" * len(truth)
     assert "codes" not in data["schemes"][1]
     scheme, codes = result.schemes["random"], data["schemes"][0]["codes"]
     again = [[int(digit, 36) for digit in code] for code in codes]
     assert np.array_equal(again, scheme.applied.reshape(6, -1))
+
+
+def test_a_run_that_holds_itself_for_lost_says_so(result: SlamResult, monkeypatch: pytest.MonkeyPatch) -> None:
+    import rislam_rt.report.view.run_data as module
+
+    told = ("ok", "diverged", "ok", "ok", "ok", "ok")
+    lost = replace(result, schemes={n: replace(one, outcome=told) for n, one in result.schemes.items()})
+    assert [one["lost"] for one in run_data(lost)["schemes"]] == ["010000"] * len(lost.schemes)
+    monkeypatch.setattr(module, "FRAMES", 3)  # cycles that have no moment of their own count in the next
+    assert [one["lost"] for one in run_data(lost)["schemes"]] == ["010"] * len(lost.schemes)
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no JavaScript engine here")
+def test_the_view_tells_a_filter_that_holds_itself_for_lost(result: SlamResult, tmp_path: Path) -> None:
+    told = ("ok", "ok", "diverged", "ok", "ok", "ok")
+    lost = replace(result, schemes={n: replace(one, outcome=told) for n, one in result.schemes.items()})
+    trial = f"""
+const document = {{ querySelectorAll: () => [] }};
+{view_script()}
+const data = {json.dumps(run_data(lost))};
+const dashes = [], on = {{}};
+for (const scheme of data.schemes) on[scheme.name] = true;
+const painter = {{ point() {{}}, name() {{}}, line(p, c, w, a, dash) {{ if (dash && dash.length) dashes.push(c); }} }};
+const words = [0, 2].map((at) => {{
+  const own = Object.assign(Object.create(Beliefs.prototype),
+    {{ view: {{ painter, data, state: {{ on }}, said: {{}} }}, codes: [], closeUp() {{}} }});
+  own.draw(at);
+  return own.view.said.textContent;
+}});
+console.log(JSON.stringify({{ words, dashes: dashes.length, schemes: data.schemes.length }}));
+"""
+    (tmp_path / "trial.js").write_text(trial)
+    done = subprocess.run(["node", tmp_path / "trial.js"], check=True, timeout=60, capture_output=True, text=True)
+    said = json.loads(done.stdout)
+    assert said["words"][0].count("holds itself for lost") == 0
+    assert said["words"][1].count("holds itself for lost") == said["dashes"] == said["schemes"]
 
 
 def test_codes_of_many_levels_and_of_several_panels_are_told_apart(result: SlamResult) -> None:
