@@ -10,7 +10,7 @@ import argparse
 import numpy as np
 
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.measurement import ReceiverConfig, capture, measure, path_snr_db, receive
+from rislam_rt.measurement import ReceiverConfig, capture, measure, receive
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 from rislam_rt.scene import load_scene
 
@@ -40,7 +40,7 @@ def main() -> None:
 
 def score(paths: Paths, motion: Trajectory, config: ReceiverConfig) -> tuple[float, float]:
     rng = np.random.default_rng(6)
-    snr = path_snr_db(paths, RADIO)
+    snr = 10.0 * np.log10(np.maximum(RADIO.integrated_snr(paths.gain), 1e-300))
     level, found = [], []
     for cycle in range(paths.num_cycles):
         heading = float(motion.heading[cycle])

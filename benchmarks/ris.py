@@ -17,7 +17,7 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.model import Paths, RadioConfig, RisCode, RisSpec
-from rislam_rt.ris import far_field_limit, far_field_response, leg_response, rephase
+from rislam_rt.ris import far_field_response, leg_response, rephase
 from rislam_rt.scene import load_scene
 
 SIDES = (6, 10, 16, 32)
@@ -73,7 +73,7 @@ def far_field_errors(side: int, angle: float, distance: Floats, codes: int, *, r
     return Curve(
         side,
         angle,
-        far_field_limit(spec, RADIO.wavelength),
+        2.0 * spec.diagonal**2 / RADIO.wavelength,
         20.0 * np.log10(np.abs((far * beam).sum(axis=1)) / np.abs((near * beam).sum(axis=1))),
         10.0 * np.log10(np.mean(np.abs(approximate - exact) ** 2, axis=1) / np.mean(np.abs(exact) ** 2, axis=1)),
     )

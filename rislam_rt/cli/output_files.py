@@ -9,6 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
+from rislam_rt.cli.verbosity import with_switches
+
 OUTPUT = "a file to write"
 """Marks, in an option's annotation, the file that the command writes."""
 PAGE_MARK = re.compile(rb"ritten\s+by\s+`rislam-rt\b")
@@ -21,8 +23,8 @@ _may_overwrite = False
 def with_overwrite(command: Callable[..., Any]) -> Callable[..., Any]:
     """A command with `--overwrite` behind its own options, if some of those name files to write; these are looked at
     before anything is worked out."""
-    own = inspect.signature(command)
-    outputs = [one.name for one in own.parameters.values() if OUTPUT in getattr(one.annotation, "__metadata__", ())]
+    own = inspect.signature(command).parameters.values()
+    outputs = [one.name for one in own if OUTPUT in getattr(one.annotation, "__metadata__", ())]
     if not outputs:
         return command
 
@@ -34,10 +36,7 @@ def with_overwrite(command: Callable[..., Any]) -> Callable[..., Any]:
             check_output(options[name], f"--{name} ")
         return command(*arguments, **options)
 
-    more = inspect.Parameter("overwrite", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Overwrite)
-    wrapped.__signature__ = own.replace(parameters=[*own.parameters.values(), more])  # type: ignore[attr-defined]
-    wrapped.__annotations__ = {**command.__annotations__, "overwrite": Overwrite}
-    return wrapped
+    return with_switches(wrapped, command, overwrite=Overwrite)
 
 
 def check_output(file: Path | None, option: str = "") -> Path | None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, pipeline_file, write_json
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, parse_point, pipeline_file, write_json
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from rislam_rt.pipeline.recordings.inputs import Inputs
     from rislam_rt.slam import StartPrior
     from rislam_rt.studies.unseen import Answers
-
-FARTHEST = 1e5
-"""Largest coordinate [m], as in a scene."""
 
 
 def command(
@@ -83,7 +80,7 @@ def _prior(start: str, velocity: str, stds: tuple[float, float, float]) -> "Star
 
     from rislam_rt.slam import StartPrior
 
-    first, speed = _triple("--start", start), _triple("--velocity", velocity)
+    first, speed = parse_point("--start", start), parse_point("--velocity", velocity)
     heading = float(np.arctan2(speed[1], speed[0])) if np.hypot(speed[0], speed[1]) > 0.0 else 0.0
     return StartPrior(first, speed, heading, *stds)
 
@@ -97,21 +94,7 @@ def _body(tx: str | None, rx: str | None) -> "Body | None":
         return None
     if tx is None or rx is None:
         raise ConfigError("--tx, --rx: one alone received; give both")
-    return Body(_triple("--tx", tx), _triple("--rx", rx))
-
-
-def _triple(option: str, text: str) -> "Floats":
-    import numpy as np
-
-    from rislam_rt.errors import ConfigError
-
-    try:
-        values = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        values = np.zeros(0)
-    if values.shape != (3,) or not (np.abs(values) <= FARTHEST).all():
-        raise ConfigError(f"{option}: '{text[:60]}' received; give three numbers, e.g. {option} 0.5,0.7,0.5")
-    return values
+    return Body(parse_point("--tx", tx), parse_point("--rx", rx))
 
 
 def _true_positions(file: Path, cycles: int) -> "Floats":

@@ -9,9 +9,7 @@ from rislam_rt.measurement.hardware import Correction, FrontEnd, HardwareConfig,
 from rislam_rt.measurement.measure import measure
 from rislam_rt.measurement.noise import (
     paper_snr_db,
-    path_snr_db,
     reference_gain,
-    with_paper_snr,
     with_reference_snr,
 )
 from rislam_rt.measurement.received import Clutter, Received, phase_reversed, receive
@@ -48,7 +46,6 @@ __all__ = [
     "measure",
     "num_tones",
     "paper_snr_db",
-    "path_snr_db",
     "path_std",
     "phase_reversed",
     "pulse_samples",
@@ -59,6 +56,5 @@ __all__ = [
     "to_samples",
     "to_tones",
     "tones",
-    "with_paper_snr",
     "with_reference_snr",
 ]

@@ -30,13 +30,6 @@ def with_reference_snr(radio: RadioConfig, snr_db: float) -> RadioConfig:
     return replace(radio, noise_psd=radio.noise_psd * snr / 10.0 ** (snr_db / 10.0))
 
 
-def path_snr_db(paths: Paths, radio: RadioConfig) -> Floats:
-    """SNR over the noise of every path (K, P) [dB], L E |alpha|^2 / N0 over all L antennas; -inf where there is
-    none."""
-    with np.errstate(divide="ignore"):
-        return 10.0 * np.log10(radio.integrated_snr(paths.gain))
-
-
 def paper_snr_db(
     paths: Paths,
     radio: RadioConfig,
@@ -69,11 +62,3 @@ def paper_snr_db(
         mean_power[cycle] = np.mean(np.abs(response) ** 2)
     with np.errstate(divide="ignore"):
         return 10.0 * np.log10(mean_power * radio.energy / (num_samples * radio.noise_psd))
-
-
-def with_paper_snr(
-    radio: RadioConfig, paths: Paths, snr_db: float, config: ReceiverConfig | None = None, *, num_samples: int = 128
-) -> RadioConfig:
-    """The radio with the noise at which the SNR of the paper, averaged over all cycles, is this many dB."""
-    snr = np.mean(10.0 ** (paper_snr_db(paths, radio, config, num_samples=num_samples) / 10.0))
-    return replace(radio, noise_psd=float(radio.noise_psd * snr / 10.0 ** (snr_db / 10.0)))

@@ -7,7 +7,7 @@ of M samples at rate B, scaled by 1 / sqrt(B), whose noise has the variance N0 B
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.arrays import Complexes, Floats, phasor
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.estimation.sounding import tone_response
 from rislam_rt.measurement.received import Received
@@ -35,7 +35,7 @@ def tones(received: Received, radio: RadioConfig, config: ReceiverConfig, elemen
     elements = radio.array.positions(1.0) if elements is None else elements
     if config.element_exact:
         return scale * _element_exact(received, radio, frequencies, elements)
-    antennas = np.exp(2j * np.pi * elements @ received.direction.T)
+    antennas = phasor(2.0 * np.pi * elements @ received.direction.T)
     return scale * (antennas * received.gain) @ tone_response(frequencies, received.tau).T
 
 
@@ -47,7 +47,7 @@ def pulse_samples(received: Received, radio: RadioConfig, config: ReceiverConfig
     """
     time = np.arange(num_tones(radio, config)) / radio.bandwidth
     pulses = flat_pulse(time - received.tau[:, None], radio.bandwidth, radio.energy)
-    antennas = np.exp(2j * np.pi * radio.array.positions(1.0) @ received.direction.T)
+    antennas = phasor(2.0 * np.pi * radio.array.positions(1.0) @ received.direction.T)
     return (antennas * received.gain) @ pulses
 
 

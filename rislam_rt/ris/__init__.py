@@ -1,10 +1,10 @@
 """Floor 3: physics of the panel, and amplitudes of believed points: pure functions that channel and belief call."""
 
 from rislam_rt.ris.element import element_gain_area, element_pattern
-from rislam_rt.ris.impairments import PanelErrors, PanelTolerance, draw_panel, flip_bits, mean_power_shares, quantise
+from rislam_rt.ris.impairments import PanelErrors, PanelTolerance, draw_panel, flip_bits, quantise
 from rislam_rt.ris.rephase import panel_gain, rephase
 from rislam_rt.ris.response import far_field_response, leg_response, zero_code
-from rislam_rt.ris.validity import delay_spread, delay_spread_warnings, far_field_limit, far_field_warnings
+from rislam_rt.ris.validity import delay_spread, delay_spread_warnings
 
 __all__ = [
     "PanelErrors",
@@ -14,12 +14,9 @@ __all__ = [
     "draw_panel",
     "element_gain_area",
     "element_pattern",
-    "far_field_limit",
     "far_field_response",
-    "far_field_warnings",
     "flip_bits",
     "leg_response",
-    "mean_power_shares",
     "panel_gain",
     "quantise",
     "rephase",

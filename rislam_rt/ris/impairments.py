@@ -79,19 +79,6 @@ def draw_panel(spec: DataSheet, tolerance: PanelTolerance, *, rng: np.random.Gen
     return PanelErrors(amplitude, phase, dead, np.where(rng.random(shape) < tolerance.stuck, level, FREE))
 
 
-def mean_power_shares(tolerance: PanelTolerance) -> tuple[float, float]:
-    """What a panel focused on one path keeps of its power in the mean over panels: (coherent, scattered) shares.
-
-    With element weights w of mean m and mean square s, the expected gain of a panel of N elements is
-    `m^2 + (s - m^2) / N` of the perfect one (Ruze); the first number is m^2, the second s - m^2. Stuck elements at
-    a random level add nothing to the mean. Amplitudes are taken as normal, without the cut at 0.
-    """
-    alive = 1.0 - tolerance.dead
-    mean = alive * (1.0 - tolerance.stuck) * np.exp(-(tolerance.phase_std**2) / 2.0)
-    square = alive * (1.0 + tolerance.amplitude_std**2)
-    return float(mean**2), float(square - mean**2)
-
-
 def flip_bits(code: RisCode, probability: float, *, rng: np.random.Generator) -> RisCode:
     """The code as it arrives over a link that turns each bit of each level over with a probability.
 

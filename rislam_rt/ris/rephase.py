@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Integers
+from rislam_rt.arrays import Complexes, Integers, phasor
 from rislam_rt.errors import ConfigError
 from rislam_rt.model.paths import Paths
 from rislam_rt.model.ris import RisCode
@@ -24,7 +24,7 @@ def panel_gain(tx: Complexes, rx: Complexes, code: RisCode, weight: Complexes | 
 
     `weight` (..., N, M): what the elements really do to the signal, divided by what they should.
     """
-    return np.einsum("...nm,...nm,...nm->...", tx, rx, weight * np.exp(-1j * code.xi))
+    return np.einsum("...nm,...nm,...nm->...", tx, rx, weight * phasor(-code.xi))
 
 
 def rephase(paths: Paths, code: RisCode, weight: Complexes | float = 1.0) -> Paths:
@@ -44,7 +44,7 @@ def rephase(paths: Paths, code: RisCode, weight: Complexes | float = 1.0) -> Pat
         raise ConfigError(
             f"code: shape {code.index.shape} received; give ({rows}, {cols}), or one a cycle: ({cycles}, ...)"
         )
-    factor = np.broadcast_to(weight * np.exp(-1j * code.xi), (cycles, rows, cols)).reshape(cycles, 1, rows * cols)
+    factor = np.broadcast_to(weight * phasor(-code.xi), (cycles, rows, cols)).reshape(cycles, 1, rows * cols)
     tx, rx = (legs.reshape(*legs.shape[:2], rows * cols) for legs in (paths.ris.tx, paths.ris.rx))
     gain = np.array(paths.gain)
     for block in _blocks(paths.ris.tx_leg, paths.ris.rx_leg):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.arrays import Complexes, Floats, phasor
 from rislam_rt.model.ris import DataSheet, RisCode, RisSpec
 from rislam_rt.ris.element import element_gain_area, element_pattern
 
@@ -24,11 +24,12 @@ def leg_response(spec: RisSpec, center: Floats, device: Floats, coefficient: Com
 
     Each leg takes half (in dB) of the join's `sqrt(4 pi G dx dy) A / lambda`.
     """
-    ray = (device - center)[..., None, None, :] - spec.offsets()
-    distance = np.sqrt(np.vecdot(ray, ray))
-    pattern = element_pattern(spec, np.vecdot(ray, spec.normal) / distance)
+    ray, offsets = np.asarray(device - center), spec.offsets()
+    along = (ray @ offsets.reshape(-1, 3).T).reshape(*ray.shape[:-1], *offsets.shape[:-1])
+    distance = np.sqrt(np.vecdot(ray, ray)[..., None, None] - 2.0 * along + np.vecdot(offsets, offsets))
+    pattern = element_pattern(spec, (ray @ spec.normal)[..., None, None] / distance)
     amplitude = _leg_share(spec, wavelength) * np.sqrt(pattern) * wavelength / (4.0 * np.pi * distance)
-    return np.asarray(coefficient)[..., None, None] * amplitude * np.exp(-2j * np.pi / wavelength * distance)
+    return np.asarray(coefficient)[..., None, None] * amplitude * phasor(-2.0 * np.pi / wavelength * distance)
 
 
 def far_field_response(
@@ -48,7 +49,7 @@ def far_field_response(
         / (4.0 * np.pi * distance)
     )
     along = np.einsum("nmi,...i->...nm", spec.offsets(), direction)
-    phase = np.exp(-2j * np.pi / wavelength * (distance[..., None, None] - along))
+    phase = phasor(-2.0 * np.pi / wavelength * (distance[..., None, None] - along))
     return (np.asarray(coefficient) * amplitude)[..., None, None] * phase
 
 

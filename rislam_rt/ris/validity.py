@@ -1,4 +1,4 @@
-"""Validity of a panel's formulas: far field, and delays over the panel that the band cannot tell apart."""
+"""Validity of a panel's formulas: delays over the panel that the band cannot tell apart."""
 
 import numpy as np
 
@@ -7,30 +7,11 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model.ris import RisSpec
 
 
-def far_field_limit(spec: RisSpec, wavelength: float) -> float:
-    """`2 D^2 / lambda` [m], D the panel's diagonal: there the edge is pi / 8 out of phase with a plane wave."""
-    return 2.0 * spec.diagonal**2 / wavelength
-
-
 def delay_spread(spec: RisSpec, center: Floats, tx: Floats, rx: Floats) -> Floats:
     """Largest difference (...,) [s] between elements of the delay from tx (..., 3) over the element to rx (..., 3)."""
     elements = np.asarray(center) + spec.offsets().reshape(-1, 3)
     length = sum(np.linalg.norm(np.asarray(end)[..., None, :] - elements, axis=-1) for end in (tx, rx))
     return np.ptp(length, axis=-1) / SPEED_OF_LIGHT
-
-
-def far_field_warnings(spec: RisSpec, center: Floats, devices: Floats, wavelength: float) -> tuple[str, ...]:
-    """One line if `far_field_response` is used for a device (..., 3) [m] inside `far_field_limit`; empty if not."""
-    distance = np.linalg.norm(np.asarray(devices) - center, axis=-1)
-    limit = far_field_limit(spec, wavelength)
-    nearest = float(np.min(distance, initial=np.inf))
-    if nearest >= limit:
-        return ()
-    inside = float(np.mean(distance < limit))
-    return (
-        f"ris: far-field response at {nearest:.3g} m, its limit 2 D^2 / lambda is {limit:.3g} m "
-        f"({inside:.0%} of the distances are inside); take the element-wise response",
-    )
 
 
 def delay_spread_warnings(spec: RisSpec, center: Floats, tx: Floats, rx: Floats, bandwidth: float) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.arrays import Complexes, Floats, phasor
 
 
 def subcarrier_frequencies(num_subcarriers: int, bandwidth: float) -> Floats:
@@ -12,4 +12,4 @@ def subcarrier_frequencies(num_subcarriers: int, bandwidth: float) -> Floats:
 
 def delay_response(tau: Floats, frequencies: Floats) -> Complexes:
     """`exp(-j 2 pi f tau)` (..., M): what delays (...,) [s] do to tones at baseband frequencies (M,) [Hz]."""
-    return np.exp(-2j * np.pi * np.asarray(tau)[..., None] * frequencies)
+    return phasor(-2.0 * np.pi * np.asarray(tau)[..., None] * frequencies)

@@ -9,8 +9,6 @@ import pytest
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.pipeline.scores.summary import summarise
-from rislam_rt.pipeline.store.identity import run_identity
-from rislam_rt.pipeline.store.run_folder import open_run, read_run
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
@@ -81,20 +79,3 @@ def test_designed_codes_light_the_panel(result):
     direct = result.paths.kind == PathKind.RIS
     level = {name: np.median(np.abs(scheme.gain[-10:, direct])) for name, scheme in result.schemes.items()}
     assert level["optimized"] > 2.0 * level["random"]
-
-
-def test_same_seed_same_bits(chain, result):
-    again = chain[2]()
-    for name, scheme in result.schemes.items():
-        np.testing.assert_array_equal(again.schemes[name].position, scheme.position)
-        np.testing.assert_array_equal(again.schemes[name].applied, scheme.applied)
-        np.testing.assert_array_equal(again.schemes[name].gain, scheme.gain)
-
-
-def test_result_survives_the_disk(chain, result, tmp_path):
-    room, spec, _ = chain
-    with open_run(tmp_path / "run", run_identity(spec, room)) as store:
-        store.update(result.schemes)
-        store.complete(result, summarise(result))
-    again = read_run(tmp_path / "run")
-    assert summarise(again) == summarise(result)

@@ -10,7 +10,6 @@ from rislam_rt.ris import (
     PanelTolerance,
     draw_panel,
     flip_bits,
-    mean_power_shares,
     quantise,
 )
 
@@ -75,7 +74,10 @@ def test_mean_gain_of_a_focused_panel(panels, tolerance):
         code = RisCode(child.integers(4, size=(6, 6)), 4)
         field = np.exp(1j * code.xi)  # what the code was chosen for
         power.append(np.abs(np.mean(field * errors.weight * np.exp(-1j * errors.applied(code).xi))) ** 2)
-    coherent, scattered = mean_power_shares(tolerance)
+    # Ruze: m^2 + (s - m^2) / N, m and s the mean and mean square of the weights; stuck elements add nothing to m
+    alive = 1.0 - tolerance.dead
+    coherent = (alive * (1.0 - tolerance.stuck)) ** 2 * np.exp(-(tolerance.phase_std**2))
+    scattered = alive * (1.0 + tolerance.amplitude_std**2) - coherent
     error = np.std(power) / np.sqrt(len(power))
     assert np.mean(power) == pytest.approx(coherent + scattered / 36, abs=4 * error)
     assert error < 0.02

@@ -3,26 +3,9 @@
 import numpy as np
 import pytest
 
-from rislam_rt.ris import delay_spread, delay_spread_warnings, far_field_limit, far_field_warnings
+from rislam_rt.ris import delay_spread, delay_spread_warnings
 
 BELOW = np.array([0.0, 0.0, -1.0])
-
-
-@pytest.mark.parametrize(("side", "limit"), [(6, 1.08), (10, 3.0), (16, 7.69), (32, 30.7)])
-def test_far_field_limits(panels, side, limit):
-    assert far_field_limit(panels.spec(side, side), panels.wavelength) == pytest.approx(limit, rel=2e-3)
-
-
-def test_far_field_warning_stands_exactly_inside_the_limit(panels):
-    spec, center = panels.spec(10, 10), panels.center
-    limit = far_field_limit(spec, panels.wavelength)
-    assert far_field_warnings(spec, center, center + 1.001 * limit * BELOW, panels.wavelength) == ()
-    assert far_field_warnings(spec, center, np.zeros((0, 3)), panels.wavelength) == ()
-    devices = center + np.array([0.4, 0.999, 2.0, 3.0])[:, None] * limit * BELOW
-    (line,) = far_field_warnings(spec, center, devices, panels.wavelength)
-    assert "1.2 m" in line
-    assert "3 m" in line
-    assert "50%" in line
 
 
 def test_delay_spread_of_a_grazing_ray_is_the_panels_length(panels):

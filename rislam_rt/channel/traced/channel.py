@@ -8,7 +8,6 @@ from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_blocks
-from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, DiffusePaths, trace_diffuse_paths
 from rislam_rt.channel.traced.float32_limits import room_center
 from rislam_rt.channel.traced.leg_query import FoundLegs, LegQuery, QueryBatch, build_batch, join_found
 from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
@@ -88,10 +87,6 @@ class TracedChannel:
     def respond(self, paths: Paths, code: RisCode) -> Paths:
         """The same paths under another code, without tracing again."""
         return rephase(paths, code)
-
-    def diffuse_paths(self, trajectory: Trajectory, config: DiffuseConfig) -> DiffusePaths:
-        """Diffuse scattering and diffraction, if switched on: paths without an analytic twin, apart from `paths`."""
-        return trace_diffuse_paths(self.scene, self.radio, trajectory, config)
 
     def _trace(self, problems: Sequence[LegQuery]) -> tuple[list[SpecularLegs], bool]:
         """Solve problems of one view of the room together, block by block; also whether all sequences were asked."""

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.arrays import Complexes, Floats, Integers, phasor
 from rislam_rt.measurement.estimation.sounding import Sounding
 
 OVERSAMPLING = 2
@@ -115,7 +115,7 @@ def _climb(
 
 def _signals(grid: MatchedFilterGrid, point: Floats) -> list[Complexes]:
     """A detected path's signal as factors over tones, rows and columns."""
-    return [np.exp(1j * value * place) for place, value in zip(grid.places, point, strict=True)]
+    return [phasor(value * place) for place, value in zip(grid.places, point, strict=True)]
 
 
 def _moments(grid: MatchedFilterGrid, signal: list[Complexes], residual: Complexes) -> Complexes:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, phasor
 from rislam_rt.measurement.estimation.sounding import Sounding, tone_response
 
 
@@ -69,7 +69,7 @@ class InnerProducts(NamedTuple):
 def waves_at(sounding: Sounding, parameters: Floats) -> PathSignals:
     """Signals for inner products of paths at parameters (P, 3)."""
     delay, u, v = parameters.T
-    row, col = (np.exp(2j * np.pi * np.multiply.outer(x, c)) for x, c in ((sounding.row, u), (sounding.col, v)))
+    row, col = (phasor(2.0 * np.pi * np.multiply.outer(x, c)) for x, c in ((sounding.row, u), (sounding.col, v)))
     return PathSignals(parameters, tone_response(sounding.frequency, delay), row, col)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.arrays import Complexes, Floats, phasor
 from rislam_rt.model import RadioConfig
 from rislam_rt.waveform import subcarrier_frequencies
 
@@ -43,6 +43,6 @@ def tone_response(frequency: Floats, delay: Floats) -> Complexes:
     spaced."""
     count = len(frequency)
     fine = next(size for size in range(int(np.sqrt(count)), 0, -1) if count % size == 0)
-    coarse = np.exp(-2j * np.pi * frequency[::fine, None] * delay)
-    offset = np.exp(-2j * np.pi * (frequency[:fine] - frequency[0])[:, None] * delay)
+    coarse = phasor(-2.0 * np.pi * frequency[::fine, None] * delay)
+    offset = phasor(-2.0 * np.pi * (frequency[:fine] - frequency[0])[:, None] * delay)
     return (coarse[:, None] * offset).reshape(count, len(delay))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rislam_rt.channel.traced import DiffuseConfig, DiffuseKind, TracedChannel
+from rislam_rt.channel.traced import DiffuseConfig, DiffuseKind
 from rislam_rt.channel.traced.diffuse_paths import trace_diffuse_paths
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
@@ -13,8 +13,7 @@ RADIO = RadioConfig()
 
 
 def test_switches_off_add_nothing(rooms):
-    channel, trajectory = TracedChannel(rooms.paper(), RADIO, 1), rooms.at([1.3, 2.1, 0.8])
-    extras = channel.diffuse_paths(trajectory, DiffuseConfig())
+    extras = trace_diffuse_paths(rooms.paper(), RADIO, rooms.at([1.3, 2.1, 0.8]), DiffuseConfig())
     assert len(extras) == 0
     assert extras.source == "traced, no analytic twin"
 

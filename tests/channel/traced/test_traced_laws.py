@@ -56,12 +56,6 @@ def test_subdivided_meshes(original, rooms):
     assert_same(before, traced(with_meshes(scene, subdivide), rooms.at(POSES)))
 
 
-def test_permuted_objects(original, rooms):
-    scene, before = original
-    order = np.random.default_rng(0).permutation(len(scene.reflectors))
-    assert_same(before, traced(replace(scene, reflectors=tuple(scene.reflectors[i] for i in order)), rooms.at(POSES)))
-
-
 def test_room_turned_and_moved(original, rooms):
     """A rotation about no axis in particular and a shift, of walls, landmarks, panel and agent alike."""
     scene, before = original

@@ -8,7 +8,7 @@ from rislam_rt.model import Body, RadioConfig, SensorModel
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.identity import STRENGTHS
-from rislam_rt.slam.moments import even_draws, poses_of
+from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.candidates import PredictedMeasurements, look_ahead
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, empty_table, enter, image_idents, learn_ratio, remove
 from rislam_rt.slam.nested.landmark_update import Hits, learn
@@ -270,10 +270,3 @@ def test_walls_on_the_map_err_as_told(rng: np.random.Generator) -> None:
     along = 0.5 * np.std(draws[:, 2])
     np.testing.assert_allclose(shown.wall_std[0], [tilt, along], rtol=0.03)
     assert abs(offset.mean() - 3.0) < 1e-3
-
-
-@pytest.mark.parametrize(("count", "dims"), [(32, 3), (32, 2), (100, 1), (5, 3)])
-def test_even_draws_have_the_moments_that_they_stand_for(count: int, dims: int) -> None:
-    draws = even_draws(count, dims)
-    np.testing.assert_allclose(draws.mean(axis=0), 0.0, atol=1e-12)
-    np.testing.assert_allclose(draws.T @ draws / count, np.eye(dims), atol=1e-12)

@@ -224,11 +224,6 @@ def effective_size(belief: Nested) -> float:
     return float(1.0 / np.sum(np.exp(2.0 * belief.log_weight)))
 
 
-def num_particles(belief: Nested) -> int:
-    """Landmark particles in all, shared ones counted for each that shares them."""
-    return sum(cloud.size for cloud in belief.clouds) * len(belief.log_weight)
-
-
 def joint(belief: Nested) -> Floats:
     """(N, 7 + 3F) the belief's agent particles with their clouds: position, velocity, heading, clouds' means."""
     count = len(belief.log_weight)
