@@ -58,7 +58,7 @@ def weigh_tracks(tracks: LandmarkTracks, belief: MapBelief, code: RisCode | None
 def find_panel_candidate(
     tracks: LandmarkTracks, table: LandmarkTable, moments: Moments, body: Body, panel: int = 0
 ) -> PanelCandidate | None:
-    """The RIS candidate: landmark or track likeliest to be a panel; None if nothing is likelier so than not.
+    """The nested filter's RIS candidate: landmark or track likeliest a panel; None if nothing is likelier so than not.
 
     A track that seems to come from behind a mirror may be the panel over walls: aiming there would miss it.
     """
