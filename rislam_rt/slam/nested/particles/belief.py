@@ -106,7 +106,7 @@ def propagate(belief: Nested, dt: float, accelerate: Floats, turn: float, *, rng
 
 
 def absorb(belief: Nested, owner: int, sightings: Sequence[Sighting], engine: CloudEngine) -> tuple[Nested, float]:
-    """The particles' belief, its weights after returns that speak of landmark `owner`, and the log evidence of what was measured.
+    """The particles' belief, reweighted by returns that speak of landmark `owner`, and the log evidence of these.
 
     The previous weight enters once, however many returns there are. If no particle can explain them, the belief stays
     as it was and the evidence is minus infinity.

@@ -67,7 +67,7 @@ def begin(start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) ->
 
 
 def set_prior_map(particles: PointParticles, features: Floats, covariance: Floats) -> PointParticles:
-    """Operation on the particles: the cycle sets a prior map, F landmarks (F, 3) known beforehand, with a covariance (3F, 3F)."""
+    """Operation of the cycle: set a prior map, F landmarks (F, 3) known beforehand, with a covariance (3F, 3F)."""
     known = place_known(particles.belief, features, covariance, particles.config, particles.engine)
     return particles._replace(belief=known)
 
