@@ -8,9 +8,9 @@ import numpy as np
 from rislam_rt.adviser.codes import codes_of, paths_under_codes
 from rislam_rt.adviser.detection import DetectionForecast, forecast_detection
 from rislam_rt.adviser.reasons import Reasons, build_reasons
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.model import Paths, Scene, Trajectory
+from rislam_rt.model import Paths, Scene
 from rislam_rt.pipeline.specification.spec import Settings
 
 PLACES = 15
@@ -62,7 +62,7 @@ class Survey(NamedTuple):
 def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
     """Paths for the link budget at places along the way, by exact image sources."""
     rows = np.unique(np.linspace(0, len(scene.agent) - 1, places).round().astype(np.int64))
-    scene = replace(scene, agent=trajectory_at(scene.agent, rows))
+    scene = replace(scene, agent=scene.agent[rows])
     faces = sum(len(reflector.faces) for reflector in scene.reflectors)
     channel = ImageSourceChannel(scene, settings.radio, next((depth for most, depth in DEPTHS if faces <= most), 0))
     return Survey(scene, channel.paths(scene.agent), settings, channel.depth)
@@ -84,13 +84,6 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLin
             for number, panel in enumerate(scene.panels)
         ]
     return links
-
-
-def trajectory_at(motion: Trajectory, rows: Integers) -> Trajectory:
-    """Cycles of these rows of a trajectory, at which the link budget is made."""
-    return Trajectory(
-        motion.time[rows], motion.position[rows], motion.velocity[rows], motion.heading[rows], motion.body
-    )
 
 
 def _all_places(paths: Paths, looked: Survey) -> list[DetectionForecast]:

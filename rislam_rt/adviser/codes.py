@@ -57,6 +57,11 @@ def aimed_codes(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Integers:
     return index.reshape(-1, spec.rows, spec.cols)
 
 
+def aimed_paths(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Paths:
+    """Paths of a room with the panels' codes aimed at the agent."""
+    return paths_under_codes(paths, spec, aimed_codes(paths, spec, radio))
+
+
 def paths_under_codes(paths: Paths, spec: DataSheet, index: Integers) -> Paths:
     """Paths of a room under a panel's codes, levels (K, N, M)."""
     return rephase(paths, RisCode(index, spec.levels))

@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.adviser.budget import trajectory_at
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.image_source.sequences import wall_sequences
 from rislam_rt.model import RadioConfig, Scene
@@ -36,7 +35,7 @@ class TraceCost(NamedTuple):
 
 def trace_cost(scene: Scene, radio: RadioConfig, walls: int) -> list[TraceCost]:
     """The cost at each of `DEPTHS` in a scene of so many walls."""
-    middle = trajectory_at(scene.agent, np.array([len(scene.agent) // 2]))
+    middle = scene.agent[len(scene.agent) // 2 :][:1]
     legs = 1 + 2 * len(scene.landmarks)
     costs: list[TraceCost] = []
     for depth in DEPTHS:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.adviser.budget import NOTHING_DB
-from rislam_rt.adviser.codes import aimed_codes, paths_under_codes
+from rislam_rt.adviser.codes import aimed_paths
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement.received import HORIZON_MARGIN
@@ -69,7 +69,7 @@ def _direct_margins(scene: Scene, points: Floats, settings: Settings) -> Floats:
     )
     alone = replace(scene, scatterers=tuple(s for s in scene.scatterers if s.shade is not None), agent=still)
     paths = ImageSourceChannel(alone, settings.radio, 0).paths(still)
-    paths = paths_under_codes(paths, scene.ris.spec, aimed_codes(paths, scene.ris.spec, settings.radio))
+    paths = aimed_paths(paths, scene.ris.spec, settings.radio)
     margin = np.full((len(scene.panels), count), np.nan)
     for path in np.flatnonzero(paths.kind == PathKind.RIS):
         heard = paths.valid[:, path]

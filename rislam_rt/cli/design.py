@@ -25,7 +25,7 @@ def command(
     """
     import numpy as np
 
-    from rislam_rt.cli.scenes import open_scene, parse_point
+    from rislam_rt.cli.scenes import open_scene, point_in
     from rislam_rt.pipeline.design_at import design_at, design_table
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.read import load_radio
@@ -34,7 +34,7 @@ def command(
     radio = load_radio(set_ or ())
     opened = open_scene(scene, radio)
     room = opened.scene
-    point = parse_point(at, room)
+    point = point_in(room, at)
     prepare_channel(channel)
     opened.warn()
     found = design_at(room, radio, point, channel=channel, depth=depth, rng=np.random.default_rng(seed))

@@ -5,6 +5,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from rislam_rt.cli.options import parse_numbers, parse_point
+
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the files of a folder that exists.")]
 _ROOM = "paper_room"
 
@@ -68,7 +70,7 @@ def command(
     from rislam_rt.scene import new_scene, write_scene
 
     _one_origin(source, floorplan, seed, template)
-    if source is not None and is_xml(source):
+    if source is not None and (source.suffix.lower() == ".xml" or str(source).startswith("sionna:")):
         own = {"--units": units, "--up": up, "--origin": origin != "0,0,0", "--material": material}
         _from_xml(source, scene, within, [name for name, value in own.items() if value], overwrite)
         return
@@ -82,8 +84,9 @@ def command(
         from rislam_rt.scene.importing import ImportOptions, import_corners, import_room
         from rislam_rt.scene.importing.materials import parse_choices, parse_material
 
+        x, y, z = parse_point("--origin", origin).tolist()
         options = ImportOptions(
-            units=units, up=up, origin=_point(origin), carrier_ghz=carrier_ghz, detail=detail, curved=curved, scan=scan,
+            units=units, up=up, origin=(x, y, z), carrier_ghz=carrier_ghz, detail=detail, curved=curved, scan=scan,
             max_walls=max_walls, fill=fill, materials=parse_choices(material or []), rest=parse_material(rest),
         )  # fmt: skip
         remarks = (
@@ -121,11 +124,6 @@ def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, te
         raise ConfigError(f"{given[1]}: a room comes from it or from {given[0]}; leave one out")
 
 
-def is_xml(source: Path) -> bool:
-    """Whether `new` makes a room from a scene file of Mitsuba or Sionna RT."""
-    return source.suffix.lower() == ".xml" or str(source).startswith("sionna:")
-
-
 def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overwrite: bool) -> None:
     """A room from an XML scene, which says itself how it lies and what it is made of.
 
@@ -134,7 +132,6 @@ def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overw
     ConfigError
         Options are given that contradict it.
     """
-    from rislam_rt.cli.options import parse_numbers
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene.xml import new_from_xml
 
@@ -143,24 +140,3 @@ def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overw
     for note in new_from_xml(str(source), folder, within=parse_numbers("--within", within), overwrite=overwrite):
         typer.echo(f"- {note}")
     typer.echo(f"{folder}: made from '{source}'; edit its scene.toml")
-
-
-def _point(text: str) -> tuple[float, float, float]:
-    """Three numbers `x,y,z` of an option of `new`.
-
-    Raises
-    ------
-    ConfigError
-        They are not.
-    """
-    from math import isfinite
-
-    from rislam_rt.errors import ConfigError
-
-    try:
-        x, y, z = (float(part) for part in text.split(","))
-        if all(isfinite(value) and abs(value) <= 1e5 for value in (x, y, z)):
-            return x, y, z
-    except ValueError:
-        pass
-    raise ConfigError(f"--origin: '{text[:60]}' received; give three numbers in metres, e.g. --origin 1.5,2,0")

@@ -12,7 +12,11 @@ from rislam_rt.cli.output_files import OUTPUT
 from rislam_rt.shipped import find_pipeline, find_room
 
 if TYPE_CHECKING:
+    from rislam_rt.arrays import Floats
     from rislam_rt.pipeline.specification.spec import Settings as RunSettings
+
+FARTHEST = 1e5
+"""Largest coordinate [m], as in a scene."""
 
 
 def pipeline_file(name: str) -> Path:
@@ -78,6 +82,32 @@ def parse_numbers(option: str, text: str) -> list[float]:
         return [float(word) for word in text.split(",")] if text.strip() else []
     except ValueError:
         raise ConfigError(f"{option}: '{text[:60]}' received; give numbers parted by commas") from None
+
+
+def parse_point(option: str, text: str) -> "Floats":
+    """The point or vector (3,) `x,y,z` of an option.
+
+    Raises
+    ------
+    ConfigError
+        It is not three numbers, or one lies beyond what a scene may hold.
+    """
+    import numpy as np
+
+    from rislam_rt.errors import ConfigError
+
+    try:
+        values = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        values = np.zeros(0)
+    if values.shape != (3,) or not (np.abs(values) <= FARTHEST).all():
+        raise ConfigError(f"{option}: '{text[:60]}' received; give three numbers, e.g. {option} 0.5,0.7,0.5")
+    return values
+
+
+def beside(pipeline: Path, name: str) -> Path:
+    """A folder that an option's pipeline file names, relative to the file."""
+    return Path(os.path.normpath(pipeline.parent / name))
 
 
 def settings_of(pipeline: Path, changed: Sequence[str]) -> "RunSettings":

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from rislam_rt.cli.options import beside, parse_point
 from rislam_rt.cli.verbosity import warn
 
 if TYPE_CHECKING:
@@ -48,35 +49,26 @@ def scene_of(option: Path | None, spec: "PipelineSpec | Fig4aSpec", pipeline: Pa
     ConfigError
         Neither names one.
     """
-    import os
-
     from rislam_rt.errors import ConfigError
 
     if option is not None:
         return option
     if spec.scene is None:
         raise ConfigError(f"{pipeline}: scene: not given; add it, or give --scene DIR")
-    return Path(os.path.normpath(pipeline.parent / spec.scene))
+    return beside(pipeline, spec.scene)
 
 
-def parse_point(text: str, scene: "Scene") -> "Floats":
-    """A point `x,y,z` [m] within the bounds of a scene.
+def point_in(scene: "Scene", text: str) -> "Floats":
+    """The point `x,y,z` [m] of `--at`, within the bounds of a scene.
 
     Raises
     ------
     ConfigError
         It is not three finite numbers, or lies outside.
     """
-    import numpy as np
-
     from rislam_rt.errors import ConfigError
 
-    try:
-        point = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        point = np.zeros(0)
-    if point.shape != (3,) or not np.isfinite(point).all():
-        raise ConfigError(f"--at: '{text[:60]}' received; give three numbers in metres, e.g. --at 1.5,1.5,0.5")
+    point = parse_point("--at", text)
     low, high = scene.bounds
     if (point < low - 1e-9).any() or (point > high + 1e-9).any():
         raise ConfigError(

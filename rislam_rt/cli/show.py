@@ -67,9 +67,6 @@ def command(
 
 def _write_view(room: "Scene", settings: "Records", depth: int, file: Path) -> Path:
     """Write the page of `show --html`, with the paths of some poses."""
-    import numpy as np
-
-    from rislam_rt.adviser.budget import trajectory_at
     from rislam_rt.channel.image_source import ImageSourceChannel
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.report.view.page import view_page
@@ -79,9 +76,9 @@ def _write_view(room: "Scene", settings: "Records", depth: int, file: Path) -> P
     with show_progress() as tell:
         tell("paths", 0, 2)
         channel = ImageSourceChannel(room, settings.radio, depth)
-        middle = channel.paths(trajectory_at(room.agent, np.array([len(room.agent) // 2])))
+        middle = channel.paths(room.agent[len(room.agent) // 2 :][:1])
         tell("paths", 1, 2)
-        motion = trajectory_at(room.agent, poses_of(room, int(middle.valid.sum())))
+        motion = room.agent[poses_of(room, int(middle.valid.sum()))]
         data = paths_data(room, motion, channel.paths(motion), settings)
         tell("paths", 2, 2)
     size = " x ".join(f"{side:.3g}" for side in room.bounds[1] - room.bounds[0])

@@ -1,11 +1,12 @@
 """`rislam-rt slam MEASUREMENTS`."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, pipeline_file, write_json
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, parse_point, pipeline_file, write_json
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
@@ -13,9 +14,6 @@ if TYPE_CHECKING:
     from rislam_rt.pipeline.recordings.inputs import Inputs
     from rislam_rt.slam import StartPrior
     from rislam_rt.studies.unseen import Answers
-
-FARTHEST = 1e5
-"""Largest coordinate [m], as in a scene."""
 
 
 def command(
@@ -82,7 +80,7 @@ def _prior(start: str, velocity: str, stds: tuple[float, float, float]) -> "Star
 
     from rislam_rt.slam import StartPrior
 
-    first, speed = _triple("--start", start), _triple("--velocity", velocity)
+    first, speed = parse_point("--start", start), parse_point("--velocity", velocity)
     heading = float(np.arctan2(speed[1], speed[0])) if np.hypot(speed[0], speed[1]) > 0.0 else 0.0
     return StartPrior(first, speed, heading, *stds)
 
@@ -96,21 +94,7 @@ def _body(tx: str | None, rx: str | None) -> "Body | None":
         return None
     if tx is None or rx is None:
         raise ConfigError("--tx, --rx: one alone received; give both")
-    return Body(_triple("--tx", tx), _triple("--rx", rx))
-
-
-def _triple(option: str, text: str) -> "Floats":
-    import numpy as np
-
-    from rislam_rt.errors import ConfigError
-
-    try:
-        values = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        values = np.zeros(0)
-    if values.shape != (3,) or not (np.abs(values) <= FARTHEST).all():
-        raise ConfigError(f"{option}: '{text[:60]}' received; give three numbers, e.g. {option} 0.5,0.7,0.5")
-    return values
+    return Body(parse_point("--tx", tx), parse_point("--rx", rx))
 
 
 def _true_positions(file: Path, cycles: int) -> "Floats":
@@ -131,14 +115,16 @@ def _true_positions(file: Path, cycles: int) -> "Floats":
 
 def _new_folder(folder: Path) -> Path:
     from rislam_rt.errors import ConfigError
+    from rislam_rt.storage.files import check_writable
 
     try:
-        place = folder.resolve()  # `x/..` is there though `x` is not
+        place = Path(os.path.realpath(folder))  # `x/..` is there though `x` is not
         taken = place.exists() and (not place.is_dir() or any(place.iterdir()))
     except OSError as error:
         raise ConfigError(f"--out {str(folder)[:80]}: cannot be used ({error.strerror}); give another folder") from None
     if taken:
         raise ConfigError(f"--out {folder}: exists and is not empty; give a new folder")
+    check_writable(folder)
     return folder
 
 

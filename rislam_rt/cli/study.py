@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 
-from rislam_rt.cli.options import write_json
+from rislam_rt.cli.options import beside, write_json
 from rislam_rt.cli.output_files import page_files, study_folder
 
 if TYPE_CHECKING:
@@ -27,11 +27,24 @@ class StudyOptions(NamedTuple):
     page: bool
 
 
+def refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
+    """Refuse `--scene` for a study that has rooms of its own, or none.
+
+    Raises
+    ------
+    ConfigError
+        It was given.
+    """
+    from rislam_rt.errors import ConfigError
+
+    if given.scene is not None:
+        raise ConfigError(f"--scene {given.scene}: a pipeline of kind '{kind}' {why}")
+
+
 def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
     """Compare both channels in all rooms; exit code 1 if a difference is unexplained or beyond its limit."""
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.studies.files import CERTIFICATE, COMPARISON, write_comparison
@@ -39,10 +52,9 @@ def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
     from rislam_rt.studies.compare import comparison_table, run_comparison
     from rislam_rt.studies.spec import study_record
 
-    if given.scene is not None:
-        raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'compare_channels' names its rooms; set 'rooms'")
+    refuse_scene(given, "compare_channels", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
-    opened = [open_scene(_beside(given.pipeline, room.scene), radio) for room in spec.rooms]
+    opened = [open_scene(beside(given.pipeline, room.scene), radio) for room in spec.rooms]
     scenes = [one.scene for one in opened]
     record = study_record(spec, scenes)
     files = (f"{COMPARISON}.md", f"{COMPARISON}.json", *([CERTIFICATE] if given.page else []))
@@ -145,13 +157,11 @@ def run_cells(
 
 def run_claims(spec: "ClaimsSpec", given: StudyOptions) -> None:
     """The claims' table, from what other studies left behind."""
-    from rislam_rt.errors import ConfigError
     from rislam_rt.report.studies.claims import write_claims
     from rislam_rt.studies.claims import SOURCE, judge, read_results
 
-    if given.scene is not None:
-        raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'claims' runs in no room; leave it out")
-    results = read_results(_beside(given.pipeline, spec.results))
+    refuse_scene(given, "claims", "runs in no room; leave it out")
+    results = read_results(beside(given.pipeline, spec.results))
     found = judge(results)
     sources = {study: {name: content[name] for name in SOURCE} for study, content in results.items()}
     folder = study_folder(given.out, spec.name, results, page_files(spec.name))
@@ -159,8 +169,3 @@ def run_claims(spec: "ClaimsSpec", given: StudyOptions) -> None:
         typer.echo(f"{claim.verdict}: {claim.claim}")
     typer.echo(f"page: {write_claims(found, spec.name, sources, folder)}")
     write_json(given.json, {"claims": [claim._asdict() for claim in found]})
-
-
-def _beside(pipeline: Path, scene: str) -> Path:
-    """A scene folder that a study's pipeline file names."""
-    return Path(os.path.normpath(pipeline.parent / scene))

@@ -1,28 +1,26 @@
 """What `rislam-rt run` does with a pipeline that trains the classifier."""
 
 import json
-import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
-from rislam_rt.cli.options import write_json
+from rislam_rt.cli.options import beside, write_json
 from rislam_rt.cli.output_files import study_folder
 
 if TYPE_CHECKING:
     from rislam_rt.cli.study import StudyOptions
     from rislam_rt.studies.classifier.spec import ClassifierSpec
 
-PAGE, SCORES, IMPORTANCE = "classifier", "figures/classifier_scores.png", "figures/classifier_features.png"
-PANEL, WEIGHTS = "figures/classifier_panel.png", "weights.npz"
+PAGE, WEIGHTS = "classifier", "weights.npz"
+SCORES, IMPORTANCE, PANEL = (f"figures/classifier_{name}.png" for name in ("scores", "features", "panel"))
 
 
 def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
     """Train the classifier of components and score it; weights, page, data and figures."""
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.errors import ConfigError
+    from rislam_rt.cli.study import refuse_scene
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.report.studies.classifier import (
@@ -38,10 +36,9 @@ def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
     from rislam_rt.studies.classifier.run import ALL, run_training
     from rislam_rt.studies.spec import study_record
 
-    if given.scene is not None:
-        raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'train_classifier' names its rooms; set 'rooms'")
-    radio, beside = build_radio(spec.radio), given.pipeline.parent
-    scenes = [open_scene(Path(os.path.normpath(beside / room.scene)), radio).scene for room in spec.rooms]
+    refuse_scene(given, "train_classifier", "names its rooms; set 'rooms'")
+    radio = build_radio(spec.radio)
+    scenes = [open_scene(beside(given.pipeline, room.scene), radio).scene for room in spec.rooms]
     record = study_record(spec, scenes)
     files = (f"{PAGE}.md", f"{PAGE}.json", WEIGHTS, *((SCORES, IMPORTANCE, PANEL) if given.page else ()))
     folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record, files)
@@ -55,8 +52,8 @@ def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
         WEIGHTS: weights_file(found),
     }
     if given.page:
-        contents |= {SCORES: to_png(draw_scores(found)), IMPORTANCE: to_png(draw_importance(found))}
-        contents |= {PANEL: to_png(draw_panel(found))}
+        pictures = {SCORES: draw_scores, IMPORTANCE: draw_importance, PANEL: draw_panel}
+        contents |= {name: to_png(draw(found)) for name, draw in pictures.items()}
     for name, data in contents.items():
         write_atomic(folder / name, data)
     typer.echo(f"F1 on all test rooms: {found.scores[ALL]['network'].f1:.4f}")

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rislam_rt.cli.output_files import page_files, study_folder
-from rislam_rt.cli.study import StudyOptions, run_cells
+from rislam_rt.cli.study import StudyOptions, refuse_scene, run_cells
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 def run_unseen(spec: "UnseenSpec", given: StudyOptions) -> None:
     """Draw the rooms, run what the file asks for in each, print and write the score card; exit code 1 if one failed."""
-    from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.report.unseen import write_unseen
     from rislam_rt.report.unseen.terminal import print_cards
@@ -24,8 +23,7 @@ def run_unseen(spec: "UnseenSpec", given: StudyOptions) -> None:
     from rislam_rt.sweeps import build_cells
     from rislam_rt.sweeps.store import check_folder, read_timings
 
-    if given.scene is not None:
-        raise ConfigError(f"--scene {given.scene}: a pipeline of kind 'unseen' draws its rooms; leave it out")
+    refuse_scene(given, "unseen", "draws its rooms; leave it out")
     cells = Path("sweeps") / spec.name
     record = unseen_record(spec)
     files = page_files(spec.name, figure=given.page)

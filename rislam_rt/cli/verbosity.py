@@ -51,13 +51,16 @@ def with_verbosity(command: Callable[..., Any]) -> Callable[..., Any]:
             return command(*arguments, **options)
         return _watched(command, *arguments, **options)
 
+    return with_switches(wrapped, command, quiet=Quiet, verbose=Verbose)
+
+
+def with_switches(wrapped: Callable[..., Any], command: Callable[..., Any], **switches: Any) -> Callable[..., Any]:
+    """A wrapped command with switches, such as those of verbosity, behind the command's own options."""
     own = inspect.signature(command)
-    more = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
-        for name, kind in (("quiet", Quiet), ("verbose", Verbose))
-    ]
+    more = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
+            for name, kind in switches.items()]  # fmt: skip
     wrapped.__signature__ = own.replace(parameters=[*own.parameters.values(), *more])  # type: ignore[attr-defined]
-    wrapped.__annotations__ = {**command.__annotations__, "quiet": Quiet, "verbose": Verbose}
+    wrapped.__annotations__ = {**command.__annotations__, **switches}
     return wrapped
 
 

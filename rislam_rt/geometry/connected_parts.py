@@ -20,13 +20,5 @@ def connected_triangles(triangles: Floats, tolerance: float = 1e-6) -> Integers:
     """Number (T,) of the connected piece each triangle belongs to; corners within `tolerance` [m] are one."""
     _, corner = np.unique(np.round(triangles.reshape(-1, 3) / tolerance), axis=0, return_inverse=True)
     faces = corner.reshape(-1, 3)
-    label = np.arange(faces.max(initial=-1) + 1)
-    while True:
-        lowest = label[faces].min(axis=1)
-        new = label.copy()
-        np.minimum.at(new, faces, lowest[:, None])
-        new = new[new]
-        if (new == label).all():
-            break
-        label = new
+    label = connected(np.concatenate([faces[:, :2], faces[:, 1:]]), int(faces.max(initial=-1)) + 1)
     return np.asarray(np.unique(label[faces[:, 0]], return_inverse=True)[1], dtype=np.int64)

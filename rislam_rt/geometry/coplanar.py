@@ -7,6 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import COPLANAR_ANGLE, RAY_OFFSET
 from rislam_rt.geometry.planes import signed_distance
+from rislam_rt.geometry.triangles import triangle_areas
 
 ALIKE = 1e-6
 """Two areas that differ by less than this share are the same: corners in float32 say no more."""
@@ -128,9 +129,8 @@ def _lies_on(area: Floats, i: int, j: int) -> bool:
 
 def _areas(triangles: Floats, owner: Integers, count: int) -> Floats:
     """(W,) [m^2] of walls that may be coplanar."""
-    sides = triangles[:, 1:] - triangles[:, :1]
     area = np.zeros(count)
-    np.add.at(area, owner, 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=-1))
+    np.add.at(area, owner, triangle_areas(triangles))
     return area
 
 

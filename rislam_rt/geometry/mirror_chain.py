@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.geometry.angles import unit
-from rislam_rt.geometry.planes import mirror
+from rislam_rt.geometry.planes import mirror, plane_tangents
 
 
 class MirrorChain(NamedTuple):
@@ -35,9 +34,3 @@ def mirror_chain(point: Floats, normal: Floats, offset: Floats) -> MirrorChain:
         point = mirror(point, normal[d], offset[d])
         linear = reflection @ linear
     return MirrorChain(point, linear, planes)
-
-
-def plane_tangents(normal: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors at right angles to a unit vector and to each other."""
-    first = unit(np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))]))
-    return first, np.cross(normal, first)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.geometry.triangles import triangle_planes
+from rislam_rt.geometry.triangles import triangle_heights, triangle_planes
 
 FLOAT32_ROUNDING = 2.0**-24
 """Largest relative error of a coordinate held in float32, as mesh files hold them."""
@@ -90,9 +90,7 @@ def _sorted_mesh(triangles: Floats, angle: float) -> tuple[Integers, _Mesh]:
     normal, _ = triangle_planes(triangles)
     key = np.abs(normal @ _GENERIC)
     order = np.argsort(key, kind="stable")
-    sides = np.roll(triangles, -1, axis=1) - triangles
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=-1)
-    altitude = area / np.maximum(np.linalg.norm(sides, axis=-1).max(axis=1), np.finfo(np.float64).tiny)
+    altitude = triangle_heights(triangles)
     rounding = FLOAT32_ROUNDING * float(np.abs(triangles).max())
     slack = angle + np.minimum(2.0 * rounding / np.maximum(altitude, 2.0 * rounding), 1.0)
     return order, _Mesh(triangles[order], normal[order], key[order], slack[order])

@@ -1,4 +1,4 @@
-"""Planes `normal . x = offset`: mirror images, intersections, and the plane behind a virtual landmark."""
+"""Planes `normal . x = offset`: mirror images, tangents, and the plane behind a virtual landmark."""
 
 import numpy as np
 
@@ -31,3 +31,9 @@ def plane_between(point: Floats, image: Floats) -> tuple[Floats, Floats]:
     offset = 0.5 * np.sum((image + point) * normal, axis=-1)
     sign = np.where(offset < 0.0, -1.0, 1.0)
     return normal * sign[..., None], offset * sign
+
+
+def plane_tangents(normal: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors at right angles to a unit vector and to each other."""
+    first = unit(np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))]))
+    return first, np.cross(normal, first)

@@ -2,13 +2,30 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
+
+
+def triangle_cross(triangles: Floats) -> Floats:
+    """Normals (T, 3) [m^2] of triangles (T, 3, 3), each twice as long as its triangle is large."""
+    return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+
+
+def triangle_areas(triangles: Floats) -> Floats:
+    """Areas (T,) [m^2] of triangles (T, 3, 3)."""
+    return np.asarray(0.5 * np.linalg.norm(triangle_cross(triangles), axis=-1))
+
+
+def triangle_heights(triangles: Floats) -> Floats:
+    """Heights (T,) [m] of triangles (T, 3, 3) over their longest edges; zero of a point."""
+    edge = np.roll(triangles, -1, axis=1) - triangles
+    longest = np.linalg.norm(edge, axis=-1).max(axis=1)
+    return np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=-1) / np.where(longest > 0.0, longest, 1.0)
 
 
 def triangle_planes(triangles: Floats) -> tuple[Floats, Floats]:
     """Unit normals (T, 3) and offsets (T,) [m] of triangles (T, 3, 3); the normal of a degenerate one is zero."""
-    normal = unit(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]))
+    normal = unit(triangle_cross(triangles))
     return normal, np.einsum("ti,ti->t", normal, triangles.mean(axis=1))
 
 
@@ -24,15 +41,16 @@ def edge_planes(triangles: Floats) -> tuple[Floats, Floats]:
     return inward, np.where(solid, np.einsum("tei,tei->te", inward, triangles), np.inf)
 
 
-def outline_edges(triangles: Floats) -> Floats:
-    """Edges (E, 2, 3) [m] that only one of the triangles (T, 3, 3) has: the outline of a planar group.
+def outline_edges(triangles: Floats, wall: Integers | None = None) -> Floats:
+    """Edges (E, 2, 3) [m] that only one of the triangles (T, 3, 3), or of those of its wall (T,), has: outlines.
 
     Corners count as the same when they agree to a nanometre.
     """
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2, 3)
     _, corner = np.unique(np.round(edges.reshape(-1, 3), 9), axis=0, return_inverse=True)
-    ends = np.sort(corner.reshape(-1, 2), axis=1)
-    _, index, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
+    owner = np.zeros(len(edges), dtype=np.int64) if wall is None else np.repeat(wall, 3)
+    key = np.column_stack([owner, np.sort(corner.reshape(-1, 2), axis=1)])
+    _, index, count = np.unique(key, axis=0, return_index=True, return_counts=True)
     return edges[index[count == 1]]
 
 

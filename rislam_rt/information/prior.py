@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.geometry.mirror_chain import plane_tangents
+from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.information.landmark_model import LandmarkModel
 
 FLOOR_TILT, UPRIGHT_TILT = 0.05, 0.01

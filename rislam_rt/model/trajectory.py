@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, freeze, show_point
+from rislam_rt.arrays import Floats, Integers, freeze, show_point
 from rislam_rt.errors import GeometryError
 from rislam_rt.geometry.angles import rotation_z
 
@@ -63,7 +63,7 @@ class Trajectory:
         ends = f"from {show_point(self.position[0])} to {show_point(self.position[-1])} m"
         return f"Trajectory: {len(self)} cycles, {self.time[0]:g} to {self.time[-1]:g} s, {length:.3g} m {ends}"
 
-    def __getitem__(self, cycles: slice) -> "Trajectory":
+    def __getitem__(self, cycles: slice | Integers) -> "Trajectory":
         return Trajectory(
             self.time[cycles], self.position[cycles], self.velocity[cycles], self.heading[cycles], self.body
         )

@@ -4,16 +4,12 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.walls import Walls
+from rislam_rt.geometry.triangles import outline_edges
 
 
-def outline_edges(walls: Walls) -> Floats:
+def wall_edges(walls: Walls) -> Floats:
     """(E, 2, 3) [m] edges of all walls, without the lines between triangles of the same wall."""
-    corners = np.round(walls.triangles, 9)
-    edges = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 3)
-    _, point = np.unique(edges.reshape(-1, 3), axis=0, return_inverse=True)
-    key = np.column_stack([np.repeat(walls.wall_of_triangle, 3), np.sort(point.reshape(-1, 2), axis=1)])
-    _, index, count = np.unique(key, axis=0, return_index=True, return_counts=True)
-    return edges[index[count == 1]]
+    return outline_edges(walls.triangles, walls.wall_of_triangle)
 
 
 def section(triangles: Floats, height: float) -> Floats:

@@ -9,10 +9,11 @@ from matplotlib.lines import Line2D
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import COPLANAR_OFFSET
+from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.model import Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.summary import landmark_track, match_walls
-from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace, section
-from rislam_rt.report.style import TRUTH, WALL, scheme_colour, styled
+from rislam_rt.report.geometry import ellipse, plane_trace, section, wall_edges
+from rislam_rt.report.style import TRUTH, WALL, close_up, scheme_colour, styled
 
 ZOOM = 0.25
 """Half the width [m] of the close-up of the path's end, unless the error is larger."""
@@ -51,7 +52,7 @@ def draw_plan(axis: Axes, scene: Scene) -> None:
     walls, path = build_walls(scene), scene.agent.position
     cuts = section(walls.triangles, float(path[-1, 2]))
     axis.add_collection(PolyCollection(list(walls.occluders.triangles[..., :2]), color=SHADE, lw=0.5, zorder=0))
-    axis.add_collection(LineCollection(list(outline_edges(walls)[..., :2]), colors="#dddddd", lw=0.8, zorder=0))
+    axis.add_collection(LineCollection(list(wall_edges(walls)[..., :2]), colors="#dddddd", lw=0.8, zorder=0))
     axis.add_collection(LineCollection(list(cuts), colors=WALL, lw=3.0, capstyle="round", zorder=1))
     axis.plot(path[:, 0], path[:, 1], color=TRUTH, lw=4.0, alpha=0.25, zorder=2)
     axis.plot(path[0, 0], path[0, 1], "o", color=TRUTH, ms=5, zorder=3)
@@ -72,7 +73,7 @@ def wall_places(scene: Scene) -> list[tuple[str, Floats]]:
 
 def largest_middle(triangles: Floats) -> Floats:
     """Centroid (3,) [m] of the largest of triangles (T, 3, 3), with those that share its plane."""
-    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    across = triangle_cross(triangles)
     area = np.linalg.norm(across, axis=1)
     normal = across[np.argmax(area)] / max(float(area.max()), 1e-300)
     height = (triangles - triangles[np.argmax(area), 0]) @ normal
@@ -152,15 +153,10 @@ def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) 
     inset.plot(*scheme.position[:, :2].T, color=colour, lw=1.4)
     inset.plot(*estimate, "o", color=colour, ms=5)
     inset.plot(*ellipse(estimate, scheme.covariance[-1, :2, :2]).T, color=colour, lw=1.0)
-    inset.set_xlim(truth[0] - half, truth[0] + half)
-    inset.set_ylim(truth[1] - half, truth[1] + half)
-    inset.set_aspect("equal")
-    inset.set_xticks([])
-    inset.set_yticks([])
+    close_up(inset, truth, half)
     inset.text(0.5, 0.03, f"end, {100.0 * 2.0 * half:.0f} cm wide", fontsize=8.5, ha="center",
                transform=inset.transAxes)  # fmt: skip
     for spine in inset.spines.values():
-        spine.set_visible(True)
         spine.set_color("#555555")
     axis.indicate_inset_zoom(inset, edgecolor="#555555")
 

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import PathKind, Paths, Scene
-from rislam_rt.report.geometry import outline_edges
+from rislam_rt.report.geometry import wall_edges
 from rislam_rt.report.map_from_above import SHADE, WALL_NAME, draw_plan, name_walls, wall_places
 from rislam_rt.report.style import KIND, TRUTH, WALL, save_figure, styled
 
@@ -63,7 +63,7 @@ def _draw_room_3d(axis: Any, scene: Scene) -> None:
     floor = walls.triangles[np.abs(walls.triangles[:, :, 2] - low[2]).max(axis=1) < 1e-6]
     if len(floor):
         axis.add_collection3d(Poly3DCollection(list(floor), facecolor="#f1f1f1", edgecolor="none", zorder=0))
-    axis.add_collection3d(Line3DCollection(list(outline_edges(walls)), colors=WALL, lw=1.0, zorder=1))
+    axis.add_collection3d(Line3DCollection(list(wall_edges(walls)), colors=WALL, lw=1.0, zorder=1))
     axis.add_collection3d(Poly3DCollection(list(walls.occluders.triangles), facecolor=SHADE, alpha=0.3, zorder=1))
     axis.set_xlim(low[0], high[0])
     axis.set_ylim(low[1], high[1])

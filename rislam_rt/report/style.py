@@ -10,6 +10,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
+from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind
 from rislam_rt.storage.files import MARK, write_atomic
@@ -69,6 +70,17 @@ def styled() -> Iterator[None]:
     """Draw in the style of all figures."""
     with mpl.rc_context(SETTINGS):
         yield
+
+
+def close_up(axis: Any, middle: Floats, half: float) -> None:
+    """Make an axis a close-up: a framed square about a point (2,), `half` [m] to each side, without marks."""
+    axis.set_xlim(middle[0] - half, middle[0] + half)
+    axis.set_ylim(middle[1] - half, middle[1] + half)
+    axis.set_aspect("equal")
+    axis.set_xticks([])
+    axis.set_yticks([])
+    for spine in axis.spines.values():
+        spine.set_visible(True)
 
 
 def scheme_colour(name: str) -> str:

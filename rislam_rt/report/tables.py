@@ -38,7 +38,8 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     rows = [["agent", *(_metres(s["rmse_m"]) for s in schemes)]]
     for name in first["landmarks"]:
         rows.append([f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)])
-    heard = [name for name in first["walls"] if any(_is_heard(s["walls"][name]) for s in schemes)]
+    known = ("bound_m", "rmse_m")  # the paths tell anything of it, or something was made of it
+    heard = [wall for wall in first["walls"] if any(s["walls"][wall][k] is not None for s in schemes for k in known)]
     for name in heard:
         rows.append([f"wall {name}", *(_wall(s["walls"][name]) for s in schemes)])
     if len(first["walls"]) > len(heard):
@@ -116,11 +117,16 @@ def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> Non
         )
     _show(title, table)
     for report, numbers in ((raw, "float32"), (refined, "refined")):
-        for path in [p for p in report.one_sided if not p.reason][:10]:
-            print(f"unexplained: {numbers}, cycle {path.cycle}, {path.label}, only {path.side}")
-        for breach in report.breaches[:10]:
-            print(f"beyond its limit: {numbers}, {breach}")
+        _print_faults(report, numbers, "cycle")
     print("agreed" if raw.passed and refined.passed else "NOT agreed")
+
+
+def _print_faults(report: "PathReport", of: str, at: str) -> None:
+    """Beside a table: the first paths that nothing explains, and the first errors beyond their limits."""
+    for path in [p for p in report.one_sided if not p.reason][:10]:
+        print(f"unexplained: {of}, {at} {path.cycle}, {path.label}, only {path.side}")
+    for breach in report.breaches[:10]:
+        print(f"beyond its limit: {of}, {breach}")
 
 
 def _nearest(limits: "Mapping[str, Any]") -> str:
@@ -137,10 +143,7 @@ def print_validation(rows: Sequence["Validation"]) -> None:
         table.add_row(scene, numbers, *map(str, counts), f"{length:.0e}")
     _show("traced against analytic, largest error", table)
     for scene, _, numbers, report in rows:
-        for path in [p for p in report.one_sided if not p.reason][:10]:
-            print(f"unexplained: {scene}, {numbers}, pose {path.cycle}, {path.label}, only {path.side}")
-        for breach in report.breaches[:10]:
-            print(f"beyond its limit: {scene}, {numbers}, {breach}")
+        _print_faults(report, f"{scene}, {numbers}", "pose")
     unexplained, beyond = sum(r.report.unexplained for r in rows), sum(r.report.num_breaches for r in rows)
     print(f"{unexplained} unexplained paths, {beyond} errors beyond their limits")
 
@@ -203,11 +206,6 @@ def _metres(value: float | None) -> str:
     if value is None:
         return "not found"
     return f"{100.0 * value:.1f} cm" if value < 1.0 else f"{value:.2f} m"
-
-
-def _is_heard(score: Mapping[str, Any]) -> bool:
-    """Whether a wall belongs in the table: the paths tell anything of it, or something was made of it."""
-    return score["bound_m"] is not None or score["rmse_m"] is not None
 
 
 def _wall(score: Mapping[str, Any]) -> str:

@@ -34,6 +34,7 @@ class Fault(SceneError):
         super().__init__(one_line(f"{message}; {mend}"))
         self.message = message
         self.mend = mend
+        self.faults: list[Fault] = [self]
 
     def at(self, file: str, field: str) -> Finding:
         """The finding at its place."""

@@ -1,7 +1,7 @@
 """Loading a scene folder as a `Scene`."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,13 +13,12 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, Occluder, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, join_panels
 from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
-from rislam_rt.scene.findings import Fault, Faults, Finding, panel_key, raise_errors
+from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
 from rislam_rt.scene.mesh_files import MeshFiles
 from rislam_rt.scene.motion import build_motion
 from rislam_rt.scene.schema import (
     MAX_SCENE_BYTES,
     MaterialSection,
-    ReflectorSection,
     RisSection,
     ScattererSection,
     SceneSpec,
@@ -95,10 +94,8 @@ def read_draft(path: str | Path) -> SceneDraft:
     file = scene_file(path)
     try:
         spec, content = read_spec(file)
-    except Faults as faults:
-        return SceneDraft(str(file), None, [fault.at(str(file), "") for fault in faults.faults])
     except Fault as fault:
-        return SceneDraft(str(file), None, [fault.at(str(file), "")])
+        return SceneDraft(str(file), None, [one.at(str(file), "") for one in fault.faults])
     return assemble(spec, file, content)
 
 
@@ -110,27 +107,29 @@ def scene_file(path: str | Path) -> Path:
 
 def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     """Read what a specification names and put the scene together."""
-    shelf, findings = MeshFiles(file.parent, spec.limits, spec.meshes), []
-    reflectors = []
-    for number, section in enumerate(spec.reflector):
-        try:
-            reflectors.append(_reflector(section, shelf))
-        except Fault as fault:
-            findings.append(fault.at(str(file), f"reflector[{number}].mesh ({section.name})"))
-    scatterers = []
-    for number, scatterer in enumerate(spec.scatterer):
-        try:
-            scatterers.append(_scatterer(scatterer, shelf))
-        except Fault as fault:
-            findings.append(fault.at(str(file), f"scatterer[{number}].mesh ({scatterer.name})"))
-    occluders = []
-    for number, shade in enumerate(spec.shade):
-        try:
-            mesh = shelf.mesh(shade.mesh, shade)
-            occluders.append(Occluder(mesh.vertices, mesh.faces, shade.name))
-        except Fault as fault:
-            findings.append(fault.at(str(file), f"shade[{number}].mesh ({shade.name})"))
-    panels = _panels(spec.ris, str(file), findings)
+    shelf = MeshFiles(file.parent, spec.limits, spec.meshes)
+    findings: list[Finding] = []
+
+    def made(kind: str, sections: Sequence[Any], build: Callable[[Any], Any]) -> list[Any]:
+        """The parts that can be made; what is wrong with the others goes to the findings."""
+        found = []
+        for number, section in enumerate(sections):
+            try:
+                found.append(build(section))
+            except Fault as fault:
+                of_mesh = f"{kind}[{number}].mesh ({section.name})"
+                field = f"{panel_key(number, len(sections))}.up" if kind == "ris" else of_mesh
+                findings.append(fault.at(str(file), field))
+        return found
+
+    reflectors = made(
+        "reflector",
+        spec.reflector,
+        lambda one: Reflector(one.name, *shelf.mesh(one.mesh, one), _material(one.material)),
+    )
+    scatterers = made("scatterer", spec.scatterer, lambda one: _scatterer(one, shelf))
+    occluders = made("shade", spec.shade, lambda one: Occluder(*shelf.mesh(one.mesh, one), one.name))
+    panels = made("ris", spec.ris, build_panel)
     try:
         if not (findings and spec.agent.random_walk):  # which needs the whole room
             surfaces = _surfaces(reflectors, [*occluders, *(s.shade for s in scatterers if s.shade)])
@@ -141,7 +140,7 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     bounds = np.stack([corners.min(axis=0), corners.max(axis=0)]) if len(corners) else None
     if findings:
         return SceneDraft(str(file), None, findings, bounds)
-    ris = join_panels(panels)
+    ris = join_panels(tuple(panels))
     digest = _digest(content, shelf.contents)
     scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(occluders))
     return SceneDraft(str(file), scene, [], bounds)
@@ -150,11 +149,6 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
 def _surfaces(reflectors: Sequence[Reflector], occluders: Sequence[Occluder]) -> Floats:
     """(T, 3, 3) [m] of all loaded surfaces that stand in an agent's way."""
     return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in occluders)])
-
-
-def _reflector(section: ReflectorSection, shelf: MeshFiles) -> Reflector:
-    mesh = shelf.mesh(section.mesh, section)
-    return Reflector(section.name, mesh.vertices, mesh.faces, _material(section.material))
 
 
 def _material(section: MaterialSection) -> Material:
@@ -188,19 +182,8 @@ def _scatterer(section: ScattererSection, shelf: MeshFiles) -> Scatterer:
         mesh = shelf.mesh(section.mesh, section)
     elif section.shadow:
         mesh = solid_mesh(position, radius or 0.0, height, axis)
-    shade = None if mesh is None else Occluder(mesh.vertices, mesh.faces)
+    shade = None if mesh is None else Occluder(*mesh)
     return Scatterer(section.name, position, rcs, radius, law, height, axis, shade)
-
-
-def _panels(sections: list[RisSection], file: str, findings: list[Finding]) -> tuple[RisPanel, ...]:
-    """Load the panels that can be made; what is wrong with the others goes to the findings."""
-    panels = []
-    for number, section in enumerate(sections):
-        try:
-            panels.append(build_panel(section))
-        except Fault as fault:
-            findings.append(fault.at(file, f"{panel_key(number, len(sections))}.up"))
-    return tuple(panels)
 
 
 def build_panel(section: RisSection) -> RisPanel:
@@ -219,15 +202,9 @@ def build_panel(section: RisSection) -> RisPanel:
         raise Fault(f"{angle:.3f} degrees from ris.normal", "give a direction at right angles to it")
     up = unit(up - (normal @ up) * normal)
     spec = RisSpec(
-        section.rows,
-        section.cols,
-        np.array(section.spacing_m),
-        normal,
-        up,
-        section.levels,
-        section.element,
+        section.rows, section.cols, np.array(section.spacing_m), normal, up, section.levels, section.element,
         section.amplitude,
-    )
+    )  # fmt: skip
     return RisPanel(spec, np.array(section.center), section.host, section.name)
 
 

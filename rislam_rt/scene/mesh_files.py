@@ -5,15 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from rislam_rt.scene.mesh_containers import too_many_faces
-from rislam_rt.scene.mesh_placement import UNITS, place_mesh
+from rislam_rt.scene.mesh_placement import UNITS, place_points
 from rislam_rt.scene.meshes import MAX_COORDINATE, MAX_MESH_BYTES, Mesh, MeshReader, read_inside
-from rislam_rt.scene.schema import (
-    LimitsSection,
-    MeshesSection,
-    OccluderSection,
-    ReflectorSection,
-    ScattererSection,
-)
+from rislam_rt.scene.schema import LimitsSection, MeshesSection, MeshSection
 
 
 class MeshFiles:
@@ -25,7 +19,7 @@ class MeshFiles:
         self.reader = MeshReader()
         self.faces = 0
 
-    def mesh(self, place: str, section: ReflectorSection | ScattererSection | OccluderSection) -> Mesh:
+    def mesh(self, place: str, section: MeshSection) -> Mesh:
         """The mesh `file` or `file#node`, placed as its section says, or else all meshes of the scene."""
         name, _, node = place.partition("#")
         if name not in self.contents:
@@ -38,4 +32,4 @@ class MeshFiles:
         if self.faces > most:
             raise too_many_faces(self.faces, most)
         origin = self.lying.origin if section.origin is None else section.origin
-        return place_mesh(mesh, up, unit, np.array(origin))
+        return Mesh(place_points(mesh.vertices, up, unit, np.array(origin)), mesh.faces)

@@ -40,6 +40,17 @@ class Mesh(NamedTuple):
     faces: Integers
     """(F, 3)."""
 
+    @property
+    def triangles(self) -> Floats:
+        """(F, 3, 3) [m] corners of the mesh's faces."""
+        return self.vertices[self.faces]
+
+
+def as_mesh(triangles: Floats) -> Mesh:
+    """Triangles (T, 3, 3) as a mesh with shared corners."""
+    vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    return Mesh(vertices, index.reshape(-1, 3).astype(np.int64))
+
 
 def read_inside(folder: Path, name: str, limit: int) -> bytes:
     """Content of a file that a scene names, which must lie inside the scene's folder, links followed.
@@ -69,17 +80,6 @@ def read_inside(folder: Path, name: str, limit: int) -> bytes:
     return content
 
 
-def parse_mesh(content: bytes, name: str, node: str | None = None) -> Mesh:
-    """Triangles of a mesh file's content; `node` picks one named node of a GLB file.
-
-    Raises
-    ------
-    Fault
-        The content is not a mesh of that format, or it is damaged, empty or too large.
-    """
-    return MeshReader().parse(content, name, node)
-
-
 class MeshReader:
     """Reads meshes, and keeps the last file unfolded: a scene picks many nodes of one GLB file, one after the other."""
 
@@ -96,8 +96,15 @@ class MeshReader:
         max_nodes: int = MAX_NODES,
         reach: float = MAX_COORDINATE,
     ) -> Mesh:
-        """See `parse_mesh`. What is too large is refused before it is unfolded: a GLB file may name one mesh in
-        thousands of nodes. `reach` is the largest coordinate in the file's unit.
+        """Triangles of a mesh file's content; `node` picks one named node of a GLB file.
+
+        What is too large is refused before it is unfolded: a GLB file may name one mesh in thousands of nodes. `reach`
+        is the largest coordinate in the file's unit.
+
+        Raises
+        ------
+        Fault
+            The content is not a mesh of that format, or it is damaged, empty or too large.
         """
         suffix = PurePosixPath(name).suffix.lower()
         if suffix not in FORMATS:
@@ -203,14 +210,22 @@ def _flatten(loaded: Any, node: str | None) -> Mesh:
         nodes = [n for n in nodes if n in below]
     vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
     for name in nodes:
-        matrix, geometry = graph[name]
-        mesh = loaded.geometry[geometry]
-        if getattr(mesh, "faces", None) is None or not len(mesh.faces):
-            continue
-        vertices.append(np.asarray(mesh.vertices, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3])
-        faces.append(np.asarray(mesh.faces, dtype=np.int64) + count)
-        count += len(vertices[-1])
+        mesh, _ = node_mesh(loaded, name)
+        vertices.append(mesh.vertices)
+        faces.append(mesh.faces + count)
+        count += len(mesh.vertices)
     return Mesh(np.concatenate(vertices), np.concatenate(faces))
+
+
+def node_mesh(loaded: Any, node: str) -> tuple[Mesh, Any]:
+    """The mesh of a node of trimesh's scene, its transform applied (no faces of points or lines), and its geometry."""
+    matrix, name = loaded.graph[node]
+    geometry = loaded.geometry[name]
+    faces = getattr(geometry, "faces", None)
+    if faces is None or not len(faces):
+        return Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)), geometry
+    vertices = np.asarray(geometry.vertices, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    return Mesh(vertices, np.asarray(faces, dtype=np.int64)), geometry
 
 
 def sound_mesh(mesh: Mesh, max_faces: int, reach: float) -> Mesh:

@@ -76,8 +76,9 @@ def parse_csv(content: bytes, named: Mapping[str, str]) -> RecordedPoses:
     lines = list(csv.reader(io.StringIO(content.decode("utf-8-sig", errors="replace"))))
     header = [name.strip() for name in lines[0]] if lines else []
     place = {what: at for what in COLUMNS if (at := _column(what, header, named)) is not None}
+    wanted = f"give a number in each column that is read, of {_few(header)}"
     rows = [
-        _numbers([line[at] if at < len(line) else "" for at, _ in place.values()], len(place), number, _wanted(header))
+        _numbers([line[at] if at < len(line) else "" for at, _ in place.values()], len(place), number, wanted)
         for number, line in enumerate(lines[1:], start=2)
         if any(word.strip() for word in line)
     ]
@@ -108,10 +109,6 @@ def _column(what: str, header: Sequence[str], named: Mapping[str, str]) -> tuple
 
 def _unit(what: str, name: str) -> float:
     return UNITS.get(what, {}).get(name.lower().rpartition("_")[2], 1.0)
-
-
-def _wanted(header: Sequence[str]) -> str:
-    return f"give a number in each column that is read, of {_few(header)}"
 
 
 def _few(header: Sequence[str]) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import Mesh, ply_bytes
+from rislam_rt.scene.write import mesh_file
 from rislam_rt.toml import toml_bytes
 
 PAPER_MATERIAL = {"reflection": 0.85}
@@ -28,28 +29,19 @@ class RoomFiles:
 
 def reflector(name: str, material: dict[str, Any] | None = None) -> dict[str, Any]:
     """Table in a room's file of a reflector with a PLY mesh of its own."""
-    return {"name": name, "mesh": f"meshes/{name}.ply", "material": material or PAPER_MATERIAL}
+    return {"name": name, "mesh": mesh_file(name), "material": material or PAPER_MATERIAL}
 
 
 def panel(
     center: list[float], normal: list[float], up: list[float], host: str = "ceiling", size: int = 6
 ) -> dict[str, Any]:
     """Table in a room's file of a panel like the paper's, anywhere."""
-    return {
-        "center": center,
-        "normal": normal,
-        "up": up,
-        "rows": size,
-        "cols": size,
-        "spacing_m": [0.015, 0.015],
-        "levels": 4,
-        "element": "tang",
-        "host": host,
-    }
+    lie = {"center": center, "normal": normal, "up": up, "rows": size, "cols": size, "spacing_m": [0.015, 0.015]}
+    return lie | {"levels": 4, "element": "tang", "host": host}
 
 
 def room_files(room: RoomFiles, origin: str) -> dict[str, bytes]:
     """The files of a scene folder: relative name -> content. `origin` says where the room comes from."""
-    files = {f"meshes/{name}.ply": ply_bytes(mesh.vertices, mesh.faces) for name, mesh in room.meshes.items()}
+    files = {mesh_file(name): ply_bytes(*mesh) for name, mesh in room.meshes.items()}
     readme = f"# {room.table['name']}\n\n{fill(room.readme, 110)}\n\n{origin}\n"
     return files | room.files | {SCENE_FILE: toml_bytes(room.table), "README.md": readme.encode()}

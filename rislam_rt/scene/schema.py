@@ -76,29 +76,29 @@ class MaterialSection(SceneSection):
         return self
 
 
-class ReflectorSection(SceneSection):
-    """A smooth mesh. `mesh = "room.glb#node"` takes one named node of a GLB file, with its transform applied.
-
-    `up_axis = "y"` turns a file whose y axis points up (as glTF's standard says) into the room's frame with z up,
-    `units` and `origin` are those of `[meshes]`, for this mesh alone.
+class MeshSection(SceneSection):
+    """How one mesh file lies. `up_axis = "y"` turns a file whose y axis points up (as glTF's standard says) into the
+    room's frame with z up, `units` and `origin` are those of `[meshes]`, for this mesh alone.
     """
+
+    up_axis: Literal["y", "z"] | None = None
+    units: Units | None = None
+    origin: Vector | None = None
+
+
+class ReflectorSection(MeshSection):
+    """A smooth mesh. `mesh = "room.glb#node"` takes one named node of a GLB file, with its transform applied."""
 
     name: Name
     mesh: str
     material: MaterialSection
-    up_axis: Literal["y", "z"] | None = None
-    units: Units | None = None
-    origin: Vector | None = None
 
 
-class OccluderSection(SceneSection):
+class OccluderSection(MeshSection):
     """A mesh that hides what lies behind it and reflects nothing: clutter too small or too round to be a mirror."""
 
     name: Name
     mesh: str
-    up_axis: Literal["y", "z"] | None = None
-    units: Units | None = None
-    origin: Vector | None = None
 
 
 class MeshesSection(SceneSection):
@@ -112,7 +112,7 @@ class MeshesSection(SceneSection):
     """[m] The point, z up, that becomes the room's zero."""
 
 
-class ScattererSection(SceneSection):
+class ScattererSection(MeshSection):
     """A small object: a sphere by its `radius` (cross-section pi r^2, or by `mie` the exact series), a cylinder by
     `radius` and `height_m`, or a point by its `rcs_m2`.
 
@@ -129,9 +129,6 @@ class ScattererSection(SceneSection):
     axis: Vector | None = None
     shadow: bool = False
     mesh: str | None = None
-    up_axis: Literal["y", "z"] | None = None
-    units: Units | None = None
-    origin: Vector | None = None
 
     @model_validator(mode="after")
     def _one_size(self) -> "ScattererSection":

@@ -2,9 +2,11 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
-from rislam_rt.scene.meshes import Mesh
+from rislam_rt.geometry.planes import plane_tangents
+from rislam_rt.geometry.triangles import triangle_areas
+from rislam_rt.scene.meshes import Mesh, as_mesh
 
 CYLINDER_SIDES = 32
 
@@ -23,18 +25,17 @@ def sphere_mesh(center: Floats, radius: float) -> Mesh:
     triangles = _icosahedron()
     for _ in range(2):
         triangles = unit(_quartered(triangles))
-    sides = triangles[:, 1:] - triangles[:, :1]
-    surface = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=-1).sum()
-    return _indexed(center + radius * np.sqrt(4.0 * np.pi / surface) * triangles)
+    surface = triangle_areas(triangles).sum()
+    return as_mesh(center + radius * np.sqrt(4.0 * np.pi / surface) * triangles)
 
 
 def cylinder_mesh(center: Floats, radius: float, height: float, axis: Floats) -> Mesh:
     """A prism with closed ends about a unit vector `axis`; its girth is the true cylinder's, as Cauchy asks."""
-    across = unit(np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
+    across, aside = plane_tangents(axis)
     # turned by a fraction of a side, so that no edge lies along the room's axes
     angle = 2.0 * np.pi * (np.arange(CYLINDER_SIDES) + 0.37) / CYLINDER_SIDES
     corner = radius * (np.pi / CYLINDER_SIDES) / np.sin(np.pi / CYLINDER_SIDES)
-    ring = corner * (np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * np.cross(axis, across))
+    ring = corner * (np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * aside)
     half = 0.5 * height * axis
     vertices = np.concatenate([ring - half, ring + half, [-half, half]]) + center
     low, high = np.arange(CYLINDER_SIDES), np.arange(CYLINDER_SIDES) + CYLINDER_SIDES
@@ -64,10 +65,3 @@ def _quartered(triangles: Floats) -> Floats:
     a, b, c = triangles.swapaxes(0, 1)
     ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
     return np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
-
-
-def _indexed(triangles: Floats) -> Mesh:
-    """A solid's triangles with shared corners."""
-    vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    faces: Integers = index.reshape(-1, 3)
-    return Mesh(vertices, faces)

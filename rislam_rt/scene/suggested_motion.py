@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
-from rislam_rt.geometry.triangles import distance_to_triangles
+from rislam_rt.geometry.triangles import distance_to_triangles, triangle_cross
 from rislam_rt.scene.check.mesh_queries import ray_hits, sphere_directions
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.room_files import BASELINE
@@ -57,7 +57,7 @@ def free_ways(place: Floats, directions: Floats, triangles: Floats, box: Floats)
         out = (np.where(directions > 0.0, box[1], box[0]) - place) / directions
     leaves = np.where(directions == 0.0, np.inf, out).min(axis=1)
     hit = ray_hits(place, directions, triangles)
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])[hit]
+    normal = triangle_cross(triangles)[hit]
     slope = np.einsum("di,di->d", directions, normal)
     height = np.einsum("di,di->d", triangles[hit, 0] - place, normal)
     return np.where(hit < 0, leaves, np.minimum(leaves, height / np.where(slope != 0.0, slope, 1.0)))

@@ -39,7 +39,7 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
     files = {mesh_file(r.name): ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
     for scatterer in scene.scatterers:
         if scatterer.shade is not None and not _has_own_shadow(scatterer):
-            files[_occluder_file(scatterer)] = ply_bytes(scatterer.shade.vertices, scatterer.shade.faces)
+            files[mesh_file(scatterer.name)] = ply_bytes(scatterer.shade.vertices, scatterer.shade.faces)
     for shade in scene.occluders:
         files[mesh_file(shade.name)] = ply_bytes(shade.vertices, shade.faces)
     agent = _agent_table(scene.agent)
@@ -62,7 +62,7 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
     """
     folder = Path(folder)
     try:
-        there = folder.exists() or folder.resolve().exists()  # `x/..` is there though `x` is not
+        there = folder.exists() or os.path.exists(os.path.realpath(folder))  # `x/..` is there though `x` is not
     except OSError as error:
         raise SceneError(f"{str(folder)[:80]}: cannot be used ({error.strerror}); give another folder") from None
     if there and not overwrite:
@@ -144,7 +144,7 @@ def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
     ):
         table["rcs_m2"] = scatterer.rcs
     if scatterer.shade is not None:
-        table |= {"shadow": True} if _has_own_shadow(scatterer) else {"mesh": _occluder_file(scatterer)}
+        table |= {"shadow": True} if _has_own_shadow(scatterer) else {"mesh": mesh_file(scatterer.name)}
     return table
 
 
@@ -157,25 +157,22 @@ def _has_own_shadow(scatterer: Scatterer) -> bool:
     return np.array_equal(mesh.vertices, shade.vertices) and np.array_equal(mesh.faces, shade.faces)
 
 
-def _occluder_file(scatterer: Scatterer) -> str:
-    return mesh_file(scatterer.name)
-
-
 def mesh_file(name: str) -> str:
     """Where the mesh of a part lies in a scene folder."""
     return f"meshes/{safe_name(name)}.ply"
 
 
 def _material_table(material: Material) -> dict[str, Any]:
-    rough = {"scattering": material.scattering} if material.scattering > 0.0 else {}
+    thick = {"thickness_m": material.thickness}
     if material.reflection is not None:
-        return {"reflection": material.reflection} | rough
-    if material.itu is not None:
-        return {"itu": material.itu, "thickness_m": material.thickness} | rough
-    if material.reflection_te is not None:
-        return {"reflection_te": material.reflection_te, "reflection_tm": material.reflection_tm} | rough
-    own = {"permittivity": material.permittivity, "conductivity_s_m": material.conductivity}
-    return own | {"thickness_m": material.thickness} | rough
+        own: dict[str, Any] = {"reflection": material.reflection}
+    elif material.itu is not None:
+        own = {"itu": material.itu} | thick
+    elif material.reflection_te is not None:
+        own = {"reflection_te": material.reflection_te, "reflection_tm": material.reflection_tm}
+    else:
+        own = {"permittivity": material.permittivity, "conductivity_s_m": material.conductivity} | thick
+    return own | ({"scattering": material.scattering} if material.scattering > 0.0 else {})
 
 
 def _agent_table(agent: Trajectory) -> dict[str, Any]:

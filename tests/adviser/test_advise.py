@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rislam_rt.adviser.advice import advise
-from rislam_rt.adviser.budget import LandmarkLink, Survey, link_budget, survey, trajectory_at
-from rislam_rt.adviser.codes import aimed_codes, paths_under_codes
+from rislam_rt.adviser.budget import LandmarkLink, Survey, link_budget, survey
+from rislam_rt.adviser.codes import aimed_paths, paths_under_codes
 from rislam_rt.adviser.cost import COUNTED, cost_words, trace_cost
 from rislam_rt.adviser.coverage import panel_coverage
 from rislam_rt.adviser.detection import forecast_detection
@@ -48,9 +48,7 @@ def test_the_chance_of_being_heard_is_the_share_of_the_receivers_own_draws(paper
     looked = survey(paper, settings("receiver.estimator=bound", "radio.reference_snr_db=0", *changed), places=3)
     rng, draws = np.random.default_rng(5), 200
     assert paper.ris is not None
-    paths = paths_under_codes(
-        looked.paths, paper.ris.spec, aimed_codes(looked.paths, paper.ris.spec, looked.settings.radio)
-    )
+    paths = aimed_paths(looked.paths, paper.ris.spec, looked.settings.radio)
     for place in range(3):
         heading = float(looked.scene.agent.heading[place])
         said, count = forecast_detection(paths, place, heading, looked.settings).probability, np.zeros(2)
@@ -66,11 +64,7 @@ def test_no_random_code_beats_the_aimed_one(paper: Scene) -> None:
     assert paper.ris is not None
     looked = survey(paper, settings(), places=4)
     panel = looked.paths.kind >= PathKind.RIS
-    best = np.abs(
-        paths_under_codes(
-            looked.paths, paper.ris.spec, aimed_codes(looked.paths, paper.ris.spec, looked.settings.radio)
-        ).gain[:, panel]
-    )
+    best = np.abs(aimed_paths(looked.paths, paper.ris.spec, looked.settings.radio).gain[:, panel])
     rng = np.random.default_rng(2)
     for _ in range(20):
         other = rng.integers(paper.ris.spec.levels, size=(looked.paths.num_cycles, 6, 6))
@@ -164,13 +158,11 @@ def test_the_map_agrees_with_the_budget(paper: Scene, office: Scene) -> None:
     assert isinstance(office.ris, RisPanel)
     step = coverage.x[1] - coverage.x[0]
     assert np.hypot(coverage.x[x] - office.ris.center[0], coverage.y[y] - office.ris.center[1]) < 2.0 * step
-    here = replace(office, agent=trajectory_at(office.agent, np.array([0])))
+    here = replace(office, agent=office.agent[:1])
     point = np.array([[coverage.x[x], coverage.y[y], coverage.height]])
     still = replace(here, agent=replace(here.agent, position=point, heading=np.zeros(1)))
     paths = ImageSourceChannel(still, said.radio, 0).paths(still.agent)
-    snr = said.radio.integrated_snr(
-        paths_under_codes(paths, office.ris.spec, aimed_codes(paths, office.ris.spec, said.radio)).gain
-    )
+    snr = said.radio.integrated_snr(aimed_paths(paths, office.ris.spec, said.radio).gain)
     direct = float(snr[0, paths.kind == PathKind.RIS][0])
     assert coverage.margin_db[y, x] == pytest.approx(10.0 * np.log10(direct / said.sensor.threshold), abs=1e-9)
     assert panel_coverage(replace(paper, ris=None), said) == []
@@ -196,7 +188,7 @@ def test_two_panels_are_judged_as_each_alone(paper: Scene) -> None:
 
 def test_the_cost_counts_what_there_is(paper: Scene) -> None:
     costs = trace_cost(paper, settings().radio, 6)
-    middle = trajectory_at(paper.agent, np.array([len(paper.agent) // 2]))
+    middle = paper.agent[len(paper.agent) // 2 :][:1]
     for cost in costs:
         paths = ImageSourceChannel(paper, settings().radio, cost.depth).paths(middle)
         assert cost.paths == paths.valid.sum()

@@ -16,23 +16,6 @@ PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
 SHORT = ("--set", "channel=image_source", "--set", "cycles=6")
 
 
-@pytest.fixture
-def edited(tmp_path_factory):
-    """A copy of the paper's room with one text replaced in its scene file."""
-    import shutil
-
-    def _edited(old, new):
-        folder = tmp_path_factory.mktemp("scene") / "room"
-        shutil.copytree(SCENE, folder)
-        file = folder / "scene.toml"
-        text = file.read_text()
-        assert old in text
-        file.write_text(text.replace(old, new))
-        return folder
-
-    return _edited
-
-
 def test_new_room_from_corners(run):
     code, out, _ = run("new", "mine", "--floorplan", "0,0 4,0 4,3 0,3", "--height", "2.5", "--rest", "itu:brick")
     assert code == 0
@@ -87,28 +70,6 @@ def test_bad_input_is_one_line_and_exit_2(run, arguments, tmp_path):
     assert ".;" not in err
     assert "Traceback" not in err
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "field"),
-    [
-        ("meshes/floor.ply", "meshes/none.ply", "mesh"),
-        ("radius =", "radios =", "radios"),
-        ("radius = 0.05", "radius = -0.05", "radius"),
-        ("center = [3.0, 3.0, 3.0]", "center = [3.0, 3.0, 9.0]", "ris.center"),
-        ("start = [0.5, 0.7, 0.5]", "start = [-2.0, 0.7, 0.5]", "agent.start"),
-    ],
-)
-def test_bad_scene_is_one_line_with_file_and_field(run, edited, tmp_path, old, new, field):
-    folder = edited(old, new)
-    code, out, err = run("run", PIPELINE, "--scene", folder)
-    assert code == 2
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert str(folder / "scene.toml") in err
-    assert field in err
-    assert list(tmp_path.iterdir()) == []
-    assert run("check", folder)[0] == 2
 
 
 def test_unwritable_file_is_exit_4(run):
@@ -336,35 +297,6 @@ def test_a_material_not_specified_at_the_carrier_names_the_file(run, tmp_path):
             assert "not specified at the carrier of 0.6 GHz" in line
         assert len(err.splitlines()) == 4
     assert list(tmp_path.iterdir()) == []
-
-
-def test_warnings_on_elements_follow_the_carrier(run, monkeypatch):
-    """15 mm are half a wavelength at 10 GHz, where `tang` reflects too much, and a whole one at 20 GHz."""
-    import rislam_rt.pipeline
-    from rislam_rt.errors import TraceError
-
-    def stop(*_, **__):
-        raise TraceError("far enough")
-
-    monkeypatch.setattr(rislam_rt.pipeline, "run_slam", stop)
-    for ghz, wanted, not_wanted in ((10, "ris.element", "ris.spacing_m"), (20, "ris.spacing_m", "ris.element")):
-        code, _, err = run("run", PIPELINE, *SHORT, "--set", f"radio.carrier_ghz={ghz}")
-        assert code == 1
-        assert "far enough" in err
-        assert wanted in err
-        assert not_wanted not in err
-
-
-def test_new_check_and_show(run, tmp_path):
-    assert run("new", "mine", "--template", "empty_box")[0] == 0
-    code, out, _ = run("check", "mine", "--json", "check.json")
-    assert code == 0
-    assert json.loads((tmp_path / "check.json").read_text())["errors"] == 0
-    assert "0 errors" in out
-    code, out, _ = run("show", "mine", "--out", "mine.svg")
-    assert code == 0
-    assert "floor" in out
-    assert b"<svg" in (tmp_path / "mine.svg").read_bytes()
 
 
 def test_doctor_proves_the_tracer(run, tmp_path):

@@ -1,29 +1,13 @@
 """`rislam-rt check` as an adviser: what it says, writes and refuses."""
 
 import json
-import sys
-from pathlib import Path
 
 import pytest
 
-from rislam_rt.cli import main
-
-ROOT = Path(__file__).parents[2]
-
 
 @pytest.fixture
-def check(capsys, monkeypatch, tmp_path):
-    """Run the command in an empty folder; returns exit code, output and error stream."""
-    monkeypatch.chdir(tmp_path)
-
-    def _check(*arguments):
-        monkeypatch.setattr(sys, "argv", ["rislam-rt", "check", *map(str, arguments)])
-        with pytest.raises(SystemExit) as left:
-            main()
-        captured = capsys.readouterr()
-        return left.value.code, captured.out, captured.err
-
-    return _check
+def check(run):
+    return lambda *arguments: run("check", *arguments)
 
 
 def test_a_panel_that_cannot_be_heard_is_said_so_with_the_mend(check, tmp_path):

@@ -56,11 +56,13 @@ def test_several_faults_of_a_scene_are_several_lines(run, tmp_path):
     file = tmp_path / "room" / "scene.toml"
     text = file.read_text()
     file.write_text(text.replace("radius = 0.05", "radius = -0.05").replace("rows = 6", "rows = 0"))
-    code, _, err = run("trace", "room")
-    assert code == 2
-    assert len(err.splitlines()) == 2
-    assert "radius" in err
-    assert "rows" in err
+    for words in (("trace", "room"), ("run", "--scene", "room")):
+        code, out, err = run(*words)
+        assert (code, out) == (2, "")
+        fields = [line.partition("scene.toml: ")[2].partition(":")[0] for line in err.splitlines()]
+        assert fields == ["scatterer[0].radius", "ris.rows"]
+        assert [path.name for path in tmp_path.iterdir()] == ["room"]
+    assert run("check", "room")[0] == 2
 
 
 def test_quiet_and_verbose(run):

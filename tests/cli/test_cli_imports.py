@@ -8,45 +8,32 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 SCENE = ROOT / "scenes" / "paper_room"
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
-HEAVY = ("numpy", "scipy", "sionna", "mitsuba", "drjit", "matplotlib", "xarray", "trimesh")
 
 
-def test_help_and_version_import_nothing_heavy():
+def loaded(names, *commands):
+    """Which of some modules are loaded after some commands, in an interpreter of their own."""
     code = (
         "import sys\n"
         "from rislam_rt.cli import main\n"
-        "for words in (['--help'], ['run', '--help'], ['--version']):\n"
+        f"for words in {commands}:\n"
         "    sys.argv = ['rislam-rt', *words]\n"
         "    try:\n        main()\n"
         "    except SystemExit as left:\n        assert left.code == 0, left.code\n"
-        f"print([name for name in {HEAVY} if name in sys.modules])\n"
+        f"print([name for name in {names} if name in sys.modules])\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "[]"
+    return done.stdout.splitlines()[-1]
+
+
+def test_help_and_version_import_nothing_heavy():
+    heavy = ("numpy", "scipy", "sionna", "mitsuba", "drjit", "matplotlib", "xarray", "trimesh")
+    assert loaded(heavy, ["--help"], ["run", "--help"], ["--version"]) == "[]"
 
 
 def test_settings_are_printed_without_what_only_a_run_needs():
     """Half a second of scipy, trimesh and plots for a list of settings; on modules, as clocks lie."""
-    heavy = [
-        "scipy.linalg",
-        "scipy.special",
-        "scipy.optimize",
-        "scipy.spatial",
-        "scipy.stats",
-        "trimesh",
-        "xarray",
-        "matplotlib",
-    ]
-    code = (
-        "import sys\n"
-        "from rislam_rt.cli import main\n"
-        "sys.argv = ['rislam-rt', 'config']\n"
-        "try:\n    main()\n"
-        "except SystemExit as left:\n    assert left.code in (0, None), left.code\n"
-        f"print([name for name in {heavy} if name in sys.modules])\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "[]"
+    parts = ("linalg", "special", "optimize", "spatial", "stats")
+    assert loaded([*(f"scipy.{part}" for part in parts), "trimesh", "xarray", "matplotlib"], ["config"]) == "[]"
 
 
 def test_missing_library_is_one_line_and_exit_3(tmp_path):

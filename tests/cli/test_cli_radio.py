@@ -1,24 +1,18 @@
 """`--set radio.*` of the commands that know no more of a pipeline than its radio."""
 
 import json
-import sys
 
 import pytest
 
-from rislam_rt.cli import main
-
 
 @pytest.fixture
-def answer(capsys, monkeypatch, tmp_path):
-    """Run a command in an empty folder; returns exit code, error stream and what `--json` wrote."""
-    monkeypatch.chdir(tmp_path)
+def answer(run, tmp_path):
+    """Run a command; returns exit code, error stream and what `--json` wrote."""
 
     def _answer(*arguments):
-        monkeypatch.setattr(sys, "argv", ["rislam-rt", *map(str, arguments), "--json", "found.json"])
-        with pytest.raises(SystemExit) as left:
-            main()
+        code, _, said = run(*arguments, "--json", "found.json")
         file = tmp_path / "found.json"
-        return left.value.code, capsys.readouterr().err, json.loads(file.read_text()) if file.exists() else None
+        return code, said, json.loads(file.read_text()) if file.exists() else None
 
     return _answer
 

@@ -1,42 +1,29 @@
 """`rislam-rt sweep`: exit codes, what it writes, one line for every failure."""
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
 
-from rislam_rt.cli import main
-
 ROOT = Path(__file__).parents[2]
-PIPELINE = str(ROOT / "pipelines" / "trace_then_slam.toml")
+PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
 TINY = ("--set", "channel=image_source", "--set", "cycles=3", "--set", "slam.num_samples=20",
         "--set", 'schemes=["random"]')  # fmt: skip
 
 
 @pytest.fixture
-def run(capsys, monkeypatch, tmp_path):
-    """Sweep in an empty folder; returns exit code, output and error stream."""
-    monkeypatch.chdir(tmp_path)
-
-    def _run(*arguments, command="sweep"):
-        monkeypatch.setattr(sys, "argv", ["rislam-rt", command, *arguments])
-        with pytest.raises(SystemExit) as left:
-            main()
-        captured = capsys.readouterr()
-        return left.value.code, captured.out, captured.err
-
-    return _run
+def sweep(run):
+    return lambda *arguments: run("sweep", *arguments)
 
 
-def test_estimate_then_sweep_then_nothing_left(run, tmp_path):
+def test_estimate_then_sweep_then_nothing_left(sweep, tmp_path):
     words = (PIPELINE, *TINY, "--axis", "slam.sigma_a=0.01,0.1", "--repeat", "1", "--jobs", "1")
-    code, out, err = run(*words, "--estimate")
+    code, out, err = sweep(*words, "--estimate")
     assert (code, out) == (0, "")
     assert "2 cells, 1 done; 1 left at about" in err
     folder = tmp_path / "sweeps" / "trace_then_slam-paper_room"
     assert len(list((folder / "cells").iterdir())) == 1
-    code, out, err = run(*words, "--json", "sweep.json")
+    code, out, err = sweep(*words, "--json", "sweep.json")
     assert code == 0
     assert "random" in out
     rows = json.loads((tmp_path / "sweep.json").read_text())["rows"]
@@ -44,14 +31,14 @@ def test_estimate_then_sweep_then_nothing_left(run, tmp_path):
     assert {path.name for path in folder.iterdir()} == {
         "cells", "sweep.json", "table.csv", "table.json", "scores.csv", "scores.json", "scores.png", "timings.jsonl",
     }  # fmt: skip
-    code, _, err = run(*words)
+    code, _, err = sweep(*words)
     assert code == 0
     assert "nothing left to do" in err
 
 
-def test_a_failed_run_is_told_and_exit_1(run, tmp_path):
+def test_a_failed_run_is_told_and_exit_1(sweep, tmp_path):
     # no run can be done in a millisecond: the limit stops each of them
-    code, out, err = run(PIPELINE, *TINY, "--repeat", "2", "--time-limit", "0.001", "--jobs", "2", "--out", "mine")
+    code, out, err = sweep(PIPELINE, *TINY, "--repeat", "2", "--time-limit", "0.001", "--jobs", "2", "--out", "mine")
     assert code == 1
     assert err.count("hung: not done after 0.001 s") == 2
     assert "none" in out
@@ -73,55 +60,55 @@ def test_a_failed_run_is_told_and_exit_1(run, tmp_path):
         (PIPELINE, "--time-limit", "0"),
         (PIPELINE, "--time-limit", "nan"),
         (PIPELINE, "--scene", "nowhere"),
-        (str(ROOT / "pipelines" / "fig4a.toml"),),
+        (ROOT / "pipelines" / "fig4a.toml",),
     ],
 )
-def test_bad_input_is_one_line_and_leaves_nothing(run, tmp_path, words):
-    code, out, err = run(*words)
+def test_bad_input_is_one_line_and_leaves_nothing(sweep, tmp_path, words):
+    code, out, err = sweep(*words)
     assert (code, out) == (2, "")
     assert len(err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
 
 
-def test_no_scheduler_is_exit_3(run, tmp_path, monkeypatch):
+def test_no_scheduler_is_exit_3(sweep, tmp_path, monkeypatch):
     from rislam_rt.sweeps import cluster
 
     assert cluster.CONNECT_SECONDS <= 3  # the command as a whole is to end within 10 s
     monkeypatch.setattr(cluster, "CONNECT_SECONDS", 0.2)
     for address in ("tcp://127.0.0.1:9", "nonsense", "nonsense://here", "tcp://127.0.0.1:99999"):
-        code, _, err = run(PIPELINE, *TINY, "--dask", address)
+        code, _, err = sweep(PIPELINE, *TINY, "--dask", address)
         assert code == 3
         assert "no scheduler answers" in err
         assert list(tmp_path.iterdir()) == []
-    assert run(PIPELINE, *TINY, "--dask", " ")[0] == 2
+    assert sweep(PIPELINE, *TINY, "--dask", " ")[0] == 2
 
 
-def test_a_sweep_touches_nothing_of_the_user(run, tmp_path):
+def test_a_sweep_touches_nothing_of_the_user(run, sweep, tmp_path):
     mine = (".git-credentials", ".pre-commit-config.yaml", "cells/.a-b", "notes.txt")
     for name in mine:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(name)
     for place in (".", "cells", "notes.txt"):
-        code, _, err = run(PIPELINE, *TINY, "--repeat", "1", "--out", place)
+        code, _, err = sweep(PIPELINE, *TINY, "--repeat", "1", "--out", place)
         assert code == 2
         assert len(err.splitlines()) == 1
     study = 'kind = "rooms"\nname = "{}"\nscenes = ["{}"]\nrepetitions = 1\n'
     for name in ("..", ".", ".hidden", "a/b", "../a", ""):
         (tmp_path / "study.toml").write_text(study.format(name, ROOT / "scenes" / "paper_room"))
-        code, _, err = run("study.toml", command="run")
+        code, _, err = run("run", "study.toml")
         assert (code, len(err.splitlines())) == (2, 1)
     (tmp_path / "study.toml").unlink()
     assert {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*")} == {*mine, "cells"}
     assert all((tmp_path / name).read_text() == name for name in mine)
 
 
-def test_interrupt_is_one_line(run, monkeypatch):
+def test_interrupt_is_one_line(sweep, monkeypatch):
     import rislam_rt.sweeps as sweeps
 
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(sweeps, "run_sweep", interrupted)
-    code, _, err = run(PIPELINE, *TINY)
+    code, _, err = sweep(PIPELINE, *TINY)
     assert code == 130
     assert err.splitlines()[-1] == "interrupted: what is done is kept; the same command goes on from there"

@@ -8,7 +8,7 @@ import pytest
 
 from rislam_rt.errors import RislamError
 from rislam_rt.pipeline import load_spec
-from rislam_rt.scene import load_scene
+from rislam_rt.scene import check_scene, load_scene
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -24,7 +24,7 @@ def cases(name: str) -> list[object]:
     ]
 
 
-def refusal(read: object, says: str) -> None:
+def refusal(read: object, says: str) -> str:
     """What `read` raises is declared, of one line, and exit code 2."""
     with pytest.raises(RislamError) as caught:
         read()  # type: ignore[operator]
@@ -33,6 +33,14 @@ def refusal(read: object, says: str) -> None:
     assert line.isprintable()
     assert len(line) < 1000
     assert caught.value.exit_code == 2
+    return line
+
+
+def refused(room: Path, says: str) -> None:
+    """Loader and check answer a scene with the same line, which names the file."""
+    line = refusal(lambda: load_scene(room), says)
+    assert line.startswith(f"{room}/scene.toml: ")
+    assert line.startswith(next(finding.line for finding in check_scene(room) if finding.severity == "error"))
 
 
 @pytest.fixture
@@ -50,7 +58,7 @@ def test_scene(case: dict[str, str], room: Path) -> None:
         limits, _, rest = rest.partition("\n\n")
         changed = f"{head}\n{rest}\n[limits]{limits}\n"
     (room / "scene.toml").write_text(changed)
-    refusal(lambda: load_scene(room), case["says"])
+    refused(room, case["says"])
 
 
 @pytest.mark.parametrize("case", cases("meshes"))
@@ -66,7 +74,7 @@ def test_mesh_or_trajectory(case: dict[str, str], room: Path) -> None:
         text = text.replace("meshes/floor.ply", f"meshes/{case['file']}")
         (room / "meshes" / case["file"]).write_text(case["content"])
     scene.write_text(text)
-    refusal(lambda: load_scene(room), case["says"])
+    refused(room, case["says"])
 
 
 @pytest.mark.parametrize("case", cases("pipelines"))

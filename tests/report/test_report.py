@@ -12,7 +12,7 @@ from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.report import draw_figures
-from rislam_rt.report.geometry import ellipse, outline_edges, plane_trace, section
+from rislam_rt.report.geometry import ellipse, plane_trace, section, wall_edges
 from rislam_rt.report.page import build_page
 from rislam_rt.report.room import path_points
 from rislam_rt.report.tables import summary_rows
@@ -30,7 +30,7 @@ def result():
 
 
 def test_outline_has_no_diagonals(result):
-    edges = outline_edges(build_walls(result.scene))
+    edges = wall_edges(build_walls(result.scene))
     along = np.abs(edges[:, 1] - edges[:, 0])
     assert len(edges) == 24  # six walls, four sides each
     assert (np.sum(along > 1e-9, axis=1) == 1).all()

@@ -10,7 +10,7 @@ from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.model import RisCode, RisSpec
 from rislam_rt.scene import load_scene, write_scene
 from rislam_rt.scene.file_names import safe_name
-from rislam_rt.scene.meshes import parse_mesh
+from rislam_rt.scene.meshes import MeshReader
 from rislam_rt.slam.inputs import check_step
 
 ROOM = Path(__file__).parents[2] / "scenes" / "paper_room"
@@ -41,7 +41,7 @@ def test_file_names_are_plain_and_tell_names_apart():
 
 @pytest.mark.parametrize("comment", ["# W\u00e4nde\n", "# \u00ff\u00fe\n"])
 def test_obj_comments_may_be_in_latin_1(comment):
-    assert len(parse_mesh((comment + SQUARE).encode("latin-1"), "a.obj").faces) == 2
+    assert len(MeshReader().parse((comment + SQUARE).encode("latin-1"), "a.obj").faces) == 2
 
 
 def test_ply_comments_reach_for_no_texture(capfd):
@@ -52,8 +52,10 @@ def test_ply_comments_reach_for_no_texture(capfd):
         b"property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
         b"0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
     )
-    np.testing.assert_array_equal(parse_mesh(told, "a.ply").vertices, parse_mesh(content, "a.ply").vertices)
-    assert len(parse_mesh(ascii_file, "a.ply").faces) == 1
+    np.testing.assert_array_equal(
+        MeshReader().parse(told, "a.ply").vertices, MeshReader().parse(content, "a.ply").vertices
+    )
+    assert len(MeshReader().parse(ascii_file, "a.ply").faces) == 1
     assert capfd.readouterr() == ("", "")
 
 

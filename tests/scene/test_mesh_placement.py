@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.meshes import parse_mesh, ply_bytes
+from rislam_rt.scene.meshes import MeshReader, ply_bytes
 
 
 def rewrite(room: Path, unit: float, origin: list[float], up: str) -> None:
     """All meshes of a room as if drawn in another frame."""
     for file in (room / "meshes").glob("*.ply"):
-        mesh = parse_mesh(file.read_bytes(), file.name)
+        mesh = MeshReader().parse(file.read_bytes(), file.name)
         x, y, z = (mesh.vertices + origin).T / unit
         file.write_bytes(ply_bytes(np.stack([x, z, -y] if up == "y" else [x, y, z], axis=-1), mesh.faces))
 

@@ -10,7 +10,8 @@ from built_in_rooms.paths import smooth_path
 from rislam_rt.errors import SceneError
 from rislam_rt.model import Body
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.meshes import parse_mesh, ply_bytes
+from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.meshes import MeshReader, ply_bytes
 from rislam_rt.scene.motion import straight_motion
 from rislam_rt.scene.recorded_poses import parse_tum
 from rislam_rt.scene.shapes import block
@@ -35,6 +36,8 @@ def test_tum_reads_what_it_wrote() -> None:
     again = parse_tum(tum_bytes(time, position, heading))
     for one, other in zip((time, position, heading), again, strict=True):
         assert np.allclose(one, other, rtol=0, atol=1e-8)  # nine digits
+    with pytest.raises(Fault, match="line 1 of the trajectory"):
+        parse_tum(b"\xff\xfe\x00")
 
 
 def test_smooth_path_has_the_arc_length_asked_for() -> None:
@@ -73,17 +76,17 @@ def test_own_ply_reader_agrees_with_trimesh() -> None:
     import trimesh
 
     mesh = block([0.0, 0.5, 1.0], [2.0, 1.5, 3.0])
-    ours = parse_mesh(ply_bytes(mesh.vertices, mesh.faces), "a.ply")
+    ours = MeshReader().parse(ply_bytes(mesh.vertices, mesh.faces), "a.ply")
     other = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     for content in (other.export(file_type="ply"), other.export(file_type="ply", encoding="ascii")):
-        theirs = parse_mesh(content, "a.ply")
+        theirs = MeshReader().parse(content, "a.ply")
         assert np.array_equal(ours.vertices, theirs.vertices)
         assert np.array_equal(ours.faces, theirs.faces)
     quads = b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
     quads += (
         b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n"
     )
-    assert len(parse_mesh(quads, "a.ply").faces) == 2
+    assert len(MeshReader().parse(quads, "a.ply").faces) == 2
 
 
 @pytest.mark.parametrize("suffix", ["ply", "stl", "obj", "glb"])
@@ -92,5 +95,5 @@ def test_every_format_gives_the_same_triangles(suffix: str) -> None:
 
     mesh = block([0.0, 0.5, 1.0], [2.0, 1.5, 3.0])
     content = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(file_type=suffix)
-    found = parse_mesh(content.encode() if isinstance(content, str) else content, f"a.{suffix}")
+    found = MeshReader().parse(content.encode() if isinstance(content, str) else content, f"a.{suffix}")
     assert np.array_equal(found.vertices[found.faces], mesh.vertices[mesh.faces])

@@ -101,26 +101,6 @@ def test_mesh_of_a_scatterer(room: Path, damaged: Callable[[str, str], Path]) ->
     assert len({before, first, load_scene(room).digest}) == 3
 
 
-@pytest.mark.parametrize(
-    ("keys", "says"),
-    [
-        ("radius = 0.05\nmie = true\nrcs_m2 = 0.1", "scatterer[0]: 'mie' is for spheres"),
-        ("radius = 0.05\nmie = true\nheight_m = 0.1", "scatterer[0]: 'mie' is for spheres"),
-        ("rcs_m2 = 0.1\nshadow = true", "scatterer[0]: 'mie', 'height_m' and 'shadow' need a 'radius'"),
-        ("radius = 0.05\naxis = [0.0, 0.0, 1.0]", "scatterer[0]: 'axis' is a cylinder's direction"),
-        ("radius = 0.05\nheight_m = 1.0\naxis = [0.0, 0.0, 0.0]", "scatterer[0]: 'axis' is a cylinder's direction"),
-        ('radius = 0.05\nshadow = true\nmesh = "meshes/floor.ply"', "scatterer[0]: give either 'shadow' or 'mesh'"),
-        ('radius = 0.05\nmesh = "meshes/none.ply"', "scatterer[0].mesh (sphere): 'meshes/none.ply' does not exist"),
-        ('radius = 0.05\nmesh = "../x.ply"', "scatterer[0].mesh (sphere): '../x.ply' does not stay inside"),
-    ],
-)
-def test_bad_keys_are_one_line(damaged: Callable[[str, str], Path], keys: str, says: str) -> None:
-    with pytest.raises(SceneError) as caught:
-        load_scene(damaged("radius = 0.05", keys))
-    assert says in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
 def paper() -> Scene:
     return load_scene(Path(__file__).parents[2] / "scenes/paper_room")
 

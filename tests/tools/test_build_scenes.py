@@ -8,7 +8,7 @@ from build_scenes import built_files, main
 from built_in_rooms import ROOMS
 
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.meshes import parse_mesh
+from rislam_rt.scene.meshes import MeshReader
 
 SCENES = Path(__file__).parents[2] / "scenes"
 NAMES = sorted(ROOMS)
@@ -26,7 +26,7 @@ def test_builder_writes_what_is_committed(name: str) -> None:
     for path, content in files.items():
         committed = (folder / path).read_bytes()
         if path.endswith(".glb"):  # its header names the version of the library that wrote it
-            ours, theirs = parse_mesh(content, path), parse_mesh(committed, path)
+            ours, theirs = MeshReader().parse(content, path), MeshReader().parse(committed, path)
             assert np.array_equal(ours.vertices, theirs.vertices)
             assert np.array_equal(ours.faces, theirs.faces)
         elif path.endswith((".ply", ".tum")):  # the last digit may differ between mathematical libraries

@@ -14,7 +14,7 @@ from rislam_rt.model import SchemeResult, SlamResult
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.report.geometry import ellipse
 from rislam_rt.report.map_from_above import draw_plan
-from rislam_rt.report.style import TRUTH, scheme_colour, styled
+from rislam_rt.report.style import TRUTH, close_up, scheme_colour, styled
 from rislam_rt.report.view.room_data import spread
 from rislam_rt.report.view.run_data import KNOWN
 from rislam_rt.storage.files import MARK
@@ -78,14 +78,10 @@ def _empty_frame(result: SlamResult) -> tuple[Figure, Axes, Axes]:
     near.plot([], [], "o", color=TRUTH, ms=5, label="agent")
     half = _half_width(result)
     near.plot(*result.scene.agent.position[:, :2].T, color=TRUTH, lw=5.0, alpha=0.2)
-    near.set_aspect("equal")
-    near.set_xticks([])
-    near.set_yticks([])
+    close_up(near, result.scene.agent.position[0, :2], half)
     near.grid(False)
     near.set_title(f"{200.0 * half:.0f} cm wide", fontsize=9)
     near.legend(loc="upper center", bbox_to_anchor=(0.5, -0.03), fontsize=9)
-    for spine in near.spines.values():
-        spine.set_visible(True)
     settled: Any = FigureCanvasAgg(figure)
     settled.draw()
     figure.set_layout_engine("none")

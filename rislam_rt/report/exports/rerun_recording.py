@@ -8,7 +8,7 @@ from matplotlib.colors import to_rgb
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import SetupError
 from rislam_rt.model import Scene, SchemeResult, SlamResult
-from rislam_rt.report.geometry import outline_edges
+from rislam_rt.report.geometry import wall_edges
 from rislam_rt.report.style import scheme_colour
 
 TIMELINE = "time"
@@ -55,7 +55,7 @@ def recording_bytes(result: SlamResult, identity: str) -> bytes:
 def _log_room(rerun: Any, stream: Any, scene: Scene) -> None:
     """Record for Rerun the edges of the walls, true landmarks, true way: the same at all times."""
     stream.log("/", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    edges = outline_edges(build_walls(scene))
+    edges = wall_edges(build_walls(scene))
     stream.log("truth/room", rerun.LineStrips3D(edges, colors=[GREY]), static=True)
     stream.log("truth/way", rerun.LineStrips3D([scene.agent.position], colors=[GREY]), static=True)
     marks = rerun.Points3D(scene.landmark_positions, labels=list(scene.landmarks), radii=0.05, colors=[GREY])

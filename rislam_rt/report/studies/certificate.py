@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from rislam_rt.channel.compare import OneSidedPath
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import PathKind, Paths
-from rislam_rt.report.geometry import outline_edges
+from rislam_rt.report.geometry import wall_edges
 from rislam_rt.report.room import path_points
 from rislam_rt.report.style import KIND, TRUTH, WALL, styled
 from rislam_rt.studies.compare import Certificate
@@ -116,7 +116,7 @@ def _draw_errors(axis: Axes, certificate: Certificate) -> None:
 def _draw_plan(axis: Axes, certificate: Certificate) -> None:
     """Walls from above in the certificate, landmarks, Tx and Rx."""
     scene = certificate.scene
-    for edge in outline_edges(build_walls(scene)):
+    for edge in wall_edges(build_walls(scene)):
         axis.plot(edge[:, 0], edge[:, 1], color=WALL, lw=1.6, solid_capstyle="round", zorder=2)
     for scatterer in scene.scatterers:
         axis.plot(*scatterer.position[:2], "o", ms=9, mfc="none", mec=TRUTH, mew=1.5, zorder=8)

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.report.style import styled
-from rislam_rt.report.swept.entries import paragraph
+from rislam_rt.report.swept.entries import paragraph, picture, table_lines
 from rislam_rt.slam.classify import FEATURES, network_arrays
 from rislam_rt.studies.classifier.codes import POLICIES
 from rislam_rt.studies.classifier.gather import Examples
@@ -139,32 +139,26 @@ def classifier_page(found: Training, spec: ClassifierSpec, figures: tuple[str, s
     along their own motion; none of them was trained on, and each walk is gone under all codes: {CODES} Intervals:
     {spec.coverage:.0%}, whole walks resampled. Clutter is neither kept nor removed in F1; its share that is kept stands
     apart."""
-    lines = [
-        "# Classifier of multipath components: scores", "",
-        *paragraph(about), "",
-    ]  # fmt: skip
-    if figures is not None:
-        lines += [f"![F1 in each room]({figures[0]})", ""]
-    lines += ["## Scores", "", *_score_table(found), ""]
+    scores, features, panel = figures or (None, None, None)
+    lines = ["# Classifier of multipath components: scores", "", *paragraph(about), ""]
+    lines += [*picture(scores, "F1 in each room"), "## Scores", "", *_score_table(found), ""]
     lines += [
         "Of each random start, the mean over classes of the share told rightly in the random rooms for validation,"
     ]
     lines += ["and F1 on all test rooms: "]
     lines[-1] += ", ".join(f"{chosen:.4f} and {tested:.4f}" for chosen, tested in found.restarts) + "."
     lines += ["", "## The panel's direct path", "", *_panel_summary(found), ""]
-    if figures is not None:
-        lines += [f"![Share of looks at the panel that are dropped, room by room]({figures[2]})", ""]
+    lines += picture(panel, "Share of looks at the panel that are dropped, room by room")
     lines += ["### Room by room", "", *_panel_rooms(found), ""]
     lines += ["## By class", "", "Share told wrongly: of LOS and VT kept, of the others removed.", ""]
     for title, examples in (("Named rooms", found.sets.tested), ("Drawn rooms", found.sets.all_drawn)):
         lines += [f"### {title}", "", *_class_table(found, examples), ""]
     lines += ["### By room, of the network", "", *_room_mistakes(found), ""]
     lines += ["### By age and by SNR", "", *_bin_table(found), "", "## Features", ""]
-    if figures is not None:
-        lines += [f"![Importance of features, and F1 against age and SNR]({figures[1]})", ""]
-    lines += ["| feature | loss of F1 when shuffled |", "| --- | --- |"]
+    lines += picture(features, "Importance of features, and F1 against age and SNR")
     order = sorted(found.importance.items(), key=lambda item: -float(item[1].mean()))
-    lines += [f"| {name} | {lost.mean():.4f} ± {lost.std():.4f} |" for name, lost in order]
+    worth = [[name, f"{lost.mean():.4f} ± {lost.std():.4f}"] for name, lost in order]
+    lines += table_lines(["feature", "loss of F1 when shuffled"], worth)
     return "\n".join(lines) + "\n"
 
 
@@ -182,7 +176,7 @@ def share_of(found: Training, name: str) -> tuple[float, float]:
 def _score_table(found: Training) -> list[str]:
     titles = ["room", "share of components", "of those to keep", *NAME.values(), "precision", "recall",
               "removed rightly", "clutter kept"]  # fmt: skip
-    lines = [_row(titles), _row(["---"] * len(titles))]
+    rows = []
     for name, scores in found.scores.items():
         net = scores["network"]
         share = [f"{part:.2f}" for part in share_of(found, name)] if name in found.sets.test else ["", ""]
@@ -191,9 +185,9 @@ def _score_table(found: Training) -> list[str]:
             cells = [*(_f1(scores[rule]) for rule in NAME), f"{net.precision:.3f}", f"{net.recall:.3f}"]
         else:
             cells = ["nothing to keep", "", "", "", "", ""]
-        lines.append(_row([name, *share, *cells, *tail]))
+        rows.append([name, *share, *cells, *tail])
     mean = [f"{m:.3f} ({low:.3f} to {high:.3f})" for m, low, high in (found.mean[rule] for rule in NAME)]
-    return [*lines, _row(["mean over test rooms", "", "", *mean, "", "", "", ""])]
+    return table_lines(titles, [*rows, ["mean over test rooms", "", "", *mean, "", "", "", ""]])
 
 
 def _rooms(found: Training) -> dict[str, Examples]:
@@ -205,7 +199,7 @@ def _panel_summary(found: Training) -> list[str]:
     """Panel looks that the classifier drops by code and rule: share of all, and of the room where largest."""
     judges = rules(found.network)
     titles = ["codes", "looks", "rooms", *(f"{name}: dropped, worst room" for name in NAME.values())]
-    lines = [_row(titles), _row(["---"] * len(titles))]
+    rows = []
     for policy in POLICIES:
         cells = []
         for rule in NAME:
@@ -214,48 +208,46 @@ def _panel_summary(found: Training) -> list[str]:
             shares = [part / whole for part, whole in looks if whole >= FEWEST]
             cells.append(f"{dropped / max(total, 1):.3f}, {max(shares, default=0.0):.2f}")
         heard = sum(whole >= FEWEST for _, whole in looks)
-        lines.append(_row([f"`{policy}`", str(total), str(heard), *cells]))
-    return [*lines, "", f"Rooms: those with {FEWEST} looks or more, of which the worst one is."]
+        rows.append([f"`{policy}`", str(total), str(heard), *cells])
+    return [*table_lines(titles, rows), "", f"Rooms: those with {FEWEST} looks or more, of which the worst one is."]
 
 
 def _panel_rooms(found: Training) -> list[str]:
     """Panel looks that the network drops by code, of all, and those of the baselines under the best code."""
     judges = rules(found.network)
     titles = ["room", *(f"`{policy}`" for policy in POLICIES), "geometric, `exact`", "amplitude, `exact`"]
-    lines = [_row(titles), _row(["---"] * len(titles))]
+    rows = []
     for name, examples in _rooms(found).items():
         own = {rule: panel_dropped(examples, judges[rule]) for rule in NAME}
         if any(total for _, total in own["network"].values()):
             looks = [*own["network"].values(), own["geometric"]["exact"], own["amplitude"]["exact"]]
-            lines.append(_row([name, *("{} of {}".format(*pair) if pair[1] else "" for pair in looks)]))
-    return lines
+            rows.append([name, *("{} of {}".format(*pair) if pair[1] else "" for pair in looks)])
+    return table_lines(titles, rows)
 
 
 def _class_table(found: Training, examples: Examples) -> list[str]:
     tables = {rule: mistakes(examples, judge) for rule, judge in rules(found.network).items()}
-    lines = [_row(["path class", "examples", *NAME.values()]), _row(["---"] * (2 + len(NAME)))]
-    for kind, (_, total) in tables["network"].items():
-        lines.append(_row([kind, str(total), *(f"{tables[rule][kind][0] / total:.3f}" for rule in NAME)]))
-    return lines
+    rows = [[kind, str(total), *(f"{tables[rule][kind][0] / total:.3f}" for rule in NAME)]
+            for kind, (_, total) in tables["network"].items()]  # fmt: skip
+    return table_lines(["path class", "examples", *NAME.values()], rows)
 
 
 def _room_mistakes(found: Training) -> list[str]:
     judge = rules(found.network)["network"]
     tables = {name: mistakes(examples, judge) for name, examples in found.sets.test.items()}
     kinds = list(mistakes(found.sets.tested, judge))
-    lines = [_row(["room", *kinds]), _row(["---"] * (1 + len(kinds)))]
-    for name, table in tables.items():
-        lines.append(_row([name, *("{} of {}".format(*table[kind]) if kind in table else "" for kind in kinds)]))
-    return lines
+    rows = [[name, *("{} of {}".format(*table[kind]) if kind in table else "" for kind in kinds)]
+            for name, table in tables.items()]  # fmt: skip
+    return table_lines(["room", *kinds], rows)
 
 
 def _bin_table(found: Training) -> list[str]:
-    lines = [_row(["bin", "examples", *NAME.values()]), _row(["---"] * (2 + len(NAME)))]
+    rows = []
     for unit, maker in (("measurements", _by_age), ("dB", _by_snr)):
         bins = {rule: maker(found, rule) for rule in NAME}
         for name, (_, count) in bins["network"].items():
-            lines.append(_row([f"{name} {unit}", str(count), *(f"{bins[rule][name][0]:.3f}" for rule in NAME)]))
-    return lines
+            rows.append([f"{name} {unit}", str(count), *(f"{bins[rule][name][0]:.3f}" for rule in NAME)])
+    return table_lines(["bin", "examples", *NAME.values()], rows)
 
 
 def _by_age(found: Training, rule: str) -> dict[str, tuple[float, int]]:
@@ -267,10 +259,6 @@ def _by_snr(found: Training, rule: str) -> dict[str, tuple[float, int]]:
     tested = found.sets.tested
     level = 10.0 / np.log(10.0) * tested.features[:, FEATURES.index("snr")]
     return by_value(tested, rules(found.network)[rule], level, SNRS)
-
-
-def _row(cells: list[str]) -> str:
-    return f"| {' | '.join(cells)} |"
 
 
 def _f1(score: ClassifierScore) -> str:

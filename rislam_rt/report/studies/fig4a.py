@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.design import GainCurves
 from rislam_rt.report.style import SCHEME, TRUTH, styled
+from rislam_rt.report.swept.entries import picture
 from rislam_rt.studies.fig4a import Fig4a
 from rislam_rt.studies.spec import Fig4aSpec
 
@@ -95,8 +96,7 @@ def fig4a_page(found: Fig4a, spec: Fig4aSpec, scene: str, figure: str | None) ->
     lines += ["The paper's claim: optimised codes lie significantly above random codes and above the sphere.", ""]
     for element in found.curves:
         lines += [*findings_of(found, element), ""]
-    if figure is not None:
-        lines += [f"![Gain against distance]({figure})", ""]
+    lines += picture(figure, "Gain against distance")
     shown = np.unique(np.linspace(0, len(found.distance) - 1, NUM_SHOWN).round().astype(int))
     for element, curves in found.curves.items():
         lines += [

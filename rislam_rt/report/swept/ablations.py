@@ -6,21 +6,22 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.evaluate import Interval
 from rislam_rt.report.style import TRUTH, styled
 from rislam_rt.report.swept.entries import (
-    failure_notes,
     interval_entry,
     metres,
     metres_between,
     percent_between,
+    picture,
     ratio,
+    rmse_change,
     scheme_entry,
     table_lines,
 )
-from rislam_rt.report.swept.error_curves import mark_metres
-from rislam_rt.studies.swept import AblationsSpec, Group, paired_gain
+from rislam_rt.report.swept.error_curves import draw_rmse, mark_metres
+from rislam_rt.studies.swept import AblationsSpec, Group
 
+TITLE = "Ablations: one setting at a time"
 WORSE, BETTER, SAME = "#D55E00", "#0072B2", "#8c8c8c"
 
 
@@ -33,30 +34,21 @@ def ablations_content(groups: Sequence[Group], spec: AblationsSpec) -> dict[str,
     for group in groups:
         variant = about[str(group.point["variant"])]
         for scheme in group.schemes:
-            gain = paired_gain(group.column(scheme, "rmse_m"), own)
-            change = Interval(-gain.value, -gain.upper, -gain.lower) if gain else None
             first = group is base and scheme == base.schemes[0]
-            entries.append(
-                {
-                    **scheme_entry(group, scheme),
-                    "group": variant.group,
-                    "note": variant.note,
-                    **interval_entry("change", None if first else change),
-                }
-            )
+            change = interval_entry("change", None if first else rmse_change(group, scheme, own))
+            about_it = {"group": variant.group, "note": variant.note}
+            entries.append({**scheme_entry(group, scheme), **about_it, **change})
     return {"reference": spec.variants[0].name, "entries": entries}
 
 
-def draw_ablations(content: Mapping[str, Any]) -> Figure:
+def draw_ablations(content: Mapping[str, Any], spec: AblationsSpec) -> Figure:
     """Draw ablations: RMSE of every variant with its interval, its bound as a tick, the reference as a line."""
     entries = [entry for entry in content["entries"] if entry["rmse_m"] is not None]
     with styled():
         figure = Figure(figsize=(8.2, 1.4 + 0.3 * len(entries)))
         axis = figure.subplots()
         for row, entry in enumerate(entries):
-            value, low, high = (entry[name] or entry["rmse_m"] for name in ("rmse_m", "rmse_low_m", "rmse_high_m"))
-            axis.plot([low, high], [row, row], color=_colour(entry), lw=1.4)
-            axis.plot([value], [row], color=_colour(entry), marker="o", ms=6)
+            draw_rmse(axis, row, entry, _colour(entry), ms=6)
             if entry["bound_m"]:
                 axis.plot([entry["bound_m"]], [row], color=TRUTH, marker="|", ms=11, mew=1.6)
         if entries:
@@ -71,21 +63,17 @@ def draw_ablations(content: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def ablations_page(
-    content: Mapping[str, Any], groups: Sequence[Group], about: Sequence[str], figure: str | None
-) -> str:
-    """Page of the ablations: what was done, the picture, a table a group of variants."""
-    lines = ["# Ablations: one setting at a time", "", *about, ""]
-    lines += [
-        f"The reference is `{content['reference']}`. The change is that of the agent's RMSE against it, from pairs of"
-    ]
-    lines += ["runs with the same motion and noise; more is worse.", ""]
-    if figure is not None:
-        lines += [f"![RMSE of every variant]({figure})", ""]
+def ablations_body(content: Mapping[str, Any], spec: AblationsSpec, figure: str | None) -> list[str]:
+    """Page of the ablations: the picture, a table a group of variants."""
+    lines = [
+        f"The reference is `{content['reference']}`. The change is that of the agent's RMSE against it, from pairs of",
+        "runs with the same motion and noise; more is worse.", "",
+    ]  # fmt: skip
+    lines += picture(figure, "RMSE of every variant")
     for name in dict.fromkeys(entry["group"] for entry in content["entries"]):
         own = [entry for entry in content["entries"] if entry["group"] == name]
         lines += [f"## {name or 'Reference'}", "", *table_lines(_HEAD, [_row(entry) for entry in own]), ""]
-    return "\n".join([*lines, "## Failures", "", *failure_notes(groups)]) + "\n"
+    return lines[:-1]
 
 
 _HEAD = [
@@ -95,11 +83,9 @@ _HEAD = [
 
 
 def _row(entry: Mapping[str, Any]) -> list[str]:
-    known = entry["change"] is not None
-    change = Interval(entry["change"], entry["change_low"], entry["change_high"]) if known else None
     return [
         f"`{entry['variant']}`" + (f": {entry['note']}" if entry["note"] else ""), entry["scheme"],
-        metres_between(entry), percent_between(change), metres(entry["bound_m"]), ratio(entry["over_bound"]),
+        metres_between(entry), percent_between(entry, "change"), metres(entry["bound_m"]), ratio(entry["over_bound"]),
         ratio(entry["nees_per_dof"]), metres(entry["ris_m"]), metres(entry["scatterer_m"]), metres(entry["wall_m"]),
         ratio(entry["association"]), f"{entry['diverged']} of {entry['runs']}", str(entry["failed"]),
     ]  # fmt: skip

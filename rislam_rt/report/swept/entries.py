@@ -11,7 +11,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import Interval
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.studies.swept import Group, spread
+from rislam_rt.studies.swept import Group, paired_gain, spread
 
 NEAR_BOUND = 1.5
 """RMSE over the posterior bound up to which the bound is what limits."""
@@ -48,6 +48,12 @@ def interval_entry(name: str, interval: Interval | None, unit: str = "") -> dict
     """Value and ends under three names of an entry; None where there is none."""
     value, low, high = interval or (None, None, None)
     return {f"{name}{unit}": value, f"{name}_low{unit}": _finite(low), f"{name}_high{unit}": _finite(high)}
+
+
+def rmse_change(group: Group, scheme: str, reference: Floats) -> Interval | None:
+    """Change of the RMSE in a group's entry against a reference (R,) [m], seed by seed, as a share; more is worse."""
+    gain = paired_gain(group.column(scheme, "rmse_m"), reference)
+    return Interval(-gain.value, -gain.upper, -gain.lower) if gain else None
 
 
 def what_limits(entry: Mapping[str, Any], over_bound: float | None = None) -> str:
@@ -89,11 +95,13 @@ def ratio(value: float | None) -> str:
     return NOTHING if value is None else f"{value:.2f}"
 
 
-def percent_between(interval: Interval | None) -> str:
+def percent_between(entry: Mapping[str, Any], name: str) -> str:
     """Entry in percent: a share with its interval."""
-    if interval is None:
+    if entry[name] is None:
         return NOTHING
-    return f"{100 * interval.value:.0f} % ({100 * interval.lower:.0f} to {100 * interval.upper:.0f})"
+    found = (entry[name + end] for end in ("", "_low", "_high"))
+    value, low, high = (np.nan if part is None else 100 * part for part in found)
+    return f"{value:.0f} % ({low:.0f} to {high:.0f})"
 
 
 def table_lines(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
@@ -101,9 +109,22 @@ def table_lines(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]
     return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
 
 
+def picture(figure: str | None, words: str) -> list[str]:
+    """A picture in markdown, if there is one."""
+    return [f"![{words}]({figure})", ""] if figure is not None else []
+
+
 def paragraph(text: str) -> list[str]:
     """A paragraph of markdown in lines of readable length."""
     return textwrap.wrap(" ".join(text.split()), 118, break_long_words=False, break_on_hyphens=False)
+
+
+def by_scheme(entries: Sequence[Mapping[str, Any]], along: str) -> dict[str, list[Mapping[str, Any]]]:
+    """Entries of each scheme, sorted by one of their numbers."""
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for entry in sorted(entries, key=lambda entry: float(entry[along])):
+        found.setdefault(entry["scheme"], []).append(entry)
+    return found
 
 
 def failure_notes(groups: Sequence[Group]) -> list[str]:

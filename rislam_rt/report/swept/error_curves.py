@@ -9,6 +9,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from rislam_rt.arrays import Floats
 from rislam_rt.report.style import MARKER, TRUTH, scheme_colour
 
 GAP = 0.055
@@ -18,18 +19,19 @@ GAP = 0.055
 def draw_schemes(axis: Axes, x: Sequence[float], curves: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
     """Draw one curve a scheme, from its entries along x, on a logarithmic axis of metres; names stand to the right."""
     for scheme, entries in curves.items():
-        colour = scheme_colour(scheme)
-        value, low, high, bound = (
-            np.array([np.nan if entry[name] is None else entry[name] for entry in entries], dtype=np.float64)
-            for name in ("rmse_m", "rmse_low_m", "rmse_high_m", "bound_m")
-        )
-        axis.fill_between(x, low, high, color=colour, alpha=0.13, lw=0.0)
-        axis.plot(x, bound, color=colour, ls="--", lw=1.1)
-        axis.plot(x, value, color=colour, marker=MARKER.get(scheme, "o"), ms=5, lw=1.7)
+        axis.plot(x, numbers(entries, "bound_m"), color=scheme_colour(scheme), ls="--", lw=1.1)
+        draw_error(axis, x, entries, scheme, "rmse")
     axis.set_yscale("log")
     mark_metres(axis.yaxis)
-    ends = {scheme: _last(entries) for scheme, entries in curves.items()}
-    label_ends(axis, {scheme: end for scheme, end in ends.items() if end is not None})
+    label_ends(axis, curves, "rmse_m")
+
+
+def draw_error(axis: Axes, x: Sequence[float], entries: Sequence[Mapping[str, Any]], scheme: str, name: str) -> None:
+    """Draw one error of a scheme's entries along x as a curve, in the band of its interval."""
+    value, low, high = (numbers(entries, f"{name}{end}_m") for end in ("", "_low", "_high"))
+    colour = scheme_colour(scheme)
+    axis.fill_between(x, low, high, color=colour, alpha=0.13, lw=0.0)
+    axis.plot(x, value, color=colour, marker=MARKER.get(scheme, "o"), ms=5, lw=1.7)
 
 
 def mark_metres(side: Axis) -> None:
@@ -39,8 +41,22 @@ def mark_metres(side: Axis) -> None:
     side.set_minor_formatter(NullFormatter())
 
 
-def label_ends(axis: Axes, ends: Mapping[str, float]) -> None:
-    """Put each name at the height where its curve ends, moved apart as far as need be."""
+def draw_rmse(axis: Axes, row: float, entry: Mapping[str, Any], colour: str, **marker: Any) -> None:
+    """Draw an entry's RMSE as a dot in a row, on the line of its interval."""
+    value, low, high = (entry[name] or entry["rmse_m"] for name in ("rmse_m", "rmse_low_m", "rmse_high_m"))
+    axis.plot([low, high], [row, row], color=colour, lw=1.4)
+    axis.plot([value], [row], color=colour, marker="o", **marker)
+
+
+def numbers(entries: Sequence[Mapping[str, Any]], name: str) -> Floats:
+    """(E,) one number of every entry along an error curve, NaN where there is none."""
+    return np.array([np.nan if entry[name] is None else entry[name] for entry in entries], dtype=np.float64)
+
+
+def label_ends(axis: Axes, curves: Mapping[str, Sequence[Mapping[str, Any]]], name: str) -> None:
+    """Put each scheme's name at the height where its error curve ends, moved apart as far as need be."""
+    known = {scheme: [entry[name] for entry in entries if entry[name]] for scheme, entries in curves.items()}
+    ends = {scheme: values[-1] for scheme, values in known.items() if values}
     low, high = np.log10(axis.get_ylim())
     order = sorted(ends, key=lambda name: ends[name])
     place = np.array([(np.log10(ends[name]) - low) / (high - low) for name in order])
@@ -62,8 +78,3 @@ def explain_lines(figure: Figure, axis: Axes) -> None:
     error = axis.plot([], [], color=TRUTH, lw=1.7, label="RMSE over seeds, band: 95 % interval")
     bound = axis.plot([], [], color=TRUTH, lw=1.1, ls="--", label="posterior bound")
     figure.legend(handles=[*error, *bound], loc="outside lower center", ncols=2, fontsize=8)
-
-
-def _last(entries: Sequence[Mapping[str, Any]]) -> float | None:
-    known = [entry["rmse_m"] for entry in entries if entry["rmse_m"]]
-    return known[-1] if known else None

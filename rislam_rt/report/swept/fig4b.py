@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.evaluate import Interval
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import (
     NOTHING,
-    failure_notes,
+    by_scheme,
     interval_entry,
     metres,
     metres_between,
     paragraph,
     percent_between,
+    picture,
     ratio,
     scheme_entry,
     table_lines,
@@ -25,6 +25,7 @@ from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines
 from rislam_rt.studies.swept import Fig4bSpec, Group, paired_difference, paired_gain
 from rislam_rt.studies.swept.sweep import SNR
 
+TITLE = "Error of the agent against SNR: Fig. 4(b)"
 OURS = "optimized"
 """The scheme that the paper proposes."""
 
@@ -37,7 +38,7 @@ def fig4b_content(groups: Sequence[Group], spec: Fig4bSpec) -> dict[str, Any]:
             "snr_db": group.point[SNR],
             "paper_snr_db": group.mean("paper_snr_db"),
             **{name: value for name, value in scheme_entry(group, scheme).items() if name not in group.point},
-            "each_m": _each(group, scheme),
+            "each_m": [None if np.isnan(rmse) else float(rmse) for rmse in group.column(scheme, "rmse_m")],
         }
         for group in groups
         for scheme in group.schemes
@@ -56,16 +57,10 @@ def gain_entries(group: Group) -> list[dict[str, Any]]:
             continue
         theirs, bound = group.column(scheme, "rmse_m"), group.column(scheme, "bound_m")
         limit = paired_gain(least, bound)
-        found.append(
-            {
-                "case": group.point["variant"],
-                "snr_db": group.point[SNR],
-                "over": scheme,
-                **interval_entry("gain", paired_gain(ours, theirs)),
-                **interval_entry("lower_by", paired_difference(ours, theirs), "_m"),
-                "bound_gain": limit.value if limit else None,
-            }
-        )
+        entry = {"case": group.point["variant"], "snr_db": group.point[SNR], "over": scheme}
+        entry |= interval_entry("gain", paired_gain(ours, theirs))
+        entry |= interval_entry("lower_by", paired_difference(ours, theirs), "_m")
+        found.append(entry | {"bound_gain": limit.value if limit else None})
     return found
 
 
@@ -78,10 +73,7 @@ def draw_fig4b(content: Mapping[str, Any], spec: Fig4bSpec) -> Figure:
         for axis, case in zip(axes, cases, strict=True):
             entries = [entry for entry in content["entries"] if entry["case"] == case.name]
             snr = sorted({entry["snr_db"] for entry in entries})
-            curves: dict[str, list[Mapping[str, Any]]] = {}
-            for entry in sorted(entries, key=lambda entry: entry["snr_db"]):
-                curves.setdefault(entry["scheme"], []).append(entry)
-            draw_schemes(axis, snr, curves)
+            draw_schemes(axis, snr, by_scheme(entries, "snr_db"))
             axis.set_title(f"{case.name}: {case.note}" if case.note else case.name, fontsize=9, weight="bold")
             axis.set_xlabel("SNR of a 5 cm sphere at 3 m, over signal and all antennas [dB]")
             shift = float(np.mean([entry["paper_snr_db"] - entry["snr_db"] for entry in entries]))
@@ -92,20 +84,16 @@ def draw_fig4b(content: Mapping[str, Any], spec: Fig4bSpec) -> Figure:
     return figure
 
 
-def fig4b_page(
-    content: Mapping[str, Any], groups: Sequence[Group], spec: Fig4bSpec, about: Sequence[str], figure: str | None
-) -> str:
-    """Page of Fig. 4(b): what was done, the picture, errors, gains, and what limits them."""
-    lines = ["# Error of the agent against SNR: Fig. 4(b)", "", *about, ""]
-    if figure is not None:
-        lines += [f"![RMSE of the agent against SNR]({figure})", ""]
+def fig4b_body(content: Mapping[str, Any], spec: Fig4bSpec, figure: str | None) -> list[str]:
+    """Page of Fig. 4(b): the picture, errors, gains, and what limits them."""
+    lines = picture(figure, "RMSE of the agent against SNR")
     for case in spec.cases:
         entries = [entry for entry in content["entries"] if entry["case"] == case.name]
         gains = [entry for entry in content["gains"] if entry["case"] == case.name]
         if entries:
             lines += [f"## {case.name}: {case.note}", "", *_error_lines(entries), "", *_gain_lines(gains), ""]
             lines += [*_budget_lines(entries), ""]
-    return "\n".join([*lines, "## Failures", "", *failure_notes(groups)]) + "\n"
+    return lines[:-1]
 
 
 def _error_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -137,10 +125,8 @@ def _gain_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
         cells = [f"{snr:g}"]
         for rival in rivals:
             entry = next(e for e in gains if e["snr_db"] == snr and e["over"] == rival)
-            known = entry["gain"] is not None
-            gain = Interval(entry["gain"], entry["gain_low"], entry["gain_high"]) if known else None
             limit = f"; bounds {100 * entry['bound_gain']:.0f} %" if entry["bound_gain"] is not None else ""
-            cells.append(f"{percent_between(gain)}, {metres(entry['lower_by_m'])} m{limit}")
+            cells.append(f"{percent_between(entry, 'gain')}, {metres(entry['lower_by_m'])} m{limit}")
         rows.append(cells)
     title = (
         f"How far `{OURS}` is below the others, from pairs of runs with the same motion and noise (95 % interval), in"
@@ -163,7 +149,3 @@ def _budget_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     95 % of the components are taken for what they are, else the filter. NEES is that of the position per degree of
     freedom: 1 if the estimator knows how wrong it is."""
     return [*paragraph(text), "", *table_lines(head, rows)]
-
-
-def _each(group: Group, scheme: str) -> list[float | None]:
-    return [None if np.isnan(value) else float(value) for value in group.column(scheme, "rmse_m")]

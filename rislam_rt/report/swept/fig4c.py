@@ -6,59 +6,54 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.evaluate import Interval
-from rislam_rt.report.style import MARKER, scheme_colour, styled
+from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import (
-    failure_notes,
+    by_scheme,
     interval_entry,
     metres,
     metres_between,
     panel_of,
     percent_between,
+    picture,
     ratio,
     scheme_entry,
     table_lines,
     what_limits,
 )
-from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines, label_ends, mark_metres
-from rislam_rt.studies.swept import Group, paired_gain, spread
+from rislam_rt.report.swept.error_curves import draw_error, draw_schemes, explain_lines, label_ends, mark_metres
+from rislam_rt.studies.swept import Fig4cSpec, Group, paired_gain, spread
+
+TITLE = "Error against the panel's size: Fig. 4(c)"
 
 
-def fig4c_content(groups: Sequence[Group]) -> dict[str, Any]:
+def fig4c_content(groups: Sequence[Group], spec: Fig4cSpec) -> dict[str, Any]:
     """Plain data: one entry a size and scheme, and how much lower the largest panel's error is than the smallest's."""
     return {
-        "entries": [_entry(group, scheme) for group in groups for scheme in group.schemes],
+        "entries": [
+            {**scheme_entry(group, scheme), **interval_entry("panel", spread(panel_error(group, scheme)), "_m")}
+            for group in groups
+            for scheme in group.schemes
+        ],
         "falls": [_fall(groups, scheme) for scheme in groups[0].schemes] if groups else [],
     }
 
 
-def draw_fig4c(content: Mapping[str, Any]) -> Figure:
+def draw_fig4c(content: Mapping[str, Any], spec: Fig4cSpec) -> Figure:
     """Draw Fig. 4(c): agent left, panel right, on a logarithmic axis of panel sizes."""
     entries = content["entries"]
     sizes = sorted({entry["size"] for entry in entries})
-    curves: dict[str, list[Mapping[str, Any]]] = {}
-    for entry in sorted(entries, key=lambda entry: entry["size"]):
-        curves.setdefault(entry["scheme"], []).append(entry)
+    curves = by_scheme(entries, "size")
     with styled():
         figure = Figure(figsize=(11.0, 4.8))
         agent, panel = figure.subplots(1, 2)
         draw_schemes(agent, sizes, curves)
         explain_lines(figure, agent)
-        ends = {}
         for scheme, own in curves.items():
-            value, low, high = (
-                np.array([np.nan if e[name] is None else e[name] for e in own], dtype=np.float64)
-                for name in ("panel_m", "panel_low_m", "panel_high_m")
-            )
-            if np.isnan(value).all():
-                continue
-            colour = scheme_colour(scheme)
-            panel.fill_between(sizes, low, high, color=colour, alpha=0.13, lw=0.0)
-            panel.plot(sizes, value, color=colour, marker=MARKER.get(scheme, "o"), ms=5, lw=1.7)
-            ends[scheme] = float(value[~np.isnan(value)][-1])
+            if any(entry["panel_m"] is not None for entry in own):
+                draw_error(panel, sizes, own, scheme, "panel")
         panel.set_yscale("log")
         mark_metres(panel.yaxis)
-        label_ends(panel, ends)
+        label_ends(panel, curves, "panel_m")
         for axis, what in ((agent, "agent's position"), (panel, "panel's position at the end")):
             axis.set_xticks(sizes, [f"{size} x {size}" for size in sizes], fontsize=9)
             axis.set_xlabel("elements of the panel")
@@ -66,20 +61,17 @@ def draw_fig4c(content: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def fig4c_page(content: Mapping[str, Any], groups: Sequence[Group], about: Sequence[str], figure: str | None) -> str:
-    """Page of Fig. 4(c): what was done, the picture, the tables."""
-    lines = ["# Error against the panel's size: Fig. 4(c)", "", *about, ""]
-    lines += [
-        "Gains of the panel are summed element by element; the far field begins farther off than the room is high"
-    ]
-    lines += ["from 10 x 10 elements on. The panel's position is that at the end of a run, where the map holds it.", ""]
-    if figure is not None:
-        lines += [f"![RMSE of agent and panel against the panel's size]({figure})", ""]
+def fig4c_body(content: Mapping[str, Any], spec: Fig4cSpec, figure: str | None) -> list[str]:
+    """Page of Fig. 4(c): the picture, the tables."""
+    lines = ["Gains of the panel are summed element by element; the far field begins farther off than the room is high",
+             "from 10 x 10 elements on. The panel's position is that at the end of a run, where the map holds it.", "",
+             *picture(figure, "RMSE of agent and panel against the panel's size")]  # fmt: skip
     rows = [
         [
             f"{entry['size']} x {entry['size']}", entry["scheme"], metres_between(entry), metres(entry["bound_m"]),
-            ratio(entry["over_bound"]), _panel_text(entry), ratio(entry["ris_found"]), ratio(entry["association"]),
-            f"{entry['diverged']} of {entry['runs']}", str(entry["failed"]), what_limits(entry),
+            ratio(entry["over_bound"]), metres_between(entry, "panel"), ratio(entry["ris_found"]),
+            ratio(entry["association"]), f"{entry['diverged']} of {entry['runs']}", str(entry["failed"]),
+            what_limits(entry),
         ]
         for entry in content["entries"]
     ]  # fmt: skip
@@ -91,18 +83,13 @@ def fig4c_page(content: Mapping[str, Any], groups: Sequence[Group], about: Seque
     for fall in content["falls"]:
         agent, panel = _percent(fall, "agent"), _percent(fall, "panel")
         lines.append(f"- `{fall['scheme']}`: agent's RMSE lower by {agent}, panel's by {panel}")
-    return "\n".join([*lines, "", "## Failures", "", *failure_notes(groups)]) + "\n"
+    return lines
 
 
 def panel_error(group: Group, scheme: str) -> Any:
     """(R,) distance [m] of the panel's estimate at the end, for Fig. 4(c); NaN where the map has none."""
     name = panel_of(group, scheme)
     return np.full(len(group.results), np.nan) if name is None else group.column(scheme, "landmarks", name, "final_m")
-
-
-def _entry(group: Group, scheme: str) -> dict[str, Any]:
-    panel = interval_entry("panel", spread(panel_error(group, scheme)), "_m")
-    return {**scheme_entry(group, scheme), **panel}
 
 
 def _fall(groups: Sequence[Group], scheme: str) -> dict[str, Any]:
@@ -114,13 +101,5 @@ def _fall(groups: Sequence[Group], scheme: str) -> dict[str, Any]:
     return {"scheme": scheme, **interval_entry("agent", agent), **interval_entry("panel", panel)}
 
 
-def _panel_text(entry: Mapping[str, Any]) -> str:
-    return metres_between(
-        {name: entry[name.replace("rmse", "panel")] for name in ("rmse_m", "rmse_low_m", "rmse_high_m")}
-    )
-
-
 def _percent(fall: Mapping[str, Any], name: str) -> str:
-    if fall[name] is None:
-        return "an unknown share"
-    return percent_between(Interval(fall[name], fall[f"{name}_low"], fall[f"{name}_high"]))
+    return "an unknown share" if fall[name] is None else percent_between(fall, name)

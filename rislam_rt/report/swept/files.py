@@ -7,13 +7,8 @@ from typing import Any, NamedTuple
 from matplotlib.figure import Figure
 
 from rislam_rt.report.style import to_png
-from rislam_rt.report.swept.ablations import ablations_content, ablations_page, draw_ablations
-from rislam_rt.report.swept.entries import csv_text, paragraph
-from rislam_rt.report.swept.fig4b import draw_fig4b, fig4b_content, fig4b_page
-from rislam_rt.report.swept.fig4c import draw_fig4c, fig4c_content, fig4c_page
-from rislam_rt.report.swept.hardware import draw_hardware, hardware_content, hardware_page
-from rislam_rt.report.swept.robustness import draw_robustness, robustness_content, robustness_page
-from rislam_rt.report.swept.rooms import draw_rooms, rooms_content, rooms_page
+from rislam_rt.report.swept import ablations, fig4b, fig4c, hardware, robustness, rooms
+from rislam_rt.report.swept.entries import csv_text, failure_notes, paragraph
 from rislam_rt.storage.files import write_atomic
 from rislam_rt.studies.swept import (
     AblationsSpec,
@@ -33,9 +28,28 @@ from rislam_rt.sweeps.record import json_bytes, plain_result
 class StudyLayout(NamedTuple):
     """How a swept study is told: what its files, figure and page hold."""
 
-    content: dict[str, Any]
-    draw: Callable[[], Figure]
-    page: Callable[[Sequence[str], str | None], str]
+    title: str
+    content: Callable[[Sequence[Group], Any], dict[str, Any]]
+    """Plain data, of groups and specification."""
+    draw: Callable[[Mapping[str, Any], Any], Figure]
+    body: Callable[[Mapping[str, Any], Any, str | None], list[str]]
+    """Lines between where the numbers come from and what failed, of content, specification and the figure's file."""
+
+
+LAYOUTS: dict[type, StudyLayout] = {
+    Fig4bSpec: StudyLayout(fig4b.TITLE, fig4b.fig4b_content, fig4b.draw_fig4b, fig4b.fig4b_body),
+    Fig4cSpec: StudyLayout(fig4c.TITLE, fig4c.fig4c_content, fig4c.draw_fig4c, fig4c.fig4c_body),
+    AblationsSpec: StudyLayout(
+        ablations.TITLE, ablations.ablations_content, ablations.draw_ablations, ablations.ablations_body
+    ),
+    HardwareSpec: StudyLayout(
+        hardware.TITLE, hardware.hardware_content, hardware.draw_hardware, hardware.hardware_body
+    ),
+    RobustnessSpec: StudyLayout(
+        robustness.TITLE, robustness.robustness_content, robustness.draw_robustness, robustness.robustness_body
+    ),
+    RoomsSpec: StudyLayout(rooms.TITLE, rooms.rooms_content, rooms.draw_rooms, rooms.rooms_body),
+}
 
 
 def write_swept(
@@ -51,41 +65,19 @@ def write_swept(
     groups = [group for group in group_rows(rows) if group.schemes or (any(group.results) and _of_receiver(spec))]
     if not groups:
         return None
-    shape = shape_of(groups, spec)
+    layout = LAYOUTS[type(spec)]
+    content = layout.content(groups, spec)
     figure = f"figures/{spec.name}.png" if figures else None
+    failures = hardware.failed_cells(groups) if _of_receiver(spec) else failure_notes(groups)
+    lines = [f"# {layout.title}", "", *about_lines(groups, spec, record, len(rows)), "",
+             *layout.body(content, spec, figure), "", "## Failures", "", *failures]  # fmt: skip
     page = folder / f"{spec.name}.md"  # first: the others are known as the program's by it
-    write_atomic(page, shape.page(about_lines(groups, spec, record, len(rows)), figure).encode())
+    write_atomic(page, ("\n".join(lines) + "\n").encode())
     if figure is not None:
-        write_atomic(folder / figure, to_png(shape.draw()))
-    write_atomic(folder / f"{spec.name}.csv", csv_text(shape.content["entries"]).encode())
-    write_atomic(folder / f"{spec.name}.json", json_bytes(plain_result({**record, **shape.content})))
+        write_atomic(folder / figure, to_png(layout.draw(content, spec)))
+    write_atomic(folder / f"{spec.name}.csv", csv_text(content["entries"]).encode())
+    write_atomic(folder / f"{spec.name}.json", json_bytes(plain_result({**record, **content})))
     return page
-
-
-def shape_of(groups: Sequence[Group], spec: SweptSpec) -> StudyLayout:
-    """Content, figure and page for the files of a study of any kind."""
-    if isinstance(spec, Fig4bSpec):
-        content = fig4b_content(groups, spec)
-        return StudyLayout(
-            content, lambda: draw_fig4b(content, spec), lambda a, f: fig4b_page(content, groups, spec, a, f)
-        )
-    if isinstance(spec, Fig4cSpec):
-        content = fig4c_content(groups)
-        return StudyLayout(content, lambda: draw_fig4c(content), lambda a, f: fig4c_page(content, groups, a, f))
-    if isinstance(spec, AblationsSpec):
-        content = ablations_content(groups, spec)
-        return StudyLayout(content, lambda: draw_ablations(content), lambda a, f: ablations_page(content, groups, a, f))
-    if isinstance(spec, HardwareSpec):
-        content = hardware_content(groups, spec)
-        return StudyLayout(content, lambda: draw_hardware(content), lambda a, f: hardware_page(content, groups, a, f))
-    if isinstance(spec, RobustnessSpec):
-        content = robustness_content(groups, spec)
-        return StudyLayout(
-            content, lambda: draw_robustness(content), lambda a, f: robustness_page(content, groups, a, f)
-        )
-    assert isinstance(spec, RoomsSpec)
-    content = rooms_content(groups)
-    return StudyLayout(content, lambda: draw_rooms(content), lambda a, f: rooms_page(content, groups, a, f))
 
 
 def _of_receiver(spec: SweptSpec) -> bool:

@@ -7,10 +7,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.report.style import styled
-from rislam_rt.report.swept.entries import NOTHING, paragraph, ratio, table_lines
+from rislam_rt.report.swept.entries import NOTHING, paragraph, picture, ratio, table_lines
 from rislam_rt.studies.swept import Group, HardwareSpec
 from rislam_rt.studies.swept.spec import CALIBRATED, MismatchSection
 
+TITLE = "Hardware: what a laboratory must reach for the panel to matter"
 SCORES = ("false", "panel", "landmarks", "components", "error_over_std", "left")
 HEARD, MORE_FALSE = 0.9, 2.0
 """The panel still matters while it is heard in this share of the looks in which an ideal front end hears it, with at
@@ -47,7 +48,7 @@ def hardware_content(groups: Sequence[Group], spec: HardwareSpec) -> dict[str, A
     return {"entries": entries, "about": about, "limits": limits}
 
 
-def draw_hardware(content: Mapping[str, Any]) -> Figure:
+def draw_hardware(content: Mapping[str, Any], spec: HardwareSpec) -> Figure:
     """Draw hardware faults: false components, and the panel's share, of every level, however the fault is met."""
     entries = content["entries"]
     rows = list(dict.fromkeys((entry["fault"], entry["level"]) for entry in entries))
@@ -71,26 +72,27 @@ def draw_hardware(content: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def hardware_page(content: Mapping[str, Any], groups: Sequence[Group], about: Sequence[str], figure: str | None) -> str:
+def hardware_body(content: Mapping[str, Any], spec: HardwareSpec, figure: str | None) -> list[str]:
     """Page on hardware: what a laboratory must reach, the picture, all numbers."""
-    lines = ["# Hardware: what a laboratory must reach for the panel to matter", "", *about, "", *paragraph(LAW), ""]
     ideal = content["entries"][0]
     text = f"""Largest level at which the panel is heard in {100 * HEARD:.0f} % of the looks in which an ideal front end
     hears it ({_share(ideal["panel"])}), with at most {MORE_FALSE:g} more false components a cycle than there
     ({ratio(ideal["false"])}); {NOTHING} where it is so at none of the levels tried:"""
-    lines += [*paragraph(text), ""]
+    lines = [*paragraph(LAW), "", *paragraph(text), ""]
     head = ["fault", *NAMES.values(), "levels tried"]
     rows = [_limit_row(content, name) for name in content["about"]]
     lines += [*table_lines(head, rows), ""]
-    if figure is not None:
-        lines += [f"![False components and the panel's share at every level]({figure})", ""]
-    lines += ["## All levels", ""]
+    lines += [*picture(figure, "False components and the panel's share at every level"), "## All levels", ""]
     for scores in (("false", "panel"), ("landmarks", "error_over_std")):
         head = ["fault", "level", *(f"{TITLES[score]}: {name}" for score in scores for name in NAMES.values())]
         lines += [*table_lines(head, _rows(content, scores)), ""]
-    lines += ["## Failures", ""]
+    return lines[:-1]
+
+
+def failed_cells(groups: Sequence[Group]) -> list[str]:
+    """How many cells of a hardware study failed."""
     failed = sum(result is None for group in groups for result in group.results) - sum(g.missing for g in groups)
-    return "\n".join([*lines, f"Of {sum(len(group.results) for group in groups)} cells {failed} failed."]) + "\n"
+    return [f"Of {sum(len(group.results) for group in groups)} cells {failed} failed."]
 
 
 TITLES = {"false": "false", "panel": "panel", "landmarks": "landmarks", "error_over_std": "errors"}

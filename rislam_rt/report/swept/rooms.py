@@ -9,18 +9,19 @@ from matplotlib.figure import Figure
 
 from rislam_rt.report.style import MARKER, scheme_colour, styled
 from rislam_rt.report.swept.entries import (
-    failure_notes,
     metres,
     metres_between,
     paragraph,
+    picture,
     ratio,
     scheme_entry,
     table_lines,
     what_limits,
 )
 from rislam_rt.report.swept.error_curves import mark_metres
-from rislam_rt.studies.swept import Group
+from rislam_rt.studies.swept import Group, RoomsSpec
 
+TITLE = "All rooms"
 AIMS: dict[str, float] = {
     "rmse_m": 0.04,
     "over_bound": 1.5,
@@ -41,7 +42,7 @@ BOUND_OF = {
 """Bounds of what is no agent."""
 
 
-def rooms_content(groups: Sequence[Group]) -> dict[str, Any]:
+def rooms_content(groups: Sequence[Group], spec: RoomsSpec) -> dict[str, Any]:
     """Plain data: one entry a room, variant and scheme, and the aims. A series is a scheme in one variant."""
     entries = []
     usual = groups[0].point.get("variant", "") if groups else ""
@@ -77,7 +78,7 @@ def missed_aims(entry: Mapping[str, Any]) -> list[str]:
     return [name for name, limit in asked.items() if entry[name] is None or entry[name] > limit]
 
 
-def draw_rooms(content: Mapping[str, Any]) -> Figure:
+def draw_rooms(content: Mapping[str, Any], spec: RoomsSpec) -> Figure:
     """Agent's RMSE in every room, the bound as a bar across, and the aim."""
     entries = content["entries"]
     rooms = list(dict.fromkeys(entry["room"] for entry in entries))
@@ -112,10 +113,9 @@ def draw_rooms(content: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def rooms_page(content: Mapping[str, Any], groups: Sequence[Group], about: Sequence[str], figure: str | None) -> str:
-    """Markdown: what was done, the aims, one table of all rooms."""
+def rooms_body(content: Mapping[str, Any], spec: RoomsSpec, figure: str | None) -> list[str]:
+    """Markdown: the aims, one table of all rooms."""
     aims = content["aims"]
-    lines = ["# All rooms", "", *about, ""]
     text = f"""Aims: agent's RMSE at most {aims["rmse_m"]:g} m and {aims["over_bound"]:g} times its posterior bound,
     panel at most {aims["ris_m"]:g} m, scatterers {aims["scatterer_m"]:g} m, walls {aims["wall_deg"]:g} degrees and
     {aims["wall_m"]:g} m, no divergence. Landmarks and walls are scored at the end of a run, RMS over those found, each
@@ -123,13 +123,11 @@ def rooms_page(content: Mapping[str, Any], groups: Sequence[Group], about: Seque
     meets. The distance of a wall is that at the middle of its surface. "Own" is the deviation of the angle that the map
     itself reckons with; planes that stand for no wall are ghosts, a mean number a run. GOSPA is of the map's points,
     cut off at 1 m, order 2."""
-    lines += [*paragraph(text), ""]
+    lines = [*paragraph(text), ""]
     text = """The error budget: each aim that is missed, with what limits it. That is the bound where the error is
     within 1.5 of it, else association where fewer than 95 % of the components are taken for what they are, else the
     filter. The bounds know the association and hold all paths as resolved."""
-    lines += [*paragraph(text), ""]
-    if figure is not None:
-        lines += [f"![RMSE of the agent in every room]({figure})", ""]
+    lines += [*paragraph(text), "", *picture(figure, "RMSE of the agent in every room")]
     head = [
         "room", "scheme", "agent RMSE [m]", "bound [m]", "RMSE / bound", "NEES", "panel [m]", "scatterers [m]",
         "walls [deg]", "own [deg]", "walls [m]", "ghosts", "GOSPA [m]", "association", "diverged", "failed",
@@ -147,7 +145,7 @@ def rooms_page(content: Mapping[str, Any], groups: Sequence[Group], about: Seque
         ]
         for entry in content["entries"]
     ]  # fmt: skip
-    return "\n".join([*lines, *table_lines(head, rows), "", "## Failures", "", *failure_notes(groups)]) + "\n"
+    return [*lines, *table_lines(head, rows)]
 
 
 NAMES = {

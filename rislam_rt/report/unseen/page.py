@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rislam_rt.report.swept.entries import NOTHING, paragraph, table_lines
+from rislam_rt.report.swept.entries import NOTHING, paragraph, picture, table_lines
 from rislam_rt.report.unseen.score_cards import SchemeRun
 from rislam_rt.studies.unseen.score import (
     FAR_OVER,
@@ -29,8 +29,7 @@ def unseen_page(
 ) -> str:  # fmt: skip
     """The page on unseen rooms in Markdown."""
     lines = ["# Unseen rooms", "", *about, "", *_meaning(), ""]
-    if figure is not None:
-        lines += [f"![Relative error of every run, by class of room and motion]({figure})", ""]
+    lines += picture(figure, "Relative error of every run, by class of room and motion")
     lines += ["## Score card", "", *card_table(content["cards"]), ""]
     for name, cards in content["classes"].items():
         lines += [f"## By class: {name}", "", *class_table(cards), ""]

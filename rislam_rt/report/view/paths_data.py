@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.adviser.codes import aimed_codes, paths_under_codes
+from rislam_rt.adviser.codes import aimed_paths
 from rislam_rt.arrays import Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import PathKind, Paths, Scene, Trajectory
@@ -23,7 +23,7 @@ def paths_data(scene: Scene, motion: Trajectory, paths: Paths, settings: Setting
     """A scene, and the paths that were found at the poses of `motion`, a part of its own."""
     posed = replace(scene, agent=motion)
     if scene.ris is not None:
-        paths = paths_under_codes(paths, scene.ris.spec, aimed_codes(paths, scene.ris.spec, settings.radio))
+        paths = aimed_paths(paths, scene.ris.spec, settings.radio)
     snr = settings.radio.integrated_snr(paths.gain) / settings.sensor.threshold
     margin = 10.0 * np.log10(np.maximum(snr, 1e-30))
     codes = ", panels aimed at the agent" if scene.ris is not None else ""

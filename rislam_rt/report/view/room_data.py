@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.walls import build_walls
-from rislam_rt.geometry.triangles import outline_edges
+from rislam_rt.geometry.triangles import outline_edges, triangle_areas, triangle_cross
 from rislam_rt.model import RisPanel, Scene
 
 MOST_TRIANGLES = 8000
@@ -49,7 +49,7 @@ def _walls(scene: Scene) -> tuple[list[dict[str, Any]], int]:
     """The room's largest walls for a view, and how many are left out."""
     walls = build_walls(scene)
     corners = walls.triangles
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = triangle_areas(corners)
     of_wall = np.bincount(walls.wall_of_triangle, weights=area, minlength=len(walls))
     order = np.argsort(-of_wall, kind="stable")
     counts = np.bincount(walls.wall_of_triangle, minlength=len(walls))
@@ -77,7 +77,7 @@ def _walls(scene: Scene) -> tuple[list[dict[str, Any]], int]:
 
 def _same_sense(triangles: Floats, normal: Floats) -> Floats:
     """Triangles (T, 3, 3) of a view's wall all counter-clockwise about a normal, so that no seam shows."""
-    sense = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) @ normal
+    sense = triangle_cross(triangles) @ normal
     return np.where((sense < 0.0)[:, None, None], triangles[:, ::-1], triangles)
 
 

@@ -25,8 +25,7 @@ def agent_errors(room: TriangleArray) -> Iterator[Finding]:
     for part, points in places.items():
         outside = room.outside(points)
         if len(outside):
-            low, high = np.round(room.bounds, 3).tolist()
-            message = f"{_where(part, int(outside[0]), points)} lies outside the meshes' bounds {low} to {high}"
+            message = f"{_where(part, int(outside[0]), points)} lies outside the meshes' bounds {room.box}"
             yield room.error(_field(int(outside[0])), message, "move the start or change the motion")
             return
     yield from _on_surface(room, places)

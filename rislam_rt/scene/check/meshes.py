@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from rislam_rt.scene.check.mesh_queries import touching
-from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray, without_area
+from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 
 
@@ -21,11 +21,8 @@ def name_errors(room: TriangleArray) -> Iterator[Finding]:
 
 def face_errors(room: TriangleArray) -> Iterator[Finding]:
     """Check meshes for faces without area."""
-    bad = without_area(room.triangles)
-    for number in np.unique(room.owner[bad]):
-        name, mine = room.scene.reflectors[number].name, bad[room.owner == number]
-        message = f"{int(mine.sum())} faces without area, the first is face {int(np.argmax(mine))}"
-        yield room.error(f"reflector[{number}].mesh ({name})", message, "remove degenerate faces from the mesh")
+    for number, reflector in enumerate(room.scene.reflectors):
+        yield from room.degenerate(f"reflector[{number}].mesh ({reflector.name})", reflector.triangles)
 
 
 def scatterer_errors(room: TriangleArray) -> Iterator[Finding]:
@@ -38,7 +35,7 @@ def scatterer_errors(room: TriangleArray) -> Iterator[Finding]:
             yield room.error(f"scatterer[{number}].radius ({scatterer.name})", message, "give its radius in metres")
             continue
         if len(room.outside(at[None])):
-            yield room.error(field, f"{at.tolist()} lies outside the meshes' bounds {_box(room)}", "move it inside")
+            yield room.error(field, f"{at.tolist()} lies outside the meshes' bounds {room.box}", "move it inside")
             continue
         _, near = touching(at[None], room.triangles, MIN_CLEARANCE)
         if len(near):
@@ -71,8 +68,3 @@ def _coincident(room: TriangleArray) -> Iterator[Finding]:
         name = room.name(int(first[np.argmax(count > 1)]))
         message = f"{int((count - 1).sum())} faces lie exactly on others of their mesh, the first in '{name}'"
         yield room.warning("reflector", message, "leave the doubles out")
-
-
-def _box(room: TriangleArray) -> str:
-    low, high = np.round(room.bounds, 3).tolist()
-    return f"{low} to {high}"

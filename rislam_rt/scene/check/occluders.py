@@ -7,17 +7,14 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import Occluder, RadioConfig
 from rislam_rt.scene.check.mesh_queries import crossings, winding
-from rislam_rt.scene.check.triangle_array import TriangleArray, without_area
+from rislam_rt.scene.check.triangle_array import TriangleArray
 from rislam_rt.scene.findings import Finding
 
 
 def occluder_face_errors(room: TriangleArray) -> Iterator[Finding]:
     """Check occluders for faces without area."""
     for field, _, shade in _occluders(room):
-        bad = without_area(shade.triangles)
-        if bad.any():
-            message = f"{int(bad.sum())} faces without area, the first is face {int(np.argmax(bad))}"
-            yield room.error(field, message, "remove degenerate faces from the mesh")
+        yield from room.degenerate(field, shade.triangles)
 
 
 def occluder_errors(room: TriangleArray) -> Iterator[Finding]:

@@ -22,8 +22,7 @@ def panel_errors(room: TriangleArray) -> Iterator[Finding]:
         at = panel.center
         tolerant = room._replace(bounds=room.bounds + MIN_CLEARANCE * np.array([[-1.0], [1.0]]))
         if len(tolerant.outside(at[None])):
-            low, high = np.round(room.bounds, 3).tolist()
-            message = f"{at.tolist()} lies outside the meshes' bounds {low} to {high}"
+            message = f"{at.tolist()} lies outside the meshes' bounds {room.box}"
             yield room.error(f"{key}.center", message, "move the panel onto its host")
             continue
         findings = list(_on_host(room, panel, key))

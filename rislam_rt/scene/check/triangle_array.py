@@ -1,10 +1,12 @@
 """All triangles of a scene as one array, and the limits that every part of the check shares."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.triangles import triangle_heights
 from rislam_rt.model import Scene
 from rislam_rt.scene.findings import Finding
 
@@ -37,6 +39,19 @@ class TriangleArray(NamedTuple):
         low, high = self.bounds
         return np.flatnonzero(((points < low) | (points > high)).any(axis=-1))
 
+    @property
+    def box(self) -> str:
+        """The triangles' bounds in words."""
+        low, high = np.round(self.bounds, 3).tolist()
+        return f"{low} to {high}"
+
+    def degenerate(self, field: str, triangles: Floats) -> Iterator[Finding]:
+        """An error at a mesh, triangles (T, 3, 3), that has faces without area."""
+        bad = without_area(triangles)
+        if bad.any():
+            message = f"{int(bad.sum())} faces without area, the first is face {int(np.argmax(bad))}"
+            yield self.error(field, message, "remove degenerate faces from the mesh")
+
     def error(self, field: str, message: str, mend: str) -> Finding:
         """An error at a key of the scene file."""
         return Finding("error", self.file, field, message, mend)
@@ -60,7 +75,4 @@ def build_triangle_array(scene: Scene, file: str) -> TriangleArray:
 
 def without_area(triangles: Floats) -> Booleans:
     """Which triangles (T, 3, 3) are no more than a line."""
-    edges = np.roll(triangles, -1, axis=1) - triangles
-    longest = np.linalg.norm(edges, axis=-1).max(axis=1)
-    double_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
-    return double_area <= MIN_ALTITUDE * longest
+    return triangle_heights(triangles) <= MIN_ALTITUDE

@@ -10,12 +10,11 @@ from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.floor_plan import FloorPlan, Opening
 from rislam_rt.scene.importing.materials import MaterialAssignment
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.polygons import inside_loop, triangulate
-from rislam_rt.scene.importing.regions.mesh_simplification import as_mesh
 from rislam_rt.scene.importing.regions.region_groups import numbered, plain_name
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.wall_lines import SAME_LINE, Line, Spans, wall_lines, without_span
-from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.meshes import Mesh, as_mesh
+from rislam_rt.scene.polygons import inside_loop, triangulate
 from rislam_rt.scene.shapes import joined, quad
 
 THICKEST = 0.6
@@ -58,7 +57,7 @@ def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft
     levels: list[Entry] = []
     for name, level in (("floor", 0.0), ("ceiling", height)):
         mesh = joined([_at_height(flat, level), *thresholds[level]])
-        levels.append((name, as_mesh(mesh.vertices[mesh.faces]), None))
+        levels.append((name, as_mesh(mesh.triangles), None))
     return _named([*levels, *walls, *entries], plan, options)
 
 
@@ -69,8 +68,7 @@ def _named(entries: list[Entry], plan: FloorPlan, options: ImportOptions) -> Roo
     for name, (_, mesh, own) in zip(names, entries, strict=True):
         by_hand = palette.by_hand(name)
         reflectors[name] = (mesh, by_hand or own or palette.material(name, "", ""))
-    if palette.unused():
-        raise Fault(f"--material {palette.unused()[0]}: nothing has that name", f"give one of: {', '.join(names[:12])}")
+    palette.check_used(names)
     closed = sum(o.material is not None for o in plan.openings)
     remarks = [
         f"floor plan of {len(plan.rooms)} rooms: {len(names)} reflectors, {len(plan.openings) - closed} openings, "

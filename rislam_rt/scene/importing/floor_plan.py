@@ -12,7 +12,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import RislamError
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.importing.materials import parse_material
-from rislam_rt.scene.importing.polygons import signed_area, triangulate
+from rislam_rt.scene.polygons import signed_area, triangulate
 
 KINDS = ("room", "wall", "door", "window")
 SPANS = {"door": (0.0, 2.0), "window": (0.9, 2.1)}

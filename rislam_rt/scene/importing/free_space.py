@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
-from rislam_rt.geometry.triangles import distance_to_triangles, triangle_planes
+from rislam_rt.geometry.triangles import distance_to_triangles, triangle_cross, triangle_planes
 from rislam_rt.scene.check.mesh_queries import crossings, ray_hits, sphere_directions
 
 HEIGHTS = (1.0, 1.4, 0.6)
@@ -138,7 +138,7 @@ def _eyes(stations: Floats, triangles: Floats) -> Floats:
 def _spread(triangles: Floats, count: int) -> tuple[Floats, Floats]:
     """Points spread over triangles about the free space by their area, and the normals there."""
     edge = triangles[:, 1:] - triangles[:, :1]
-    area = np.cumsum(np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1))
+    area = np.cumsum(np.linalg.norm(triangle_cross(triangles), axis=1))
     chosen: Integers = np.searchsorted(area, (np.arange(count) + 0.5) / count * area[-1])
     chosen = np.minimum(chosen, len(triangles) - 1)
     # a lattice of the plane by the roots of x^3 = x + 1 (R2 sequence), folded into the triangle

@@ -17,8 +17,7 @@ def summarise_import(
 ) -> list[str]:  # fmt: skip
     """Report of an import: what became of the mesh, in numbers."""
     walls = sum(
-        len(planar_regions(mesh.vertices[mesh.faces], COPLANAR_ANGLE, COPLANAR_OFFSET).offset)
-        for mesh, _ in reflectors.values()
+        len(planar_regions(mesh.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET).offset) for mesh, _ in reflectors.values()
     )
     total, waves = float(facets.area.sum()), found.narrow / options.wavelength
     triangles = sum(len(mesh.faces) for mesh in occluders.values())
@@ -36,7 +35,8 @@ def summarise_import(
     if found.shade_error:
         how = f"corners joined in cells of {1e3 * found.cell:.2g} mm, moved {1e3 * found.shade_error:.2g} mm at most"
         remarks.append(f"clutter is thinned: {how}")
-    for (radius, sides, error), count in _counted(found.cylinders)[:8]:
+    alike = Counter((round(radius, 3), sides, round(error, 4)) for radius, sides, error in found.cylinders)
+    for (radius, sides, error), count in alike.most_common(8):
         what = "reflect" if options.curved == "planes" else "shade (--curved planes: reflect)"
         many = "a cylinder" if count == 1 else f"each of {count} cylinders"
         off = f"{1e3 * error:.2g} mm"
@@ -48,9 +48,3 @@ def summarise_import(
     if found.narrow > options.narrow * (1.0 + 1e-9):
         remarks.append(f"the {options.max_walls} widest walls reflect (--max-walls)")
     return remarks
-
-
-def _counted(cylinders: list[tuple[float, int, float]]) -> list[tuple[tuple[float, int, float], int]]:
-    """Cylinders of one size (to a millimetre) together in the report of an import, the most frequent first."""
-    sizes = Counter((round(radius, 3), sides, round(error, 4)) for radius, sides, error in cylinders)
-    return sizes.most_common()

@@ -1,10 +1,12 @@
 """Materials of an imported room: by hand, by the name that the file gives them, or one for all the rest."""
 
 import re
+from collections.abc import Iterable
 from fnmatch import fnmatchcase
 from typing import Any, get_args
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.schema import ItuMaterial
 
 THICKNESS = {
@@ -111,9 +113,18 @@ class MaterialAssignment:
         more = f" and {len(names) - 8} more" if len(names) > 8 else ""
         return [f"material unknown, taken as {what}: {', '.join(names[:8])}{more} (--material NAME=...)"]
 
-    def unused(self) -> list[str]:
-        """Patterns of materials that nothing matched."""
-        return sorted(set(self.choices) - self.used)
+    def check_used(self, names: Iterable[str]) -> None:
+        """Whether every material that was given has been used; `names`: some that could have been meant.
+
+        Raises
+        ------
+        Fault
+            A pattern of materials matches nothing.
+        """
+        unused = sorted(set(self.choices) - self.used)
+        if unused:
+            few = ", ".join([*names][:12])
+            raise Fault(f"--material {unused[0]}: nothing has that name", f"give one of: {few}")
 
 
 def itu_by_word(name: str) -> str | None:

@@ -14,7 +14,6 @@ from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.placement import place_parts
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, find_facets
-from rislam_rt.scene.importing.regions.mesh_simplification import as_mesh
 from rislam_rt.scene.importing.regions.region_groups import (
     RegionGroup,
     find_pieces,
@@ -27,7 +26,7 @@ from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface, 
 from rislam_rt.scene.importing.regions.welded_mesh import weld
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.scans.scan_room import looks_scanned, sort_scan
-from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.meshes import Mesh, as_mesh
 from rislam_rt.scene.shapes import joined
 
 
@@ -65,9 +64,7 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
     palette = MaterialAssignment(options.materials, options.rest)
     reflectors = _reflectors(surfaces, pieces, parts, palette)
     occluders = _occluders(found, pieces, list(reflectors))
-    if palette.unused():
-        names = ", ".join([*reflectors, *sorted({p.material for p in parts if p.material})][:12])
-        raise Fault(f"--material {palette.unused()[0]}: nothing has that name", f"give one of: {names}")
+    palette.check_used([*reflectors, *sorted({p.material for p in parts if p.material})])
     said = summarise_import(facets, found, surfaces, unseen, reflectors, occluders, options, scanned=bool(about))
     remarks = [*notes, *about, *said]
     return RoomDraft(reflectors, occluders, remarks + palette.remarks())
@@ -77,12 +74,12 @@ def _seen(found: SortedSurfaces) -> tuple[list[Surface], float]:
     """Surfaces of a mesh that an agent inside the room can see, and the area [m^2] of the others: outer skins, insides
     of boards."""
     triangles = np.concatenate([
-        *(s.mesh.vertices[s.mesh.faces] for s in found.surfaces), *(c.triangles for c in found.clutter)
+        *(s.mesh.triangles for s in found.surfaces), *(c.triangles for c in found.clutter)
     ])  # fmt: skip
     free = find_free(triangles, float(triangles[..., 2].min()))
     if free is None:
         return found.surfaces, 0.0
-    seen = is_seen(free.stations, [s.mesh.vertices[s.mesh.faces] for s in found.surfaces], triangles)
+    seen = is_seen(free.stations, [s.mesh.triangles for s in found.surfaces], triangles)
     hidden = sum(surface.area for surface, visible in zip(found.surfaces, seen, strict=True) if not visible)
     kept = [surface for surface, visible in zip(found.surfaces, seen, strict=True) if visible]
     return (kept, hidden) if kept else (found.surfaces, 0.0)
@@ -98,7 +95,7 @@ def _reflectors(
     uses = [place_free_name(parts[s.part].node) for s in shell]
     entries: list[tuple[str, Mesh, int]] = []
     for surface, node in zip(shell, uses, strict=True):
-        middle = surface.mesh.vertices[surface.mesh.faces].mean(axis=(0, 1))
+        middle = surface.mesh.triangles.mean(axis=(0, 1))
         place = wall_name(surface.normal, middle, room)
         if itu_by_word(parts[surface.part].material) == "glass":
             place = place.replace("wall", "window")

@@ -12,7 +12,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.importing.obj import read_obj
 from rislam_rt.scene.mesh_containers import check_glb
-from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, read_inside, sound_mesh, unfold
+from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, node_mesh, read_inside, sound_mesh, unfold
 
 MESH_FORMATS = (".glb", ".gltf", ".obj", ".ply", ".stl")
 MAX_IMPORT_FACES = 2_000_000
@@ -56,7 +56,7 @@ def read_source(path: Path) -> tuple[list[MeshPart], list[str]]:
             notes.append(f"'{library[:60]}' is not there: materials are known by their names in the OBJ file alone")
     else:
         mesh = MeshReader().parse(content, path.name, max_faces=MAX_IMPORT_FACES, reach=ANY_UNIT)
-        parts = [MeshPart("", "", mesh.vertices[mesh.faces])]
+        parts = [MeshPart("", "", mesh.triangles)]
     if not parts:
         raise Fault("the file has no triangles", "export it with its meshes")
     return [MeshPart(part.node, part.material, _sound(part)) for part in parts], notes
@@ -95,18 +95,13 @@ def _from_gltf(content: bytes, suffix: str, folder: Path) -> list[MeshPart]:
     content = _plain_glb(content) if suffix == ".glb" else _joined_glb(content, folder)
     check_glb(content, MAX_IMPORT_FACES, MAX_IMPORT_NODES)
     loaded = unfold(content, "glb")
-    parts, seen = [], 0
+    parts = []
     for name in loaded.graph.nodes_geometry:
-        matrix, geometry = loaded.graph[name]
-        mesh = loaded.geometry[geometry]
-        faces = np.asarray(getattr(mesh, "faces", np.zeros((0, 3))))
-        if not len(faces):
-            continue
-        seen += len(faces)
-        vertices = np.asarray(mesh.vertices, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-        mesh_checked = sound_mesh(Mesh(vertices, faces.astype(np.int64)), MAX_IMPORT_FACES, ANY_UNIT)
-        material = getattr(getattr(mesh.visual, "material", None), "name", None)
-        parts.append(MeshPart(str(name), str(material or ""), mesh_checked.vertices[mesh_checked.faces]))
+        mesh, geometry = node_mesh(loaded, name)
+        if len(mesh.faces):
+            material = getattr(getattr(geometry.visual, "material", None), "name", None)
+            triangles = sound_mesh(mesh, MAX_IMPORT_FACES, ANY_UNIT).triangles
+            parts.append(MeshPart(str(name), str(material or ""), triangles))
     return parts
 
 

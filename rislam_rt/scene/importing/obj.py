@@ -1,19 +1,13 @@
 """OBJ files: corners, polygons, groups and the names of materials."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault, one_line
-from rislam_rt.scene.importing.polygons import triangulate
+from rislam_rt.scene.polygons import signed_area, triangulate
 
-
-class _Reading(NamedTuple):
-    points: list[list[float]]
-    faces: dict[tuple[str, str], list[list[int]]]
-    """Corners of the polygons of each (group, material)."""
-    library: str
+Polygons = dict[tuple[str, str], list[list[int]]]
+"""Corners of the polygons of each (group, material) of an OBJ file."""
 
 
 def read_obj(content: bytes) -> tuple[list[tuple[str, str, Floats]], str]:
@@ -24,20 +18,20 @@ def read_obj(content: bytes) -> tuple[list[tuple[str, str, Floats]], str]:
     Fault
         A line cannot be read, or a face names a corner that is not there.
     """
-    reading = _read_lines(content.decode("latin-1"))
-    points = np.array(reading.points, dtype=np.float64).reshape(-1, 3)
+    points, faces, library = _read_lines(content.decode("latin-1"))
     found = []
-    for (group, material), polygons in reading.faces.items():
+    for (group, material), polygons in faces.items():
         sizes = np.array([len(polygon) for polygon in polygons])
         triangles = [points[np.array([p for p in polygons if len(p) == 3], dtype=np.int64).reshape(-1, 3)]]
         triangles += [_split(points[polygons[number]]) for number in np.flatnonzero(sizes > 3)]
         found.append((group, material, np.concatenate(triangles)))
-    return found, reading.library
+    return found, library
 
 
-def _read_lines(text: str) -> _Reading:
+def _read_lines(text: str) -> tuple[Floats, Polygons, str]:
+    """Points (V, 3), polygons and library of an OBJ file."""
     points: list[list[float]] = []
-    faces: dict[tuple[str, str], list[list[int]]] = {}
+    faces: Polygons = {}
     group = material = library = ""
     for number, line in enumerate(text.replace("\\\n", " ").splitlines(), start=1):
         key, _, rest = line.strip().partition(" ")
@@ -56,7 +50,7 @@ def _read_lines(text: str) -> _Reading:
             material = rest.strip()
         elif key == "mtllib":
             library = rest.strip()
-    return _Reading(points, faces, library)
+    return np.array(points, dtype=np.float64).reshape(-1, 3), faces, library
 
 
 def _corners(text: str, count: int) -> list[int]:
@@ -75,7 +69,7 @@ def _split(corners: Floats) -> Floats:
     middle = corners.mean(axis=0)
     normal = np.linalg.svd(corners - middle)[2] if np.isfinite(corners).all() else np.eye(3)
     flat = (corners - middle) @ normal[:2].T
-    turned = 0.5 * float(np.sum(flat[:, 0] * np.roll(flat[:, 1], -1) - flat[:, 1] * np.roll(flat[:, 0], -1))) < 0.0
+    turned = signed_area(flat) < 0.0
     order = np.arange(len(corners))[::-1] if turned else np.arange(len(corners))
     found = triangulate(flat[order], [])
     if found is None:  # a polygon that crosses itself

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.mesh_source import MeshPart
 from rislam_rt.scene.importing.options import ImportOptions
@@ -57,6 +58,4 @@ def check_size(diagonal: float, units: str | None) -> None:
 
 def _facing(placed: list[Floats]) -> Floats:
     """(3,) area [m^2] seen along each axis, which tells how a mesh is to be placed."""
-    triangles = np.concatenate(placed)
-    edge = triangles[:, 1:] - triangles[:, :1]
-    return np.asarray(0.5 * np.abs(np.cross(edge[:, 0], edge[:, 1])).sum(axis=0))
+    return np.asarray(0.5 * np.abs(triangle_cross(np.concatenate(placed))).sum(axis=0))

@@ -7,13 +7,14 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
+from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.scene.check.mesh_queries import ray_hits
-from rislam_rt.scene.file_names import safe_name
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.free_space import FreeSpace, find_free
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.room_files import BASELINE, CYCLES, RoomFiles, panel, reflector
+from rislam_rt.scene.write import mesh_file
 
 FROM_EDGE = 0.1
 """[m] The panel measures 9 cm: so far it keeps off the edges of its host."""
@@ -32,7 +33,7 @@ class RoomDraft:
     def triangles(self) -> Floats:
         """(T, 3, 3) [m] of all that stands in the room."""
         meshes = [mesh for mesh, _ in self.reflectors.values()] + list(self.occluders.values())
-        return np.concatenate([mesh.vertices[mesh.faces] for mesh in meshes])
+        return np.concatenate([mesh.triangles for mesh in meshes])
 
 
 def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, list[str]]:
@@ -52,13 +53,12 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, li
     start, end = free.way
     agent = {"start": start.round(4).tolist(), "velocity": ((end - start) / 60.0).round(6).tolist(), **CYCLES}
     table: dict[str, Any] = {"name": name}
-    table["reflector"] = [_reflector(key, material) for key, (_, material) in draft.reflectors.items()]
-    table["shade"] = [{"name": key, "mesh": f"meshes/{safe_name(key)}.ply"} for key in draft.occluders]
+    table["reflector"] = [reflector(key, material) for key, (_, material) in draft.reflectors.items()]
+    table["shade"] = [{"name": key, "mesh": mesh_file(key)} for key in draft.occluders]
     ris, about = propose_panel(draft, free)
     table |= {"ris": ris} if ris else {}
     table["agent"] = agent | BASELINE
-    meshes = {safe_name(key): mesh for key, (mesh, _) in draft.reflectors.items()}
-    meshes |= {safe_name(key): mesh for key, mesh in draft.occluders.items()}
+    meshes = {key: mesh for key, (mesh, _) in draft.reflectors.items()} | draft.occluders
     length = float(np.linalg.norm(end - start))
     remarks = [
         *draft.remarks,
@@ -70,14 +70,10 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, li
     return RoomFiles({key: value for key, value in table.items() if value != []}, meshes, readme), remarks
 
 
-def _reflector(name: str, material: dict[str, Any]) -> dict[str, Any]:
-    return reflector(name, material) | {"mesh": f"meshes/{safe_name(name)}.ply"}
-
-
 def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | None, str]:
     """A panel like the paper's on what is above the middle of the way, or else beside it."""
     names = [key for key, (mesh, _) in draft.reflectors.items() for _ in range(len(mesh.faces))]
-    triangles = np.concatenate([mesh.vertices[mesh.faces] for mesh, _ in draft.reflectors.values()])
+    triangles = np.concatenate([mesh.triangles for mesh, _ in draft.reflectors.values()])
     middle, along = free.way.mean(axis=0), unit(free.way[1] - free.way[0])
     side = np.array([-along[1], along[0], 0.0])
     up = np.array([0.0, 0.0, 1.0])
@@ -88,7 +84,7 @@ def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | N
         normal, offset = (part[0] for part in triangle_planes(triangles[hit : hit + 1]))
         center = middle + look * float((offset - normal @ middle) / (normal @ look))
         normal = normal * (1.0 if (middle - center) @ normal > 0.0 else -1.0) + 0.0
-        right = unit(np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))]))
+        right, _ = plane_tangents(normal)
         if _fits(center, normal, right, names[hit], draft, free):
             table = panel(center.round(9).tolist(), normal.tolist(), right.tolist(), names[hit])
             return table, f"a panel of 6 x 6 elements on '{names[hit]}'"
@@ -103,5 +99,5 @@ def _fits(center: Floats, normal: Floats, right: Floats, host: str, draft: RoomD
     middle = free.way.mean(axis=0)
     hits = ray_hits(middle, unit(corners - middle), draft.triangles)
     seen = draft.triangles[hits]
-    own = mesh.vertices[mesh.faces]
+    own = mesh.triangles
     return bool((hits >= 0).all()) and all((own == triangle).all(axis=(1, 2)).any() for triangle in seen)

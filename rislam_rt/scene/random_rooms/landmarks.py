@@ -1,8 +1,6 @@
 """Landmarks drawn at random, scatterers and panel: open, below the agent, behind a screen; on any wall or in the
 ceiling."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rislam_rt.arrays import Floats
@@ -42,17 +40,10 @@ ABOVE = 0.3
 _TRIES = 60
 
 
-class ScattererPlacement(NamedTuple):
-    """A scatterer's place, and the screen that hides it, if any."""
-
-    position: Floats
-    screen: FurniturePiece | None = None
-
-
 def draw_scatterer(
     place: str, ground: PlacementLimits, pieces: list[FurniturePiece], landmarks: Floats, *, rng: np.random.Generator
-) -> ScattererPlacement | None:
-    """A place of one of `PLACES` for a scatterer; None where the room has none."""
+) -> tuple[Floats, list[FurniturePiece]] | None:
+    """A place (3,) of one of `PLACES` for a scatterer, and the screen that hides it, if any; None without one."""
     low, high = ground.outline.min(axis=0), ground.outline.max(axis=0)
     lowest = float(ground.way[:, 2].min())
     for _ in range(_TRIES):
@@ -67,18 +58,18 @@ def draw_scatterer(
         if not _is_free(point, ground, pieces, landmarks):
             continue
         if place != "hidden":
-            return ScattererPlacement(point)
+            return point, []
         screen = _screen_before(point, ground, rng)
         clear = not any(screen.holds(mark, OFF_SURFACES) for mark in [*landmarks, point])
         if clear and fits(screen, ground, pieces) and hidden_share(point, ground.way, [*pieces, screen]) >= MOST:
-            return ScattererPlacement(point, screen)
+            return point, [screen]
     return None
 
 
 def hidden_share(point: Floats, way: Floats, pieces: list[FurniturePiece]) -> float:
     """Share of a way (K, 3) from which furniture hides a random landmark (3,), every tenth of it looked at."""
     seen_from = way[::10]
-    triangles = [mesh.vertices[mesh.faces] for mesh in (piece.mesh() for piece in pieces)]
+    triangles = [mesh.triangles for mesh in (piece.mesh() for piece in pieces)]
     if not triangles:
         return 0.0
     cycles, _ = crossings(seen_from, np.broadcast_to(point, seen_from.shape), np.concatenate(triangles))

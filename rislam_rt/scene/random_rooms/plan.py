@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.scene.polygons import inside_loop
 
 SHAPES = ("convex", "l", "t", "u")
 """Shapes of a plan."""
@@ -35,7 +36,10 @@ def extent(outline: Floats) -> float:
 
 
 def area(outline: Floats) -> float:
-    """[m^2] of a random room's plan, positive where the corners run counter-clockwise."""
+    """[m^2] of a random room's plan, positive where the corners run counter-clockwise.
+
+    Its rounding decides which of two flat ears is cut off, and so the meshes of every room that was ever drawn.
+    """
     x, y = outline.T
     return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
@@ -46,7 +50,7 @@ def depth_inside(outline: Floats, points: Floats) -> Floats:
     offset = points[..., None, :] - start
     share = np.clip(np.sum(offset * along, axis=-1) / np.sum(along**2, axis=-1), 0.0, 1.0)
     gap = np.linalg.norm(offset - share[..., None] * along, axis=-1).min(axis=-1)
-    return np.where(_inside(outline, points), gap, -gap)
+    return np.where(inside_loop(outline, points), gap, -gap)
 
 
 def triangulate(outline: Floats) -> Integers:
@@ -102,16 +106,6 @@ def _horseshoe(sides: Floats, rng: np.random.Generator) -> Floats:
         [[0, 0], [a, 0], [a, b], [a - right, b], [a - right, floor], [left, floor], [left, b], [0, b]],
         dtype=np.float64,
     )
-
-
-def _inside(outline: Floats, points: Floats) -> Booleans:
-    """Whether a point lies in a plan: a ray towards +x crosses the outline an odd number of times."""
-    a, b = outline, np.roll(outline, -1, axis=0)
-    y = points[..., None, 1]
-    straddles = (a[:, 1] > y) != (b[:, 1] > y)
-    rise = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
-    x = a[:, 0] + (y - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
-    return np.asarray(np.sum(straddles & (points[..., None, 0] < x), axis=-1) % 2 == 1)
 
 
 def _is_ear(outline: Floats, left: list[int], place: int) -> bool:

@@ -132,8 +132,8 @@ def _landmarks(
     for place in rng.choice(PLACES, p=SHARES, size=int(rng.integers(1, MAX_SCATTERERS + 1))):
         found = draw_scatterer(str(place), ground, pieces, np.concatenate([marks, positions]), rng=rng)
         if found is not None:
-            positions = np.concatenate([positions, found.position[None]])
-            pieces += [found.screen] if found.screen is not None else []
+            positions = np.concatenate([positions, found[0][None]])
+            pieces += found[1]
     scatterers = [make_scatterer(number, point, rng=rng) for number, point in enumerate(positions)]
     return scatterers, ris
 

@@ -11,7 +11,7 @@ def clip_mesh(mesh: Mesh, window: Floats) -> Mesh:
 
     Sutherland and Hodgman (Commun. ACM 1974), side by side; a cut triangle comes back as a fan of triangles.
     """
-    corners = mesh.vertices[mesh.faces]
+    corners = mesh.triangles
     low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
     touched = ((high > window[0]) & (low < window[1])).all(axis=1)
     inside = touched & ((low >= window[0]) & (high <= window[1])).all(axis=1)

@@ -184,7 +184,7 @@ def _too_many(root: Element, number: int, max_faces: int) -> Fault:
 
 def _take(found: XmlScene, identity: str, mesh: Mesh, material: Material | None) -> None:
     """Add a shape of an XML scene under a name of its own, without faces that are no more than a line."""
-    bad = without_area(mesh.vertices[mesh.faces])
+    bad = without_area(mesh.triangles)
     if bad.any():
         found.notes.append(f"{identity}: {int(bad.sum())} faces without area left out")
     if not bad.all():

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rislam_rt.adviser.budget import trajectory_at
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.model import Scene, SlamResult
 from rislam_rt.pipeline import load_spec, run_slam
@@ -138,7 +137,7 @@ def test_walls_are_the_rooms(paper: Scene) -> None:
 
 def test_paths_are_those_found_with_their_lengths_and_margins(paper: Scene) -> None:
     settings = build_settings(load_spec(PIPELINE))
-    motion = trajectory_at(paper.agent, np.array([0, 300]))
+    motion = paper.agent[:600:300]
     paths = ImageSourceChannel(paper, settings.radio, 1).paths(motion)
     _, (data,) = read(view_page("a <room>", "two & poses", paths_data(paper, motion, paths, settings)))
     assert isinstance(data, dict)

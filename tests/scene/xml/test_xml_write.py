@@ -1,12 +1,10 @@
 """A room as a Sionna scene file, and back: the same, or as it was changed there."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rislam_rt.cli.new import is_xml
 from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.model import Material
 from rislam_rt.scene import check_scene, load_scene
@@ -93,7 +91,3 @@ def test_failures_leave_nothing_behind(tmp_path):
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(SceneError, match="exists already"):
         write_xml(load_scene("empty_box"), tmp_path)
-
-
-def test_which_sources_are_xml():
-    assert [is_xml(Path(name)) for name in ("a.xml", "b/c.XML", "sionna:box", "room.glb")] == [True, True, True, False]

@@ -7,6 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.connected_parts import connected
+from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.scene.importing.regions.welded_mesh import Welded
 
 FLAT_ANGLE = np.radians(0.5)
@@ -51,7 +52,7 @@ class FlatRegions(NamedTuple):
 def find_facets(mesh: Welded) -> FlatRegions:
     """Part a welded mesh into flat regions: neighbours of one part that meet at less than `FLAT_ANGLE`."""
     triangles = mesh.vertices[mesh.faces]
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    cross = triangle_cross(triangles)
     area, normal = 0.5 * np.linalg.norm(cross, axis=1), unit(cross)
     edges = _edges(mesh.faces, normal)
     flat = (edges.turn < FLAT_ANGLE) & (mesh.part[edges.a] == mesh.part[edges.b])

@@ -3,11 +3,11 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.geometry.triangles import distance_to_edges
-from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
+from rislam_rt.geometry.planes import plane_tangents
+from rislam_rt.geometry.triangles import distance_to_edges, triangle_heights
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions
-from rislam_rt.scene.importing.regions.round_surfaces import across
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
 
 
 def corners_kept(facets: FlatRegions, label: Integers) -> Booleans:
@@ -50,8 +50,7 @@ def _filled(
     faces: Integers, points: Floats, normal: Floats, kept: Booleans, tolerance: float
 ) -> tuple[Mesh | None, float]:
     """The thinned outlines as a mesh, and how far the farthest corner is off them [m]."""
-    u, v = across(normal)
-    flat = points @ np.stack([u, v], axis=-1)
+    flat = points @ np.stack(plane_tangents(normal), axis=-1)
     drawn = outline_loops(faces)
     loops = [simplify_loop(loop, points, kept, tolerance) for loop in drawn]
     moved = max(_off_loop(points[a], points[b]) for a, b in zip(drawn, loops, strict=True)) if drawn else 0.0
@@ -81,14 +80,9 @@ def _off_loop(corners: Floats, loop: Floats) -> float:
 
 
 def _around(hole: Floats, outers: list[Floats]) -> int | None:
-    """Smallest outer loop around a hole, for simplification."""
-    around = [k for k, outer in enumerate(outers) if _holds(outer, hole)]
+    """Smallest outer loop around a hole, by the middle of its first edge, for simplification."""
+    around = [k for k, outer in enumerate(outers) if inside_loop(outer, 0.5 * (hole[0] + hole[1]))]
     return min(around, key=lambda k: signed_area(outers[k])) if around else None
-
-
-def _holds(outer: Floats, hole: Floats) -> bool:
-    """Whether a loop (n, 2) to simplify holds the middle of another's first edge."""
-    return inside_loop(outer, 0.5 * (hole[0] + hole[1]))
 
 
 def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:
@@ -112,12 +106,4 @@ def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:
 
 def has_area(triangles: Floats) -> Booleans:
     """Which triangles (T, 3, 3) are more than a line: higher than a tenth of a millimetre."""
-    edge = np.roll(triangles, -1, axis=1) - triangles
-    height = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
-    return np.asarray(height > 1e-4 * np.linalg.norm(edge, axis=-1).max(axis=1))
-
-
-def as_mesh(triangles: Floats) -> Mesh:
-    """Triangles (T, 3, 3) with shared corners."""
-    vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    return Mesh(vertices, index.reshape(-1, 3).astype(np.int64))
+    return np.asarray(triangle_heights(triangles) > 1e-4)

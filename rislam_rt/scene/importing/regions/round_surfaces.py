@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.geometry.angles import unit
+from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions, crease_groups
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.shapes import joined, quad
@@ -60,19 +60,13 @@ def prism(found: RoundPatch, sagitta: float) -> tuple[Mesh, float]:
     half = 0.5 * (end - start) / count
     full = end - start > 2.0 * np.pi - 1e-9
     corner = found.radius * half / np.sin(half) if full else found.radius
-    u, v = across(found.axis)
+    u, v = plane_tangents(found.axis)
     ring = found.center + corner * (np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v)
     if full:
         ring[-1] = ring[0]
     low, high = (ring + height * found.axis for height in found.along)
     sides = [quad(np.stack([low[i], low[i + 1], high[i + 1], high[i]])) for i in range(count)]
     return joined(sides), max(corner - found.radius, found.radius - corner * float(np.cos(half)))
-
-
-def across(axis: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors across a round surface's axis, and each other."""
-    u = unit(np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
-    return u, np.cross(axis, u)
 
 
 def _cylinder(facets: FlatRegions, regions: Integers) -> RoundPatch:
@@ -84,7 +78,7 @@ def _cylinder(facets: FlatRegions, regions: Integers) -> RoundPatch:
     other = RoundPatch(regions, axis, points.mean(axis=0), 0.0, (0.0, 0.0), (0.0, 0.0))
     if values[0] > 0.01:
         return other
-    u, v = across(axis)
+    u, v = plane_tangents(axis)
     flat, along = points @ np.stack([u, v], axis=-1), points @ axis
     # |p|^2 = 2 c . p + (r^2 - |c|^2), linear in c (Kasa, IEEE Trans. Instrum. Meas. 1976), about the middle
     middle = flat.mean(axis=0)

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
-from rislam_rt.geometry.triangles import distance_to_triangles
+from rislam_rt.geometry.triangles import distance_to_triangles, triangle_areas
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions
 from rislam_rt.scene.importing.regions.mesh_simplification import clustered, corners_kept, has_area, region_mesh
@@ -92,7 +92,7 @@ def sort_regions(
         mesh, error = region_mesh(facets, regions, kept, OUTLINE * options.wavelength)
         area = float(facets.area[regions].sum())
         surfaces.append(Surface(int(owner[first]), int(part[first]), facets.normal[first], mesh, area, error))
-    return _with_clutter(facets, pieces, rounds, surfaces, mirror, resting, narrow, options)
+    return _with_clutter(facets, pieces, rounds, surfaces, owner, part, mirror, resting, narrow, options)
 
 
 def _mirrors(facets: FlatRegions, rounded: Booleans, options: ImportOptions) -> tuple[Booleans, float]:
@@ -147,29 +147,26 @@ def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Inte
 
 
 def _with_clutter(
-    facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], surfaces: list[Surface], mirror: Booleans,
-    resting: Booleans, narrow: float, options: ImportOptions,
+    facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], surfaces: list[Surface], owner: Integers,
+    part: Integers, mirror: Booleans, resting: Booleans, narrow: float, options: ImportOptions,
 ) -> SortedSurfaces:  # fmt: skip
     """Cylinders as prisms and all else that does not reflect in cells."""
     wavelength, cylinders, prisms = options.wavelength, [], []
     rest = ~mirror & ~resting
-    owner = {int(region): number for number, piece in enumerate(pieces) for region in piece.regions}
-    part = np.zeros(len(mirror), dtype=np.int64)
-    part[facets.region] = facets.mesh.part
     for found in rounds:
         if found.radius < wavelength or found.along[1] - found.along[0] < narrow or resting[found.regions].all():
             continue
         sagitta = SAGITTA * wavelength * (0.5 if options.curved == "planes" else 1.0)
         mesh, error = prism(found, sagitta)
         first = int(found.regions[0])
-        thing = owner[first]
+        thing = int(owner[first])
         cylinders.append((found.radius, len(mesh.faces) // 2, error))
         rest[found.regions] = False
         if options.curved == "planes":
             area = float(facets.area[found.regions].sum())
             surfaces.append(Surface(thing, int(part[first]), facets.normal[first], mesh, area, error))
         else:
-            prisms.append(ClutterMesh(thing, mesh.vertices[mesh.faces]))
+            prisms.append(ClutterMesh(thing, mesh.triangles))
     gone = float(facets.area[resting].sum())
     raw, planes = [], _shell_planes(surfaces)
     for number, piece in enumerate(pieces):
@@ -181,7 +178,7 @@ def _with_clutter(
             gone += float(facets.area[regions].sum())
             rest[regions] = False
     thin, error, cell = in_cells(raw, wavelength)
-    shading = float(facets.area[rest].sum()) + sum(surface_area(clutter.triangles) for clutter in prisms)
+    shading = float(facets.area[rest].sum()) + sum(float(triangle_areas(clutter.triangles).sum()) for clutter in prisms)
     thin = [ClutterMesh(c.piece, off_planes(c.triangles, planes)) for c in (*prisms, *thin)]
     thin = [clutter for clutter in thin if len(clutter.triangles)]
     return SortedSurfaces(surfaces, thin, error, cell, narrow, shading, gone, cylinders)
@@ -210,9 +207,3 @@ def off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats:
     for normal, offset in planes:
         keep &= np.abs(triangles @ normal - offset).max(axis=1) > RESTING
     return triangles[keep]
-
-
-def surface_area(triangles: Floats) -> float:
-    """Area [m^2] of triangles (T, 3, 3)."""
-    edge = triangles[:, 1:] - triangles[:, :1]
-    return 0.5 * float(np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1).sum())

@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.connected_parts import connected
+from rislam_rt.geometry.triangles import triangle_heights
 
 WELD = 2e-5
 """[m] Corners nearer than this are one: what float32 leaves open in a file of 100 m, and no drawing means less."""
@@ -32,9 +33,6 @@ def weld(triangles: list[Floats]) -> Welded:
     group = connected(pairs, len(vertices))
     _, first = np.unique(group, return_index=True)
     vertices, faces = vertices[first], group[index.ravel()].reshape(-1, 3)
-    edge = vertices[np.roll(faces, -1, axis=1)] - vertices[faces]
-    height = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
-    solid = height > WELD * np.linalg.norm(edge, axis=-1).max(axis=1)
     _, single = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-    keep = np.intersect1d(np.flatnonzero(solid), single)
+    keep = np.intersect1d(np.flatnonzero(triangle_heights(vertices[faces]) > WELD), single)
     return Welded(vertices, faces[keep], part[keep])

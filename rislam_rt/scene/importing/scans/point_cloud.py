@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
+from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.scene.importing.regions.welded_mesh import Welded
 
 SPACING = 0.04
@@ -61,7 +62,7 @@ def downsample_mesh(mesh: Welded) -> PointCloud:
 def _facing(mesh: Welded) -> tuple[Floats, Floats]:
     """(V, 3) where each corner faces, smoothed over its neighbours, and the area (V,) [m^2] that it stands for."""
     triangles = mesh.vertices[mesh.faces]
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    cross = triangle_cross(triangles)
     share, facing = np.zeros(len(mesh.vertices)), np.zeros((len(mesh.vertices), 3))
     np.add.at(share, mesh.faces, np.linalg.norm(cross, axis=1)[:, None] / 6.0)
     for corner in range(3):

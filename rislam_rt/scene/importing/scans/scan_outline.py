@@ -7,11 +7,11 @@ from scipy.ndimage import binary_closing, binary_fill_holes, label
 from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Booleans, Floats
-from rislam_rt.scene.importing.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
-from rislam_rt.scene.importing.regions.round_surfaces import across
+from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.scene.importing.scans.point_cloud import PointCloud
 from rislam_rt.scene.importing.scans.scan_planes import ScanPlane
 from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
 from rislam_rt.scene.shapes import joined
 
 CELL = 0.1
@@ -55,7 +55,7 @@ def _outline(
     number: int, planes: list[ScanPlane], trees: list[cKDTree], cloud: PointCloud, fill: float
 ) -> Outline | None:
     plane = planes[number]
-    frame = np.stack(across(plane.normal), axis=-1)
+    frame = np.stack(plane_tangents(plane.normal), axis=-1)
     flat = cloud.points[plane.members] @ frame
     low = flat.min(axis=0) - (BRIDGE + 1.5) * CELL
     size = np.ceil((flat.max(axis=0) - low) / CELL).astype(int) + BRIDGE + 2
@@ -72,6 +72,14 @@ def _outline(
     return Outline(joined(meshes), filled) if meshes else None
 
 
+def _meeting(plane: ScanPlane, other: ScanPlane, frame: Floats) -> tuple[Floats, float, float]:
+    """Line in a scanned plane's frame (3, 2) where another plane cuts it: normal, offset [m], sine of the angle."""
+    line = frame.T @ other.normal
+    slope = float(np.linalg.norm(line))
+    rest = other.offset - plane.offset * float(plane.normal @ other.normal)
+    return (line / slope, rest / slope, slope) if slope > 0.0 else (line, rest, slope)
+
+
 def _ridges(
     number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats, low: Floats, shape: tuple[int, ...]
 ) -> Booleans:
@@ -84,12 +92,9 @@ def _ridges(
     reach = float(np.hypot(shape[0], shape[1])) * CELL
     ends: list[tuple[Floats, Booleans]] = []
     for other, tree in enumerate(trees):
-        line = frame.T @ planes[other].normal
-        slope = float(np.linalg.norm(line))
+        line, offset, slope = _meeting(plane, planes[other], frame)
         if other == number or slope < 0.5:
             continue
-        offset = (planes[other].offset - plane.offset * float(plane.normal @ planes[other].normal)) / slope
-        line = line / slope
         middle = low + 0.5 * CELL * np.array(shape)
         foot = middle + (offset - float(line @ middle)) * line
         steps = np.arange(-reach, reach, 0.5 * CELL)
@@ -158,9 +163,8 @@ def _loops(there: Booleans) -> list[list[Floats]]:
 
 def _snapped(loop: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats) -> Floats:
     """Outline of a scan's plane whose edges lie where planes meet, its corners where its edges meet."""
-    plane, edges = planes[number], []
-    for start, end in zip(loop, np.roll(loop, -1, axis=0), strict=True):
-        edges.append(_edge(start, end, number, planes, trees, frame, plane))
+    ends = zip(loop, np.roll(loop, -1, axis=0), strict=True)
+    edges = [_edge(start, end, number, planes, trees, frame) for start, end in ends]
     # a short edge beside one that another plane gives is the grid's cut through a corner
     kept = []
     for k, edge in enumerate(edges):
@@ -187,12 +191,10 @@ def _converged(corners: Floats, number: int, planes: list[ScanPlane], trees: lis
         place = frame @ corner + plane.offset * plane.normal
         near = []
         for other, tree in enumerate(trees):
-            line = frame.T @ planes[other].normal
-            slope = float(np.linalg.norm(line))
+            line, offset, slope = _meeting(plane, planes[other], frame)
             if other == number or slope < 0.3 or tree.query(place)[0] > 4.0 * CELL:
                 continue
-            offset = (planes[other].offset - plane.offset * float(plane.normal @ planes[other].normal)) / slope
-            near.append((abs(float(line @ corner) / slope - offset), tuple(line / slope), offset))
+            near.append((abs(float(line @ corner) - offset), tuple(line), offset))
         near = sorted(item for item in near if item[0] < 1.5 * CELL)
         if not near:
             continue
@@ -213,27 +215,23 @@ def _same(a: _Edge, b: _Edge) -> bool:
 
 
 def _edge(
-    start: Floats, end: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats,
-    plane: ScanPlane,
+    start: Floats, end: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats
 ) -> _Edge:  # fmt: skip
     """Line of an outline's edge: where the nearest other plane of the scan cuts this one, if near all along."""
-    along = end - start
+    plane, along = planes[number], end - start
     length = float(np.linalg.norm(along))
     normal = np.array([along[1], -along[0]]) / length
     middle = frame @ (0.5 * (start + end)) + plane.offset * plane.normal
-    best = (MEET * CELL, None)
+    best: tuple[float, _Edge | None] = (MEET * CELL, None)
     for other, tree in enumerate(trees):
-        across_line = frame.T @ planes[other].normal
-        slope = float(np.linalg.norm(across_line))
+        line, offset, slope = _meeting(plane, planes[other], frame)
         if other == number or slope < 0.3 or tree.query(middle)[0] > 4.0 * CELL + 0.5 * length:
             continue
-        line = across_line / slope
-        offset = (planes[other].offset - plane.offset * float(plane.normal @ planes[other].normal)) / slope
         if abs(float(line @ normal)) < SLANT:
             continue
         far = max(abs(float(line @ start) - offset), abs(float(line @ end) - offset))
         if far < best[0]:
-            best = (far, _Edge(line, offset, length, True))  # type: ignore[assignment]
+            best = (far, _Edge(line, offset, length, True))
     # cells with a point in them reach half a cell beyond what is there, on average; the solid lies to the left
     return best[1] or _Edge(normal, float(normal @ (0.5 * (start + end))) - 0.5 * CELL, length, False)
 

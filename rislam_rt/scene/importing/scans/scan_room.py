@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
-from rislam_rt.geometry.triangles import distance_to_triangles
+from rislam_rt.geometry.triangles import distance_to_triangles, triangle_areas
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions
@@ -13,7 +13,6 @@ from rislam_rt.scene.importing.regions.surfaces import (
     Surface,
     in_cells,
     off_planes,
-    surface_area,
 )
 from rislam_rt.scene.importing.regions.welded_mesh import Welded
 from rislam_rt.scene.importing.scans.point_cloud import downsample_mesh
@@ -48,7 +47,7 @@ def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[SortedSurfaces, lis
     if not kept:
         raise Fault("no plane is found in the scan", "check --units, or clean the mesh")
     surfaces = [
-        Surface(0, 0, plane.normal, outline.mesh, surface_area(outline.mesh.vertices[outline.mesh.faces]),
+        Surface(0, 0, plane.normal, outline.mesh, float(triangle_areas(outline.mesh.triangles).sum()),
                 WIDTHS * plane.residual)
         for plane, outline in kept
     ]  # fmt: skip
@@ -63,7 +62,7 @@ def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[SortedSurfaces, lis
         error,
         cell,
         options.narrow,
-        surface_area(triangles),
+        float(triangle_areas(triangles).sum()),
         0.0,
         [],
     )
@@ -78,8 +77,8 @@ def _lies_on(pair: tuple[ScanPlane, Outline], larger: tuple[ScanPlane, Outline],
         return False
     if np.abs(corners @ wall.normal - wall.offset).max() > 2.0 * WIDTHS * noise:
         return False
-    middle = outline.mesh.vertices[outline.mesh.faces].mean(axis=1)
-    apart = distance_to_triangles(middle, around.mesh.vertices[around.mesh.faces])
+    middle = outline.mesh.triangles.mean(axis=1)
+    apart = distance_to_triangles(middle, around.mesh.triangles)
     return bool((apart < 4.0 * WIDTHS * noise).all())
 
 
@@ -97,7 +96,7 @@ def _remarks(kept: list[tuple[ScanPlane, Outline]], noise: float) -> list[str]:
 
 def _unexplained(mesh: Welded, surfaces: list[Surface], reach: float) -> Booleans:
     """Triangles of a scan with a corner farther from every clean plane than a reach [m]."""
-    walls = np.concatenate([s.mesh.vertices[s.mesh.faces] for s in surfaces])
+    walls = np.concatenate([s.mesh.triangles for s in surfaces])
     distance = np.full(len(mesh.vertices), np.inf)
     for normal, offset in ((s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in surfaces):
         distance = np.minimum(distance, np.abs(mesh.vertices @ normal - offset))

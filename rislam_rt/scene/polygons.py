@@ -42,13 +42,14 @@ def signed_area(corners: Floats) -> float:
     return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
 
 
-def inside_loop(corners: Floats, point: Floats) -> bool:
-    """Whether a polygon (n, 2) holds a point (2,), by the even-odd rule."""
+def inside_loop(corners: Floats, points: Floats) -> Booleans:
+    """Which points (..., 2) a polygon (n, 2) holds: a ray towards +x crosses its outline an odd number of times."""
     a, b = corners, np.roll(corners, -1, axis=0)
-    spans = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
-    return bool((spans & (at > point[0])).sum() % 2)
+    y = points[..., None, 1]
+    spans = (a[:, 1] > y) != (b[:, 1] > y)
+    rise = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
+    at = a[:, 0] + (y - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
+    return np.asarray(np.sum(spans & (points[..., None, 0] < at), axis=-1) % 2 == 1)
 
 
 def simplify_loop(loop: list[int], points: Floats, kept: Booleans, tolerance: float) -> list[int]:
