@@ -113,12 +113,14 @@ def _interactions(paths: Paths, path: int) -> int:
 
 
 def _parameters(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> dict[str, Any]:
+    from rislam_rt import __version__
+
     faces = sum(len(one.faces) for one in scene.reflectors)
     return {
         "version": FORMAT_VERSION,
         "rt_params": {
             "raytracer_name": f"rislam_rt ({paths.source})",
-            "raytracer_version": _version(),
+            "raytracer_version": __version__,
             "frequency": radio.carrier,
             "max_path_depth": depth + 1,
             "max_reflections": depth,
@@ -165,12 +167,6 @@ def _parameters(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> d
             "representation": "mesh",
         },
     }
-
-
-def _version() -> str:
-    from rislam_rt import __version__
-
-    return __version__
 
 
 def _distinct(scene: Scene) -> list[Material]:
