@@ -1,7 +1,5 @@
 """What `rislam-rt run` does with a pipeline that trains the classifier; loaded for that alone."""
 
-import json
-
 import typer
 
 from rislam_rt.cli.options import StudyOptions, beside, write_json
@@ -20,7 +18,7 @@ from rislam_rt.report.studies.classifier import (
     weights_file,
 )
 from rislam_rt.report.style import to_png
-from rislam_rt.storage.files import write_atomic
+from rislam_rt.storage.files import json_file, write_atomic
 from rislam_rt.studies.classifier.run import ALL, run_training
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.spec import study_record
@@ -47,7 +45,7 @@ def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
     content = {**record, **classifier_table(found)}
     contents = {
         f"{PAGE}.md": classifier_page(found, spec, (*PICTURES,) if given.page else None).encode(),
-        f"{PAGE}.json": (json.dumps(content, indent=1, allow_nan=False) + "\n").encode(),
+        f"{PAGE}.json": json_file(content),
         WEIGHTS: weights_file(found),
     }
     if given.page:
