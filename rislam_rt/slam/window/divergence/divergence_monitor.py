@@ -89,7 +89,8 @@ def landed(window: Window, by: Floats) -> Window:
     slots = window.slots._replace(middle=np.concatenate([head[[0, 1, 2, 6]], head[HEAD:]])[None])
     prior = Quadratic(inverse(covariance), np.zeros(size), head)
     turn = prior.hessian @ inverse(window.prior.hessian)
-    return window._replace(head=head, prior=prior, noise=turn @ window.noise @ turn.T, slots=slots, covariance=covariance)
+    noise = turn @ window.noise @ turn.T
+    return window._replace(head=head, prior=prior, noise=noise, slots=slots, covariance=covariance)
 
 
 def ask_tracks(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.StartCheck | None:

@@ -15,7 +15,7 @@ is made again at the present estimate whenever that is worth it. The first pose 
 tells where the start was, whose error stands beside the Gaussian.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -243,7 +243,7 @@ def slide(window: Window) -> Window:
     )
 
 
-def _without(noise: Floats, size: int, gain: Floats) -> Floats:
+def _without(noise: Floats, size: int, gain: Any) -> Floats:
     """Covariance (size, size) of the slopes that are left, when the rest is taken out by `gain`."""
     lift = np.concatenate([np.eye(size), -gain], axis=1)
     return np.asarray(lift @ noise @ lift.T)
