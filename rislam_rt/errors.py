@@ -70,6 +70,14 @@ class StoreError(RislamError):
     exit_code = 4
 
 
+def disk_error(error: OSError) -> RislamError:
+    """What the disk answered, as one line: of a file that was named, or of where the output goes."""
+    said = error.strerror or type(error).__name__
+    if error.filename is None:
+        return StoreError(f"output: cannot be written ({said}); check where it goes, and the free space")
+    return ConfigError(f"{str(error.filename)[:80]}: cannot be used ({said}); check the name and its permissions")
+
+
 def _printable(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 

@@ -36,7 +36,7 @@ def _run(heard: list[int]) -> int:
     from rislam_rt.cli.app import app
     from rislam_rt.cli.interrupts import EXIT_CODE, Interrupted
     from rislam_rt.cli.verbosity import reset
-    from rislam_rt.errors import RislamError
+    from rislam_rt.errors import RislamError, disk_error
 
     reset()
     try:
@@ -45,6 +45,8 @@ def _run(heard: list[int]) -> int:
         if heard:  # it reached the workers too, and the first to die was mourned
             return _say("interrupted: what is done is kept; the same command goes on from there", EXIT_CODE)
         return _tell(error)
+    except OSError as error:  # a name or a disk that nobody looked at more closely
+        return _say("interrupted", EXIT_CODE) if heard else _tell(disk_error(error))
     except typer.Abort:
         return _say("interrupted", EXIT_CODE)
     except Exception as error:

@@ -46,11 +46,17 @@ def check_output(file: Path | None, option: str = "") -> Path | None:
     ------
     ConfigError
         It is there, is not empty, and was not made by this program; and the command was not told to overwrite it.
+    StoreError
+        Its folder cannot be written to.
     """
     from rislam_rt.errors import ConfigError
-    from rislam_rt.storage.files import is_own
+    from rislam_rt.storage.files import check_writable, is_device, is_own
 
-    if file is not None and not _may_overwrite and not is_own(file):
+    if file is None:
+        return None
+    if not is_device(file):
+        check_writable(file.parent)
+    if not _may_overwrite and not is_own(file):
         raise ConfigError(
             f"{option}{file}: is there already, and not of this program's making; give another name, or --overwrite"
         )
@@ -72,14 +78,19 @@ def study_folder(out: Path | None, name: str, record: Mapping[str, Any], files: 
     ConfigError
         There is a file of that name; or one of the study's files is there, not empty, and not the program's, which was
         not told to overwrite it.
+    StoreError
+        The disk would refuse.
     """
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.store.identity import short_name
+    from rislam_rt.storage.files import check_writable
     from rislam_rt.storage.seal import checksum
 
     folder = out or Path("runs") / short_name(name, checksum(record))
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"--out {folder}: is a file; give a folder")
+    for place in {folder, *((folder / one).parent for one in files)}:
+        check_writable(place)
     if _may_overwrite or _is_page(folder / files[0]):
         return folder
     for file in (folder / one for one in files):

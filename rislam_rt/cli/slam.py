@@ -1,5 +1,6 @@
 """`rislam-rt slam MEASUREMENTS`."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -114,14 +115,16 @@ def _true_positions(file: Path, cycles: int) -> "Floats":
 
 def _new_folder(folder: Path) -> Path:
     from rislam_rt.errors import ConfigError
+    from rislam_rt.storage.files import check_writable
 
     try:
-        place = folder.resolve()  # `x/..` is there though `x` is not
+        place = Path(os.path.realpath(folder))  # `x/..` is there though `x` is not
         taken = place.exists() and (not place.is_dir() or any(place.iterdir()))
     except OSError as error:
         raise ConfigError(f"--out {str(folder)[:80]}: cannot be used ({error.strerror}); give another folder") from None
     if taken:
         raise ConfigError(f"--out {folder}: exists and is not empty; give a new folder")
+    check_writable(folder)
     return folder
 
 

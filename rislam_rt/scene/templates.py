@@ -1,5 +1,6 @@
 """Templates: new scene folders from the rooms that come with the package."""
 
+import os
 import re
 from pathlib import Path
 
@@ -34,5 +35,5 @@ def new_scene(template: str, folder: str | Path, *, overwrite: bool = False) -> 
 
 def room_name(folder: Path, template: str) -> str:
     """What a room is called that lies in a folder: the folder's name, with what a room's name cannot hold as `_`."""
-    name = re.sub(r"[^A-Za-z0-9_.\-]", "_", folder.resolve().name)[:64]
+    name = re.sub(r"[^A-Za-z0-9_.\-]", "_", os.path.basename(os.path.realpath(folder)))[:64]
     return name if name.strip("._-") else template

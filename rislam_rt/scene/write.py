@@ -62,7 +62,7 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
     """
     folder = Path(folder)
     try:
-        there = folder.exists() or folder.resolve().exists()  # `x/..` is there though `x` is not
+        there = folder.exists() or os.path.exists(os.path.realpath(folder))  # `x/..` is there though `x` is not
     except OSError as error:
         raise SceneError(f"{str(folder)[:80]}: cannot be used ({error.strerror}); give another folder") from None
     if there and not overwrite:

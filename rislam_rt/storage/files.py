@@ -6,6 +6,7 @@ import re
 import tempfile
 from collections.abc import Iterable
 from contextlib import suppress
+from errno import EACCES, ENOTDIR
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ RECORDING = (b"RRF", b"rislam_rt")
 
 def is_own(path: Path) -> bool:
     """Whether nothing of the user's is lost by writing to a path: no file, an empty one, or one with our mark."""
-    if not path.is_file() or path.stat().st_size == 0 or _is_device(path):
+    if not path.is_file() or path.stat().st_size == 0 or is_device(path):
         return True
     try:
         with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
@@ -59,7 +60,7 @@ def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
         The disk refused.
     """
     try:
-        if _is_device(path):
+        if is_device(path):
             with os.fdopen(os.open(path, os.O_WRONLY | os.O_APPEND), "wb") as device:
                 device.writelines(pieces)
             return
@@ -79,7 +80,7 @@ def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
         raise refused(path, error) from None
 
 
-def _is_device(path: Path) -> bool:
+def is_device(path: Path) -> bool:
     """Whether a path is a device, a pipe or a standard stream, which a file must not take the place of."""
     return path.exists() and not path.is_dir() and (not path.is_file() or path.parent == Path("/dev"))
 
@@ -107,6 +108,24 @@ def make_folders(folder: Path) -> list[Path]:
     except OSError as error:
         raise refused(folder, error) from None
     return missing
+
+
+def check_writable(folder: Path) -> None:
+    """Refuse a folder, there or not yet, that cannot be written to, before anything is worked out for it.
+
+    Raises
+    ------
+    StoreError
+        The disk would refuse.
+    """
+    place = next((one for one in (folder, *folder.absolute().parents) if os.path.lexists(one)), Path("/"))
+    try:
+        if not os.path.isdir(os.path.realpath(place, strict=True)):
+            raise NotADirectoryError(ENOTDIR, os.strerror(ENOTDIR))
+        if not os.access(place, os.W_OK | os.X_OK):
+            raise PermissionError(EACCES, os.strerror(EACCES))
+    except OSError as error:
+        raise refused(folder, error) from None
 
 
 def remove_empty(folders: Iterable[Path]) -> None:

@@ -1,5 +1,6 @@
 """A command replaces the files that the program made, and no others unless it is told to."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -103,3 +104,96 @@ def test_every_page_that_is_there_is_known_as_the_programs(run, tmp_path):
     assert len(pages) > 10
     for page in pages:
         assert study_folder(page.parent, "", {}, [page.name]) == page.parent
+
+
+@pytest.fixture
+def shut(tmp_path, monkeypatch):
+    """A folder that nobody may write to, whoever runs the tests."""
+    folder = tmp_path / "shut"
+    folder.mkdir()
+    refuse(monkeypatch, folder)
+    return folder
+
+
+def refuse(monkeypatch, folder):
+    may = os.access
+
+    def access(path, mode, **options):
+        return not (mode & os.W_OK and Path(path).absolute() == folder) and may(path, mode, **options)
+
+    monkeypatch.setattr(os, "access", access)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", ROOT / "pipelines/fig4a.toml", "--out", "shut/new/results"),
+        ("run", ROOT / "pipelines/claims.toml", "--out", "shut"),
+        ("run", ROOT / "pipelines/train_classifier.toml", "--out", "shut"),
+        ("trace", "empty_box", "--channel", "image_source", "--out", "shut/paths.nc"),
+        ("config", "--json", "shut/config.json"),
+        ("slam", "mine.csv", "--start", "0,0,1", "--out", "shut/found"),
+    ],
+)
+def test_a_folder_that_refuses_is_known_before_anything_is_worked_out(run, tmp_path, shut, words):
+    (tmp_path / "mine.csv").write_text("time_s,heading_rad,delay_s,cos_x,cos_y,amplitude\n0,0,1e-8,0.1,0.1,0.01\n")
+    code, out, err = run(*words)
+    assert (code, out) == (4, "")
+    assert "cannot be written (Permission denied); check permissions and free space" in err
+    assert len(err.splitlines()) == 1
+    assert not list(shut.iterdir())
+
+
+def test_a_device_is_written_to_wherever_it_lies(run, monkeypatch):
+    refuse(monkeypatch, Path("/dev"))
+    assert run("config", "--explain", "slam.sigma_a", "--json", "/dev/null")[0] == 0
+
+
+LONG = "x" * 300
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("check", LONG),
+        ("run", LONG),
+        ("run", "--scene", LONG),
+        ("show", "empty_box", "--out", f"{LONG}.png"),
+        ("trace", "empty_box", "--out", LONG),
+        ("report", LONG),
+        ("config", "--json", LONG),
+        ("run", "claims", "--out", LONG),
+    ],
+)
+def test_a_name_that_the_disk_does_not_take_is_one_line(run, words):
+    code, out, err = run(*words)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ")
+    assert "(File name too long)" in err
+    assert len(err.splitlines()) == 1
+
+
+def test_output_that_finds_no_room_is_one_line(run, monkeypatch):
+    import errno
+
+    import typer
+
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(typer, "echo", full)
+    code, _, err = run("config")
+    assert code == 4
+    assert (
+        err == "error: output: cannot be written (No space left on device); check where it goes, and the free space\n"
+    )
+
+
+def test_a_link_that_leads_to_itself_takes_no_room(run, tmp_path):
+    (tmp_path / "loop").symlink_to("loop")
+    for words in (("new", "loop"), ("slam", "mine.csv", "--start", "0,0,1", "--out", "loop")):
+        (tmp_path / "mine.csv").write_text("time_s,heading_rad,delay_s,cos_x,cos_y,amplitude\n0,0,1e-8,0,0,0.01\n")
+        code, _, err = run(*words)
+        assert code == 4
+        assert err.startswith("error: loop: cannot be written (")
+        assert (tmp_path / "loop").is_symlink()

@@ -153,4 +153,6 @@ def _within_reach(
     near = (gap**2 <= GATE * (variance[row] + observed.std[column] ** 2)).all(axis=1)
     near &= loudness**2 < GATE * (doubt[row] ** 2 + observed.log_amplitude_std[column] ** 2)
     near &= (side[row] == observed.sides[column]) | (side[row] == UNTOLD) | (observed.sides[column] == UNTOLD)
-    return np.unique(row[near])
+    found = np.zeros(len(seen), dtype=np.bool_)
+    found[row[near]] = True
+    return np.flatnonzero(found)

@@ -175,7 +175,8 @@ def cluster(
     """From the strongest down, each return takes in all that is in its cell; neighbours on the cell's edge disturb."""
     strength, power = expected.log_amplitude, np.exp(2.0 * expected.log_amplitude)
     first, second, gap = _neighbours(expected.seen / cell, strength, sides)
-    taken, partner, by_itself, total = _taken_in(first[gap < 1.0], second[gap < 1.0], strength, power, clear)
+    inside = gap < 1.0
+    taken, partner, by_itself, total = _taken_in(first[inside], second[inside], strength, power, clear)
     around = ~taken[first] & (partner[first] != second)
     first, second = first[around], second[around]
     ratio = 0.5 * power[second] / power[first] * clear[second]
@@ -236,10 +237,10 @@ def _taken_in(
     """
     count = len(strength)
     taken, partner, by_itself, total = np.zeros(count, np.bool_), np.full(count, -1), np.ones(count), power.copy()
-    crowded = np.unique(first)
-    crowded = crowded[np.argsort(-strength[crowded], kind="stable")]
-    begin, end = (np.searchsorted(first, crowded, side=side) for side in ("left", "right"))
-    for leader, low, high in zip(crowded.tolist(), begin.tolist(), end.tolist(), strict=True):
+    begin = np.flatnonzero(np.diff(first, prepend=-1))
+    crowded, end = first[begin], np.append(begin[1:], len(first))
+    order = np.argsort(-strength[crowded], kind="stable")
+    for leader, low, high in zip(crowded[order].tolist(), begin[order].tolist(), end[order].tolist(), strict=True):
         if taken[leader]:
             continue
         members = second[low:high]

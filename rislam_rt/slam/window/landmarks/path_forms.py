@@ -47,12 +47,13 @@ def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces
     single = [(w, NONE) for w in walls] if max_bounces >= 1 else []
     double = [(a, b) for a, b in product(walls, walls) if a != b] if max_bounces >= 2 else []
     ways = [(NONE, NONE), *single, *double]
-    order = [0] + [1] * len(single) + [2] * len(double)
+    bounces = [0] + [1] * len(single) + [2] * len(double)
+    upto = [1, 1 + len(single), len(ways)]  # the first ways, of so many bounces at most
     found = [
-        (point, *ways[i], *ways[j])
+        (point, *way, *other)
         for point in points
-        for i, j in product(range(len(ways)), repeat=2)
-        if order[i] + order[j] <= max_bounces
+        for way, spent in zip(ways, bounces, strict=True)
+        for other in ways[: upto[max_bounces - spent]]
     ]
     if use_vt:
         found += [(TX, NONE, NONE, *way) for way in ways[1:]]
