@@ -1,8 +1,8 @@
 """The best code for one path: exact over discrete levels, and the references around it.
 
-`|h_0 + sum_n h_n exp(-j 2 pi k_n / H)|` is largest for levels that are, each on its own, nearest to some common phase.
-As that phase turns by one level spacing, every element changes its nearest level once, so N + 1 candidates remain (and
-their H turns, if there is a direct term): arXiv 2211.04704; Pekcan and Ayanoglu.
+`|sum_n h_n exp(-j 2 pi k_n / H)|` is largest for levels that are, each on its own, nearest to some common phase.
+As that phase turns by one level spacing, every element changes its nearest level once, so N + 1 candidates remain:
+arXiv 2211.04704; Pekcan and Ayanoglu.
 """
 
 import numpy as np
@@ -10,10 +10,10 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats, Integers
 
 
-def exact_code(response: Complexes, levels: int, direct: Complexes | complex = 0.0) -> tuple[Integers, Floats]:
+def exact_code(response: Complexes, levels: int) -> tuple[Integers, Floats]:
     """Levels (..., N) that maximise the gain of responses (..., N), and that gain's magnitude (...,).
 
-    `direct` (...,) is the part of the gain that does not pass the panel. O(N log N), vectorised over the batch.
+    O(N log N), vectorised over the batch.
     """
     step = 2.0 * np.pi / levels
     response = np.asarray(response, dtype=np.complex128)
@@ -28,31 +28,19 @@ def exact_code(response: Complexes, levels: int, direct: Complexes | complex = 0
     np.cumsum(changes, axis=-1, out=sums[..., 1:])
     sums[..., 1:] *= np.exp(1j * step) - 1.0
     sums[..., 1:] += sums[..., :1]
-    best, turn = _best_candidate(sums, np.asarray(direct, dtype=np.complex128), levels)
+    best = np.argmax(sums.real**2 + sums.imag**2, axis=-1)
     passed = np.empty(response.shape, dtype=np.int64)
     np.put_along_axis(passed, rank_order, np.broadcast_to(np.arange(count), response.shape), axis=-1)
-    index = (start.astype(np.int64) - (passed < best[..., None]) - turn[..., None]) % levels
-    total = np.asarray(direct) + np.sum(response * np.exp(-1j * step * index), axis=-1)
-    return index, np.abs(total)
+    index = (start.astype(np.int64) - (passed < best[..., None])) % levels
+    return index, np.abs(np.sum(response * np.exp(-1j * step * index), axis=-1))
 
 
-def _best_candidate(sums: Complexes, direct: Complexes, levels: int) -> tuple[Integers, Integers]:
-    """Which of the candidates (..., N + 1), and which of their H turns, is largest with the direct term added."""
-    if not np.any(direct):
-        best = np.argmax(sums.real**2 + sums.imag**2, axis=-1)
-        return best, np.zeros_like(best)
-    turned = sums[..., None] * np.exp(2j * np.pi / levels * np.arange(levels))
-    total = direct[..., None, None] + turned
-    flat = np.argmax((total.real**2 + total.imag**2).reshape(*sums.shape[:-1], -1), axis=-1)
-    return flat // levels, flat % levels
+def continuous_phases(response: Complexes) -> Floats:
+    """Phases xi (..., N) [rad] that align every element."""
+    return np.asarray(np.angle(response))
 
 
-def continuous_phases(response: Complexes, direct: Complexes | complex = 0.0) -> Floats:
-    """Phases xi (..., N) [rad] that align every element with the direct term (with phase 0 if there is none)."""
-    return np.angle(response) - np.angle(np.asarray(direct, dtype=np.complex128))[..., None]
-
-
-def nearest_code(response: Complexes, levels: int, direct: Complexes | complex = 0.0) -> Integers:
+def nearest_code(response: Complexes, levels: int) -> Integers:
     """`continuous_phases` rounded to the nearest level, element by element: (..., N)."""
-    turns = continuous_phases(response, direct) * levels / (2.0 * np.pi)
+    turns = continuous_phases(response) * levels / (2.0 * np.pi)
     return np.floor(turns + 0.5).astype(np.int64) % levels

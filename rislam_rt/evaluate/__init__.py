@@ -11,14 +11,13 @@ from rislam_rt.evaluate.confidence_intervals import (
     share_interval,
 )
 from rislam_rt.evaluate.consistency import normalised_squares
-from rislam_rt.evaluate.errors import TrajectoryError, align, position_errors, rmse, root_mean_square, trajectory_error
+from rislam_rt.evaluate.errors import align, position_errors, rmse, root_mean_square
 from rislam_rt.evaluate.set_distances import Gospa, gospa, match_points
 
 __all__ = [
     "AssociationScore",
     "Gospa",
     "Interval",
-    "TrajectoryError",
     "align",
     "association_fractions",
     "association_score",
@@ -35,5 +34,4 @@ __all__ = [
     "rmse",
     "root_mean_square",
     "share_interval",
-    "trajectory_error",
 ]

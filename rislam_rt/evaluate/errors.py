@@ -1,12 +1,9 @@
-"""Errors of positions, trajectories and walls. Plain arrays in, plain values out."""
-
-from typing import NamedTuple
+"""Errors of positions, and trajectories aligned. Plain arrays in, plain values out."""
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import GeometryError
-from rislam_rt.geometry.angles import wrap
 
 
 def position_errors(estimate: Floats, truth: Floats) -> Floats:
@@ -31,56 +28,6 @@ def root_mean_square(errors: Floats) -> float:
     if not errors.size:
         raise GeometryError("errors: none received; give at least one")
     return float(np.sqrt(np.mean(errors**2)))
-
-
-class TrajectoryError(NamedTuple):
-    """Errors of a trajectory, in metres and radians."""
-
-    rmse: float
-    """Absolute, without alignment: SLAM with a known start has no free frame."""
-    rmse_aligned: float
-    """Absolute, after the best rotation about z and translation: the shape alone."""
-    median: float
-    largest: float
-    final: float
-    drift: float
-    """RMS error of the displacement over `step` cycles."""
-    heading: float
-    """RMS error of the heading; 0 where none was given."""
-
-
-def trajectory_error(
-    estimate: Floats,
-    truth: Floats,
-    *,
-    heading: Floats | None = None,
-    true_heading: Floats | None = None,
-    step: int = 1,
-) -> TrajectoryError:
-    """Errors of estimated positions (K, 3), and headings (K,) if given, against the true ones.
-
-    Raises
-    ------
-    GeometryError
-        The shapes differ, or there are not more than `step` poses.
-    """
-    estimate, truth = np.asarray(estimate, dtype=np.float64), np.asarray(truth, dtype=np.float64)
-    if estimate.shape != truth.shape or len(truth) <= step:
-        raise GeometryError(f"trajectories {estimate.shape} and {truth.shape}: give the same (K, 3), K above {step}")
-    errors = position_errors(estimate, truth)
-    moved = position_errors(estimate[step:] - estimate[:-step], truth[step:] - truth[:-step])
-    turned = 0.0
-    if heading is not None and true_heading is not None:
-        turned = root_mean_square(wrap(np.asarray(heading) - np.asarray(true_heading)))
-    return TrajectoryError(
-        root_mean_square(errors),
-        rmse(align(estimate, truth), truth),
-        float(np.median(errors)),
-        float(errors.max()),
-        float(errors[-1]),
-        root_mean_square(moved),
-        turned,
-    )
 
 
 def align(estimate: Floats, truth: Floats) -> Floats:

@@ -60,7 +60,7 @@ def find_legs(
         found.setdefault(walls.shape[1], []).append(rays)
     blockers = facets.possible_blockers(np.concatenate([device, far]))
     visible = [_visible(facets, _joined(p), device, far, blockers, host, front, landmark) for p in found.values()]
-    return _legs(facets, coatings, [rays for rays in visible if len(rays.cycle)], device, far, depth, terminals)
+    return _legs(facets, coatings, [rays for rays in visible if len(rays.cycle)], device, depth, terminals)
 
 
 def _joined(parts: list[ImageRays]) -> ImageRays:
@@ -138,7 +138,6 @@ def _legs(
     coatings: Coatings,
     found: list[ImageRays],
     device: Floats,
-    far: Floats,
     depth: int,
     terminals: LegEnds | None,
 ) -> SpecularLegs:

@@ -12,19 +12,15 @@ from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
 from rislam_rt.channel.traced.tracer_scene import TracerScene, as_points
 
 
-def fill_buffer(
-    tracer_scene: TracerScene, sequences: Integers, rows: CandidateIndices, vertices: Floats | None = None
-) -> PathsBuffer:
+def fill_buffer(tracer_scene: TracerScene, sequences: Integers, rows: CandidateIndices) -> PathsBuffer:
     """The tracer's path buffer, from far ends (sources) to devices (targets) over `sequences` (N, D), in reverse.
 
-    `vertices` (N, D, 3) [m] are in the order from device to far end; without them any point of each wall's plane, which
-    the image method needs, from the tracer scene's origin.
+    Its vertices are any point of each wall's plane, which the image method needs, from the tracer scene's origin.
     """
     count, depth = sequences.shape
     buffer = PathsBuffer(count, max(depth, 1), False)  # at depth 0 the image method counts down from 0 without end
     walls = turned_round(sequences)
-    points = tracer_scene.corner[walls] if vertices is None else turned_vertices(vertices, sequences)
-    for column, (wall, point) in enumerate(zip(walls.T, np.moveaxis(points, 1, 0), strict=True)):
+    for column, (wall, point) in enumerate(zip(walls.T, np.moveaxis(tracer_scene.corner[walls], 1, 0), strict=True)):
         real = wall != NO_WALL
         event = np.where(real, rt.InteractionType.SPECULAR, rt.InteractionType.NONE)
         at, here = dr.full(mi.UInt, column + 1, count), mi.Bool(real)

@@ -9,13 +9,14 @@ import scipy
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.evaluate import (
+    align,
     association_score,
     gospa,
     match_points,
     normalised_squares,
     position_errors,
+    rmse,
     root_mean_square,
-    trajectory_error,
 )
 from rislam_rt.model import NOTHING, STEPS, MapEstimate, PathKind, Paths, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.own_methods import is_own
@@ -65,8 +66,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     errors = position_errors(scheme.position, truth)
     least = run_bound(result, scheme)
     limit = least.agent if least else None
-    rmse, bound = root_mean_square(errors), None if limit is None else root_mean_square(limit)
-    motion = trajectory_error(scheme.position, truth) if len(truth) > 1 else None
+    error, bound = root_mean_square(errors), None if limit is None else root_mean_square(limit)
     squares = nees_per_dof(scheme, truth)
     nees = None if squares is None else float(np.mean(squares))
     score = association_score(*component_labels(result.paths, scheme))
@@ -74,12 +74,12 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     walls = wall_scores(scene, scheme.map, least)
     seconds = dict(zip(STEPS, scheme.seconds.mean(axis=0).tolist(), strict=True))
     return {
-        "rmse_m": rmse,
+        "rmse_m": error,
         "bound_m": bound,
-        "over_bound": rmse / bound if bound else None,
+        "over_bound": error / bound if bound else None,
         "final_m": float(errors[-1]),
         "largest_m": largest,
-        "rmse_aligned_m": motion.rmse_aligned if motion else None,
+        "rmse_aligned_m": rmse(align(scheme.position, truth), truth) if len(truth) > 1 else None,
         "nees_per_dof": nees if nees is None or np.isfinite(nees) else None,
         "diverged": has_diverged(errors, limit),
         "outcomes": {name: scheme.outcome.count(name) for name in sorted(set(scheme.outcome))},

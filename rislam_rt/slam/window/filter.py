@@ -32,7 +32,6 @@ from rislam_rt.slam.window.measurement_log import Log, Residuals, append, empty_
 from rislam_rt.slam.window.numerics import DAMPING, LATELY, MISSED, REFRESH
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import motion, window_gaussian
-from rislam_rt.slam.window.smoother.excess import grow, take_in
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.state import WindowState
@@ -58,7 +57,7 @@ def init(
         no_observations(),
         motion_mode, motion_mode,
         np.array([start.heading]), start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
-        (None,), np.zeros((6, 6)), np.zeros((0, 3)),
+        (None,), np.zeros((0, 3)),
     )  # fmt: skip
 
 
@@ -88,7 +87,6 @@ def step(
     state, view = _notice(state, heading, code, observed, strangers)
     mean, poses, expected, groups = view.mean, view.poses, view.expected, view.groups
     shows, scatter, row, pick = view.shows, view.scatter, view.row, view.pick
-    before = window_gaussian.now(state.window)[1]
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
 
     log = append(state.log, observed, state.cycle, state.cycle - state.window.num_poses + 1)
@@ -120,7 +118,6 @@ def step(
 
     state, wrong = recovery.ask(state)
     state = _grown(state, left, expected, groups)
-    state = state._replace(excess=take_in(state.excess, before[:6, :6], window_gaussian.now(state.window)[1][:6, :6]))
     outcome = _outcome(len(measurement), len(state.landmarks.ident), wrong or jumped or state.lost_log_odds >= 0.0)
     if divergence_monitor.is_lost(state.lost_log_odds) and len(state.landmarks.ident):
         state = recovery.restart(state)
@@ -150,12 +147,12 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         window, headings = window_gaussian.slide(window), headings[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)
     if state.config.motion == "told":
-        window, excess = window_gaussian.extend(window, dt, _assumed_precision(state.config, dt)), state.excess
+        window = window_gaussian.extend(window, dt, _assumed_precision(state.config, dt))
     else:
-        window = window_gaussian.extend(window, dt, precision := _precisions(level))
-        excess = grow(state.excess, dt, motion.expected_variance(level)[COLUMNS[:3]] - 1.0 / precision[:3])
+        precision = _precisions(level)
+        window = window_gaussian.extend(window, dt, precision, _surplus(precision, level))
     return state._replace(
-        window=window, motion_mode=motion_mode, heading=np.append(headings, heading), excess=excess, passed=passed
+        window=window, motion_mode=motion_mode, heading=np.append(headings, heading), passed=passed
     )  # fmt: skip
 
 
@@ -225,6 +222,12 @@ def _precisions(levels: Floats) -> Floats:
     return np.stack([each[group] for group in COLUMNS[: len(levels) + 1]], axis=-1)
 
 
+def _surplus(precision: Floats, levels: Floats) -> Floats:
+    """(..., A) variance of the slopes of priors (..., A) that levels (N, ..., L) have beyond their precisions."""
+    variance = np.stack([motion.expected_variance(levels[group]) for group in COLUMNS[: len(levels) + 1]], axis=-1)
+    return np.asarray(np.maximum(precision**2 * variance - precision, 0.0))
+
+
 STILL = 1e-5
 """[m/s^2] Acceleration of an axis that is known to be still."""
 
@@ -289,7 +292,8 @@ def widen_motion(state: WindowState) -> WindowState:
     fresh = _precisions(posterior)
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
-    return state._replace(window=window._replace(precision=precision), level=level)
+    window = window._replace(precision=precision, surplus=_surplus(precision, posterior))
+    return state._replace(window=window, level=level)
 
 
 def _unexplained(state: WindowState, observed: Observations) -> float:

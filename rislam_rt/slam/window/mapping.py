@@ -35,7 +35,7 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
     """Mean and covariance of the pose, equally likely samples of it, and the map."""
     mean, covariance = window_gaussian.now(state.window)
     spread = covariance.copy()
-    spread[:6, :6] += state.excess
+    spread[:6, :6] += window_gaussian.excess(state.window)
     spread[:3, :3] += np.diag(state.shift**2)
     position = mean[:3] + ahead * mean[3:6]
     root = square_root(spread[:3, :3])

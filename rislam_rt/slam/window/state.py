@@ -41,7 +41,5 @@ class WindowState(NamedTuple):
     """[rad] by which the compass was found to be wrong."""
     codes: tuple[RisCode | None, ...]
     """(K,) as the agent believes they were applied."""
-    excess: Floats
-    """(6, 6) covariance of position and velocity that lively steps may add to the window's (see `excess`)."""
     passed: Floats
     """(P, 3) [m] positions that left the window, each with the hindsight of its whole length."""

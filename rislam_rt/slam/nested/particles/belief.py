@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
-from rislam_rt.slam.nested.moments import POSE, Moments, normalised, where
+from rislam_rt.slam.nested.belief_moments import POSE, Moments, normalised, where
 from rislam_rt.slam.nested.particles import agents
 from rislam_rt.slam.nested.particles.cloud import HOPELESS, Cloud, CloudEngine, Kernel, kernel_width
 from rislam_rt.slam.nested.particles.kld_sampling import num_agents, num_points

@@ -7,8 +7,8 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.nested.belief_moments import Moments
 from rislam_rt.slam.nested.birth import Birth
-from rislam_rt.slam.nested.moments import Moments
 from rislam_rt.slam.nested.particles import belief
 from rislam_rt.slam.nested.particles import initialise_landmark as history
 from rislam_rt.slam.nested.particles.backend import pick_engine

@@ -88,7 +88,9 @@ def landed(window: Window, by: Floats) -> Window:
     covariance[[0, 1], [0, 1]] += CONSTANTS.walk**2
     slots = window.slots._replace(middle=np.concatenate([head[[0, 1, 2, 6]], head[HEAD:]])[None])
     prior = Quadratic(inverse(covariance), np.zeros(size), head)
-    return window._replace(head=head, prior=prior, slots=slots, covariance=covariance)
+    turn = prior.hessian @ inverse(window.prior.hessian)
+    noise = turn @ window.noise @ turn.T
+    return window._replace(head=head, prior=prior, noise=noise, slots=slots, covariance=covariance)
 
 
 def ask_tracks(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.StartCheck | None:
@@ -139,7 +141,8 @@ def with_free_compass(window: Window, std: float) -> Window:
     hessian, still = window.prior.hessian.copy(), ((0, 0), (0, 1))
     hessian[6, 6] = std**-2.0
     precision = np.pad(window.precision, still, constant_values=CONSTANTS.calmest**-2.0)
-    return _begun(window._replace(accel=np.pad(window.accel, still), precision=precision), window.head, hessian)
+    window = window._replace(accel=np.pad(window.accel, still), surplus=np.pad(window.surplus, still))
+    return _begun(window._replace(precision=precision), window.head, hessian)
 
 
 def _begun(window: Window, head: Floats, hessian: Floats) -> Window:

@@ -58,7 +58,6 @@ def restart(state: WindowState) -> WindowState:
         log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), visibility=no_observations(),
         motion_mode=state.level,
         heading=state.heading[-1:], shift=np.hypot(state.shift, away), lost_log_odds=0.0, asked=False,
-        excess=np.zeros_like(state.excess),
         codes=state.codes[-1:], passed=np.concatenate([state.passed, window_gaussian.poses(window)[:-1, :3]]),
     )  # fmt: skip
 

@@ -15,7 +15,7 @@ is made again at the present estimate whenever that is worth it. The first pose 
 tells where the start was, whose error stands beside the Gaussian.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -72,10 +72,14 @@ class Window(NamedTuple):
     """(K - 1, A) [m/s^2] over the steps between the poses, along the room's axes; of `TURN`, rates [rad/s]."""
     precision: Floats
     """(K - 1, A) [s^4/m^2] of each acceleration's prior (see `motion`)."""
+    surplus: Floats
+    """(K - 1, A) [s^4/m^2] variance of each prior's slope that `precision` leaves out (see `excess`)."""
     step: Floats
     """(K - 1,) [s]."""
     prior: Quadratic
     """On the head."""
+    noise: Floats
+    """(7 + 3F, 7 + 3F) the same of the head's prior, from steps that left the window."""
     slots: Quadratic
     """(K, 4 + 3F): on each pose and the features."""
     covariance: Floats
@@ -106,7 +110,8 @@ def begin(position: Floats, velocity: Floats, std: Floats, *, turns: bool = Fals
     slots = Quadratic(np.zeros((1, POSE, POSE)), np.zeros((1, POSE)), np.concatenate([position, [0.0]])[None])
     none = np.zeros((0, 3 + turns))
     return Window(
-        head, none, none, np.zeros(0), prior, slots, np.diag(np.maximum(std, 1e-6) ** 2), no_holds(),
+        head, none, none, none, np.zeros(0), prior, np.zeros((HEAD, HEAD)), slots,
+        np.diag(np.maximum(std, 1e-6) ** 2), no_holds(),
     )  # fmt: skip
 
 
@@ -117,11 +122,12 @@ def begin_with(
     alone, count = begin(position, velocity, std, turns=turns), len(features)
     spread = scipy.linalg.block_diag(alone.covariance, covariance)
     information = scipy.linalg.block_diag(alone.prior.hessian, inverse(covariance))
+    noise = np.zeros(information.shape)
     head, size = np.concatenate([alone.head, features]), POSE + count
     pose = np.concatenate([alone.slots.middle[0], features])
     slots = Quadratic(np.zeros((1, size, size)), np.zeros((1, size)), pose[None])
     prior = Quadratic(information, np.zeros(len(head)), head)
-    return alone._replace(head=head, prior=prior, slots=slots, covariance=spread)
+    return alone._replace(head=head, prior=prior, noise=noise, slots=slots, covariance=spread)
 
 
 def _basis(window: Window) -> Floats:
@@ -163,8 +169,23 @@ def pose_covariance(window: Window, axis: int) -> Floats:
     return np.asarray(used @ window.covariance[np.ix_(rows, rows)] @ used.T)
 
 
-def extend(window: Window, dt: float, precision: Floats) -> Window:
-    """One more pose, a step of `dt` [s] on, with the prior precisions (A,) of the step's acceleration."""
+def excess(window: Window) -> Floats:
+    """(6, 6) covariance of the present's position and velocity beyond what the window holds.
+
+    The estimate takes each acceleration by a precision p, that of the calmest motion mode that may be; its error hangs
+    on the variance q that the acceleration truly has. The slope `p a` of its prior then has the variance `p^2 q`, of
+    which the window's covariance C holds p: `C (p^2 q - p) C^T` over all steps is what is left out. That is the error
+    of an estimator with a wrong model (Gelb 1974, chapter 7: suboptimal filter design and sensitivity analysis).
+    """
+    size, design = len(window.head), latest(window.step.tobytes(), window.turns)[:6]
+    rows = design[:, :HEAD] @ window.covariance[:HEAD] + design[:, HEAD:] @ window.covariance[size:]
+    late = rows[:, size:]
+    return np.asarray(rows[:, :size] @ window.noise @ rows[:, :size].T + (late * window.surplus.ravel()) @ late.T)
+
+
+def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float = 0.0) -> Window:
+    """One more pose, a step of `dt` [s] on, with the prior precisions (A,) of the step's acceleration, and their
+    `surplus` (A,)."""
     free = len(precision)
     slots = Quadratic(*(np.concatenate([field, np.zeros((1, *field.shape[1:]))]) for field in window.slots))
     covariance = np.zeros((len(window.covariance) + free,) * 2)
@@ -173,6 +194,7 @@ def extend(window: Window, dt: float, precision: Floats) -> Window:
     return window._replace(
         accel=np.concatenate([window.accel, np.zeros((1, free))]),
         precision=np.concatenate([window.precision, precision[None]]),
+        surplus=np.concatenate([window.surplus, np.broadcast_to(surplus, (1, free))]),
         step=np.append(window.step, dt),
         slots=slots,
         covariance=covariance,
@@ -197,6 +219,8 @@ def slide(window: Window) -> Window:
     steep[size:] += window.precision[0] * accel
     gain = np.linalg.solve(wide[size:, size:], wide[size:, :size]).T
     left = wide[:size, :size] - gain @ wide[size:, :size]
+    shaken = change.T @ window.noise @ change
+    shaken[size:, size:] += np.diag(window.surplus[0])
     carry = carry_on(dt, free)
     head = window.head.copy()
     head[:HEAD] = carry @ np.concatenate([head[:HEAD], accel])
@@ -210,11 +234,19 @@ def slide(window: Window) -> Window:
         head=head,
         accel=window.accel[1:],
         precision=window.precision[1:],
+        surplus=window.surplus[1:],
         step=window.step[1:],
         prior=prior,
+        noise=_without(shaken, size, gain),
         slots=Quadratic(*(field[1:] for field in window.slots)),
         covariance=covariance[np.ix_(kept, kept)],
     )
+
+
+def _without(noise: Floats, size: int, gain: Any) -> Floats:
+    """Covariance (size, size) of the slopes that are left, when the rest is taken out by `gain`."""
+    lift = np.concatenate([np.eye(size), -gain], axis=1)
+    return np.asarray(lift @ noise @ lift.T)
 
 
 def solve(window: Window, *, spread: bool = True) -> Window:
@@ -318,6 +350,7 @@ def add_feature(window: Window, place: Floats, holds: DirectionPriors, ridge: fl
         holds=joined,
         head=np.concatenate([window.head, place]),
         prior=prior,
+        noise=np.pad(window.noise, (0, 3)),
         slots=Quadratic(wide, gradient, middle),
         covariance=covariance,
     )
@@ -329,6 +362,7 @@ def drop_features(window: Window, keep: Booleans) -> Window:
     size = len(window.head)
     stays = np.concatenate([np.ones(HEAD, dtype=np.bool_), np.repeat(keep, 3)])
     inside, out = np.flatnonzero(stays), np.flatnonzero(~stays)
+    order = np.concatenate([inside, out])
     hessian, gradient = window.prior.hessian, window.prior.slope(window.head)
     spread = inverse(hessian[np.ix_(out, out)] + 1e-9 * np.eye(len(out)))
     gain = hessian[np.ix_(inside, out)] @ spread
@@ -345,6 +379,7 @@ def drop_features(window: Window, keep: Booleans) -> Window:
         holds=holds,
         head=window.head[inside],
         prior=prior,
+        noise=_without(window.noise[np.ix_(order, order)], len(inside), gain),
         slots=slots,
         covariance=window.covariance[np.ix_(kept, kept)],
     )
