@@ -1,17 +1,20 @@
 """Replay of what an estimator was given, cycle by cycle, and what it answered."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.errors import ConfigError
 from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SlamEstimate, empty_map
 from rislam_rt.pipeline.assumed_model import tell_settings
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.pipeline.specification.read import Table, build_spec
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.slam import StartPrior
 from rislam_rt.toml import put_dotted
@@ -59,8 +62,24 @@ def answers_from_arrays(
         (K,) whether it holds itself for lost.
     landmark
         (K,) numbers (M,) of the landmarks, as in the maps, that each cycle's components were taken for.
+
+    Raises
+    ------
+    ConfigError
+        An array is of another shape; the line names it.
     """
-    cycles, known = len(position), list(maps or [])
+    cycles, known = len(inputs.time), list(maps or [])
+    shapes = {
+        "position": (position, (cycles, 3)),
+        "covariance": (covariance, (cycles, 3, 3)),
+        "lost": (lost, (cycles,)),
+    }
+    for name, (given, wanted) in shapes.items():
+        if given is not None and np.shape(given) != wanted:
+            raise ConfigError(f"{name}: shape {np.shape(given)} received; give {wanted}, a row a cycle")
+    if len(known) > cycles or (landmark is not None and len(landmark) != cycles):
+        name, count = ("maps", len(known)) if len(known) > cycles else ("landmark", len(landmark or ()))
+        raise ConfigError(f"{name}: {count} received; give {cycles}, one a cycle")
     found = (cycles - len(known)) * [empty_map()] + known
     spread = np.zeros((cycles, 6, 6))
     if covariance is not None:
@@ -151,11 +170,16 @@ def replay(
         Its name, which says whose estimator is run, unless `estimator` gives one.
     changes
         Settings by dotted key, as `slam.filter`.
+
+    Raises
+    ------
+    ConfigError
+        A setting is unknown, or its value unusable.
     """
     content = dict(config)
     for key, value in (changes or {}).items():
         content = put_dotted(content, key, value)
-    spec = PipelineSpec.model_validate(content)
+    spec = build_spec(Table(Path("settings of the replay"), content, ()), PipelineSpec, build_settings)
     settings = tell_settings(build_settings(spec), spec.told)
     recorder = Recorder(estimator or ESTIMATORS[SCHEMES[scheme].estimator])
     run = recorder.estimator

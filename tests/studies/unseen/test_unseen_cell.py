@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.errors import ConfigError, StoreError
+from rislam_rt.model import empty_map
 from rislam_rt.scene import load_scene
 from rislam_rt.studies import UnseenSpec, load_any
 from rislam_rt.studies.unseen import (
@@ -53,6 +54,10 @@ def test_a_recording_is_read_back_and_replayed_to_the_bit(tmp_path: Path) -> Non
     # another setting is another estimator
     other = replay(recording.inputs, recording.config, "random", {"slam.sigma_a": 0.5}, rng=np.random.default_rng(0))
     assert score_run(recording.truth, recording.inputs, other)["rmse_m"] != scores["rmse_m"]
+    for wrong in ({"slam.bogus": 1}, {"slam.sigma_a": "much"}):
+        with pytest.raises(ConfigError, match=rf"^settings of the replay: {next(iter(wrong))}: ") as found:
+            replay(recording.inputs, recording.config, "random", wrong, rng=np.random.default_rng(0))
+        assert len(str(found.value).splitlines()) == 1
     # the room beside it is a scene like any other, with the motion of the run
     assert np.allclose(load_scene(folder / "scene").agent.position, recording.truth.position, atol=1e-6)
 
@@ -66,6 +71,17 @@ def test_plain_arrays_are_scored_like_an_estimator(tmp_path: Path) -> None:
     assert scores["relative_rmse_m"] == pytest.approx(scores["dead_reckoning_m"])
     assert scores["births"] == 0
     assert scores["nees"] is None
+    cycles = len(told)
+    for name, wrong, said in (
+        ("position", {"position": told[:2]}, f"shape (2, 3) received; give ({cycles}, 3), a row a cycle"),
+        ("covariance", {"covariance": np.eye(3)}, f"shape (3, 3) received; give ({cycles}, 3, 3), a row a cycle"),
+        ("lost", {"lost": np.array([True])}, f"shape (1,) received; give ({cycles},), a row a cycle"),
+        ("landmark", {"landmark": []}, f"0 received; give {cycles}, one a cycle"),
+        ("maps", {"maps": (cycles + 1) * [empty_map()]}, f"{cycles + 1} received; give {cycles}, one a cycle"),
+    ):
+        with pytest.raises(ConfigError) as found:
+            answers_from_arrays(inputs, **({"position": told} | wrong))
+        assert str(found.value) == f"{name}: {said}"
 
 
 def test_what_is_no_recording_is_refused_in_one_line(tmp_path: Path) -> None:
