@@ -94,8 +94,8 @@ MUTANTS = (
     ),
     Mutant(
         "the best code is turned by a level", "design/single_path.py",
-        "(passed < best[..., None]) - turn[..., None]) % levels",
-        "(passed < best[..., None]) - turn[..., None] + (passed % 2)) % levels",
+        "(passed < best[..., None])) % levels",
+        "(passed < best[..., None]) + (passed % 2)) % levels",
     ),
     Mutant(
         "descent never steps", "design/coordinate.py",

@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import typer
 
@@ -66,6 +66,17 @@ JsonFile = Annotated[
 Seed = Annotated[int, typer.Option(min=0, help="Seed of all random draws.")]
 Depth = Annotated[int, typer.Option(min=0, max=4, help="Largest number of wall bounces on a path.")]
 ChannelName = Annotated[Literal["traced", "image_source"], typer.Option(help="Ray tracer, or exact image sources.")]
+
+
+class StudyOptions(NamedTuple):
+    """What the command line says beside the settings."""
+
+    pipeline: Path
+    scene: Path | None
+    out: Path | None
+    jobs: int | None
+    json: Path | None
+    page: bool
 
 
 def parse_numbers(option: str, text: str) -> list[float]:

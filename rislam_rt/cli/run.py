@@ -5,12 +5,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, write_json
-from rislam_rt.cli.study import StudyOptions
+from rislam_rt.cli.options import (
+    MAIN_JOB,
+    JsonFile,
+    PipelineFile,
+    SceneOption,
+    Settings,
+    StudyOptions,
+    write_json,
+)
 from rislam_rt.cli.verbosity import warn
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from rislam_rt.model import Scene
     from rislam_rt.pipeline import PipelineSpec
@@ -40,37 +47,25 @@ def command(
 
     Example: rislam-rt run trace_then_slam --scene office --set seed=1 --set 'schemes=["optimized", "no_ris"]'
     """
-    from rislam_rt.cli.study import run_claims, run_compare_channels, run_gain_curves, run_swept
-    from rislam_rt.studies import (
-        ClaimsSpec,
-        ClassifierSpec,
-        CompareSpec,
-        Fig4aSpec,
-        SweptSpec,
-        UnseenSpec,
-        load_any,
-    )
+    from rislam_rt.pipeline import PipelineSpec
+    from rislam_rt.studies import load_any
 
     spec = load_any(pipeline, set_ or ())
     given = StudyOptions(pipeline, scene, out, jobs, json, page)
-    if isinstance(spec, CompareSpec):
-        run_compare_channels(spec, given)
-    elif isinstance(spec, Fig4aSpec):
-        run_gain_curves(spec, given)
-    elif isinstance(spec, UnseenSpec):
-        from rislam_rt.cli.unseen import run_unseen
-
-        run_unseen(spec, given)
-    elif isinstance(spec, SweptSpec):
-        run_swept(spec, given)
-    elif isinstance(spec, ClaimsSpec):
-        run_claims(spec, given)
-    elif isinstance(spec, ClassifierSpec):
-        from rislam_rt.cli.training import run_classifier
-
-        run_classifier(spec, given)
-    else:
+    if isinstance(spec, PipelineSpec):
         run_main_job(spec, given)
+        return
+    from rislam_rt.cli import study, training, unseen
+    from rislam_rt.studies import ClaimsSpec, ClassifierSpec, CompareSpec, Fig4aSpec, UnseenSpec
+
+    runs: dict[type, Callable[[Any, StudyOptions], None]] = {
+        CompareSpec: study.run_compare_channels,
+        Fig4aSpec: study.run_gain_curves,
+        UnseenSpec: unseen.run_unseen,
+        ClaimsSpec: study.run_claims,
+        ClassifierSpec: training.run_classifier,
+    }
+    runs.get(type(spec), study.run_swept)(spec, given)
 
 
 def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:

@@ -1,30 +1,36 @@
-"""Studies: what `rislam-rt run` does with a pipeline that is not the main job."""
+"""Studies: what `rislam-rt run` does with a pipeline that is not the main job; loaded for one alone."""
 
 import os
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
+import numpy as np
 import typer
 
-from rislam_rt.cli.options import beside, write_json
+from rislam_rt.cli.interrupts import Interrupted
+from rislam_rt.cli.options import StudyOptions, beside, write_json
 from rislam_rt.cli.output_files import page_files, study_folder
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from rislam_rt.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec
-    from rislam_rt.sweeps import Row, Sweep
-
-
-class StudyOptions(NamedTuple):
-    """What the command line says beside the settings."""
-
-    pipeline: Path
-    scene: Path | None
-    out: Path | None
-    jobs: int | None
-    json: Path | None
-    page: bool
+from rislam_rt.cli.progress import show_progress, show_sweep
+from rislam_rt.cli.scenes import open_scene, scene_of
+from rislam_rt.errors import ConfigError
+from rislam_rt.pipeline.run import prepare_channel
+from rislam_rt.pipeline.specification.radio import build_radio
+from rislam_rt.report.studies.claims import write_claims
+from rislam_rt.report.studies.fig4a import fig4a_table, findings_of
+from rislam_rt.report.studies.files import CERTIFICATE, COMPARISON, CURVES, write_comparison, write_fig4a
+from rislam_rt.report.swept import write_swept
+from rislam_rt.report.tables import print_validation
+from rislam_rt.scene.file_names import safe_name
+from rislam_rt.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec
+from rislam_rt.studies.claims import SOURCE, judge, read_results
+from rislam_rt.studies.compare import comparison_table, run_comparison
+from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
+from rislam_rt.studies.spec import study_record
+from rislam_rt.studies.swept import build_sweep
+from rislam_rt.studies.swept.record import swept_record
+from rislam_rt.sweeps import Row, Sweep, SweepOptions, build_cells, run_sweep
+from rislam_rt.sweeps.store import check_folder
 
 
 def refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
@@ -35,23 +41,12 @@ def refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
     ConfigError
         It was given.
     """
-    from rislam_rt.errors import ConfigError
-
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind '{kind}' {why}")
 
 
-def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
+def run_compare_channels(spec: CompareSpec, given: StudyOptions) -> None:
     """Compare both channels in all rooms; exit code 1 if a difference is unexplained or beyond its limit."""
-    from rislam_rt.cli.progress import show_progress
-    from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.specification.radio import build_radio
-    from rislam_rt.report.studies.files import CERTIFICATE, COMPARISON, write_comparison
-    from rislam_rt.report.tables import print_validation
-    from rislam_rt.studies.compare import comparison_table, run_comparison
-    from rislam_rt.studies.spec import study_record
-
     refuse_scene(given, "compare_channels", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     opened = [open_scene(beside(given.pipeline, room.scene), radio) for room in spec.rooms]
@@ -73,20 +68,8 @@ def run_compare_channels(spec: "CompareSpec", given: StudyOptions) -> None:
         raise typer.Exit(1)
 
 
-def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
+def run_gain_curves(spec: Fig4aSpec, given: StudyOptions) -> None:
     """Run the study of Fig. 4(a): gain against distance."""
-    import numpy as np
-
-    from rislam_rt.cli.progress import show_progress
-    from rislam_rt.cli.scenes import open_scene, scene_of
-    from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.specification.radio import build_radio
-    from rislam_rt.report.studies.fig4a import fig4a_table, findings_of
-    from rislam_rt.report.studies.files import CURVES, write_fig4a
-    from rislam_rt.scene.file_names import safe_name
-    from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
-    from rislam_rt.studies.spec import study_record
-
     opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
     scene = opened.scene
     check_fig4a(scene, spec)
@@ -104,15 +87,8 @@ def run_gain_curves(spec: "Fig4aSpec", given: StudyOptions) -> None:
     write_json(given.json, content)
 
 
-def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
+def run_swept(spec: SweptSpec, given: StudyOptions) -> None:
     """A study on the sweep engine; its page grows while it runs. Exit code 1 if a cell failed."""
-    from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.report.swept import write_swept
-    from rislam_rt.studies.swept import build_sweep
-    from rislam_rt.studies.swept.record import swept_record
-    from rislam_rt.sweeps import build_cells
-    from rislam_rt.sweeps.store import check_folder
-
     sweep = build_sweep(spec, given.pipeline, given.scene)
     found = build_cells(sweep)
     record, cells = swept_record(spec, sweep, given.pipeline), Path("sweeps") / spec.name
@@ -122,22 +98,19 @@ def run_swept(spec: "SweptSpec", given: StudyOptions) -> None:
     for kind in {cell.depends["config"]["channel"] for cell in found}:
         prepare_channel(kind)
 
-    def write(rows: "Sequence[Row]") -> Path | None:
+    def write(rows: Sequence[Row]) -> Path | None:
         return write_swept(rows, spec, record, folder, figures=given.page)
 
     run_cells(sweep, cells, spec.time_limit_s, given, record, write)
 
 
 def run_cells(
-    sweep: "Sweep", cells: Path, limit: float | None, given: StudyOptions, record: "Mapping[str, Any]",
-    write: "Callable[[Sequence[Row]], Path | None]", show: "Callable[[Sequence[Row]], None] | None" = None,
+    sweep: Sweep, cells: Path, limit: float | None, given: StudyOptions, record: Mapping[str, Any],
+    write: Callable[[Sequence[Row]], Path | None], show: Callable[[Sequence[Row]], None] | None = None,
 ) -> None:  # fmt: skip
     """Run a study's cells, its page written anew as they end; `show` prints them at last. Exit code 1 if one failed."""
-    from rislam_rt.cli.interrupts import Interrupted
-    from rislam_rt.cli.progress import show_sweep
-    from rislam_rt.sweeps import SweepOptions, run_sweep
 
-    def grow(rows: "Sequence[Row]") -> None:
+    def grow(rows: Sequence[Row]) -> None:
         write(rows)
 
     effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, limit)
@@ -155,11 +128,8 @@ def run_cells(
         raise typer.Exit(1)
 
 
-def run_claims(spec: "ClaimsSpec", given: StudyOptions) -> None:
+def run_claims(spec: ClaimsSpec, given: StudyOptions) -> None:
     """The claims' table, from what other studies left behind."""
-    from rislam_rt.report.studies.claims import write_claims
-    from rislam_rt.studies.claims import SOURCE, judge, read_results
-
     refuse_scene(given, "claims", "runs in no room; leave it out")
     results = read_results(beside(given.pipeline, spec.results))
     found = judge(results)

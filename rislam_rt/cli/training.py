@@ -1,59 +1,55 @@
-"""What `rislam-rt run` does with a pipeline that trains the classifier."""
-
-import json
-from typing import TYPE_CHECKING
+"""What `rislam-rt run` does with a pipeline that trains the classifier; loaded for that alone."""
 
 import typer
 
-from rislam_rt.cli.options import beside, write_json
+from rislam_rt.cli.options import StudyOptions, beside, write_json
 from rislam_rt.cli.output_files import study_folder
-
-if TYPE_CHECKING:
-    from rislam_rt.cli.study import StudyOptions
-    from rislam_rt.studies.classifier.spec import ClassifierSpec
+from rislam_rt.cli.progress import show_progress
+from rislam_rt.cli.scenes import open_scene
+from rislam_rt.cli.study import refuse_scene
+from rislam_rt.pipeline.run import prepare_channel
+from rislam_rt.pipeline.specification.radio import build_radio
+from rislam_rt.report.studies.classifier import (
+    classifier_page,
+    classifier_table,
+    draw_importance,
+    draw_panel,
+    draw_scores,
+    weights_file,
+)
+from rislam_rt.report.style import to_png
+from rislam_rt.storage.files import json_file, write_atomic
+from rislam_rt.studies.classifier.run import ALL, run_training
+from rislam_rt.studies.classifier.spec import ClassifierSpec
+from rislam_rt.studies.spec import study_record
 
 PAGE, WEIGHTS = "classifier", "weights.npz"
-SCORES, IMPORTANCE, PANEL = (f"figures/classifier_{name}.png" for name in ("scores", "features", "panel"))
+PICTURES = {
+    "figures/classifier_scores.png": draw_scores,
+    "figures/classifier_features.png": draw_importance,
+    "figures/classifier_panel.png": draw_panel,
+}
 
 
-def run_classifier(spec: "ClassifierSpec", given: "StudyOptions") -> None:
+def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
     """Train the classifier of components and score it; weights, page, data and figures."""
-    from rislam_rt.cli.progress import show_progress
-    from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.cli.study import refuse_scene
-    from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.specification.radio import build_radio
-    from rislam_rt.report.studies.classifier import (
-        classifier_page,
-        classifier_table,
-        draw_importance,
-        draw_panel,
-        draw_scores,
-        weights_file,
-    )
-    from rislam_rt.report.style import to_png
-    from rislam_rt.storage.files import write_atomic
-    from rislam_rt.studies.classifier.run import ALL, run_training
-    from rislam_rt.studies.spec import study_record
-
     refuse_scene(given, "train_classifier", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     scenes = [open_scene(beside(given.pipeline, room.scene), radio).scene for room in spec.rooms]
     record = study_record(spec, scenes)
-    files = (f"{PAGE}.md", f"{PAGE}.json", WEIGHTS, *((SCORES, IMPORTANCE, PANEL) if given.page else ()))
+    files = (f"{PAGE}.md", f"{PAGE}.json", WEIGHTS, *(PICTURES if given.page else ()))
     folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record, files)
     prepare_channel(spec.channel)
     with show_progress() as progress:
         found = run_training(scenes, spec, progress=progress)
     content = {**record, **classifier_table(found)}
     contents = {
-        f"{PAGE}.md": classifier_page(found, spec, (SCORES, IMPORTANCE, PANEL) if given.page else None).encode(),
-        f"{PAGE}.json": (json.dumps(content, indent=1, allow_nan=False) + "\n").encode(),
+        f"{PAGE}.md": classifier_page(found, spec, (*PICTURES,) if given.page else None).encode(),
+        f"{PAGE}.json": json_file(content),
         WEIGHTS: weights_file(found),
     }
     if given.page:
-        pictures = {SCORES: draw_scores, IMPORTANCE: draw_importance, PANEL: draw_panel}
-        contents |= {name: to_png(draw(found)) for name, draw in pictures.items()}
+        contents |= {name: to_png(draw(found)) for name, draw in PICTURES.items()}
     for name, data in contents.items():
         write_atomic(folder / name, data)
     typer.echo(f"F1 on all test rooms: {found.scores[ALL]['network'].f1:.4f}")

@@ -1,28 +1,23 @@
-"""What `rislam-rt run` does with a study in unseen rooms."""
+"""What `rislam-rt run` does with a study in unseen rooms; loaded for that alone."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from rislam_rt.cli.options import StudyOptions
 from rislam_rt.cli.output_files import page_files, study_folder
-from rislam_rt.cli.study import StudyOptions, refuse_scene, run_cells
+from rislam_rt.cli.study import refuse_scene, run_cells
+from rislam_rt.pipeline.run import prepare_channel
+from rislam_rt.report.unseen import write_unseen
+from rislam_rt.report.unseen.terminal import print_cards
+from rislam_rt.studies import UnseenSpec
+from rislam_rt.studies.unseen import build_unseen, count_tests
+from rislam_rt.studies.unseen.record import unseen_record
+from rislam_rt.sweeps import Row, build_cells
+from rislam_rt.sweeps.store import check_folder, read_timings
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
-    from rislam_rt.studies import UnseenSpec
-    from rislam_rt.sweeps import Row
-
-
-def run_unseen(spec: "UnseenSpec", given: StudyOptions) -> None:
+def run_unseen(spec: UnseenSpec, given: StudyOptions) -> None:
     """Draw the rooms, run what the file asks for in each, print and write the score card; exit code 1 if one failed."""
-    from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.report.unseen import write_unseen
-    from rislam_rt.report.unseen.terminal import print_cards
-    from rislam_rt.studies.unseen import build_unseen, count_tests
-    from rislam_rt.studies.unseen.record import unseen_record
-    from rislam_rt.sweeps import build_cells
-    from rislam_rt.sweeps.store import check_folder, read_timings
-
     refuse_scene(given, "unseen", "draws its rooms; leave it out")
     cells = Path("sweeps") / spec.name
     record = unseen_record(spec)
@@ -34,11 +29,11 @@ def run_unseen(spec: "UnseenSpec", given: StudyOptions) -> None:
         prepare_channel(kind)
     tests = count_tests(spec, given.pipeline)
 
-    def write(rows: "Sequence[Row]") -> Path | None:
+    def write(rows: Sequence[Row]) -> Path | None:
         timings = read_timings(cells)
         return write_unseen(rows, spec, record, folder, tests=tests, timings=timings, figures=given.page)
 
-    def show(rows: "Sequence[Row]") -> None:
+    def show(rows: Sequence[Row]) -> None:
         print_cards(rows, read_timings(cells))
 
     run_cells(sweep, cells, spec.time_limit_s, given, record, write, show)

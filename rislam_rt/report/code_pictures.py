@@ -66,7 +66,8 @@ def _draw_code(axis: Axes, index: Integers | Floats, levels: int, sheet: DataShe
     axis.grid(False)
     if max(index.shape) <= MAX_LABELLED and np.isfinite(index).all():
         for (row, col), level in np.ndenumerate(index):
-            dark = _brightness(int(level), levels) < 0.5
+            red, green, blue, _ = _colours(levels)(int(level))
+            dark = 0.299 * red + 0.587 * green + 0.114 * blue < 0.5
             axis.text(col, row, str(level), ha="center", va="center", fontsize=7, color="white" if dark else "black")
 
 
@@ -75,11 +76,6 @@ def _colours(levels: int) -> ListedColormap:
     from matplotlib import colormaps
 
     return ListedColormap(colormaps["twilight"](np.arange(levels) / levels))
-
-
-def _brightness(level: int, levels: int) -> float:
-    red, green, blue, _ = _colours(levels)(int(level))
-    return float(0.299 * red + 0.587 * green + 0.114 * blue)
 
 
 def _colour_bar(figure: Figure, axes: "np.ndarray[tuple[int, ...], np.dtype[np.object_]]", levels: int) -> None:

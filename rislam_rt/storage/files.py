@@ -1,5 +1,6 @@
 """Writing files so that they are there whole or not at all, and taking away what a killed process was writing."""
 
+import json
 import os
 import re
 import tempfile
@@ -8,6 +9,7 @@ from contextlib import suppress
 from errno import EACCES, ENOTDIR
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
+from typing import Any
 
 from rislam_rt.errors import StoreError
 
@@ -31,6 +33,11 @@ def is_own(path: Path) -> bool:
             return content.find(MARK.encode()) >= 0 or (content[:3] == head and content.find(application) >= 0)
     except OSError:  # not to be read, so not known to be ours
         return False
+
+
+def json_file(content: Any) -> bytes:
+    """Content of a JSON file, as plain data stand in it; NaN and infinity are refused."""
+    return (json.dumps(content, indent=1, allow_nan=False) + "\n").encode()
 
 
 def write_atomic(path: Path, content: bytes) -> None:

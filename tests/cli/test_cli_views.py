@@ -6,6 +6,7 @@ from pathlib import Path
 from rislam_rt.storage.files import is_own
 from rislam_rt.storage.seal import seal
 
+SHORT = ("--set", "channel=image_source", "--set", "cycles=3", "--set", "depth=0", "--set", 'schemes=["random"]')
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
 
 
@@ -36,8 +37,7 @@ def test_a_view_that_cannot_be_is_one_line(run, tmp_path):
 
 
 def test_report_writes_a_moving_picture(run, tmp_path):
-    short = ("--set", "channel=image_source", "--set", "cycles=3", "--set", "depth=0", "--set", 'schemes=["random"]')
-    assert run("run", PIPELINE, *short, "--no-report", "--out", "r")[0] == 0
+    assert run("run", PIPELINE, *SHORT, "--no-report", "--out", "r")[0] == 0
     code, _, err = run("report", "r", "--gif", "run.mp4")
     assert code == 2
     assert "give a name that ends in .gif" in err
@@ -50,8 +50,7 @@ def test_report_writes_a_moving_picture(run, tmp_path):
 
 
 def test_report_of_a_run_with_settings_of_another_version_is_one_line(run, tmp_path):
-    short = ("--set", "channel=image_source", "--set", "cycles=3", "--set", "depth=0", "--set", 'schemes=["random"]')
-    assert run("run", PIPELINE, *short, "--no-report", "--out", "r")[0] == 0
+    assert run("run", PIPELINE, *SHORT, "--no-report", "--out", "r")[0] == 0
     marker = tmp_path / "r" / "run.json"
     about = json.loads(marker.read_text())
     del about["checksum"], about["schema"]

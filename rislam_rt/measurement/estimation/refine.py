@@ -235,7 +235,7 @@ def joint_bound(inner: InnerProducts, amplitude: Complexes) -> tuple[Floats, Flo
 
 
 def amplitude_variance(inner: InnerProducts, known: Floats, amplitude: Complexes, information: Floats) -> Floats:
-    """Variance (P,) of the complex amplitudes: what is `known` (P, P) at given parameters, and by these' information.
+    """Variance (P,) of refined complex amplitudes: what is `known` (P, P) of them at given parameters, and by those.
 
     That information is the full one (3P, 3P); of the parameters' covariance no more is worked out than is asked for.
     """

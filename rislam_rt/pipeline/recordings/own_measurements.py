@@ -107,9 +107,9 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
         try:
             return check_inputs(dataset_to_inputs(data), str(file))
         except (KeyError, ValueError, TypeError) as error:
-            raise ConfigError(
-                f"{file}: {type(error).__name__} {str(error)[:80]}; give one as a run folder's measurements_<scheme>.nc"
-            ) from None
+            said = " ".join(str(error.args[0] if error.args else error).split())
+            cause = said.partition(". Did you mean")[0][:80]
+            raise ConfigError(f"{file}: {cause}; give one as a run folder's measurements_<scheme>.nc") from None
     table = _read_csv(file)
     if start is None:
         raise ConfigError(f"{file}: a CSV file does not say where the agent starts; give --start X,Y,Z")
@@ -129,7 +129,12 @@ def inputs_of(
     columns = {str(name): _numbers(table[name], str(name), place) for name in table}
     _check_names(columns, place)
     time = columns["time_s"]
-    if not np.isfinite(time).all() or (np.diff(time) < 0.0).any():
+    if not np.isfinite(time).all():
+        row = int(np.argmin(np.isfinite(time))) + 1
+        raise ConfigError(
+            f"{place}: time_s: row {row} of the data has no finite number; give each row its cycle's time"
+        )
+    if (np.diff(time) < 0.0).any():
         raise ConfigError(f"{place}: time_s: not in order; sort the rows by time")
     cycles, cycle = np.unique(time, return_inverse=True)
     for name in ("delay_s", "heading_rad"):
@@ -292,6 +297,8 @@ def _read_csv(file: Path) -> dict[str, list[float]]:
         raise ConfigError(f"{file}: cannot be read ({str(error)[:80]}); give a CSV file in UTF-8") from None
     if not rows:
         raise ConfigError(f"{file}: no rows; give a header and a row a component")
+    if len(names) == 1 and any(mark in names[0] for mark in ";\t"):
+        raise ConfigError(f"{file}: line 1: one column, '{names[0][:40]}'; part the columns by commas")
     if len(set(names)) < len(names):
         raise ConfigError(f"{file}: line 1: a column is there twice; leave one out")
     table: dict[str, list[float]] = {}

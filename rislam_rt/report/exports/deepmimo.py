@@ -6,7 +6,6 @@ triangular mesh. A moving agent is a dynamic scenario: one folder of such files 
 """
 
 import io
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,6 +15,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Material, PathKind, Paths, RadioConfig, Scene
 from rislam_rt.model.itu import itu_parameters
+from rislam_rt.storage.files import json_file
 
 FORMAT_VERSION = "4.0.5"
 """Of the package whose readers these files were made for."""
@@ -56,7 +56,7 @@ def deepmimo_files(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -
     """
     room = _room_files(scene, radio)
     cycles = paths.num_cycles
-    files: dict[str, bytes] = {"params.json": _json(_parameters(scene, paths, radio, depth))}
+    files: dict[str, bytes] = {"params.json": json_file(_parameters(scene, paths, radio, depth))}
     for cycle in range(cycles):
         folder = "" if cycles == 1 else f"scene_{cycle:05d}/"
         values = cycle_matrices(paths, cycle)
@@ -113,12 +113,14 @@ def _interactions(paths: Paths, path: int) -> int:
 
 
 def _parameters(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> dict[str, Any]:
+    from rislam_rt import __version__
+
     faces = sum(len(one.faces) for one in scene.reflectors)
     return {
         "version": FORMAT_VERSION,
         "rt_params": {
             "raytracer_name": f"rislam_rt ({paths.source})",
-            "raytracer_version": _version(),
+            "raytracer_version": __version__,
             "frequency": radio.carrier,
             "max_path_depth": depth + 1,
             "max_reflections": depth,
@@ -165,12 +167,6 @@ def _parameters(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> d
             "representation": "mesh",
         },
     }
-
-
-def _version() -> str:
-    from rislam_rt import __version__
-
-    return __version__
 
 
 def _distinct(scene: Scene) -> list[Material]:
@@ -225,7 +221,7 @@ def _room_files(scene: Scene, radio: RadioConfig) -> dict[str, bytes]:
         "vertices.npz": _npz({"vertices": pool}),
         "faces.npz": _npz(faces),
         "materials.npz": _npz(kinds),
-        "objects.json": _json(objects),
+        "objects.json": json_file(objects),
     }
 
 
@@ -233,7 +229,3 @@ def _npz(arrays: Mapping[str, Any]) -> bytes:
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()
-
-
-def _json(content: Any) -> bytes:
-    return (json.dumps(content, indent=1, allow_nan=False) + "\n").encode()

@@ -64,6 +64,8 @@ def _log_room(rerun: Any, stream: Any, scene: Scene) -> None:
 
 def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: int) -> None:
     """Record for Rerun the estimate of a cycle with its 2 sigma ellipsoid, and the map as it then was."""
+    from scipy.spatial.transform import Rotation
+
     size, axes = np.linalg.eigh(scheme.covariance[cycle, :3, :3])
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0
@@ -73,7 +75,7 @@ def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: 
     ellipsoid = rerun.Ellipsoids3D(
         centers=[place],
         half_sizes=[TWO_SIGMA * np.sqrt(np.maximum(size, 0.0))],
-        quaternions=[rerun.Quaternion(xyzw=_quaternion(axes))],
+        quaternions=[rerun.Quaternion(xyzw=Rotation.from_matrix(axes).as_quat())],
         colors=[colour],
     )
     stream.log(f"{name}/ellipsoid", ellipsoid)
@@ -87,9 +89,3 @@ def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: 
 
 def _colour(scheme: str) -> tuple[int, ...]:
     return tuple(round(255 * part) for part in to_rgb(scheme_colour(scheme)))
-
-
-def _quaternion(rotation: Any) -> Any:
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(rotation).as_quat()

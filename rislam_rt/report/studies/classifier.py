@@ -1,6 +1,7 @@
 """The classifier's page and figures: F1 room by room, what each feature is worth, and how it grows with age."""
 
 import io
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -129,7 +130,7 @@ def classifier_table(found: Training) -> dict[str, Any]:
     }
 
 
-def classifier_page(found: Training, spec: ClassifierSpec, figures: tuple[str, str, str] | None) -> str:
+def classifier_page(found: Training, spec: ClassifierSpec, figures: Sequence[str] | None) -> str:
     """The classifier's page: what was done, scores by room, by class and of the panel by code, features."""
     about = f"""Written by `rislam-rt run` from one pipeline, do not edit. Seed {spec.seed}, paths by
     {"ray tracing" if spec.channel == "traced" else "image sources"}, receiver `{spec.receiver.estimator}`. Trained on

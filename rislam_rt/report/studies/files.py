@@ -1,6 +1,5 @@
 """The files of a study: page, data and figures, each there whole or not at all."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ from rislam_rt.channel.compare import validation_page
 from rislam_rt.report.studies.certificate import draw_certificate
 from rislam_rt.report.studies.fig4a import draw_fig4a, fig4a_csv, fig4a_page
 from rislam_rt.report.style import to_png
-from rislam_rt.storage.files import write_atomic
+from rislam_rt.storage.files import json_file, write_atomic
 from rislam_rt.studies.compare import Comparison
 from rislam_rt.studies.fig4a import Fig4a
 from rislam_rt.studies.spec import CompareSpec, Fig4aSpec
@@ -31,7 +30,7 @@ def write_comparison(
     files = {f"{COMPARISON}.md": validation_page(found.rows, seed=spec.seed).encode()}
     if figures and found.certificate is not None:
         files[CERTIFICATE] = to_png(draw_certificate(found.certificate))
-    return _write(files | {f"{COMPARISON}.json": _json(content)}, folder)
+    return _write(files | {f"{COMPARISON}.json": json_file(content)}, folder)
 
 
 def write_fig4a(
@@ -48,7 +47,7 @@ def write_fig4a(
     files = {f"{CURVES}.md": page.encode(), f"{CURVES}.csv": fig4a_csv(found).encode()}
     if figures:
         files[CURVES_FIGURE] = to_png(draw_fig4a(found, spec))
-    return _write(files | {f"{CURVES}.json": _json(content)}, folder)
+    return _write(files | {f"{CURVES}.json": json_file(content)}, folder)
 
 
 def _write(files: Mapping[str, bytes], folder: Path) -> Path:
@@ -56,7 +55,3 @@ def _write(files: Mapping[str, bytes], folder: Path) -> Path:
     for name, content in files.items():
         write_atomic(folder / name, content)
     return folder / next(iter(files))
-
-
-def _json(content: Mapping[str, Any]) -> bytes:
-    return (json.dumps(content, indent=1, allow_nan=False) + "\n").encode()

@@ -56,8 +56,8 @@ def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft
             walls.append((_line_name(line, plan), joined(cells), line.material))
     levels: list[Entry] = []
     for name, level in (("floor", 0.0), ("ceiling", height)):
-        mesh = joined([_at_height(flat, level), *thresholds[level]])
-        levels.append((name, as_mesh(mesh.triangles), None))
+        whole = as_mesh(np.concatenate([flat, np.full((*flat.shape[:2], 1), level)], axis=-1))
+        levels.append((name, as_mesh(joined([whole, *thresholds[level]]).triangles), None))
     return _named([*levels, *walls, *entries], plan, options)
 
 
@@ -152,10 +152,6 @@ def _floor_triangles(plan: FloorPlan, lines: list[Line]) -> Floats:
         box = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
         found.append(box[np.array([[0, 1, 2], [0, 2, 3]])])
     return np.concatenate(found)
-
-
-def _at_height(triangles: Floats, height: float) -> Mesh:
-    return as_mesh(np.concatenate([triangles, np.full((*triangles.shape[:2], 1), height)], axis=-1))
 
 
 def _line_name(line: Line, plan: FloorPlan) -> str:

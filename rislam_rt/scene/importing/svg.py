@@ -3,7 +3,6 @@
 import re
 import xml.etree.ElementTree as Tree
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -73,9 +72,10 @@ def _walk(element: Tree.Element, matrix: Floats, inherited: str, depth: int) -> 
     matrix = matrix @ _matrix(element.get("transform", ""))
     kind = _kind(element) or inherited
     if tag in _SHAPES:
+        about = {key: element.get(f"data-{key}") for key in _KEYS if element.get(f"data-{key}") is not None}
         for points, closed in _outline(tag, element):
             ends = np.column_stack([points, np.ones(len(points))]) @ matrix.T
-            yield PlanShape(kind or ("room" if closed else "wall"), ends[:, :2], closed, _about(element))
+            yield PlanShape(kind or ("room" if closed else "wall"), ends[:, :2], closed, about)
     for child in element:
         yield from _walk(child, matrix, kind, depth + 1)
 
@@ -89,10 +89,6 @@ def _kind(element: Tree.Element) -> str:
     )
     words = set(re.split(r"[\W\d_]+", own.lower()))
     return next((kind for kind, known in _WORDS.items() if words & set(known)), "")
-
-
-def _about(element: Tree.Element) -> dict[str, Any]:
-    return {key: element.get(f"data-{key}") for key in _KEYS if element.get(f"data-{key}") is not None}
 
 
 def _outline(tag: str, element: Tree.Element) -> Iterator[tuple[Floats, bool]]:

@@ -15,7 +15,8 @@ def clip_mesh(mesh: Mesh, window: Floats) -> Mesh:
     low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
     touched = ((high > window[0]) & (low < window[1])).all(axis=1)
     inside = touched & ((low >= window[0]) & (high <= window[1])).all(axis=1)
-    cut = [piece for triangle in corners[touched & ~inside] for piece in _fan(_clipped(triangle, window))]
+    polygons = [_clipped(triangle, window) for triangle in corners[touched & ~inside]]
+    cut = [polygon[[0, k, k + 1]] for polygon in polygons for k in range(1, len(polygon) - 1)]
     kept = mesh.faces[inside]
     vertices = np.concatenate([mesh.vertices, np.array(cut, dtype=np.float64).reshape(-1, 3)])
     added = len(mesh.vertices) + np.arange(3 * len(cut)).reshape(-1, 3)
@@ -36,8 +37,3 @@ def _clipped(polygon: Floats, window: Floats) -> Floats:
                     found.append(polygon[k])
             polygon = np.array(found).reshape(-1, 3)
     return polygon
-
-
-def _fan(polygon: Floats) -> list[Floats]:
-    """Triangles (3, 3) of a clipped convex polygon."""
-    return [polygon[[0, k, k + 1]] for k in range(1, len(polygon) - 1)]

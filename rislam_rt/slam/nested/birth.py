@@ -11,6 +11,7 @@ from rislam_rt.slam.associate import squared_distance
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import poses_of, square_root
+from rislam_rt.slam.nested.belief_moments import Moments
 from rislam_rt.slam.nested.birth_scheduling import PARALLEL, due_tracks
 from rislam_rt.slam.nested.candidates import PredictedMeasurements, explained
 from rislam_rt.slam.nested.hypotheses import (
@@ -31,7 +32,6 @@ from rislam_rt.slam.nested.hypotheses import (
 )
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, enter
 from rislam_rt.slam.nested.mirrors import is_behind_mirror, mirror_images
-from rislam_rt.slam.nested.moments import Moments
 from rislam_rt.slam.nested.tracks import LandmarkTracks, overstatement, panel_surplus
 from rislam_rt.slam.observations import PANEL, UNTOLD, same_side
 from rislam_rt.slam.returns import TX, Poses, Returns, compact, leg_images, observe

@@ -7,9 +7,9 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import merged_pull
 from rislam_rt.slam.associate import DIAGONAL, Candidates, near_pairs, squared_distance
+from rislam_rt.slam.nested.belief_moments import POSE, Moments
 from rislam_rt.slam.nested.landmark_table import LandmarkTable
 from rislam_rt.slam.nested.measurement_prediction import ExpectedReturns, MapBelief
-from rislam_rt.slam.nested.moments import POSE, Moments
 from rislam_rt.slam.nested.tracks import AMPLITUDE_WANDER, LandmarkTracks
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, same_side
 from rislam_rt.slam.returns import TX, Returns, linearise

@@ -11,17 +11,17 @@ from rislam_rt.slam.associate import associate
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.nested.belief_moments import POSE, Moments
 from rislam_rt.slam.nested.birth import Past, examine
 from rislam_rt.slam.nested.candidates import PredictedMeasurements, candidates, hidden_tracks, look_ahead
 from rislam_rt.slam.nested.divergence_monitor import DivergenceMonitor, check
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, empty_table, remove
 from rislam_rt.slam.nested.landmark_update import Hits, learn
 from rislam_rt.slam.nested.measurement_prediction import MapBelief, detection_share, expected_returns
-from rislam_rt.slam.nested.moments import POSE, Moments
+from rislam_rt.slam.nested.panel_candidate import weigh_tracks
 from rislam_rt.slam.nested.particles import operations
 from rislam_rt.slam.nested.particles.operations import ParticleUpdate, PointParticles
 from rislam_rt.slam.nested.prune import keepers
-from rislam_rt.slam.nested.ris_candidate import weigh_tracks
 from rislam_rt.slam.nested.track_classification import classify_tracks
 from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, has_ended, no_tracks
 from rislam_rt.slam.observations import PANEL, Observations, free_space, is_los, observations_of, stranger_density

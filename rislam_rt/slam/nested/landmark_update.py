@@ -18,10 +18,10 @@ from rislam_rt.slam.identity import (
     weigh_silence,
 )
 from rislam_rt.slam.moments import poses_of, square_root
+from rislam_rt.slam.nested.belief_moments import Moments
 from rislam_rt.slam.nested.candidates import PredictedMeasurements
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, image_idents, learn_ratio
 from rislam_rt.slam.nested.measurement_prediction import ExpectedReturns, MapBelief
-from rislam_rt.slam.nested.moments import Moments
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.returns import NONE, TX, Returns, compact, observe
 

@@ -9,10 +9,10 @@ from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.map_geometry import MAX_LEAN, diagonal_blocks, images_in, wall_planes
 from rislam_rt.slam.moments import even_draws, square_root
+from rislam_rt.slam.nested.belief_moments import POSE, Moments
 from rislam_rt.slam.nested.filter import NestedState, believed
 from rislam_rt.slam.nested.landmark_table import RATIO_SPREAD, LandmarkTable
-from rislam_rt.slam.nested.moments import POSE, Moments
-from rislam_rt.slam.nested.ris_candidate import find_panel_candidate
+from rislam_rt.slam.nested.panel_candidate import find_panel_candidate
 
 IMAGE_HITS = 3
 """Measurements of an image before it is shown on the map."""

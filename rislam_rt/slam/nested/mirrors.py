@@ -5,8 +5,8 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.nested.belief_moments import Moments
 from rislam_rt.slam.nested.landmark_table import LandmarkTable
-from rislam_rt.slam.nested.moments import Moments
 from rislam_rt.slam.nested.tracks import LandmarkTracks
 from rislam_rt.slam.returns import reflect
 from rislam_rt.slam.ris_candidate import rays

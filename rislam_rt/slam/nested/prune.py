@@ -4,10 +4,10 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.nested.belief_moments import Moments
 from rislam_rt.slam.nested.candidates import PredictedMeasurements
 from rislam_rt.slam.nested.landmark_table import LandmarkTable
 from rislam_rt.slam.nested.measurement_prediction import MapBelief
-from rislam_rt.slam.nested.moments import Moments
 from rislam_rt.slam.returns import NONE, TX, reflect
 
 MAX_DRIFT = 0.8

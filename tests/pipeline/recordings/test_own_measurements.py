@@ -261,3 +261,32 @@ def test_a_start_told_wrong_is_said_where_nobody_knows_the_truth(
             said = [row["outcome"] for row in csv.DictReader(lines)].count("diverged")
         assert (said > 0) == (off > 0.0)
         assert f"cycles_diverged: {said}\n" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time_s;delay_s\n0;1e-8\n", "line 1: one column, 'time_s;delay_s'; part the columns by commas"),
+        ("time_s\tdelay_s\n0\t1e-8\n", "line 1: one column, 'time_s delay_s'; part the columns by commas"),
+        (
+            "time_s,heading_rad,delay_s,cos_x,cos_y,amplitude\n0,0,1e-8,0,0,0.01\nnan,0,1e-8,0,0,0.01\n",
+            "time_s: row 2 of the data has no finite number; give each row its cycle's time",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_table_is_named(tmp_path: Path, spec: PipelineSpec, text: str, said: str) -> None:
+    (tmp_path / "mine.csv").write_text(text)
+    start = StartPrior(np.zeros(3), np.zeros(3), heading=0.0)
+    with pytest.raises(ConfigError) as found:
+        read_inputs(tmp_path / "mine.csv", start, build_radio(spec.radio))
+    assert str(found.value) == f"{tmp_path / 'mine.csv'}: {said}"
+
+
+def test_a_file_of_another_kind_names_what_it_lacks(tmp_path: Path, spec: PipelineSpec) -> None:
+    import xarray as xr
+
+    xr.Dataset({"map_position": ("x", [1.0])}).to_netcdf(tmp_path / "scheme.nc", engine="h5netcdf")
+    with pytest.raises(ConfigError) as found:
+        read_inputs(tmp_path / "scheme.nc", None, build_radio(spec.radio))
+    said = str(found.value).removeprefix(f"{tmp_path / 'scheme.nc'}: ")
+    assert said == "No variable named 'start_position'; give one as a run folder's measurements_<scheme>.nc"

@@ -8,9 +8,9 @@ from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.nested.belief_moments import Moments
 from rislam_rt.slam.nested.birth import Birth, BirthDecision
 from rislam_rt.slam.nested.hypotheses import IMAGE, POINT, History, fit_feature, initial_value
-from rislam_rt.slam.nested.moments import Moments
 from rislam_rt.slam.nested.particles import operations
 from rislam_rt.slam.returns import NONE, Returns, observe
 

@@ -9,12 +9,12 @@ from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.identity import STRENGTHS
 from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.nested.belief_moments import POSE, Moments
 from rislam_rt.slam.nested.candidates import PredictedMeasurements, look_ahead
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, empty_table, enter, image_idents, learn_ratio, remove
 from rislam_rt.slam.nested.landmark_update import Hits, learn
 from rislam_rt.slam.nested.mapping import WALL_HITS, build_map
 from rislam_rt.slam.nested.measurement_prediction import MapBelief, detection_share, expected_returns
-from rislam_rt.slam.nested.moments import POSE, Moments
 from rislam_rt.slam.nested.prune import keepers
 from rislam_rt.slam.nested.tracks import no_tracks
 from rislam_rt.slam.observations import Observations

@@ -12,11 +12,11 @@ from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.identity import panel_probabilities
 from rislam_rt.slam.inputs import check_sides
 from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.nested.belief_moments import POSE, Moments
 from rislam_rt.slam.nested.candidates import return_sides
 from rislam_rt.slam.nested.landmark_table import LandmarkTable, empty_table, enter
 from rislam_rt.slam.nested.measurement_prediction import MapBelief
-from rislam_rt.slam.nested.moments import POSE, Moments
-from rislam_rt.slam.nested.ris_candidate import find_panel_candidate, weigh_tracks
+from rislam_rt.slam.nested.panel_candidate import find_panel_candidate, weigh_tracks
 from rislam_rt.slam.nested.tracks import LandmarkTracks, advance, begin, extend, no_tracks
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations, side_of
 from rislam_rt.slam.returns import TX, Returns, observe

@@ -132,7 +132,7 @@ def kind_by_shape(bounds: Floats, room: Floats) -> str:
 
 
 def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
-    """Where a region of the shell is: `floor`, `ceiling`, `wall_north` (y grows to the north, x to the east)."""
+    """Name of a group of regions by where in the shell it is: `floor`, `ceiling`, `wall_north` (y to the north)."""
     center, height = room.mean(axis=0), float(room[1, 2] - room[0, 2])
     if abs(normal[2]) >= LEVEL:
         share = (float(middle[2]) - float(room[0, 2])) / height if height else 0.0

@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
-from rislam_rt.slam.nested.moments import POSE, Moments, normalised, where
+from rislam_rt.slam.nested.belief_moments import POSE, Moments, normalised, where
 from rislam_rt.slam.nested.particles import agents
 from rislam_rt.slam.nested.particles.cloud import HOPELESS, Cloud, CloudEngine, Kernel, kernel_width
 from rislam_rt.slam.nested.particles.kld_sampling import num_agents, num_points
@@ -106,7 +106,7 @@ def propagate(belief: Nested, dt: float, accelerate: Floats, turn: float, *, rng
 
 
 def absorb(belief: Nested, owner: int, sightings: Sequence[Sighting], engine: CloudEngine) -> tuple[Nested, float]:
-    """Belief's weights after returns that speak of landmark `owner`, and the log evidence of what was measured.
+    """The particles' belief, reweighted by returns that speak of landmark `owner`, and the log evidence of these.
 
     The previous weight enters once, however many returns there are. If no particle can explain them, the belief stays
     as it was and the evidence is minus infinity.

@@ -7,8 +7,8 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.nested.belief_moments import Moments
 from rislam_rt.slam.nested.birth import Birth
-from rislam_rt.slam.nested.moments import Moments
 from rislam_rt.slam.nested.particles import belief
 from rislam_rt.slam.nested.particles import initialise_landmark as history
 from rislam_rt.slam.nested.particles.backend import pick_engine
@@ -67,7 +67,7 @@ def begin(start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) ->
 
 
 def set_prior_map(particles: PointParticles, features: Floats, covariance: Floats) -> PointParticles:
-    """The cycle sets a prior map: F landmarks (F, 3) known beforehand, with a covariance (3F, 3F)."""
+    """Operation of the cycle: set a prior map, F landmarks (F, 3) known beforehand, with a covariance (3F, 3F)."""
     known = place_known(particles.belief, features, covariance, particles.config, particles.engine)
     return particles._replace(belief=known)
 

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.moments import poses_of
-from rislam_rt.slam.nested.moments import POSE, Moments
+from rislam_rt.slam.nested.belief_moments import POSE, Moments
 from rislam_rt.slam.nested.particles.belief import Nested, absorb, gaussian, mean_covariances
 from rislam_rt.slam.nested.particles.cloud import CloudEngine
 from rislam_rt.slam.nested.particles.sightline import Sighting, trace_sightline

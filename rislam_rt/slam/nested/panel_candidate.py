@@ -11,11 +11,11 @@ from rislam_rt.model import Body, PanelCandidate, RisCode
 from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam.identity import add_evidence, log_panel, log_panel_missed, log_scatterer, log_scatterer_missed
 from rislam_rt.slam.moments import even_draws, poses_of
+from rislam_rt.slam.nested.belief_moments import Moments
 from rislam_rt.slam.nested.landmark_table import LandmarkTable
 from rislam_rt.slam.nested.landmark_update import TOLD
 from rislam_rt.slam.nested.measurement_prediction import MapBelief
 from rislam_rt.slam.nested.mirrors import is_behind_mirror, mirror_images
-from rislam_rt.slam.nested.moments import Moments
 from rislam_rt.slam.nested.tracks import LandmarkTracks
 from rislam_rt.slam.observations import PANEL, UNTOLD
 from rislam_rt.slam.ris_candidate import DEEP, DISMISSAL, PATIENCE, places
@@ -58,7 +58,7 @@ def weigh_tracks(tracks: LandmarkTracks, belief: MapBelief, code: RisCode | None
 def find_panel_candidate(
     tracks: LandmarkTracks, table: LandmarkTable, moments: Moments, body: Body, panel: int = 0
 ) -> PanelCandidate | None:
-    """The RIS candidate: landmark or track likeliest to be a panel; None if nothing is likelier so than not.
+    """The nested filter's RIS candidate: landmark or track likeliest a panel; None if nothing is likelier so than not.
 
     A track that seems to come from behind a mirror may be the panel over walls: aiming there would miss it.
     """
