@@ -292,8 +292,9 @@ def widen_motion(state: WindowState) -> WindowState:
     fresh = _precisions(posterior)
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
-    window = window._replace(precision=precision, surplus=_surplus(precision, posterior))
-    return state._replace(window=window, level=level)
+    # the covariance is that of the precisions before
+    surplus = _surplus(window.precision, posterior)
+    return state._replace(window=window._replace(precision=precision, surplus=surplus), level=level)
 
 
 def _unexplained(state: WindowState, observed: Observations) -> float:
