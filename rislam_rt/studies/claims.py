@@ -145,7 +145,8 @@ def _with_snr(case: str, entries: Sequence[Mapping[str, Any]]) -> list[Claim]:
         return []
     steps = [after["rmse_m"] <= before["rmse_m"] for before, after in pairwise(own)]
     text = ", ".join(f"{entry['snr_db']:g} dB: {entry['rmse_m']:.3f} m" for entry in own)
-    reason = "At high SNR what is left is the start's own error, which no measurement of unknown landmarks removes."
+    over = ", ".join(f"{e['snr_db']:g} dB {e['over_bound']:.2f}" for e in own if e.get("over_bound") is not None)
+    reason = f"RMSE over its posterior bound: {over}. The start's own error is in both, and nothing removes it."
     return [Claim(f"error falls as the SNR grows ({case})", "Fig. 4(b)", text, _judgement(steps, any(steps)), reason)]
 
 
