@@ -1,6 +1,7 @@
 """Runs in slices: the scores of the whole, the same files after a stop, and no changed slice read in silence."""
 
 import hashlib
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,7 @@ def short_slices(monkeypatch):
 
 @pytest.fixture(scope="module")
 def spec():
-    settings = ["channel=image_source", "cycles=90", "depth=1", 'schemes=["random", "no_ris"]', "slam.use_vt=true"]
+    settings = ["channel=image_source", "cycles=90", "depth=1", 'schemes=["random", "no_ris"]', "receiver.estimator=bound"]
     return load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
 
 
@@ -47,13 +48,16 @@ def contents(folder):
     return {str(f.relative_to(folder)): hashlib.sha256(f.read_bytes()).hexdigest() for f in files}
 
 
-@pytest.fixture
-def done(room, spec, short_slices, tmp_path):
-    """A completed run of four slices, the last of them short."""
-    return lead(room, spec, tmp_path / "run"), tmp_path / "run"
+@pytest.fixture(scope="module")
+def done(room, spec, tmp_path_factory):
+    """A completed run of four slices, the last of them short; nobody changes it."""
+    folder = tmp_path_factory.mktemp("done") / "run"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(slices, "SLICE", 25)
+        return lead(room, spec, folder), folder
 
 
-def test_scores_counted_slice_by_slice_are_those_of_the_whole(room, spec, done):
+def test_scores_counted_slice_by_slice_are_those_of_the_whole(room, spec, short_slices, done):
     found, folder = done
     assert is_long(room, spec)
     assert sorted(p.name for p in (folder / "slices").iterdir()) == [f"{n:05d}" for n in range(4)]
@@ -91,7 +95,7 @@ def _cut(room):
     return cut_scene(room, 90)
 
 
-def test_a_stopped_run_goes_on_and_leaves_the_same(room, spec, done, tmp_path):
+def test_a_stopped_run_goes_on_and_leaves_the_same(room, spec, short_slices, done, tmp_path):
     def stop(setup, at, total):
         if (setup, at) == ("no_ris", 30):
             raise KeyboardInterrupt
@@ -116,8 +120,9 @@ def test_a_stop_before_the_first_scheme_is_done_leaves_nothing(room, spec, short
     assert not (tmp_path / "run").exists()
 
 
-def test_it_can_be_read_again_and_a_changed_slice_is_told(done):
-    found, folder = done
+def test_it_can_be_read_again_and_a_changed_slice_is_told(short_slices, done, tmp_path):
+    found, folder = done[0], tmp_path / done[1].name
+    shutil.copytree(done[1], folder)
     again = read_any(folder)
     assert again.summary["schemes"]["random"]["rmse_m"] == pytest.approx(
         found.summary["schemes"]["random"]["rmse_m"], rel=1e-6
