@@ -33,7 +33,13 @@ def short_slices(monkeypatch):
 
 @pytest.fixture(scope="module")
 def spec():
-    settings = ["channel=image_source", "cycles=90", "depth=1", 'schemes=["random", "no_ris"]', "receiver.estimator=bound"]
+    settings = [
+        "channel=image_source",
+        "cycles=90",
+        "depth=1",
+        'schemes=["random", "no_ris"]',
+        "receiver.estimator=bound",
+    ]
     return load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
 
 
