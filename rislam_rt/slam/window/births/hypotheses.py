@@ -13,17 +13,15 @@ from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 
 KINDS = (
     "wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same",
-    "two walls", "wall beside its edge", "known point, wall", "known point, tx wall",
-    "known point over tx wall, wall", "known point over wall, wall", "known point, wall, known", "known point over rx wall, tx wall",
+    "two walls", "wall beside its edge", "image of known point", "the same on the tx leg", "image, known tx wall",
+    "image of image", "image over known wall", "tx image, known rx wall",
 )  # fmt: skip
-"""Names of the kinds, by their number."""
-WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS, BESIDE, IMAGE, TX_IMAGE, BOTH_LEGS, THEN_WALL, WALL_THEN, TX_BOTH = range(
-    len(KINDS)
-)
+"""Names of the kinds, by their number; the last six in new walls (`image_hypotheses`)."""
+WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS, BESIDE = range(9)
+IMAGE, TX_IMAGE, BOTH_LEGS, THEN_WALL, WALL_THEN, OTHER_LEG = IMAGES = range(9, 15)
 
-IMAGES = (IMAGE, TX_IMAGE, BOTH_LEGS, THEN_WALL, WALL_THEN, TX_BOTH)
-FAR = (TX_IMAGE, TX_BOTH)
-"""Kinds whose new wall mirrors a known point."""
+FAR = (TX_IMAGE, OTHER_LEG)
+"""Kinds whose new wall mirrors a known point on the leg to the Tx."""
 WALLS = (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE, *IMAGES)
 """Kinds whose new feature is a wall."""
 
@@ -83,8 +81,8 @@ def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
     return np.asarray(-2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]))
 
 
-def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool) -> Hypotheses:
-    """Every kind for every track, with its first guess; images of known points where wall returns tell no walls."""
+def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:
+    """Every kind for every track, with its first guess; images of known points stand in `image_hypotheses`."""
     count, walls = len(digest.seen), landmarks.walls
     seen, tx, rx = digest.mean
     ray, length = digest.direction, seen[:, 0]
@@ -116,10 +114,9 @@ def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTabl
             upright = reflect(anchor, image, tx)
             upright[:, 2] = middle[2]  # what lies higher comes of the edge
             add(BESIDE, wall, upright, NONE, NONE, (tx, tx))
-    pairs, points = _pairs(ray), landmarks.points.tolist() if not use_vt else []
+    pairs = _pairs(ray)
     for pair in pairs:
         add(TWO_WALLS, NONE, image - (pair @ tx[..., None])[..., 0], NONE, NONE, (tx, tx))
-    begin = len(kinds)
     turns, shifts, spreads = _over(known, np.array(legs), np.array(spots), middle)
     for row, pair in zip((np.array(kinds) == TWO_WALLS).nonzero()[0], pairs, strict=True):
         turns[row, :, 0] = pair
@@ -131,65 +128,7 @@ def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTabl
         turns.reshape(-1, 2, 3, 3), shifts.reshape(-1, 2, 3), spreads.reshape(-1, 2, 3, 3), kind == BESIDE,
         _beyond(kind, walled, known), none, none, none, np.zeros((rows, 3)),
     )  # fmt: skip
-    table = Hypotheses(kind, walled, np.full(rows, NONE), trials)
-    more = [_images(digest, known, point, wall) for point in points for wall in (NONE, *walls.tolist())]
-    return _in_reach(_stacked([table, *more]), digest, known) if more else table
-
-
-def _stacked(tables: list[Hypotheses]) -> Hypotheses:
-    trials = Trials._make(np.concatenate(fields) for fields in zip(*(table.trials for table in tables), strict=True))
-    kind, known, over = (np.concatenate([table[column] for table in tables]) for column in range(3))
-    return Hypotheses(kind, known, over, trials)
-
-
-def _images(digest: TrackSummary, known: KnownFeatures, point: int, wall: int) -> Hypotheses:
-    """The images of a known point in a new wall, by ways that go over that known wall besides, `NONE` for none."""
-    (seen, tx, rx), count = digest.mean, len(digest.seen)
-    spot, root, still = known.place[point], known.root[point], (AXES, np.zeros(3), np.zeros((3, 3)))
-    image = rx + seen[:, :1] * digest.direction
-    ways = []  # kind, what the new wall mirrors, with its root; what stands on the other leg; map behind the new wall
-    if wall == NONE:
-        ways += [(IMAGE, spot, root, spot, still), (TX_IMAGE, spot, root, spot, still)]
-    else:
-        turn, shift = known.turn[wall], known.shift[wall]
-        mirror = turn @ spot + shift
-        move = by_wall(spot, known.place[wall], digest.middle) @ known.root[wall]
-        wide = square_root(turn @ root @ root.T @ turn.T + move @ move.T)
-        wide = np.pad(wide, ((0, 0), (0, 3 - wide.shape[1])))
-        ways += [
-            (BOTH_LEGS, spot, root, mirror, (AXES, np.zeros(3), move)),
-            (THEN_WALL, mirror, wide, spot, still),
-            (WALL_THEN, spot, root, spot, (turn, shift, by_wall(image.mean(axis=0), known.place[wall], digest.middle) @ known.root[wall])),
-            (TX_BOTH, spot, root, mirror, (turn, shift, move)),
-        ]
-    kinds, starts, turns, shifts, spreads, others = [], [], [], [], [], []
-    for kind, inner, inner_root, other, (turn, shift, spread) in ways:
-        if kind in FAR:
-            firsts = _tx_images(digest, inner, other)
-        else:
-            reach = np.maximum(seen[:, 0] - np.linalg.norm(other - tx, axis=1), 0.1)
-            firsts = [_mirror_of(digest, inner, (rx + reach[:, None] * digest.direction) @ turn.T + shift)]
-        for first in firsts:
-            kinds.append(kind)
-            starts.append(first)
-            turns.append(np.stack([np.zeros((3, 3)), turn]))
-            shifts.append(np.stack([inner, shift]))
-            spreads.append(np.stack([inner_root, spread]))
-            others.append(other)
-    size = len(kinds) * count
-    kind, every = np.repeat(kinds, count), np.ones(size, dtype=np.bool_)
-    trials = Trials(
-        np.tile(np.arange(count), len(kinds)), every, ~every, np.concatenate(starts),
-        *(np.repeat(np.array(field), count, axis=0) for field in (turns, shifts, spreads)),
-        ~every, np.zeros((size, 3, 4)), every, np.isin(kind, FAR), kind == BOTH_LEGS,
-        np.repeat(np.array(others), count, axis=0),
-    )  # fmt: skip
-    return Hypotheses(kind, np.full(size, point), np.full(size, wall), trials)
-
-
-def _mirror_of(digest: TrackSummary, spot: Floats, image: Floats) -> Floats:
-    """Walls (T, 3), as images of the agent, that mirror a point (3,) to the places (T, 3)."""
-    return reflect(np.broadcast_to(digest.middle, image.shape), image, np.broadcast_to(spot, image.shape))
+    return Hypotheses(kind, walled, np.full(rows, NONE), trials)
 
 
 def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
@@ -201,50 +140,6 @@ def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -
     uncertainty = np.swapaxes(slope @ root[legs][:, :, None], 1, 2)
     turns, shifts = (np.repeat(field[legs][:, None], count, axis=1) for field in (turn, shift))
     return turns, shifts, uncertainty
-
-
-def _tx_images(digest: TrackSummary, spot: Floats, heard: Floats) -> list[Floats]:
-    """First guesses of the wall (T, 3) each that mirrors a point (3,) on the leg to the Tx: level ones below and above,
-    upright ones all around; the length alone tells where, as the agent moves. The Rx hears it at (3,)."""
-    seen, tx, rx = digest.mean
-    span = spot - tx
-    reach = np.maximum(seen[:, 0] - np.linalg.norm(heard - rx, axis=1), 0.1)
-    rise = np.sqrt(np.maximum(reach**2 - np.vecdot(span[:, :2], span[:, :2]), 1e-4))
-    across = np.sqrt(np.maximum(reach**2 - span[:, 2] ** 2, 1e-4))
-    ends = [tx + np.stack([span[:, 0], span[:, 1], sign * rise], axis=1) for sign in (-1.0, 1.0)]
-    for angle in np.arange(BEARINGS) * 2.0 * np.pi / BEARINGS:
-        ends.append(tx + np.stack([across * np.cos(angle), across * np.sin(angle), span[:, 2]], axis=1))
-    return [_mirror_of(digest, spot, end) for end in ends]
-
-
-def _in_reach(table: Hypotheses, digest: TrackSummary, known: KnownFeatures) -> Hypotheses:
-    """Without the images on the leg to the Tx of points that the track does not come from, and what it is too short
-    for."""
-    rows = np.isin(table.kind, IMAGES).nonzero()[0]
-    (seen, tx, rx), track, far = digest.mean, table.trials.track[rows], table.trials.far[rows]
-    other, spot = table.trials.other[rows], known.place[table.known[rows]]
-    out = other[:, None] - digest.rx[track]
-    reach = np.linalg.norm(out, axis=2)
-    weight = digest.weight[track, :, 1:] ** 2
-    total = weight.sum(axis=1)
-    gap = np.abs((weight * (digest.seen[track, :, 1:] - out[..., :2] / reach[..., None])).sum(axis=1) / total)
-    reach, leg = np.linalg.norm(other - rx[track], axis=1), np.linalg.norm(other - tx[track], axis=1)
-    spread = np.hypot(*np.linalg.norm(table.trials.uncertainty[rows], axis=(2, 3)).T)
-    spread = spread + np.linalg.norm(digest.uncertainty[track, 0, :, :], axis=(1, 2))
-    std = np.sqrt(1.0 / total + (spread / reach)[:, None] ** 2)
-    straight = np.linalg.norm(spot - tx[track], axis=1)
-    keep = np.ones(len(table.kind), dtype=np.bool_)
-    keep[rows] = np.where(
-        far, (gap < REACH * std).all(axis=1) & (seen[track, 0] > reach + straight), seen[track, 0] > leg + straight
-    )
-    trials = Trials._make(field[keep] for field in table.trials)
-    return Hypotheses(table.kind[keep], table.known[keep], table.over[keep], trials)
-
-
-BEARINGS = 8
-"""First guesses around the agent of an upright wall whose bearing the length alone has to tell."""
-REACH = 5.0
-"""Standard deviations by which a track may come from elsewhere than the point of which it may be an image."""
 
 
 def _beyond(kind: Integers, walled: Integers, known: KnownFeatures) -> Floats:

@@ -126,7 +126,7 @@ def _equations(
     track, wall, pair = trials.track[rows], trials.is_wall[rows], trials.is_pair[rows]
     moving = wall | pair
     tx, rx = digest.tx[track], digest.rx[track]
-    turn, shift, uncertainty = trials.turn[rows], trials.shift[rows], trials.uncertainty[rows]
+    turn, shift = trials.turn[rows], trials.shift[rows]
     first, second = turn[:, 0], turn[:, 1]
     # a point: fixed images; a wall: the image of the Tx, which moves
     span = place - digest.middle
@@ -147,7 +147,6 @@ def _equations(
     to_rx = image - rx
     reach = np.maximum(np.sqrt(np.vecdot(to_rx, to_rx)), 1e-6)
     arrival = to_rx / reach[..., None]
-    cosines = arrival[..., :2]
     by_image = _by_image(arrival, reach)
     # the point's leg to the Tx
     far = np.where(fixed, trials.other[rows][:, None], place[:, None, :] @ np.swapaxes(first, 1, 2) + shift[:, None, 0])
@@ -155,23 +154,16 @@ def _equations(
     to_tx = np.where(moving[:, None, None] & ~fixed, 0.0, far - tx)
     leg = np.sqrt(np.vecdot(to_tx, to_tx))
     toward = to_tx / np.maximum(leg, 1e-6)[..., None]
-    seen = np.concatenate([(reach + leg)[..., None], cosines], axis=-1)
+    seen = np.concatenate([(reach + leg)[..., None], arrival[..., :2]], axis=-1)
     new = by_image @ by_place
     by_far = np.where(out[..., None], by_wall, first[:, None])
     new[..., 0, :] += (toward[..., None, :] @ by_far)[..., 0, :]
     pose = by_image @ (by_tx[:, None] - AXES)
     pose[..., 0, :] -= toward
-    beside = trials.aside[rows][:, None, None, None]
-    maps_out = np.where(beside, 0.0, by_image @ uncertainty[:, None, 1])
-    maps_out[..., 0, :] += np.where(beside[..., 0], (toward[..., None, :] @ uncertainty[:, None, 1])[..., 0, :], 0.0)
-    mirror = flip @ uncertainty[:, 0]
-    inside = np.where(out, second @ uncertainty[:, 0], np.where(wall[:, None, None], second @ mirror, 0.0))
-    maps_in = by_image @ inside[:, None]
-    outside = np.where(out, mirror, uncertainty[:, 0])
-    maps_in[..., 0, :] += (toward[..., None, :] @ outside[:, None])[..., 0, :]
+    maps = _by_maps(trials, rows, by_image, toward, flip)
     split = _mix(trials, rows, rx, image, error, (by_place, by_tx), (seen, new, pose))
     wide = np.concatenate(
-        [digest.twist[track], pose @ digest.uncertainty[track], maps_in, maps_out, split, new], axis=-1
+        [digest.twist[track], pose @ digest.uncertainty[track], *maps, split, new], axis=-1
     )  # fmt: skip
     weight = digest.weight[track]
     wide *= weight[..., None]
@@ -190,6 +182,22 @@ def _equations(
     tail = CONSTANTS.tail
     cost = (tail + 3.0) * np.log1p(squared / tail).sum(axis=1) + np.vecdot(error, error)
     return _Equations(normal, slope, cost, (tail + 3.0) / (tail + squared))
+
+
+def _by_maps(trials: Trials, rows: Integers, by_image: Floats, toward: Floats, flip: Floats) -> tuple[Floats, Floats]:
+    """Slopes (H, B, 3, 3) by the errors of the map on the new feature's near side, and of that behind it.
+
+    What is seen moves by `by_image` (H, B, 3, 3) with the image that the Rx hears, its length by `toward` (H, B, 3)
+    with what the Tx sees; `flip` (H, 3, 3) mirrors.
+    """
+    (near, behind), second = np.moveaxis(trials.uncertainty[rows], 1, 0), trials.turn[rows, 1]
+    far, wall, aside = (field[rows][:, None, None] for field in (trials.far, trials.is_wall, trials.aside))
+    mirrored = flip @ near
+    heard = np.where(far, second @ near, np.where(wall, second @ mirrored, 0.0))
+    first, last = by_image @ heard[:, None], by_image @ np.where(aside, 0.0, behind)[:, None]
+    first[..., 0, :] += (toward[..., None, :] @ np.where(far, mirrored, near)[:, None])[..., 0, :]
+    last[..., 0, :] += (toward[..., None, :] @ np.where(aside, behind, 0.0)[:, None])[..., 0, :]
+    return first, last
 
 
 def _mix(

@@ -23,6 +23,7 @@ from rislam_rt.slam.window.births.hypotheses import (
     hypotheses,
 )
 from rislam_rt.slam.window.births.hypothesis_fits import Fits, smooth_paths, try_all
+from rislam_rt.slam.window.births.image_hypotheses import fitted_twice, image_amplitudes, with_images
 from rislam_rt.slam.window.births.point_identification import identify
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -90,7 +91,8 @@ _TEMPLATES = (
     (NEW, NONE, NONE, NONE, NONE), (NEW, NONE, NONE, KNOWN, NONE), (NEW, KNOWN, NONE, NONE, NONE),
     (NEW, KNOWN, NONE, KNOWN, NONE), (TX, NONE, NONE, NONE, NONE),
     (TX, NONE, NONE, NEW, NONE), (KNOWN, NONE, NONE, NEW, NONE), (KNOWN, NEW, NONE, NONE, NONE),
-    (KNOWN, OVER, NONE, NEW, NONE), (KNOWN, NONE, NONE, OVER, NEW), (KNOWN, NONE, NONE, NEW, OVER), (KNOWN, NEW, NONE, OVER, NONE),
+    (KNOWN, OVER, NONE, NEW, NONE), (KNOWN, NONE, NONE, OVER, NEW), (KNOWN, NONE, NONE, NEW, OVER),
+    (KNOWN, NEW, NONE, OVER, NONE),
 )  # fmt: skip
 """Form of each kind."""
 
@@ -108,7 +110,9 @@ def judge(
     returns beside it, `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
     """
     landmarks, scene = context.landmarks, context.scene
-    table = hypotheses(digest, known, landmarks, scene.use_vt)
+    table = hypotheses(digest, known, landmarks)
+    if not scene.use_vt:  # wall returns tell no walls
+        table = with_images(table, digest, known, landmarks)
     fits = try_all(table.trials, digest)
     track = table.trials.track
     rivals = np.where(table.known >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
@@ -120,12 +124,14 @@ def judge(
     evidence += _beside(table, digest, known, landmarks, scene)
     gain = _upright(table, fits, digest, known, landmarks)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
-    evidence[_twice(table, fits, evidence)] = -np.inf
+    evidence[fitted_twice(table, fits.place, evidence)] = -np.inf
     over = identify(context, ats, table, fits, evidence)
     evidence += over.gain
     for number, panel in enumerate(landmarks.panels):
         if panel >= 0:
-            evidence += np.where(np.isin(table.kind, IMAGES) & (table.known == panel), over.elsewhere[track, number], 0.0)
+            evidence += np.where(
+                np.isin(table.kind, IMAGES) & (table.known == panel), over.elsewhere[track, number], 0.0
+            )
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
@@ -153,7 +159,8 @@ def judge(
         misfit = (fits.cost[at] - COST_MEAN * (count - 1.0)) / (COST_STD * np.sqrt(count))
         verdicts.append(
             TrackDecision(
-                int(table.kind[at]), probability, int(table.known[at]), int(table.over[at]), fits.place[at], fits.held[at],
+                int(table.kind[at]), probability, int(table.known[at]), int(table.over[at]), fits.place[at],
+                fits.held[at],
                 beliefs(fits.place[at], digest, known, landmarks) if table.trials.is_wall[at] else no_holds(),
                 float(fits.share[at]), float(misfit), over.identity.take(np.array([at])),
             )
@@ -171,20 +178,6 @@ def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:
     gap, spread = fits.place[own] - fits.place[at], fits.covariance[own] + fits.covariance[at]
     near = np.vecdot(gap, np.linalg.solve(spread, gap[..., None])[..., 0]) < 1.0
     return np.asarray(near & (wall[own] == wall[at]) & ~pair[own] & np.isfinite(fits.cost[own]) & (own != at))
-
-
-def _twice(table: Hypotheses, fits: Fits, evidence: Floats) -> Integers:
-    """Rows of images on the leg to the Tx that another first guess has led to as well, with more evidence."""
-    rows = (table.trials.far & np.isfinite(evidence)).nonzero()[0]
-    rows = rows[np.argsort(-evidence[rows])]
-    track, known, over, place = table.trials.track[rows], table.known[rows], table.over[rows], fits.place[rows]
-    same = (track[:, None] == track) & (known[:, None] == known) & (over[:, None] == over)
-    same &= np.linalg.norm(place[:, None] - place, axis=-1) < APART
-    return rows[np.tril(same, -1).any(axis=1)]
-
-
-APART = 0.5
-"""Distance [m] between two fits of one kind below which they are one."""
 
 
 def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
@@ -292,27 +285,9 @@ def _amplitudes(
     double, wide = free + 2.0 * CONSTANTS.wall_ratio, 2.0 * CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
     pair = -0.5 * (level - double) ** 2 / wide - 0.5 * np.log(wide) - 20.0 * surplus**2
     amplitude = np.where(table.trials.is_wall, wall, np.where(table.trials.is_pair, pair, point))
-    image = np.isin(table.kind, IMAGES).nonzero()[0]
-    amplitude[image] = _image_amplitudes(table, image, digest, landmarks, scene)
+    rows, image = image_amplitudes(table, digest, landmarks, scene.radio)
+    amplitude[rows] = image
     return amplitude
-
-
-def _image_amplitudes(
-    table: Hypotheses, rows: Integers, digest: TrackSummary, landmarks: WindowTable, scene: KnownEnvironment
-) -> Floats:
-    """The same of images of known points in new walls, hypotheses `rows` (R,); the panel's hangs on codes."""
-    track, point = table.trials.track[rows], table.known[rows]
-    first = np.maximum(np.linalg.norm(table.trials.other[rows] - digest.mean[1][track], axis=1), 0.05)
-    unit = point_amplitude(np.ones(len(rows)), first, np.maximum(digest.mean[0][track, 0] - first, 0.05), scene.radio)
-    strength, uncertainty = (field[point] for field in landmarks.log_strength)
-    over = table.over[rows]
-    mean, variance = (
-        np.log(unit) + strength + CONSTANTS.wall_ratio + np.where(over >= 0, landmarks.ratio[over], 0.0),
-        uncertainty**2 + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
-        + np.where(over >= 0, landmarks.ratio_variance[over], 0.0),
-    )
-    off = np.where(np.isin(point, landmarks.panels), 0.0, digest.log_amplitude[track] - mean)
-    return np.asarray(-0.5 * off**2 / variance - 0.5 * np.log(variance))
 
 
 def _opacity(
