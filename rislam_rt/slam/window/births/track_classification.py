@@ -32,9 +32,10 @@ from rislam_rt.slam.window.numerics import NEARBY
 from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors, no_holds
 from rislam_rt.slam.window.state import WindowState
 
-LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 0.2]))
-"""Log prior of each kind; over known walls, of all walls together; of known points in walls, of all points together."""
-LOG_NONE = np.log(0.05)
+LOG_KIND = 2.0 * CONSTANTS.wall_ratio * np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 1])
+"""Log prior of each kind, but for a constant: each wall more on the way takes its share of the power, and so of the
+paths that are heard. Over known walls, of all walls together; of known points in walls, of all points together."""
+LOG_NONE = 2.0 * CONSTANTS.wall_ratio * 2
 """Of a path of no kind here: over walls that the map lacks."""
 
 
