@@ -67,6 +67,8 @@ def unexplained(state: WindowState, observed: Observations) -> float:
 
 
 class Followed(NamedTuple):
+    """Tracks after a cycle, and the log that names them."""
+
     tracks: WindowTracks
     log: Log
     followed: int
