@@ -2,9 +2,8 @@
 
 Each mutant changes one place of a copy of the package: the pose is no longer updated, the codes are random ones, a run
 never says that it diverged, a bound is half of what it is. The tests run on the copy until as many have failed, in as
-many files, as must; with `--all` to their end. `nothing` changes a comment only and must break none. Unlike
-`mutation.py`, which asks whether single operators are tested, this asks whether what users rely on is. What was found
-stands in `docs/tests.md`.
+many files, as must; with `--all` to their end. `nothing` changes a comment only and must break none. It asks whether
+what users rely on is tested, not whether every operator is. What was found stands in `docs/tests.md`.
 Run: `python benchmarks/mutants.py [--only NAME ...] [--workers 2] [--all] [--tests PATH ...]`.
 """
 

@@ -1,11 +1,8 @@
 """One cycle of the window filter: predict, expect, associate, solve, learn, births and deaths."""
 
-from typing import NamedTuple
-
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
-from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.arrays import Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.inputs import check_sides, check_step
@@ -15,27 +12,19 @@ from rislam_rt.slam.returns import TX
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
 from rislam_rt.slam.window import tracks
-from rislam_rt.slam.window.births.births import births
-from rislam_rt.slam.window.births.feature_removal import condemned, release
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes, score_again
 from rislam_rt.slam.window.divergence import divergence_monitor, recovery
-from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, empty_table, idents, image_ident
+from rislam_rt.slam.window.explanation import explain, follow, grow, names, squares, unexplained
+from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import learn, no_observations
-from rislam_rt.slam.window.landmarks.measurement_prediction import (
-    ExpectedComponents,
-    KnownEnvironment,
-    UnresolvedClusters,
-    conditioned_share,
-)
-from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
-from rislam_rt.slam.window.measurement_log import Log, Residuals, append, empty_log, renew
+from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
+from rislam_rt.slam.window.measurement_log import Residuals, append, empty_log, renew
 from rislam_rt.slam.window.numerics import DAMPING, LATELY, MISSED, REFRESH
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.state import WindowState
-from rislam_rt.slam.window.tracks import WindowTracks
 
 
 def init(
@@ -83,7 +72,7 @@ def step(
     free = free[~echoes(observed.take(free), scene.sensor.cell_length)]
     observed = observed.take(free)
 
-    strangers = stranger_density(observed, scene.sensor, max(config.new_density, _unexplained(state, observed)))
+    strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(state, observed)))
     state, view = _notice(state, heading, code, observed, strangers)
     mean, poses, expected, groups = view.mean, view.poses, view.expected, view.groups
     shows, scatter, row, pick = view.shows, view.scatter, view.row, view.pick
@@ -92,16 +81,16 @@ def step(
     log = append(state.log, observed, state.cycle, state.cycle - state.window.num_poses + 1)
     # wall returns that are thrown away are known for what they are, and move nothing
     used = np.ones(len(row), dtype=np.bool_) if config.use_vt else expected.forms[groups.leader[row], 0] != TX
-    log = _explain(log, expected, groups, landmarks, scatter, row[used], pick[used], len(observed.seen))
+    log = explain(log, expected, groups, landmarks, scatter, row[used], pick[used], len(observed.seen))
     state = state._replace(log=log)
     state, left, nis = _solve(state)
     raw = scatter[groups.leader[row]]
-    raw[used] = _squares(left, log, len(log.cycle) - len(observed.seen) + pick[used])
+    raw[used] = squares(left, log, len(log.cycle) - len(observed.seen) + pick[used])
 
     taken = np.zeros(len(observed.seen), dtype=np.bool_)
     taken[pick] = True
     turn += float(np.diff(window_gaussian.poses(state.window)[-2:, 3]).sum())
-    followed = _follow(state, mean, observed, (~taken).nonzero()[0], dt, turn, bend)
+    followed = follow(state, mean, observed, (~taken).nonzero()[0], dt, turn, bend)
     state = state._replace(tracks=followed.tracks, log=followed.log)
     jumped = state.lost_log_odds == 0.0
     if len(expected.seen) and len(observed.seen):
@@ -114,26 +103,15 @@ def step(
         state.visibility, landmarks, state.window, expected, groups, shows, row, pick, raw, observed, poses, scene, code
     )
     state = state._replace(visibility=visibility, landmarks=landmarks)
-    landmark[free[pick]] = np.where(used, _names(state.landmarks, expected, groups, row), REMOVED)
+    landmark[free[pick]] = np.where(used, names(state.landmarks, expected, groups, row), REMOVED)
 
     state, wrong = recovery.ask(state)
-    state = _grown(state, left, expected, groups)
+    state = grow(state, left, expected, groups)
     outcome = _outcome(len(measurement), len(state.landmarks.ident), wrong or jumped or state.lost_log_odds >= 0.0)
     if divergence_monitor.is_lost(state.lost_log_odds) and len(state.landmarks.ident):
         state = recovery.restart(state)
     info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.landmarks.points), outcome)
     return state._replace(cycle=state.cycle + 1), info
-
-
-def _grown(
-    state: WindowState, left: Residuals, expected: ExpectedComponents, groups: UnresolvedClusters
-) -> WindowState:
-    """With what the evidence has turned against taken back, or else with what is born."""
-    fresh = True
-    if state.cycle % REFRESH == 0 and len(state.landmarks.ident):
-        gone = condemned(state.landmarks, left, state.log, expected, window_gaussian.now(state.window)[1])
-        state, fresh = release(state, ~gone), not gone.any()
-    return births(state, expected, groups) if fresh else state
 
 
 def _move(state: WindowState, dt: float, heading: float) -> WindowState:
@@ -239,37 +217,6 @@ def _assumed_precision(config: SlamConfig, dt: float) -> Floats:
     return np.array([config.sigma_a, config.sigma_a, upwards, *turns]) ** -2.0
 
 
-def _explain(
-    log: Log,
-    expected: ExpectedComponents,
-    groups: UnresolvedClusters,
-    landmarks: WindowTable,
-    scatter: Floats,
-    row: Integers,
-    pick: Integers,
-    count: int,
-) -> Log:
-    """The log's last `count` components with what they were taken for."""
-    if not len(row):
-        return log
-    at = len(log.cycle) - count + pick
-    lead, mate = groups.leader[row], groups.partner[row]
-    share, variance = conditioned_share(groups, expected, row, log.log_amplitude[at], log.log_amplitude_std[at])
-    both = (mate >= 0)[:, None]
-    forms = np.stack([expected.forms[lead], np.where(both, expected.forms[mate], UNKNOWN)], axis=1)
-    extra = groups.disturbance[row] + variance[:, None] * groups.gap[row] ** 2
-    extra += CONSTANTS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
-    return log.explain(at, idents(landmarks, forms), np.where(both[:, 0], share, 0.0), extra)
-
-
-def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:
-    """Mean squares (A,) of the residuals of some explained rows of the log, in reported deviations."""
-    if not len(rows):
-        return np.zeros(0)
-    at = np.searchsorted(left.row, rows)
-    return np.asarray(np.mean(left.left[at] ** 2 * (1.0 + log.extra[rows] / log.std[rows] ** 2), axis=1))
-
-
 def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
     """The window after this cycle's components: two Gauss-Newton steps; the whole of it again now and then."""
     window, log, landmarks, body = state.window, state.log, state.landmarks, state.scene.body
@@ -295,60 +242,6 @@ def widen_motion(state: WindowState) -> WindowState:
     # the covariance is that of the precisions before
     surplus = _surplus(window.precision, posterior)
     return state._replace(window=window._replace(precision=precision, surplus=surplus), level=level)
-
-
-def _unexplained(state: WindowState, observed: Observations) -> float:
-    """Components per metre, unit of each cosine and e-fold that nothing explained in the cycle before."""
-    if not len(observed.seen):
-        return 0.0
-    window, sensor = np.diff(state.scene.sensor.window)[0] * SPEED_OF_LIGHT, state.scene.sensor
-    loudness = 0.5 * np.log(sensor.radio.integrated_snr(np.exp(observed.log_amplitude.max())) / sensor.threshold)
-    count = float((state.tracks.last == state.cycle - 1).sum())
-    return count / (window * np.pi * max(float(loudness), 1.0))
-
-
-class _Followed(NamedTuple):
-    tracks: WindowTracks
-    log: Log
-    followed: int
-    """Tracks of the last cycle..."""
-    kept: int
-    """...and those among them that go on."""
-
-
-def _follow(
-    state: WindowState, mean: Floats, observed: Observations, free: Integers, dt: float, turn: float, bend: float
-) -> _Followed:
-    """Tracks extended, begun and ended by the components that nothing explains."""
-    speed = float(np.linalg.norm(mean[3:6]))
-    length = np.maximum(state.tracks.mean[:, 0, 0], 0.5) if len(state.tracks.ident) else np.ones(1)
-    drift = np.array([2.0 * bend + speed**2, 0.1, 0.1]) if len(length) else np.zeros(3)
-    found = tracks.advance(state.tracks, dt, turn, drift)
-    late = found.last == state.cycle - 1
-    rows, picks = tracks.match(found, observed, free, state.cycle, state.config.new_density)
-    found = tracks.extend(found, rows, observed, picks, state.cycle)
-    spare = np.setdiff1d(free, picks)
-    reach = np.maximum(observed.seen[spare, 0], 0.5)
-    rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * (speed + 0.05)
-    if len(state.level) > 2:  # what turns without a compass turns all that it sees
-        rate[:, 1:] += np.sqrt(motion.expected_variance(state.level[2]))
-    found, fresh = tracks.start(found, observed, spare, rate, state.cycle)
-    base = len(state.log.cycle) - len(observed.seen)
-    track = state.log.track.copy()
-    track[base + picks], track[base + spare] = found.ident[rows], fresh
-    found = found.keep(tracks.alive(found, state.cycle))
-    return _Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()))
-
-
-def _names(landmarks: WindowTable, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers) -> Integers:
-    """Ident of what each of the clusters `row` (A,) came over first: a point, its image in a wall, a wall."""
-    if not len(row):
-        return np.zeros(0, dtype=np.int64)
-    forms = expected.forms[groups.leader[row]]
-    wall = np.where(forms[:, 3] >= 0, forms[:, 3], forms[:, 1])
-    own = landmarks.ident[np.where(forms[:, 0] >= 0, forms[:, 0], wall)]
-    image = (forms[:, 0] >= 0) & (wall >= 0)
-    return np.where(image, image_ident(own, landmarks.ident[wall]), own)
 
 
 def _outcome(heard: int, features: int, lost: bool) -> StepOutcome:

@@ -1,7 +1,6 @@
 """Numerics: steps of the solver and limits of what is worth a look.
 
-Some belong to the model and are not in its table: `EDGE`, `LEVEL`, `IN_WALL`, `SHORTER`, `BEARING`, `ALIGNED`,
-`LATELY`, `MISSED`.
+Some belong to the model and are not in its table: `EDGE`, `LEVEL`, `ALIGNED`, `LATELY`, `MISSED`.
 """
 
 import numpy as np
@@ -46,15 +45,7 @@ LEVEL = 0.02
 """Third direction cosine down to which returns are heard: those of upright walls arrive level."""
 EDGE = 1.15
 """Distance in cells up to which a weaker path moves a stronger one: cells have no sharp edge."""
-IN_WALL = 0.05
-"""Distance [m] from a wall below which a point is held to lie in it."""
 MODES = 7
 """Motion modes, half a decade apart."""
-SCATTER_RATE = 0.1
-"""Share of the latest residual in its running mean square."""
-BEARING = 0.01
-"""Cosine by which a track's last bearing is off its mean one."""
-SHORTER = 0.2
-"""[m] by which a way without a wall is shorter."""
 ALIGNED = 0.2
 """Share of the paths over unknown walls that have them on the Tx leg alone."""

@@ -16,7 +16,7 @@ from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
 from rislam_rt.slam.window.landmarks.landmark_update import seed
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, UnresolvedClusters
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.numerics import ALIGNED, BEARING, MOST, NEAR, SHORTER, STRIDE
+from rislam_rt.slam.window.numerics import ALIGNED, MOST, NEAR, STRIDE
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.steps import HEAD
 from rislam_rt.slam.window.state import WindowState
@@ -122,12 +122,12 @@ def _company(context: WindowState, ats: list[Integers], histories: TrackSummary,
     away, reach = np.concatenate([away, span / np.maximum(far, 0.05)[:, None]]), np.append(reach, 2.0 * far)
     panel = np.append(context.tracks.side[old] >= PANEL, np.isin(points, panels[panels >= 0]))
     ray, length = histories.direction, histories.mean[0][:, 0]
-    variance = (histories.weight[..., 1:] ** 2).sum(axis=1) ** -1.0 + BEARING**2
+    variance = (histories.weight[..., 1:] ** 2).sum(axis=1) ** -1.0 + CONSTANTS.lean**2
     gap = ray[:, None, :2] - away[None, :, :2]
     log_odds = -0.5 * (gap**2 / variance[:, None]).sum(axis=-1) - 0.5 * np.log(variance).sum(axis=1)[:, None]
     log_odds += np.log(np.maximum(ray[:, 2], 0.1))[:, None]  # against any direction of the half sphere
     over_panel = np.array([bool((context.log.side[at] >= PANEL).all()) for at in ats])
-    shorter = (reach < length[:, None] - SHORTER) & (panel | ~over_panel[:, None])
+    shorter = (reach < length[:, None] - CONSTANTS.depth) & (panel | ~over_panel[:, None])
     odds = np.where(shorter, np.exp(np.minimum(log_odds, 20.0)), 0.0).sum(axis=1)
     return np.asarray(np.log1p(ALIGNED * (odds - 1.0)))
 

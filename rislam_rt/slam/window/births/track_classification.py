@@ -33,10 +33,11 @@ from rislam_rt.slam.window.numerics import NEARBY
 from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors, no_holds
 from rislam_rt.slam.window.state import WindowState
 
-LOG_KIND = np.log(np.array([0.25, 0.1, 0.1, 0.25, 0.05, 0.05, 0.02, 0.05, 0.15, 0.2, 0.2, 0.1, 0.1, 0.1, 0.1]))
-"""Log prior of each kind; over known walls, of all walls together; of known points in walls, of all points together."""
-LOG_NONE = np.log(0.05)
-"""Of a path of no kind here: over walls that the map lacks."""
+MORE_WALLS = np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 1, 1, 2, 2, 2, 2])
+"""Walls on the way of each kind beyond the first one of a wall return: each takes its share of the power, and so of the
+paths that are heard. Over known walls, of all walls together; of known points in walls, of all points together."""
+MORE_UNKNOWN = 2
+"""The same of a path of no kind here: over walls that the map lacks."""
 
 
 class TrackDecision(NamedTuple):
@@ -119,7 +120,8 @@ def judge(
     rivals[np.isin(table.kind, IMAGES)] = np.log(max(len(landmarks.points), 1))
     rivals += np.where(table.over >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
     evidence = fits.log_evidence + log_place(table, fits.place, digest.middle)
-    evidence += LOG_KIND[table.kind] - rivals + np.where(table.trials.is_pair, lonely[track], 0.0)
+    evidence += 2.0 * CONSTANTS.wall_ratio * MORE_WALLS[table.kind] - rivals
+    evidence += np.where(table.trials.is_pair, lonely[track], 0.0)
     evidence += _amplitudes(table, fits, digest, landmarks, scene) + _opacity(table, fits, digest, known, landmarks)
     evidence += _beside(table, digest, known, landmarks, scene)
     gain = _upright(table, fits, digest, known, landmarks)
@@ -135,7 +137,8 @@ def judge(
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
-    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - CONSTANTS.log_volume + LOG_NONE + beside
+    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - CONSTANTS.log_volume
+    none += 2.0 * CONSTANTS.wall_ratio * MORE_UNKNOWN + beside
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
     none += np.logaddexp(np.log1p(-CONSTANTS.panels), np.log(CONSTANTS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]

@@ -16,7 +16,6 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     UnresolvedClusters,
 )
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, weigh
-from rislam_rt.slam.window.numerics import SCATTER_RATE
 from rislam_rt.slam.window.smoother.steps import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 
@@ -97,7 +96,7 @@ def learn(
     told = hit | (groups.by_itself == 1.0)
     after[groups.leader[told]] = np.where(hit, 0.995, missed[groups.leader])[told]
     lead = groups.leader[row]
-    scatter[lead] += SCATTER_RATE * (np.minimum(raw, 30.0 * scatter[lead]) - scatter[lead])
+    scatter[lead] += CONSTANTS.memory / CONSTANTS.window * (np.minimum(raw, 30.0 * scatter[lead]) - scatter[lead])
     alone = (groups.partner < 0) & (groups.by_itself == 1.0)
     landmarks = _existence(landmarks, expected, groups, hit & alone, ~hit & alone, shows)
     landmarks = _strengths(landmarks, window, expected, groups, row, pick, observed, poses, scene, code)

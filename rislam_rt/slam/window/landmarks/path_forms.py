@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, reflect
-from rislam_rt.slam.window.numerics import IN_WALL
 
 UNKNOWN = -9
 """In a form's base: it is not known."""
@@ -76,13 +76,13 @@ def possible_legs(legs: Integers, features: Floats, anchor: Floats, poses: Poses
     image[one] = reflect(base[one], features[legs[one, 1]], anchor[legs[one, 1]])
     two = (legs[:, 2] != NONE).nonzero()[0]
     near, device = _depths(legs[two, 2], image[two], far[two], features, anchor)
-    fine[two] = (near * device > 0.0) & (np.abs(near) > IN_WALL)
+    fine[two] = (near * device > 0.0) & (np.abs(near) > CONSTANTS.depth)
     # where the ray from the device meets the outer wall: the next end for the inner one
     mirrored = image[two] - 2.0 * near[:, None] * _normals(legs[two, 2], features, anchor)
     share = device / np.where(np.abs(device + near) > 1e-9, device + near, 1e-9)
     far[two] += np.clip(share, 0.0, 1.0)[:, None] * (mirrored - far[two])
     near, device = _depths(legs[one, 1], base[one], far[one], features, anchor)
-    fine[one] &= (near * device > 0.0) & (np.abs(near) > IN_WALL)
+    fine[one] &= (near * device > 0.0) & (np.abs(near) > CONSTANTS.depth)
     return fine
 
 

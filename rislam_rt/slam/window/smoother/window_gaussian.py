@@ -15,7 +15,7 @@ is made again at the present estimate whenever that is worth it. The first pose 
 tells where the start was, whose error stands beside the Gaussian.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -217,7 +217,7 @@ def slide(window: Window) -> Window:
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
     steep[size:] += window.precision[0] * accel
-    gain = np.linalg.solve(wide[size:, size:], wide[size:, :size]).T
+    gain = np.asarray(np.linalg.solve(wide[size:, size:], wide[size:, :size])).T
     left = wide[:size, :size] - gain @ wide[size:, :size]
     shaken = change.T @ window.noise @ change
     shaken[size:, size:] += np.diag(window.surplus[0])
@@ -243,7 +243,7 @@ def slide(window: Window) -> Window:
     )
 
 
-def _without(noise: Floats, size: int, gain: Any) -> Floats:
+def _without(noise: Floats, size: int, gain: Floats) -> Floats:
     """Covariance (size, size) of the slopes that are left, when the rest is taken out by `gain`."""
     lift = np.concatenate([np.eye(size), -gain], axis=1)
     return np.asarray(lift @ noise @ lift.T)
