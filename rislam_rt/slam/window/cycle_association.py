@@ -73,9 +73,11 @@ def associate_cycle(
     observed: Observations, strangers: Floats,
 ) -> CycleAssociation:  # fmt: skip
     """Expect, cluster, associate."""
-    mean, covariance = window_gaussian.now(window)
+    mean, covariance = _now(window)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
-    expected = predict_returns(mean[HEAD:].reshape(-1, 3), landmarks, poses, mean[:3], scene, code)
+    expected = predict_returns(
+        mean[HEAD:].reshape(-1, 3), landmarks, poses, mean[:3], scene, code, covariance[HEAD:, HEAD:]
+    )
     sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
     clear, scatter = recall(visibility, expected, landmarks)
     groups = cluster(expected, scene.sensor.cell_length, clear, None if sides is None else np.maximum(sides, OTHER))
@@ -87,11 +89,21 @@ def associate_cycle(
     return CycleAssociation(mean, poses, expected, groups, shows, scatter, row, pick, score, float(surprise))
 
 
+def _now(window: Window) -> tuple[Floats, Floats]:
+    """Mean and covariance of the present, the height's with what it may be off by beyond the window's own variance.
+
+    Across, a livelier motion is looked at beside the one that is held (`filter.step`); upwards none is.
+    """
+    mean, covariance = window_gaussian.now(window)
+    covariance[2, 2] += window_gaussian.excess(window)[2, 2]
+    return mean, covariance
+
+
 def score_again(
     view: CycleAssociation, window: Window, landmarks: WindowTable, observed: Observations, strangers: Floats
 ) -> float:
     """The cycle's score under another belief: what is expected moves with it to first order, clusters stay."""
-    mean, covariance = window_gaussian.now(window)
+    mean, covariance = _now(window)
     expected = view.expected._replace(seen=view.expected.seen + view.expected.jacobian @ (mean - view.mean))
     sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
     return _associate(expected, view.groups, view.shows, view.scatter, covariance, observed, sides, strangers)[2]

@@ -18,8 +18,8 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     conditioned_share,
 )
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
-from rislam_rt.slam.window.measurement_log import Log, Residuals
-from rislam_rt.slam.window.numerics import REFRESH
+from rislam_rt.slam.window.measurement_log import Log, Residuals, unique_forms
+from rislam_rt.slam.window.numerics import LOUDEST, REFRESH
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
@@ -43,9 +43,37 @@ def explain(
     share, variance = conditioned_share(groups, expected, row, log.log_amplitude[at], log.log_amplitude_std[at])
     both = (mate >= 0)[:, None]
     forms = np.stack([expected.forms[lead], np.where(both, expected.forms[mate], UNKNOWN)], axis=1)
-    extra = groups.disturbance[row] + variance[:, None] * groups.gap[row] ** 2
-    extra += CONSTANTS.memory * (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * log.std[at] ** 2
-    return log.explain(at, idents(landmarks, forms), np.where(both[:, 0], share, 0.0), extra)
+    shared = groups.disturbance[row] + variance[:, None] * groups.gap[row] ** 2
+    return log.explain(
+        at, idents(landmarks, forms), np.where(both[:, 0], share, 0.0), shared,
+        scatter_variance(scatter[lead], log.std[at]),
+    )  # fmt: skip
+
+
+def scatter_variance(scatter: Floats, std: Floats) -> Floats:
+    """Variances (A, 3) beyond the reported ones of components whose residuals have a mean square `scatter` (A,)."""
+    return np.asarray(CONSTANTS.memory * (np.maximum(scatter, 1.0) - 1.0)[:, None] * std**2)
+
+
+def weigh_again(log: Log, left: Residuals, num_poses: int) -> Log:
+    """The log with every component's scatter as its form shows it before and after; at first nothing is known of it.
+
+    What is known beforehand (`crowd`) counts as one measurement.
+    """
+    if not len(left.row):
+        return log
+    std = log.std[left.row]
+    raw = np.mean(left.left**2 * (1.0 + log.extra[left.row] / std**2), axis=1)
+    _, which = unique_forms(log.form[left.row, 0])
+    total, count = np.zeros((2, num_poses, which.max() + 1))
+    np.add.at(total, (left.slot, which), np.minimum(raw, LOUDEST))
+    np.add.at(count, (left.slot, which), 1.0)
+    slots = np.arange(num_poses)
+    fade = (1.0 - CONSTANTS.memory / CONSTANTS.window) ** np.abs(slots[:, None] - slots)
+    scatter = ((CONSTANTS.crowd + fade @ total) / (1.0 + fade @ count))[left.slot, which]
+    extra = log.extra.copy()
+    extra[left.row] = log.shared[left.row] + scatter_variance(scatter, std)
+    return log._replace(extra=extra)
 
 
 def squares(left: Residuals, log: Log, rows: Integers) -> Floats:

@@ -14,7 +14,7 @@ from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes, score_again
 from rislam_rt.slam.window.divergence import divergence_monitor, recovery
-from rislam_rt.slam.window.explanation import explain, follow, grow, names, squares, unexplained
+from rislam_rt.slam.window.explanation import explain, follow, grow, names, squares, unexplained, weigh_again
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import learn, no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
@@ -227,7 +227,10 @@ def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
     slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else last
     window, left = renew(window, log, landmarks, body, state.heading, slots)
     window = window_gaussian.weigh_holds(window_gaussian.solve(window))
-    return widen_motion(state._replace(window=window)), left, nis
+    state = state._replace(window=window)
+    if state.cycle % REFRESH == 0:
+        state = state._replace(log=weigh_again(log, left, window.num_poses))
+    return widen_motion(state), left, nis
 
 
 def widen_motion(state: WindowState) -> WindowState:

@@ -39,17 +39,22 @@ class Log(NamedTuple):
     share: Floats
     """(N,) of the partner in its place."""
     extra: Floats
-    """(N, 3) variance beyond the reported one."""
+    """(N, 3) variance beyond the reported one..."""
+    shared: Floats
+    """(N, 3) ...and its part by what the map knows in the component's cell: the rest is scatter."""
 
     def take(self, rows: Any) -> "Log":
         """Only some of the components."""
         return Log._make(field[rows] for field in self)
 
-    def explain(self, rows: Integers, forms: Integers, share: Floats | float, extra: Floats) -> "Log":
-        """With rows (A,) held to be forms (A, 2, 5) of idents, with the partners' shares (A,) and variances (A, 3)."""
-        form, shares, variance = self.form.copy(), self.share.copy(), self.extra.copy()
-        form[rows], shares[rows], variance[rows] = forms, share, extra
-        return self._replace(form=form, share=shares, extra=variance)
+    def explain(
+        self, rows: Integers, forms: Integers, share: Floats | float, shared: Floats | float, scatter: Floats
+    ) -> "Log":
+        """With rows (A,) held to be forms (A, 2, 5) of idents, with the partners' shares (A,) and variances (A, 3): by
+        what the map knows in their cells, and by scatter."""
+        form, shares, variance, known = self.form.copy(), self.share.copy(), self.extra.copy(), self.shared.copy()
+        form[rows], shares[rows], variance[rows], known[rows] = forms, share, shared + scatter, shared
+        return self._replace(form=form, share=shares, extra=variance, shared=known)
 
     @property
     def explained(self) -> Booleans:
@@ -61,7 +66,7 @@ def empty_log() -> Log:
     """No components."""
     none, count = np.zeros(0), np.zeros(0, dtype=np.int64)
     wide = np.zeros((0, 3))
-    return Log(count, wide, wide, none, none, count, count, np.zeros((0, 2, 5), dtype=np.int64), none, wide)
+    return Log(count, wide, wide, none, none, count, count, np.zeros((0, 2, 5), dtype=np.int64), none, wide, wide)
 
 
 def append(log: Log, observed: Observations, cycle: int, first: int) -> Log:
@@ -71,6 +76,7 @@ def append(log: Log, observed: Observations, cycle: int, first: int) -> Log:
         np.full(count, cycle), observed.seen, observed.std, observed.log_amplitude, observed.log_amplitude_std,
         observed.sides,
         np.full(count, -1), np.full((count, 2, 5), UNKNOWN), np.zeros(count), np.zeros((count, 3)),
+        np.zeros((count, 3)),
     )  # fmt: skip
     return Log(*(np.concatenate(pair) for pair in zip(old, fresh, strict=True)))
 

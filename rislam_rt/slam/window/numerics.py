@@ -45,6 +45,8 @@ LEVEL = 0.02
 """Third direction cosine down to which returns are heard: those of upright walls arrive level."""
 EDGE = 1.15
 """Distance in cells up to which a weaker path moves a stronger one: cells have no sharp edge."""
+LOUDEST = 1e3
+"""Mean square of a residual in reported deviations beyond which it counts no more: 30 dB of SNR beside it."""
 MODES = 7
 """Motion modes, half a decade apart."""
 ALIGNED = 0.2

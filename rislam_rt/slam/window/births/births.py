@@ -213,7 +213,7 @@ def _taken(context: WindowState, at: Integers, form: Integers) -> bool:
 def _assign(context: WindowState, at: Integers, forms: Integers, scatter: Floats, part: float) -> WindowState:
     """Rows of the log held to be forms (2, 5) of idents; they err by as much more as they scatter."""
     extra = CONSTANTS.memory * context.log.std[at] ** 2 * (scatter**2 - 1.0)
-    return context._replace(log=context.log.explain(at, forms, part if forms[1, 0] != UNKNOWN else 0.0, extra))
+    return context._replace(log=context.log.explain(at, forms, part if forms[1, 0] != UNKNOWN else 0.0, 0.0, extra))
 
 
 def _enter(

@@ -63,11 +63,12 @@ def predict_returns(
     position: Floats,
     scene: KnownEnvironment,
     code: RisCode | None,
+    covariance: Floats,
 ) -> ExpectedComponents:
-    """All forms that are possible at the mean belief, arrive from above, and may be detected."""
+    """All forms that are possible, arrive from above, and may be detected; `covariance` (3F, 3F) of the features."""
     legs = enumerate_forms(tuple(landmarks.points.tolist()), tuple(landmarks.walls.tolist()), scene.max_bounces, True)
     returns, bounces = legs.returns, legs.bounces
-    fine = possible_legs(returns.legs, features, landmarks.anchor, poses)
+    fine = possible_legs(returns.legs, features, covariance, landmarks.anchor, poses)
     rows = (fine[returns.tx] & fine[returns.rx]).nonzero()[0]
     returns, bounces = compact(returns, rows), bounces[rows]
     sight = observe(returns, features, landmarks.anchor, poses)

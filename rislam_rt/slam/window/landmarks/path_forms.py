@@ -61,37 +61,89 @@ def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces
     return FormLegs(compile_forms(forms), (forms[:, 1:] != NONE).sum(axis=1))
 
 
-def possible_legs(legs: Integers, features: Floats, anchor: Floats, poses: Poses) -> Booleans:
+def possible_legs(legs: Integers, features: Floats, covariance: Floats, anchor: Floats, poses: Poses) -> Booleans:
     """(G,) whether each bounce of a leg (G, 3) has both its neighbours on one side of its wall; poses of one cycle.
+
+    Two walls at right angles throw a path back in one order or the other: the ray meets both near their edge, and which
+    comes first hangs on the baseline between Tx and Rx, and on angles of which the features (F, 3) know no more than
+    `covariance` (3F, 3F). If neither order is possible at the mean, the nearer one is, within two deviations. Legs are
+    sorted as `compile_forms` sorts them, and come in both orders.
 
     The Tx and Rx are near each other: one serves for both. A point that lies in the wall (the panel in its host) has no
     image in it.
     """
     count = len(legs)
     base = np.where((legs[:, 0] == TX)[:, None], poses.tx, features[legs[:, 0]] if len(features) else 0.0)
-    far = np.broadcast_to(poses.rx, base.shape).copy()
-    fine = np.ones(count, dtype=np.bool_)
-    image = base.copy()
-    one = (legs[:, 1] != NONE).nonzero()[0]
-    image[one] = reflect(base[one], features[legs[one, 1]], anchor[legs[one, 1]])
-    two = (legs[:, 2] != NONE).nonzero()[0]
-    near, device = _depths(legs[two, 2], image[two], far[two], features, anchor)
-    fine[two] = (near * device > 0.0) & (np.abs(near) > CONSTANTS.depth)
-    # where the ray from the device meets the outer wall: the next end for the inner one
-    mirrored = image[two] - 2.0 * near[:, None] * _normals(legs[two, 2], features, anchor)
-    share = device / np.where(np.abs(device + near) > 1e-9, device + near, 1e-9)
-    far[two] += np.clip(share, 0.0, 1.0)[:, None] * (mirrored - far[two])
-    near, device = _depths(legs[one, 1], base[one], far[one], features, anchor)
-    fine[one] &= (near * device > 0.0) & (np.abs(near) > CONSTANTS.depth)
+    sound, ahead = np.ones(count, dtype=np.bool_), np.full(count, np.inf)
+    one, two = ((legs[:, 1] != NONE) & (legs[:, 2] == NONE)).nonzero()[0], (legs[:, 2] != NONE).nonzero()[0]
+    far = np.broadcast_to(poses.rx, (len(one), 3))
+    near, device = _depths(base[one], far, features[legs[one, 1]], anchor[legs[one, 1]])
+    sound[one], ahead[one] = np.abs(near) > CONSTANTS.depth, np.sign(near) * device
+    ahead[two], near, outer, opposite = _margin(base[two], poses.rx, anchor[legs[two, 1:]], features[legs[two, 1:]])
+    sound[two] = opposite & (np.minimum(np.abs(near), np.abs(outer)) > CONSTANTS.depth)
+    fine = sound & (ahead > 0.0)
+    mate = _swapped(legs, two)
+    edge = two[sound[two] & ~fine[two] & ~fine[mate]]
+    if len(edge):
+        behind = np.full(count, np.inf)
+        behind[edge] = -ahead[edge] / _margin_std(base[edge], poses.rx, anchor, features, legs[edge, 1:], covariance)
+        nearer = (behind[two] < behind[mate]) | ((behind[two] == behind[mate]) & (two < mate))
+        fine[two] |= nearer & (behind[two] < 2.0)
     return fine
 
 
-def _normals(walls: Integers, features: Floats, anchor: Floats) -> Floats:
-    span = features[walls] - anchor[walls]
+def _margin(base: Floats, device: Floats, anchor: Floats, walls: Floats) -> tuple[Floats, Floats, Floats, Booleans]:
+    """By how much (N,) the ray that leaves `device` (3,) for the wall `walls[:, 1]` and `walls[:, 0]` (N, 2, 3), to
+    `base` (N, 3), meets the one before the other; the depths of the base before the one, and of its image before the
+    other (N,); whether that image and the device are on one side."""
+    image = reflect(base, walls[:, 0], anchor[:, 0])
+    far = np.broadcast_to(device, base.shape)
+    outer, own = _depths(image, far, walls[:, 1], anchor[:, 1])
+    # where the ray from the device meets the outer wall: the next end for the inner one
+    mirrored = image - 2.0 * outer[:, None] * _normals(walls[:, 1], anchor[:, 1])
+    share = own / np.where(np.abs(own + outer) > 1e-9, own + outer, 1e-9)
+    edge = far + np.clip(share, 0.0, 1.0)[:, None] * (mirrored - far)
+    near, depth = _depths(base, edge, walls[:, 0], anchor[:, 0])
+    return np.sign(near) * depth, near, outer, outer * own > 0.0
+
+
+def _margin_std(
+    base: Floats, device: Floats, anchor: Floats, features: Floats, walls: Integers, covariance: Floats
+) -> Floats:
+    """Standard deviations (N,) [m] of the margins over walls (N, 2), by what these are uncertain by."""
+    places, anchor = features[walls], anchor[walls]
+    first = _margin(base, device, anchor, places)[0]
+    slope = np.empty((len(walls), 2, 3))
+    for wall in range(2):
+        for axis in range(3):
+            moved = places.copy()
+            moved[:, wall, axis] += STEP
+            slope[:, wall, axis] = (_margin(base, device, anchor, moved)[0] - first) / STEP
+    slope = slope.reshape(len(walls), 6)
+    rows = (3 * walls[:, :, None] + np.arange(3)).reshape(len(walls), 6)
+    block = covariance[rows[:, :, None], rows[:, None, :]]
+    return np.asarray(np.sqrt(np.maximum(np.vecdot(slope, (block @ slope[..., None])[..., 0]), STEP**2)))
+
+
+STEP = 1e-6
+"""[m] by which walls are moved for the slope of a margin: its second derivative is of the order of one over metres."""
+
+
+def _swapped(legs: Integers, two: Integers) -> Integers:
+    """Rows of the legs over the same two walls as legs `two` in the other order."""
+    base = int(legs.max(initial=0)) + 3
+    code, other = (
+        ((row[:, 0] + 1) * base + row[:, 1] + 1) * base + row[:, 2] + 1 for row in (legs, legs[two][:, [0, 2, 1]])
+    )
+    return np.searchsorted(code, other)
+
+
+def _normals(wall: Floats, anchor: Floats) -> Floats:
+    span = wall - anchor
     return np.asarray(span / np.sqrt(np.vecdot(span, span))[:, None])
 
 
-def _depths(walls: Integers, first: Floats, second: Floats, features: Floats, anchor: Floats) -> tuple[Floats, Floats]:
-    """Signed distances (W,) of two sets of points (W, 3) from walls."""
-    normal, middle = _normals(walls, features, anchor), 0.5 * (features[walls] + anchor[walls])
+def _depths(first: Floats, second: Floats, wall: Floats, anchor: Floats) -> tuple[Floats, Floats]:
+    """Signed distances (W,) of two sets of points (W, 3) from walls (W, 3)."""
+    normal, middle = _normals(wall, anchor), 0.5 * (wall + anchor)
     return np.vecdot(first - middle, normal), np.vecdot(second - middle, normal)
