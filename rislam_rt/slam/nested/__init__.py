@@ -1,1 +1,1 @@
-"""The nested particle filter of the paper: agent particles, each with clouds of landmark particles."""
+"""The paper's nested particle filter: agent particles, each with clouds of landmark particles, behind the window's front end."""
