@@ -1,1 +1,1 @@
-"""The paper's nested particle filter: agent particles, each with clouds of landmark particles, behind the window's front end."""
+"""The paper's particle filter: agent particles, each with clouds of landmark particles; the rest is the window's."""
