@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.nested.particles import agents
-from rislam_rt.slam.nested.particles.cloud import HOPELESS, Cloud, CloudEngine, Kernel, kernel_width
+from rislam_rt.slam.nested.particles.cloud import HOPELESS, LEAST_STD, Cloud, CloudEngine, Kernel, kernel_width
 from rislam_rt.slam.nested.particles.kld_sampling import num_agents, num_points
 from rislam_rt.slam.nested.particles.sightline import Sighting, pack
 from rislam_rt.slam.nested_config import NestedConfig
@@ -174,11 +174,14 @@ def drop(belief: Nested, keep: Booleans) -> Nested:
 
 
 def gaussian(belief: Nested) -> tuple[Floats, Floats]:
-    """Mean (7 + 3F,) and covariance of pose and landmarks: the agent particles' own, and their clouds' on average."""
+    """Mean (7 + 3F,) and covariance of pose and landmarks: the agent particles' own, and their clouds' on average.
+
+    No cloud, single precision as it is, counts as known to better than `LEAST_STD`.
+    """
     mean, covariance = agents.moments(belief.weight, joint(belief))
     for feature, block in enumerate(mean_covariances(belief)):
         own = slice(HEAD + 3 * feature, HEAD + 3 * feature + 3)
-        covariance[own, own] += block
+        covariance[own, own] += block + LEAST_STD**2 * np.eye(3)
     return mean, covariance
 
 
