@@ -73,7 +73,7 @@ def associate_cycle(
     observed: Observations, strangers: Floats,
 ) -> CycleAssociation:  # fmt: skip
     """Expect, cluster, associate."""
-    mean, covariance = _now(window)
+    mean, covariance = _now(window, scene)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
     expected = predict_returns(
         mean[HEAD:].reshape(-1, 3), landmarks, poses, mean[:3], scene, code, covariance[HEAD:, HEAD:]
@@ -89,21 +89,24 @@ def associate_cycle(
     return CycleAssociation(mean, poses, expected, groups, shows, scatter, row, pick, score, float(surprise))
 
 
-def _now(window: Window) -> tuple[Floats, Floats]:
+def _now(window: Window, scene: KnownEnvironment) -> tuple[Floats, Floats]:
     """Mean and covariance of the present, the height's with what it may be off by beyond the window's own variance.
 
-    Across, a livelier motion is looked at beside the one that is held (`filter.step`); upwards none is.
+    Across, a livelier motion is looked at beside the one that is held (`filter._notice`); upwards none is. Without wall
+    returns next to nothing measures the height: a gate as wide as it may be off holds anything.
     """
     mean, covariance = window_gaussian.now(window)
-    covariance[2, 2] += window_gaussian.excess(window)[2, 2]
+    if scene.use_vt:
+        covariance[2, 2] += window_gaussian.excess(window)[2, 2]
     return mean, covariance
 
 
 def score_again(
-    view: CycleAssociation, window: Window, landmarks: WindowTable, observed: Observations, strangers: Floats
-) -> float:
+    view: CycleAssociation, window: Window, landmarks: WindowTable, scene: KnownEnvironment, observed: Observations,
+    strangers: Floats,
+) -> float:  # fmt: skip
     """The cycle's score under another belief: what is expected moves with it to first order, clusters stay."""
-    mean, covariance = _now(window)
+    mean, covariance = _now(window, scene)
     expected = view.expected._replace(seen=view.expected.seen + view.expected.jacobian @ (mean - view.mean))
     sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
     return _associate(expected, view.groups, view.shows, view.scatter, covariance, observed, sides, strangers)[2]

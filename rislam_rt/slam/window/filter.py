@@ -159,7 +159,7 @@ def _notice(
         lively = COLUMNS[: precision.shape[1]] != 1
         precision[-LATELY:, lively] = np.minimum(precision[-LATELY:, lively], CONSTANTS.liveliest**-2.0)
         trial = window_gaussian.solve(state.window._replace(precision=precision))
-        score = score_again(calm, trial, state.landmarks, observed, strangers)
+        score = score_again(calm, trial, state.landmarks, state.scene, observed, strangers)
         if score + CONSTANTS.log_rare > calm.score:
             view = view_of(trial)
             if view.score + CONSTANTS.log_rare > calm.score:
@@ -228,7 +228,7 @@ def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
     window, left = renew(window, log, landmarks, body, state.heading, slots)
     window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     state = state._replace(window=window)
-    if state.cycle % REFRESH == 0:
+    if state.cycle % REFRESH == 0 and state.scene.use_vt:  # else the fit is too free to show a scatter
         state = state._replace(log=weigh_again(log, left, window.num_poses))
     return widen_motion(state), left, nis
 

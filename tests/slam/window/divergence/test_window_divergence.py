@@ -85,7 +85,7 @@ def test_rates_are_those_of_walls_points_and_square_corners(heading):
     log = Log(
         np.array([row[0] for row in rows]), np.array([[row[1], *row[2]] for row in rows]), np.full((number, 3), 1e-3),
         np.zeros(number), np.zeros(number), np.zeros(number, dtype=np.int64), np.array([row[3] for row in rows]),
-        np.full((number, 2, 5), UNKNOWN), np.zeros(number), np.zeros((number, 3)),
+        np.full((number, 2, 5), UNKNOWN), np.zeros(number), np.zeros((number, 3)), np.zeros((number, 3)),
     )  # fmt: skip
     found = egomotion.rates(log, np.full(count, heading), step, 0.0)
     assert len(found.rate) == 3
