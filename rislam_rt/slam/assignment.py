@@ -25,7 +25,7 @@ class Candidates(NamedTuple):
     log_odds: Floats
     """(C,) logarithm of the probability that it shows at all."""
     side: Integers
-    """(C,) (see `tracks.Observations`)."""
+    """(C,) (see `slam.observations`)."""
 
 
 def cheapest(cost: Floats) -> tuple[Integers, Integers]:

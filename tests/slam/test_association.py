@@ -41,9 +41,7 @@ def associate(candidates: Candidates, observations: Observations, clutter: float
 def observed(seen: Floats, log_amplitude: Floats, std: float = 0.02) -> Observations:
     """Measurements as the filter looks at them."""
     count = len(seen)
-    return Observations(
-        seen, np.full((count, 3), std), log_amplitude, np.full(count, 0.1), np.zeros(count)
-    )
+    return Observations(seen, np.full((count, 3), std), log_amplitude, np.full(count, 0.1), np.zeros(count))
 
 
 def test_assignment_is_the_best_of_all() -> None:
