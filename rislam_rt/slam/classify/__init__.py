@@ -11,7 +11,6 @@ from rislam_rt.slam.classify.network import (
     network_arrays,
     read_network,
 )
-from rislam_rt.slam.classify.sightings import sightings_of
 
 __all__ = [
     "FEATURES",
@@ -26,6 +25,5 @@ __all__ = [
     "log_odds",
     "network_arrays",
     "read_network",
-    "sightings_of",
     "track_features",
 ]

@@ -114,19 +114,22 @@ def _company(context: WindowState, ats: list[Integers], histories: TrackSummary,
 
     A wall on the Tx leg alone changes the length and not the direction: the point itself is heard there as well.
     """
-    away, reach = _bearings(context, context.tracks.hits >= 3, mean)
-    span = mean[HEAD:].reshape(-1, 3)[context.landmarks.points] - mean[:3]
+    old = context.tracks.hits >= 3
+    away, reach = _bearings(context, old, mean)
+    points, panels = context.landmarks.points, np.array(context.landmarks.panels)
+    span = mean[HEAD:].reshape(-1, 3)[points] - mean[:3]
     far = np.linalg.norm(span, axis=1)
     away, reach = np.concatenate([away, span / np.maximum(far, 0.05)[:, None]]), np.append(reach, 2.0 * far)
+    panel = np.append(context.tracks.side[old] >= PANEL, np.isin(points, panels[panels >= 0]))
     ray, length = histories.direction, histories.mean[0][:, 0]
     variance = (histories.weight[..., 1:] ** 2).sum(axis=1) ** -1.0 + CONSTANTS.lean**2
     gap = ray[:, None, :2] - away[None, :, :2]
     log_odds = -0.5 * (gap**2 / variance[:, None]).sum(axis=-1) - 0.5 * np.log(variance).sum(axis=1)[:, None]
     log_odds += np.log(np.maximum(ray[:, 2], 0.1))[:, None]  # against any direction of the half sphere
-    shorter = reach < length[:, None] - CONSTANTS.depth
-    odds = np.where(shorter, np.exp(np.minimum(log_odds, 20.0)), 0.0).sum(axis=1)
     over_panel = np.array([bool((context.log.side[at] >= PANEL).all()) for at in ats])
-    return np.where(over_panel, 0.0, np.log1p(ALIGNED * (odds - 1.0)))
+    shorter = (reach < length[:, None] - CONSTANTS.depth) & (panel | ~over_panel[:, None])
+    odds = np.where(shorter, np.exp(np.minimum(log_odds, 20.0)), 0.0).sum(axis=1)
+    return np.asarray(np.log1p(ALIGNED * (odds - 1.0)))
 
 
 LEG = 0.04

@@ -13,12 +13,16 @@ from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 
 KINDS = (
     "wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same",
-    "two walls", "wall beside its edge", "known point, wall",
+    "two walls", "wall beside its edge", "image of known point", "the same on the tx leg", "image, known tx wall",
+    "image of image", "image over known wall", "tx image, known rx wall",
 )  # fmt: skip
-"""Names of the kinds, by their number."""
-WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS, BESIDE, IMAGE = range(len(KINDS))
+"""Names of the kinds, by their number; the last six in new walls (`image_hypotheses`)."""
+WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS, BESIDE = range(9)
+IMAGE, TX_IMAGE, BOTH_LEGS, THEN_WALL, WALL_THEN, OTHER_LEG = IMAGES = range(9, 15)
 
-WALLS = (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE, IMAGE)
+FAR = (TX_IMAGE, OTHER_LEG)
+"""Kinds whose new wall mirrors a known point on the leg to the Tx."""
+WALLS = (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE, *IMAGES)
 """Kinds whose new feature is a wall."""
 
 
@@ -42,6 +46,8 @@ class Hypotheses(NamedTuple):
     """(H,)."""
     known: Integers
     """(H,) row of the known wall (of the known point, for its image in a wall), -1 for none."""
+    over: Integers
+    """(H,) row of the known wall that an image of a known point runs over besides, -1 for none."""
     trials: Trials
 
 
@@ -75,8 +81,8 @@ def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
     return np.asarray(-2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]))
 
 
-def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool) -> Hypotheses:
-    """Every kind for every track, with its first guess; images of known points where wall returns tell no walls."""
+def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:
+    """Every kind for every track, with its first guess; images of known points stand in `image_hypotheses`."""
     count, walls = len(digest.seen), landmarks.walls
     seen, tx, rx = digest.mean
     ray, length = digest.direction, seen[:, 0]
@@ -108,24 +114,21 @@ def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTabl
             upright = reflect(anchor, image, tx)
             upright[:, 2] = middle[2]  # what lies higher comes of the edge
             add(BESIDE, wall, upright, NONE, NONE, (tx, tx))
-    pairs, points = _pairs(ray), landmarks.points.tolist() if not use_vt else []
+    pairs = _pairs(ray)
     for pair in pairs:
         add(TWO_WALLS, NONE, image - (pair @ tx[..., None])[..., 0], NONE, NONE, (tx, tx))
-    images = [_image(digest, known.place[point], known.root[point]) for point in points]
-    for point, (start, *_) in zip(points, images, strict=True):
-        add(IMAGE, point, start, NONE, NONE, (tx, tx))
     turns, shifts, spreads = _over(known, np.array(legs), np.array(spots), middle)
     for row, pair in zip((np.array(kinds) == TWO_WALLS).nonzero()[0], pairs, strict=True):
         turns[row, :, 0] = pair
-    for row, (_, *parts) in zip((np.array(kinds) == IMAGE).nonzero()[0], images, strict=True):
-        turns[row], shifts[row], spreads[row] = parts
     kind, walled = np.repeat(kinds, count), np.repeat(knowns, count)
+    rows = len(kind)
+    none = np.zeros(rows, dtype=np.bool_)
     trials = Trials(
         np.tile(np.arange(count), len(kinds)), np.isin(kind, WALLS), kind == TWO_WALLS, np.concatenate(starts),
         turns.reshape(-1, 2, 3, 3), shifts.reshape(-1, 2, 3), spreads.reshape(-1, 2, 3, 3), kind == BESIDE,
-        _beyond(kind, walled, known), kind == IMAGE,
+        _beyond(kind, walled, known), none, none, none, np.zeros((rows, 3)),
     )  # fmt: skip
-    return Hypotheses(kind, walled, trials)
+    return Hypotheses(kind, walled, np.full(rows, NONE), trials)
 
 
 def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
@@ -137,17 +140,6 @@ def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -
     uncertainty = np.swapaxes(slope @ root[legs][:, :, None], 1, 2)
     turns, shifts = (np.repeat(field[legs][:, None], count, axis=1) for field in (turn, shift))
     return turns, shifts, uncertainty
-
-
-def _image(digest: TrackSummary, spot: Floats, root: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """First guess of the wall (T, 3) that mirrors a point (3,), known to `root` (3, 3), and the `Trials` of that."""
-    (seen, tx, rx), count = digest.mean, len(digest.seen)
-    reach = np.maximum(seen[:, 0] - np.linalg.norm(spot - tx, axis=1), 0.1)
-    anchor = np.broadcast_to(digest.middle, rx.shape)
-    start = reflect(anchor, rx + reach[:, None] * digest.direction, np.broadcast_to(spot, rx.shape))
-    parts = ((np.zeros((3, 3)), AXES), (spot, np.zeros(3)), (root, np.zeros((3, 3))))
-    turn, shift, uncertainty = (np.tile(np.stack(pair), (count, *(1,) * (pair[1].ndim + 1))) for pair in parts)
-    return start, turn, shift, uncertainty
 
 
 def _beyond(kind: Integers, walled: Integers, known: KnownFeatures) -> Floats:

@@ -2,7 +2,7 @@
 
 Known walls are affine maps here. What is sought is a wall `w` (as image of the agent's place), with the Tx's image
 `m = S_out R_w(S_in x + t_in) + t_out`, or a point `p`, seen by the Rx at `S_r p + t_r` and by the Tx at `S_t p + t_t`.
-With `S_in = 0` the wall mirrors a known point `t_in`, which the Tx sees as it is.
+With `S_in = 0` the wall mirrors a known point `t_in`, for the Rx while the Tx sees it as it is, or the other way round.
 What two unknown walls throw together is `m = S_in x + d`, the shift `d` being sought: opposite walls turn nothing, at
 right angles they turn by half a turn about their edge.
 """
@@ -40,7 +40,13 @@ class Trials(NamedTuple):
     beyond: Floats
     """(H, 3, 4) turn and shift of that wall."""
     fixed: Booleans
-    """(H,) whether the wall mirrors a known point, which is `shift[:, 0]`, and not the Tx; on the leg to the Rx."""
+    """(H,) whether the wall mirrors a known point, which is `shift[:, 0]`, and not the Tx..."""
+    far: Booleans
+    """(H,) ...on the leg to the Tx..."""
+    aside: Booleans
+    """(H,) ...or on that to the Rx, with a known wall on the other: its map is that of `other`."""
+    other: Floats
+    """(H, 3) what stands for that point on the leg that the new wall is not on; of `far`, `turn[:, 1]` makes it."""
 
 
 class Fits(NamedTuple):
@@ -78,7 +84,10 @@ def try_all(trials: Trials, digest: TrackSummary) -> Fits:
             log_det[active] = np.linalg.slogdet(now.normal)[1]
             break
         trust[active] = now.trust
-        step = np.linalg.solve(now.normal, now.slope[..., None])[..., 0]
+        stiff = now.normal.copy()
+        # a length alone leaves a ring of places, along which a straight step leads astray
+        stiff[trials.far[active], common:, common:] += AXES / ASTRAY**2
+        step = np.linalg.solve(stiff, now.slope[..., None])[..., 0]
         length = np.sqrt(np.vecdot(step[:, common:], step[:, common:]))[:, None]
         short = np.minimum(1.0, 1.5 / np.maximum(length, 1e-12))
         place[active] += short * step[:, common:]
@@ -97,6 +106,8 @@ def try_all(trials: Trials, digest: TrackSummary) -> Fits:
     return Fits(place, covariance, held, cost, share, evidence)
 
 
+ASTRAY = 0.3
+"""[m] by which a step may go where nothing is measured."""
 COMMON = 13
 """Unknowns beside the place: errors of pose and velocity, of the two maps, and of the share; headings come on top."""
 
@@ -115,7 +126,7 @@ def _equations(
     track, wall, pair = trials.track[rows], trials.is_wall[rows], trials.is_pair[rows]
     moving = wall | pair
     tx, rx = digest.tx[track], digest.rx[track]
-    turn, shift, uncertainty = trials.turn[rows], trials.shift[rows], trials.uncertainty[rows]
+    turn, shift = trials.turn[rows], trials.shift[rows]
     first, second = turn[:, 0], turn[:, 1]
     # a point: fixed images; a wall: the image of the Tx, which moves
     span = place - digest.middle
@@ -123,36 +134,36 @@ def _equations(
     inner = tx @ np.swapaxes(first, 1, 2) + shift[:, None, 0]
     depth = np.vecdot(scaled[:, None], inner - 0.5 * (place + digest.middle)[:, None])
     mirrored = inner - 2.0 * depth[..., None] * span[:, None]
+    out, fixed = trials.far[rows][:, None, None], trials.fixed[rows][:, None, None]
     base = np.where(wall[:, None, None], mirrored, place[:, None] + np.where(pair[:, None, None], inner, 0.0))
+    base = np.where(out, inner, base)
     image = base @ np.swapaxes(second, 1, 2) + shift[:, None, 1]
     by_wall = -2.0 * (
         depth[..., None, None] * AXES + scaled[:, None, :, None] * (mirrored - place[:, None])[..., None, :]
     )
-    by_place = second[:, None] @ np.where(wall[:, None, None, None], by_wall, AXES)
+    by_place = second[:, None] @ np.where(wall[:, None, None, None], np.where(out[..., None], 0.0, by_wall), AXES)
     flip = AXES - 2.0 * span[:, :, None] * scaled[:, None, :]
     by_tx = np.where(wall[:, None, None], second @ flip @ first, np.where(pair[:, None, None], first, 0.0))
     to_rx = image - rx
     reach = np.maximum(np.sqrt(np.vecdot(to_rx, to_rx)), 1e-6)
     arrival = to_rx / reach[..., None]
-    cosines = arrival[..., :2]
     by_image = _by_image(arrival, reach)
     # the point's leg to the Tx
-    far = place[:, None, :] @ np.swapaxes(first, 1, 2) + shift[:, None, 0]
-    to_tx = np.where((moving & ~trials.fixed[rows])[:, None, None], 0.0, far - tx)
+    far = np.where(fixed, trials.other[rows][:, None], place[:, None, :] @ np.swapaxes(first, 1, 2) + shift[:, None, 0])
+    far = np.where(out, mirrored, far)
+    to_tx = np.where(moving[:, None, None] & ~fixed, 0.0, far - tx)
     leg = np.sqrt(np.vecdot(to_tx, to_tx))
     toward = to_tx / np.maximum(leg, 1e-6)[..., None]
-    seen = np.concatenate([(reach + leg)[..., None], cosines], axis=-1)
+    seen = np.concatenate([(reach + leg)[..., None], arrival[..., :2]], axis=-1)
     new = by_image @ by_place
-    new[..., 0, :] += toward @ first
+    by_far = np.where(out[..., None], by_wall, first[:, None])
+    new[..., 0, :] += (toward[..., None, :] @ by_far)[..., 0, :]
     pose = by_image @ (by_tx[:, None] - AXES)
     pose[..., 0, :] -= toward
-    maps_out = by_image @ uncertainty[:, None, 1]
-    inside = np.where(wall[:, None, None], (second @ flip) @ uncertainty[:, 0], 0.0)
-    maps_in = by_image @ inside[:, None]
-    maps_in[..., 0, :] += (toward[..., None, :] @ uncertainty[:, None, 0])[..., 0, :]
+    maps = _by_maps(trials, rows, by_image, toward, flip)
     split = _mix(trials, rows, rx, image, error, (by_place, by_tx), (seen, new, pose))
     wide = np.concatenate(
-        [digest.twist[track], pose @ digest.uncertainty[track], maps_in, maps_out, split, new], axis=-1
+        [digest.twist[track], pose @ digest.uncertainty[track], *maps, split, new], axis=-1
     )  # fmt: skip
     weight = digest.weight[track]
     wide *= weight[..., None]
@@ -166,11 +177,27 @@ def _equations(
     slope = (np.swapaxes(thick, 1, 2) @ left.reshape(len(rows), -1, 1))[..., 0]
     common, own = np.arange(error.shape[1]), np.arange(error.shape[1], size)
     normal[:, common, common] += 1.0
-    normal[:, own, own] += RIDGE
+    normal[:, own, own] += np.where(trials.far[rows], 1.0 / np.maximum(np.vecdot(span, span), 0.01), RIDGE)[:, None]
     slope[:, common] -= error
     tail = CONSTANTS.tail
     cost = (tail + 3.0) * np.log1p(squared / tail).sum(axis=1) + np.vecdot(error, error)
     return _Equations(normal, slope, cost, (tail + 3.0) / (tail + squared))
+
+
+def _by_maps(trials: Trials, rows: Integers, by_image: Floats, toward: Floats, flip: Floats) -> tuple[Floats, Floats]:
+    """Slopes (H, B, 3, 3) by the errors of the map on the new feature's near side, and of that behind it.
+
+    What is seen moves by `by_image` (H, B, 3, 3) with the image that the Rx hears, its length by `toward` (H, B, 3)
+    with what the Tx sees; `flip` (H, 3, 3) mirrors.
+    """
+    (near, behind), second = np.moveaxis(trials.uncertainty[rows], 1, 0), trials.turn[rows, 1]
+    far, wall, aside = (field[rows][:, None, None] for field in (trials.far, trials.is_wall, trials.aside))
+    mirrored = flip @ near
+    heard = np.where(far, second @ near, np.where(wall, second @ mirrored, 0.0))
+    first, last = by_image @ heard[:, None], by_image @ np.where(aside, 0.0, behind)[:, None]
+    first[..., 0, :] += (toward[..., None, :] @ np.where(far, mirrored, near)[:, None])[..., 0, :]
+    last[..., 0, :] += (toward[..., None, :] @ np.where(aside, behind, 0.0)[:, None])[..., 0, :]
+    return first, last
 
 
 def _mix(

@@ -10,7 +10,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
     BESIDE,
-    IMAGE,
+    IMAGES,
     LEVEL_TURN,
     OVER_SAME,
     OVER_TX,
@@ -23,6 +23,7 @@ from rislam_rt.slam.window.births.hypotheses import (
     hypotheses,
 )
 from rislam_rt.slam.window.births.hypothesis_fits import Fits, smooth_paths, try_all
+from rislam_rt.slam.window.births.image_hypotheses import fitted_twice, image_amplitudes, with_images
 from rislam_rt.slam.window.births.point_identification import identify
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -32,7 +33,7 @@ from rislam_rt.slam.window.numerics import NEARBY
 from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors, no_holds
 from rislam_rt.slam.window.state import WindowState
 
-MORE_WALLS = np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 1])
+MORE_WALLS = np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 1, 1, 2, 2, 2, 2])
 """Walls on the way of each kind beyond the first one of a wall return: each takes its share of the power, and so of the
 paths that are heard. Over known walls, of all walls together; of known points in walls, of all points together."""
 MORE_UNKNOWN = 2
@@ -47,6 +48,8 @@ class TrackDecision(NamedTuple):
     probability: float
     known: int
     """Row of the known wall or point, -1 for none."""
+    over: int
+    """Row of the known wall that an image of a known point runs over besides, -1 for none."""
     place: Floats
     """(3,) of the new feature."""
     covariance: Floats
@@ -63,7 +66,8 @@ class TrackDecision(NamedTuple):
     @property
     def form(self) -> tuple[int, int, int, int, int]:
         """Five rows, the new feature being `NEW`."""
-        base, *walls = (self.known if part == KNOWN else part for part in _TEMPLATES[self.kind])
+        held = {KNOWN: self.known, OVER: self.over}
+        base, *walls = (held.get(part, part) for part in _TEMPLATES[self.kind])
         return base, walls[0], walls[1], walls[2], walls[3]
 
     @property
@@ -81,11 +85,15 @@ NEW = -5
 """In a form: the feature that is sought."""
 KNOWN = -6
 """In a template: the known wall, or the known point."""
+OVER = -7
+"""In a template: the known wall that an image of a known point runs over besides."""
 _TEMPLATES = (
     (TX, NONE, NONE, NEW, NONE), (TX, NONE, NONE, KNOWN, NEW), (TX, NONE, NONE, NEW, KNOWN),
     (NEW, NONE, NONE, NONE, NONE), (NEW, NONE, NONE, KNOWN, NONE), (NEW, KNOWN, NONE, NONE, NONE),
     (NEW, KNOWN, NONE, KNOWN, NONE), (TX, NONE, NONE, NONE, NONE),
-    (TX, NONE, NONE, NEW, NONE), (KNOWN, NONE, NONE, NEW, NONE),
+    (TX, NONE, NONE, NEW, NONE), (KNOWN, NONE, NONE, NEW, NONE), (KNOWN, NEW, NONE, NONE, NONE),
+    (KNOWN, OVER, NONE, NEW, NONE), (KNOWN, NONE, NONE, OVER, NEW), (KNOWN, NONE, NONE, NEW, OVER),
+    (KNOWN, NEW, NONE, OVER, NONE),
 )  # fmt: skip
 """Form of each kind."""
 
@@ -103,11 +111,14 @@ def judge(
     returns beside it, `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
     """
     landmarks, scene = context.landmarks, context.scene
-    table = hypotheses(digest, known, landmarks, scene.use_vt)
+    table = hypotheses(digest, known, landmarks)
+    if not scene.use_vt:  # wall returns tell no walls
+        table = with_images(table, digest, known, landmarks)
     fits = try_all(table.trials, digest)
     track = table.trials.track
     rivals = np.where(table.known >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
-    rivals[table.kind == IMAGE] = np.log(max(len(landmarks.points), 1))
+    rivals[np.isin(table.kind, IMAGES)] = np.log(max(len(landmarks.points), 1))
+    rivals += np.where(table.over >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
     evidence = fits.log_evidence + log_place(table, fits.place, digest.middle)
     evidence += 2.0 * CONSTANTS.wall_ratio * MORE_WALLS[table.kind] - rivals
     evidence += np.where(table.trials.is_pair, lonely[track], 0.0)
@@ -115,11 +126,14 @@ def judge(
     evidence += _beside(table, digest, known, landmarks, scene)
     gain = _upright(table, fits, digest, known, landmarks)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
+    evidence[fitted_twice(table, fits.place, evidence)] = -np.inf
     over = identify(context, ats, table, fits, evidence)
     evidence += over.gain
     for number, panel in enumerate(landmarks.panels):
         if panel >= 0:
-            evidence += np.where((table.kind == IMAGE) & (table.known == panel), over.elsewhere[track, number], 0.0)
+            evidence += np.where(
+                np.isin(table.kind, IMAGES) & (table.known == panel), over.elsewhere[track, number], 0.0
+            )
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
@@ -141,14 +155,15 @@ def judge(
         weighed = np.append(weight[best], weight[1 : 1 + len(own)][same])
         probability = float(np.exp(np.logaddexp.reduce(weighed) - total))
         if best == 0:
-            verdicts.append(TrackDecision(-1, probability, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody))
+            verdicts.append(TrackDecision(-1, probability, -1, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody))
             continue
         at = own[best - 1]
         count = int((digest.weight[row, :, 0] > 0.0).sum())
         misfit = (fits.cost[at] - COST_MEAN * (count - 1.0)) / (COST_STD * np.sqrt(count))
         verdicts.append(
             TrackDecision(
-                int(table.kind[at]), probability, int(table.known[at]), fits.place[at], fits.held[at],
+                int(table.kind[at]), probability, int(table.known[at]), int(table.over[at]), fits.place[at],
+                fits.held[at],
                 beliefs(fits.place[at], digest, known, landmarks) if table.trials.is_wall[at] else no_holds(),
                 float(fits.share[at]), float(misfit), over.identity.take(np.array([at])),
             )
@@ -160,7 +175,7 @@ def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:
     """Which others of a track's hypotheses `own` put the same feature where hypothesis `at` has it: it is in question
     then over which known wall it is heard (before or after, where two stand at right angles), not whether it is there.
     """
-    wall, pair = table.trials.is_wall, table.trials.is_pair
+    wall, pair = table.trials.is_wall, table.trials.is_pair | table.trials.far
     if pair[at]:
         return np.zeros(len(own), dtype=np.bool_)
     gap, spread = fits.place[own] - fits.place[at], fits.covariance[own] + fits.covariance[at]
@@ -273,25 +288,9 @@ def _amplitudes(
     double, wide = free + 2.0 * CONSTANTS.wall_ratio, 2.0 * CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
     pair = -0.5 * (level - double) ** 2 / wide - 0.5 * np.log(wide) - 20.0 * surplus**2
     amplitude = np.where(table.trials.is_wall, wall, np.where(table.trials.is_pair, pair, point))
-    image = (table.kind == IMAGE).nonzero()[0]
-    amplitude[image] = _image_amplitudes(table, image, digest, landmarks, scene)
+    rows, image = image_amplitudes(table, digest, landmarks, scene.radio)
+    amplitude[rows] = image
     return amplitude
-
-
-def _image_amplitudes(
-    table: Hypotheses, rows: Integers, digest: TrackSummary, landmarks: WindowTable, scene: KnownEnvironment
-) -> Floats:
-    """The same of images of known points in new walls, hypotheses `rows` (R,); the panel's hangs on codes."""
-    track, point = table.trials.track[rows], table.known[rows]
-    first = np.maximum(np.linalg.norm(table.trials.shift[rows, 0] - digest.mean[1][track], axis=1), 0.05)
-    unit = point_amplitude(np.ones(len(rows)), first, np.maximum(digest.mean[0][track, 0] - first, 0.05), scene.radio)
-    strength, uncertainty = (field[point] for field in landmarks.log_strength)
-    mean, variance = (
-        np.log(unit) + strength + CONSTANTS.wall_ratio,
-        uncertainty**2 + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2,
-    )
-    off = np.where(np.isin(point, landmarks.panels), 0.0, digest.log_amplitude[track] - mean)
-    return np.asarray(-0.5 * off**2 / variance - 0.5 * np.log(variance))
 
 
 def _opacity(

@@ -18,16 +18,18 @@ SIDES = np.array([OTHER, OTHER, OTHER, PANEL])
 NOWHERE, ALL = np.zeros((0, 3)), slice(None)
 
 
-def _odds(points=NOWHERE, rows=ALL):
-    """Of four tracks, the first two and the last from one direction; with points of the map (P, 3)."""
+def _odds(points=NOWHERE, rows=ALL, panel=-1):
+    """Of four tracks, the first two and the last from one direction; with points of the map (P, 3), one the panel."""
     rays = np.concatenate([RAYS, np.sqrt(1.0 - (RAYS**2).sum(axis=1))[:, None]], axis=1)
     cos, sin = np.cos(HEADING), np.sin(HEADING)
     body = RAYS @ np.array([[cos, -sin], [sin, cos]])  # from the room's axes into the agent's
     state = np.concatenate([LENGTHS[:, None], body], axis=1)
-    tracks = SimpleNamespace(hits=np.full(4, 9)[rows], mean=np.stack([state, 0.0 * state], axis=-1)[rows])
+    tracks = SimpleNamespace(
+        hits=np.full(4, 9)[rows], mean=np.stack([state, 0.0 * state], axis=-1)[rows], side=SIDES[rows]
+    )  # fmt: skip
     context = SimpleNamespace(
         tracks=tracks, heading=np.array([HEADING]), log=SimpleNamespace(side=SIDES),
-        landmarks=SimpleNamespace(points=np.arange(len(points))),
+        landmarks=SimpleNamespace(points=np.arange(len(points)), panels=(panel,)),
     )  # fmt: skip
     histories = SimpleNamespace(
         mean=(np.concatenate([LENGTHS[:, None], rays[:, :2]], axis=1), None, None), direction=rays,
@@ -46,8 +48,12 @@ def test_a_longer_way_from_the_same_direction_goes_over_a_wall():
     np.testing.assert_allclose(odds[[0, 2]], np.log1p(-ALIGNED), rtol=1e-9)
 
 
-def test_what_comes_over_the_panel_alone_is_not_asked():
-    assert _odds()[3] == 0.0
+def test_what_comes_over_the_panel_has_what_comes_over_the_panel_for_company():
+    alone = np.log1p(-ALIGNED)
+    np.testing.assert_allclose(_odds()[3], alone, rtol=1e-9)
+    point = 1.5 * np.array([[0.3, 0.4, np.sqrt(0.75)]])
+    np.testing.assert_allclose(_odds(point)[3], alone, rtol=1e-9)
+    assert _odds(point, panel=0)[3] > 5.0
 
 
 def test_points_of_the_map_are_company_as_tracks_are():

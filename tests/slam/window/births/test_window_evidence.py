@@ -32,6 +32,7 @@ def _wall(middle):
 
 
 SPOT = np.array([1.5, -1.0, 2.0])
+IMAGES = ("image", "image of image", "over", "both legs", "far", "far over")
 
 
 def _mirror(middle, wall):
@@ -41,13 +42,19 @@ def _mirror(middle, wall):
 
 
 def _trials(kind, digest, rng):
-    """One hypothesis of a kind: `wall`, `point`, `pair`, `edge` (a wall beside its edge with a known one), `image`."""
+    """One hypothesis of a kind: `wall`, `point`, `pair`, `edge` (a wall beside its edge with a known one), or an
+    image of a known point on the Rx leg: `image`, `image of image` (over a known wall first), `over` (over it last),
+    `both legs` (over it on the Tx leg); on the Tx leg: `far`, `far over` (the Rx hears it over a known wall)."""
     turn, shift = np.tile(AXES, (1, 2, 1, 1)), np.zeros((1, 2, 3))
     known = _mirror(digest.middle, digest.middle + np.array([-3.0, 1.0, 0.5]))
     if kind == "edge":
         start = _wall(digest.middle)
-    elif kind == "image":
+    elif kind in IMAGES:
         turn[0, 0], shift[0, 0] = 0.0, SPOT
+        if kind == "image of image":
+            shift[0, 0] = known[0] @ SPOT + known[1]
+        if kind in ("over", "far over"):
+            turn[0, 1], shift[0, 1] = known
         start = _wall(digest.middle)
     elif kind == "wall":
         turn[0, 1], shift[0, 1] = known
@@ -61,7 +68,7 @@ def _trials(kind, digest, rng):
     uncertainty = 1e-3 * rng.standard_normal((1, 2, 3, 3))
     if kind == "pair":
         uncertainty[:] = 0.0
-    flags = np.array([kind in ("wall", "edge", "image")]), np.array([kind == "pair"])
+    flags = np.array([kind in ("wall", "edge", *IMAGES)]), np.array([kind == "pair"])
     mixed = np.array([kind == "edge"])
     beyond = np.zeros((1, 3, 4))
     beyond[0, :, :3], beyond[0, :, 3] = _mirror(digest.middle, digest.middle + np.array([0.2, 0.0, 3.0]))
@@ -74,7 +81,10 @@ def _trials(kind, digest, rng):
         uncertainty,
         mixed,
         beyond,
-        np.array([kind == "image"]),
+        np.array([kind in IMAGES]),
+        np.array([kind in ("far", "far over")]),
+        np.array([kind == "both legs"]),
+        (known[0] @ SPOT + known[1] if kind in ("both legs", "far over") else SPOT)[None],
     )
 
 
@@ -87,7 +97,7 @@ def _left(trials, digest, place, error):
 
 def test_slopes_are_those_of_the_cost():
     rng = np.random.default_rng(1)
-    for kind in ("wall", "point", "pair", "edge", "image"):
+    for kind in ("wall", "point", "pair", "edge", *IMAGES):
         # measurements far off in metres and next to nothing in deviations: a slope, and tails that do not count
         digest = _digest(6, rng=rng)._replace(weight=np.full((1, 6, 3), 1e-3))
         trials = _trials(kind, digest, rng)
@@ -117,6 +127,11 @@ def test_the_kernel_sees_what_the_measurement_library_sees():
         ("wall", (TX, NONE, NONE, 1, 0), new),
         ("point", (1, 0, NONE, NONE, NONE), np.array([1.5, -1.0, 2.0])),
         ("image", (2, NONE, NONE, 1, NONE), new),
+        ("image of image", (2, NONE, NONE, 0, 1), new),
+        ("over", (2, NONE, NONE, 1, 0), new),
+        ("both legs", (2, 0, NONE, 1, NONE), new),
+        ("far", (2, 1, NONE, NONE, NONE), new),
+        ("far over", (2, 1, NONE, 0, NONE), new),
     ):
         trials = _trials(kind, digest, rng)
         features = np.stack([known, start, SPOT])

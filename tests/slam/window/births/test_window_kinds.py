@@ -17,7 +17,9 @@ def _table(kind, pair=None):
     count = len(kind)
     walls = np.array(kind) != POINT
     pair = np.zeros(count, dtype=bool) if pair is None else np.array(pair)
-    return SimpleNamespace(kind=np.array(kind), trials=SimpleNamespace(is_wall=walls & ~pair, is_pair=pair))
+    return SimpleNamespace(
+        kind=np.array(kind), trials=SimpleNamespace(is_wall=walls & ~pair, is_pair=pair, far=pair & False)
+    )
 
 
 def test_places_of_walls_and_points_have_densities_that_integrate_to_one():

@@ -1,0 +1,160 @@
+"""Images of known points in new walls, on either leg, straight or over one known wall besides.
+
+What makes walls known where wall returns are thrown away. On the leg to the Rx an image is a direction of its own. On
+the leg to the Tx the direction stays that of the point: a longer way from where a shorter one comes. Its length alone
+then tells of the wall, which for a straight motion leaves a ring of places: as many initial values stand around it.
+"""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.model import RadioConfig
+from rislam_rt.ris.path_gain import point_amplitude
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.moments import square_root
+from rislam_rt.slam.returns import AXES, NONE, reflect
+from rislam_rt.slam.window.births.hypotheses import (
+    BOTH_LEGS,
+    FAR,
+    IMAGE,
+    IMAGES,
+    OTHER_LEG,
+    THEN_WALL,
+    TX_IMAGE,
+    WALL_THEN,
+    Hypotheses,
+    KnownFeatures,
+    by_wall,
+)
+from rislam_rt.slam.window.births.hypothesis_fits import Trials
+from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
+
+BEARINGS = 8
+"""Initial values, all around, of an upright wall whose bearing only a length tells."""
+REACH = 5.0
+"""Standard deviations by which a track may come from elsewhere than the point of which it may be an image."""
+APART = 0.5
+"""Distance [m] between two fits of one kind below which they are one."""
+
+
+def with_images(
+    table: Hypotheses, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
+) -> Hypotheses:  # fmt: skip
+    """The hypotheses (H,), and behind them the images of every known point in a new wall that are in reach."""
+    ways = [(point, wall) for point in landmarks.points.tolist() for wall in (NONE, *landmarks.walls.tolist())]
+    more = [_in_reach(_images(digest, known, point, wall), digest, known) for point, wall in ways]
+    every = [table, *more]
+    trials = Trials._make(np.concatenate(fields) for fields in zip(*(each.trials for each in every), strict=True))
+    kind, which, over = (np.concatenate([each[column] for each in every]) for column in range(3))
+    return Hypotheses(kind, which, over, trials)
+
+
+def _images(digest: TrackSummary, known: KnownFeatures, point: int, wall: int) -> Hypotheses:
+    """The images of one point in a new wall for T tracks, over a known wall besides, or none (`NONE`)."""
+    (seen, _, rx), count = digest.mean, len(digest.seen)
+    spot, root, still = known.place[point], known.root[point], (AXES, np.zeros(3), np.zeros((3, 3)))
+    # kind; what the new wall mirrors, with its root; what stands on the other leg; the map behind the new wall
+    if wall == NONE:
+        ways = [(IMAGE, spot, root, spot, still), (TX_IMAGE, spot, root, spot, still)]
+    else:
+        turn, shift = known.turn[wall], known.shift[wall]
+        mirror, around = turn @ spot + shift, (rx + seen[:, :1] * digest.direction).mean(axis=0)
+        move, behind = (by_wall(at, known.place[wall], digest.middle) @ known.root[wall] for at in (spot, around))
+        wide = square_root(turn @ root @ root.T @ turn.T + move @ move.T)
+        wide = np.pad(wide, ((0, 0), (0, 3 - wide.shape[1])))
+        ways = [
+            (BOTH_LEGS, spot, root, mirror, (AXES, np.zeros(3), move)),
+            (THEN_WALL, mirror, wide, spot, still),
+            (WALL_THEN, spot, root, spot, (turn, shift, behind)),
+            (OTHER_LEG, spot, root, mirror, (turn, shift, move)),
+        ]
+    kinds, starts, inners, others, outers = [], [], [], [], []
+    for number, inner, inner_root, other, outer in ways:
+        for start in _initial_values(digest, number, inner, other, outer):
+            kinds.append(number)
+            starts.append(start)
+            inners.append((inner, inner_root))
+            others.append(other)
+            outers.append(outer)
+    kind, every = np.repeat(np.array(kinds), count), np.ones(len(kinds) * count, dtype=np.bool_)
+    turns = [np.stack([np.zeros((3, 3)), turn]) for turn, _, _ in outers]
+    shifts = [np.stack([inner, shift]) for (inner, _), (_, shift, _) in zip(inners, outers, strict=True)]
+    roots = [np.stack([inner, outer]) for (_, inner), (_, _, outer) in zip(inners, outers, strict=True)]
+    trials = Trials(
+        np.tile(np.arange(count), len(kinds)), every, ~every, np.concatenate(starts),
+        np.repeat(turns, count, axis=0), np.repeat(shifts, count, axis=0), np.repeat(roots, count, axis=0),
+        ~every, np.zeros((len(every), 3, 4)), every, np.isin(kind, FAR), kind == BOTH_LEGS,
+        np.repeat(others, count, axis=0),
+    )  # fmt: skip
+    return Hypotheses(kind, np.full(len(every), point), np.full(len(every), wall), trials)
+
+
+def _initial_values(
+    digest: TrackSummary, kind: int, inner: Floats, other: Floats, outer: tuple[Floats, Floats, Floats]
+) -> list[Floats]:
+    """Walls (T, 3) each: on the Tx leg level ones below and above, and upright ones all around."""
+    seen, tx, rx = digest.mean
+    if kind not in FAR:
+        reach = np.maximum(seen[:, 0] - np.linalg.norm(other - tx, axis=1), 0.1)
+        return [_mirror_of(digest, inner, (rx + reach[:, None] * digest.direction) @ outer[0].T + outer[1])]
+    span = inner - tx
+    reach = np.maximum(seen[:, 0] - np.linalg.norm(other - rx, axis=1), 0.1)
+    rise = np.sqrt(np.maximum(reach**2 - np.vecdot(span[:, :2], span[:, :2]), 1e-4))
+    across = np.sqrt(np.maximum(reach**2 - span[:, 2] ** 2, 1e-4))
+    ends = [tx + np.stack([span[:, 0], span[:, 1], sign * rise], axis=1) for sign in (-1.0, 1.0)]
+    for angle in np.arange(BEARINGS) * 2.0 * np.pi / BEARINGS:
+        ends.append(tx + np.stack([across * np.cos(angle), across * np.sin(angle), span[:, 2]], axis=1))
+    return [_mirror_of(digest, inner, end) for end in ends]
+
+
+def _mirror_of(digest: TrackSummary, spot: Floats, image: Floats) -> Floats:
+    """Walls (T, 3), as images of the agent, that mirror a point (3,) to the places (T, 3)."""
+    return reflect(np.broadcast_to(digest.middle, image.shape), image, np.broadcast_to(spot, image.shape))
+
+
+def _in_reach(table: Hypotheses, digest: TrackSummary, known: KnownFeatures) -> Hypotheses:
+    """Without what the track is too short for, and images on the Tx leg of points that it does not come from."""
+    (seen, tx, rx), track, other = digest.mean, table.trials.track, table.trials.other
+    out = other[:, None] - digest.rx[track]
+    reach = np.linalg.norm(out, axis=2)
+    weight = digest.weight[track, :, 1:] ** 2
+    total = weight.sum(axis=1)
+    gap = (weight * (digest.seen[track, :, 1:] - out[..., :2] / reach[..., None])).sum(axis=1) / total
+    reach = np.linalg.norm(other - rx[track], axis=1)
+    spread = np.hypot(*np.linalg.norm(table.trials.uncertainty, axis=(2, 3)).T)
+    spread = spread + np.linalg.norm(digest.uncertainty[track, 0], axis=(1, 2))
+    std = np.sqrt(1.0 / total + (spread / reach)[:, None] ** 2)
+    straight = np.linalg.norm(known.place[table.known] - tx[track], axis=1)
+    leg = np.linalg.norm(other - tx[track], axis=1)
+    aligned = (np.abs(gap) < REACH * std).all(axis=1) & (seen[track, 0] > reach + straight)
+    keep = np.where(table.trials.far, aligned, seen[track, 0] > leg + straight)
+    trials = Trials._make(field[keep] for field in table.trials)
+    return Hypotheses(table.kind[keep], table.known[keep], table.over[keep], trials)
+
+
+def fitted_twice(table: Hypotheses, place: Floats, evidence: Floats) -> Integers:
+    """Rows of images on the Tx leg that another initial value has led to as well, with more evidence (H,)."""
+    rows = (table.trials.far & np.isfinite(evidence)).nonzero()[0]
+    rows = rows[np.argsort(-evidence[rows])]
+    same = np.linalg.norm(place[rows][:, None] - place[rows], axis=-1) < APART
+    for field in (table.trials.track, table.known, table.over):
+        same &= field[rows][:, None] == field[rows]
+    return rows[np.tril(same, -1).any(axis=1)]
+
+
+def image_amplitudes(
+    table: Hypotheses, digest: TrackSummary, landmarks: WindowTable, radio: RadioConfig
+) -> tuple[Integers, Floats]:
+    """Rows (R,) of images of known points, and the log probability (R,) of their amplitudes; the panel's hangs on
+    codes."""
+    rows = np.isin(table.kind, IMAGES).nonzero()[0]
+    track, point, over = table.trials.track[rows], table.known[rows], table.over[rows]
+    first = np.maximum(np.linalg.norm(table.trials.other[rows] - digest.mean[1][track], axis=1), 0.05)
+    unit = point_amplitude(np.ones(len(rows)), first, np.maximum(digest.mean[0][track, 0] - first, 0.05), radio)
+    strength, uncertainty = (field[point] for field in landmarks.log_strength)
+    besides = [np.where(over >= 0, field[over], 0.0) for field in (landmarks.ratio, landmarks.ratio_variance)]
+    mean = np.log(unit) + strength + CONSTANTS.wall_ratio + besides[0]
+    variance = uncertainty**2 + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2 + besides[1]
+    off = np.where(np.isin(point, landmarks.panels), 0.0, digest.log_amplitude[track] - mean)
+    return rows, np.asarray(-0.5 * off**2 / variance - 0.5 * np.log(variance))
