@@ -11,12 +11,11 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.gaussian_view import gaussian_view
-from rislam_rt.slam.nested.particles.backend import pick_engine
 from rislam_rt.slam.nested.particles.belief import Nested, draw, drop, effective_size, propagate, remember, renew
+from rislam_rt.slam.nested.particles.engine_choice import pick_engine
 from rislam_rt.slam.nested.particles.new_landmark import LandmarkHistory, initialise_landmark
 from rislam_rt.slam.nested.particles.prior_map import set_prior_map
 from rislam_rt.slam.nested.particles.weights import FLOOR, Seen, update
@@ -24,14 +23,15 @@ from rislam_rt.slam.nested.wall_return_removal import wall_returns
 from rislam_rt.slam.observations import is_los, observations_of, stranger_density
 from rislam_rt.slam.returns import AXES, TX, observe
 from rislam_rt.slam.start_prior import StartPrior
+from rislam_rt.slam.step_checks import check_sides, check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
 from rislam_rt.slam.window import WindowState
 from rislam_rt.slam.window import init as window_init
 from rislam_rt.slam.window import revisit as window_revisit
 from rislam_rt.slam.window.births.feature_removal import release
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes
+from rislam_rt.slam.window.cycle_explanation import explain, follow, grow, names, squares, unexplained
 from rislam_rt.slam.window.divergence import divergence_monitor
-from rislam_rt.slam.window.explanation import explain, follow, grow, names, squares, unexplained
 from rislam_rt.slam.window.landmarks.landmark_update import learn
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.measurement_log import Log, append

@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import SensorModel
 from rislam_rt.model.sensor import merged_pull
-from rislam_rt.slam.schemes.bp_slam_aoa.features import GaussianFeatures, PredictedReturns
+from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import GaussianFeatures, PredictedReturns
 
 
 def unresolved_neighbours(
