@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import NOTHING, RisCode, SchemeResult
 from rislam_rt.pipeline.cycle import Cycle
-from rislam_rt.pipeline.recordings.given import RecordedInputs
+from rislam_rt.pipeline.recordings.recorded_inputs import RecordedInputs
 from rislam_rt.storage.netcdf import padded
 
 if TYPE_CHECKING:

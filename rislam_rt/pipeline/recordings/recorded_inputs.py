@@ -1,4 +1,4 @@
-"""What the estimator of a run was given, and what it drew from."""
+"""Recorded inputs: what the estimator of a run was given, and what it drew from."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
