@@ -23,12 +23,13 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.backend import prepare_backend
 from rislam_rt.model import Body
-from rislam_rt.slam import NestedConfig, SlamConfig, StartPrior
+from rislam_rt.slam import NestedConfig
 from rislam_rt.slam.moments import poses_of
-from rislam_rt.slam.nested.particles import belief, operations
-from rislam_rt.slam.nested.particles.backend import pick_engine
+from rislam_rt.slam.nested.particles import belief
 from rislam_rt.slam.nested.particles.cloud import CloudEngine, Kernel, kernel_width
+from rislam_rt.slam.nested.particles.engine_choice import pick_engine
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, pack, trace_sightline
+from rislam_rt.slam.nested.particles.weights import Seen, update
 from rislam_rt.slam.returns import NONE, Returns, observe
 
 BODY = Body(np.array([-0.04388, -0.02397, 0.0]), np.array([0.04388, 0.02397, 0.0]))
@@ -36,6 +37,8 @@ START, VELOCITY, HEADING, CYCLE, SIGMA_A = np.array([0.5, 0.7, 0.5]), np.array([
 STD = np.array([0.01, 0.01, 0.01])
 BYTES = 16
 """Memory that an update must touch: a point (8) and its weight read, the weight written."""
+TRAIL = 40
+"""Poses of the trail."""
 CYCLES = 600
 """Of a run at the paper's scale."""
 ROUNDS = 7
@@ -99,8 +102,8 @@ def _passes(
     returns = Returns(np.array([[0, NONE, NONE]]), np.array([0]), np.array([0]))
     seen = observe(returns, place[None], np.zeros((1, 3)), poses_of(START, np.asarray(HEADING), BODY)).seen[0]
     line = trace_sightline(returns, 0, 0, features, np.zeros((1, 3)), poses)
-    sighting = Sighting((line,), seen, np.diag(STD**2))
-    kinds, constants = (sighting.kind,), pack([sighting], agents)
+    sighting = Sighting(line, seen, np.diag(STD**2))
+    kinds, constants = (line.kind,), pack([sighting], agents)
     zero = np.zeros(agents, dtype=np.int64)
     cloud = engine.build(0.05 * rng.standard_normal((1, points, 3)), np.zeros((1, points)), zero, zero)
     cloud, sums = engine.weigh(cloud, (), np.zeros((0, agents)))
@@ -116,33 +119,26 @@ def _passes(
 def walk(agents: int, points: int, landmarks: int, cycles: int) -> Floats:
     """Processor seconds of each cycle of a walk at fixed numbers of particles, all landmarks seen every cycle."""
     rng = np.random.default_rng(2)
-    config = SlamConfig(
-        filter="nested", nested=NestedConfig(num_agents=agents, num_points=points, adaptive=False, engine="drjit")
-    )
-    particles = operations.begin(StartPrior(START, VELOCITY, HEADING), config, rng=rng)
+    config = NestedConfig(num_agents=agents, num_points=points, adaptive=False, engine="drjit")
+    engine, start = pick_engine("drjit"), np.concatenate([START, VELOCITY, [HEADING]])
+    state = belief.draw(start, 0.01 * np.array([1, 1, 0, 1, 1, 0, 0]), agents, rng=rng)
     places = rng.uniform([1.0, 1.0, 1.0], [5.0, 5.0, 3.0], (landmarks, 3))
-    state = particles.belief
     for row, place in enumerate(places):
         at = place + 0.03 * rng.standard_normal(3)
-        state = belief.initialise_landmark(
-            state, np.tile(at, (agents, 1)), 0.03**2 * np.eye(3), particles.config, particles.engine, rng=rng
-        )
+        state = belief.place_landmark(state, np.tile(at, (agents, 1)), 0.03**2 * np.eye(3), config, engine, rng=rng)
         known = linear_sightline(state.centre[:, row] - at, np.zeros(3))
-        state, _ = belief.absorb(state, row, [Sighting((known,), np.zeros(3), 0.03**2 * np.eye(3))], particles.engine)
-    particles = particles._replace(belief=state)
+        state, _ = belief.absorb(state, row, [Sighting(known, np.zeros(3), 0.03**2 * np.eye(3))], engine)
     rows, anchor = np.arange(landmarks), np.zeros((landmarks, 3))
     returns = Returns(np.column_stack([rows, np.full((landmarks, 2), NONE)]), rows, rows)
-    spent = []
+    spent, noise = [], np.tile(STD**2, (landmarks, 1))
     for cycle in range(1, cycles + 1):
         poses = poses_of(START + cycle * CYCLE * VELOCITY, np.asarray(HEADING), BODY)
         seen = observe(returns, places, anchor, poses).seen + STD * rng.standard_normal((landmarks, 3))
         began = time.process_time()
-        particles = operations.propagate(
-            particles, CYCLE, SIGMA_A * config.axes, HEADING, cycle % config.nested.window, config, rng=rng
-        )
-        std = np.tile(STD, (landmarks, 1))
-        particles = operations.update(particles, returns, returns, anchor, BODY, seen, std, rng=rng).particles
-        particles, _ = operations.resample(particles, config, rng=rng)
+        state = belief.propagate(state, CYCLE, SIGMA_A * np.array([1.0, 1.0, 0.0]), 0.0, rng=rng)
+        state = belief.remember(state, TRAIL)
+        state = update(state, Seen(returns, anchor, BODY, seen, noise), config, engine).belief
+        state, _ = belief.renew(state, CYCLE * np.arange(len(state.trail))[::-1], config, engine, rng=rng)
         spent.append(time.process_time() - began)
     return np.array(spent)
 

@@ -42,7 +42,6 @@ from rislam_rt.model import (
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import NestedConfig, SlamConfig, StartPrior, StepInfo, StepOutcome, estimate, init, predict, step
-from rislam_rt.slam.nested.filter import believed
 from rislam_rt.slam.window import WindowState
 from rislam_rt.slam.window.smoother import window_gaussian
 
@@ -126,7 +125,7 @@ def _settings(engine: str, rng: np.random.Generator) -> SlamConfig:
             height=str(rng.choice(["known", "estimated"])),
             max_bounces=int(rng.integers(3)),
         )
-        own = NestedConfig(birth_cycles=int(rng.choice([12, 3, 1])), window=int(rng.choice([40, 12])))
+        own = NestedConfig(birth_cycles=int(rng.choice([12, 6, 1])))
     if engine != "nested":
         return config
     # as many as a thousand runs allow; the laws looked at here do not depend on their number
@@ -219,7 +218,7 @@ def run_case(case: Case) -> Verdict:
 
 def _believed(state: Any) -> Floats:
     """Covariance of all that the filter holds of the present."""
-    return window_gaussian.now(state.window)[1] if isinstance(state, WindowState) else believed(state).covariance
+    return window_gaussian.now((state if isinstance(state, WindowState) else state.front).window)[1]
 
 
 def faults_of(belief: SlamEstimate, info: StepInfo, count: int, covariance: Floats | None = None) -> list[str]:

@@ -8,8 +8,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam import window
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.nested import filter as nested
-from rislam_rt.slam.nested import mapping as nested_map
+from rislam_rt.slam.nested import particle_filter as nested
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import StepInfo
 
@@ -35,8 +34,7 @@ def step(
 
 def predict(state: Any, dt: float, config: SlamConfig) -> SlamEstimate:
     """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent."""
-    ahead = window.predict if isinstance(state, window.WindowState) else nested_map.predict
-    return ahead(state, dt, config)
+    return window.predict(_front(state), dt, config)
 
 
 def revisit(state: Any, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> Any:
@@ -55,6 +53,9 @@ def smoothed(state: Any) -> Floats | None:
 
 def estimate(state: Any, config: SlamConfig) -> SlamEstimate:
     """An estimator's mean and covariance of the pose, equally likely samples of it, and the map."""
-    if isinstance(state, window.WindowState):
-        return window.estimate(state, config)
-    return nested_map.estimate(state, config)
+    return window.estimate(_front(state), config)
+
+
+def _front(state: Any) -> window.WindowState:
+    """What pose and map are read from: the window filter's state, or the nested filter's Gaussian view."""
+    return state if isinstance(state, window.WindowState) else state.front

@@ -12,8 +12,10 @@ ENGINES = ("auto", "drjit", "numpy")
 """`auto` takes Dr.Jit where it runs, else numpy."""
 CLASSIFIERS = ("amplitude", "geometric", "network")
 """Rules by which components are taken for wall returns."""
-MOST = {"num_agents": 1_000_000, "num_points": 1_000_000, "window": 10_000}
-"""Largest counts: ten times and more what any study of this package takes."""
+MOST = {"num_agents": 1_000_000, "num_points": 1_000_000, "birth_cycles": 40}
+"""Largest counts: of particles ten times and more what any study of this package takes; of cycles, those kept."""
+LEAST = {"num_agents": 4, "num_points": 4, "min_agents": 4, "min_points": 4, "capacity": 4, "birth_cycles": 1}
+"""Least counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,23 +48,13 @@ class NestedConfig:
     """Most landmark particles in all: at most 20 bytes each, and the passes' own 0.5 GB."""
     engine: str = "auto"
     """Where the heavy passes run: `drjit`, `numpy`, or `auto` for Dr.Jit if it can."""
-    gate: float = 16.3
-    """Largest squared Mahalanobis distance of delay and two cosines that still associates (chi^2, 3 dof: 0.999)."""
     specular_ratio: float = 0.35
     """Amplitude over that of free space of the same length, above which a component is a wall return."""
     classifier: str = "amplitude"
-    """Who tells wall returns from landmark paths: the rule above, `geometric`, or the trained `network`."""
-    window: int = 40
-    """Cycles of history that are kept."""
+    """Who tells wall returns from landmark paths, where these are thrown away: the rule above, `geometric`, or the
+    trained `network`."""
     birth_cycles: int = 12
-    """Cycles of history that a track needs before a landmark can come of it, two in three of them with a measurement;
-    all of them where the panel's codes may make the gaps."""
-    birth_margin: float = 9.0
-    """By how much chi^2 a hypothesis must win over the next one."""
-    max_misses: int = 4
-    """Cycles without a component after which a track dies, unless its past lets expect longer gaps."""
-    merge_distance: float = 9.0
-    """Squared Mahalanobis distance below which two landmarks are one."""
+    """Measurements that a track needs before a landmark can come of it."""
 
     def __post_init__(self) -> None:
         for name, value, allowed in (
@@ -72,19 +64,13 @@ class NestedConfig:
         ):
             if value not in allowed:
                 raise ConfigError(f"nested.{name}: '{value}' received; give one of {', '.join(allowed)}")
-        for name in ("num_agents", "num_points", "min_agents", "min_points", "capacity"):
-            if getattr(self, name) < 4:
-                raise ConfigError(f"nested.{name}: {getattr(self, name)} received; give at least 4")
-        for name in ("birth_cycles", "window", "max_misses"):
-            if getattr(self, name) < 1:
-                raise ConfigError(f"nested.{name}: {getattr(self, name)} received; give at least 1")
+        for name, least in LEAST.items():
+            if getattr(self, name) < least:
+                raise ConfigError(f"nested.{name}: {getattr(self, name)} received; give at least {least}")
         for name, most in MOST.items():
             if getattr(self, name) > most:
                 raise ConfigError(f"nested.{name}: {getattr(self, name)} received; give at most {most}")
-        if self.window < self.birth_cycles:
-            raise ConfigError(f"nested.window: {self.window} received; give at least birth_cycles, {self.birth_cycles}")
-        for name in ("agent_cell", "point_cell", "common_length_std", "common_cosine_std", "gate", "specular_ratio",
-                     "birth_margin", "merge_distance"):  # fmt: skip
+        for name in ("agent_cell", "point_cell", "common_length_std", "common_cosine_std", "specular_ratio"):
             number = getattr(self, name)
             if not (np.isfinite(number) and number > 0.0):
                 raise ConfigError(f"nested.{name}: {number} received; give a positive number")

@@ -149,6 +149,10 @@ class Recorder:
         return found
 
 
+GONE = ("gate", "window", "birth_margin", "max_misses", "merge_distance")
+"""Settings `nested.*` that recordings of earlier versions hold."""
+
+
 def replay(
     inputs: Inputs,
     config: Mapping[str, Any],
@@ -177,6 +181,7 @@ def replay(
         A setting is unknown, or its value unusable.
     """
     content = dict(config)
+    content["nested"] = {name: value for name, value in content.get("nested", {}).items() if name not in GONE}
     for key, value in (changes or {}).items():
         content = put_dotted(content, key, value)
     spec = build_spec(Table(Path("settings of the replay"), content, ()), PipelineSpec, build_settings)

@@ -1,1 +1,1 @@
-"""The nested particle filter of the paper: agent particles, each with clouds of landmark particles."""
+"""The paper's particle filter: agent particles, each with clouds of landmark particles; the rest is the window's."""

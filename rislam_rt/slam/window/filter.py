@@ -5,16 +5,16 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations, is_los, observations_of, stranger_density
 from rislam_rt.slam.returns import TX
 from rislam_rt.slam.start_prior import StartPrior
+from rislam_rt.slam.step_checks import check_sides, check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes, score_again
+from rislam_rt.slam.window.cycle_explanation import explain, follow, grow, names, squares, unexplained
 from rislam_rt.slam.window.divergence import divergence_monitor, recovery
-from rislam_rt.slam.window.explanation import explain, follow, grow, names, squares, unexplained
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import learn, no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment

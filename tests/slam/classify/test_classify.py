@@ -19,12 +19,10 @@ from rislam_rt.slam.classify import (
     load_classifier,
     network_arrays,
     read_network,
-    sightings_of,
     track_features,
 )
-from rislam_rt.slam.classify.echo import FAR, echo_misfit
-from rislam_rt.slam.classify.images import image_misfit
-from rislam_rt.slam.nested.tracks import no_tracks
+from rislam_rt.slam.classify.echo_misfit import FAR, echo_misfit
+from rislam_rt.slam.classify.image_misfit import image_misfit
 
 RADIO, BODY, WINDOW = RadioConfig(), Body(), 40
 START, HEADING = np.array([1.0, 1.2, 0.5]), 0.4
@@ -214,18 +212,3 @@ def test_a_file_for_other_features_is_refused():
         file.seek(0)
         with pytest.raises(ConfigError, match="train it anew"):
             read_network(file)
-
-
-def test_tracks_of_the_filter_are_read_in_the_order_of_their_cycles():
-    window, now = 6, 8
-    cycles = np.array([[6, 7, 8, -1, 4, 5], [-1, 7, 8, -1, -1, -1]])
-    seen = np.repeat(cycles[..., None].astype(float), 3, axis=2)
-    tracks = no_tracks(window)._replace(cycle=cycles, seen=seen, std=np.ones_like(seen))
-    level = cycles.astype(float)
-    position = np.repeat(np.array([6.0, 7.0, 8.0, 3.0, 4.0, 5.0])[:, None], 3, axis=1)
-    held = tracks.seen, tracks.std, tracks.cycle
-    found = sightings_of(*held, level, position, position[:, 0], now)
-    assert found.heading.tolist() == [3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
-    assert found.held.tolist() == [[False] + [True] * 5, [False] * 4 + [True] * 2]
-    assert found.seen[0, 1:, 0].tolist() == found.log_amplitude[0, 1:].tolist() == [4.0, 5.0, 6.0, 7.0, 8.0]
-    assert sightings_of(*held, level[:, 2], position, position[:, 0], now).log_amplitude[0].tolist() == [8.0] * window

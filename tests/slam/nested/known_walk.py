@@ -6,13 +6,15 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
-from rislam_rt.slam import SlamConfig, StartPrior
+from rislam_rt.slam import NestedConfig, SlamConfig
 from rislam_rt.slam.moments import poses_of
-from rislam_rt.slam.nested.belief_moments import Moments
-from rislam_rt.slam.nested.birth import Birth, BirthDecision
-from rislam_rt.slam.nested.hypotheses import IMAGE, POINT, History, fit_feature, initial_value
-from rislam_rt.slam.nested.particles import operations
+from rislam_rt.slam.nested.particles.belief import Nested, draw, gaussian, propagate, remember, renew
+from rislam_rt.slam.nested.particles.cloud import CloudEngine
+from rislam_rt.slam.nested.particles.engine_choice import pick_engine
+from rislam_rt.slam.nested.particles.new_landmark import LandmarkHistory, initialise_landmark
+from rislam_rt.slam.nested.particles.weights import Seen, update
 from rislam_rt.slam.returns import NONE, Returns, observe
+from rislam_rt.slam.window.landmarks.path_forms import compile_forms
 
 BODY = Body(np.array([-0.04388, -0.02397, 0.0]), np.array([0.04388, 0.02397, 0.0]))
 """The method's baseline of 0.1 m, turned 0.5 rad against the heading."""
@@ -24,7 +26,8 @@ STD = np.array([0.01, 0.01, 0.01])
 """Of length [m] and cosines: about 25 dB over all antennas."""
 FIRST = 12
 """Cycles of history that the landmarks are born from."""
-DEAF = np.zeros(3)
+WINDOW = 40
+"""Poses of the trail."""
 
 
 class Truth(NamedTuple):
@@ -44,11 +47,10 @@ class Truth(NamedTuple):
 class Run(NamedTuple):
     """What a filter made of it."""
 
-    moments: list[Moments]
-    """After every cycle."""
+    moments: list[tuple[Floats, Floats]]
+    """Mean and covariance after every cycle."""
     nees: Floats
     """(K,) of horizontal position and velocity, chi^2 with 4 degrees of freedom."""
-    particles: operations.PointParticles
     resampled: int
 
 
@@ -77,58 +79,54 @@ def measure(truth: Truth, cycle: int, std: Floats, *, rng: np.random.Generator) 
 def walk(config: SlamConfig, cycles: int, walls: int = 0, std: Floats = STD, *, rng: np.random.Generator) -> Run:
     """A filter led through a walk; its start prior is as wrong as it says."""
     rng, own = rng.spawn(2)
-    truth = room(cycles, walls, rng=rng)
+    truth, engine = room(cycles, walls, rng=rng), pick_engine(config.nested.engine)
     wrong = 0.01 * rng.standard_normal((2, 3)) * [1.0, 1.0, 0.0]
-    start = StartPrior(START + wrong[0], VELOCITY + wrong[1], HEADING)
-    particles = operations.begin(start, config, rng=own)
+    start = np.concatenate([START + wrong[0], VELOCITY + wrong[1], [HEADING]])
+    spread = 0.01 * np.array([1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0])
+    belief = draw(start, spread, config.nested.num_agents, rng=own)
     history: list[Floats] = []
     moments, nees, resampled = [], [], 0
     for cycle in range(1, cycles + 1):
-        accelerate = SIGMA_A * config.axes
-        particles = operations.propagate(
-            particles, CYCLE, accelerate, HEADING, cycle % config.nested.window, config, rng=own
-        )
+        belief = remember(propagate(belief, CYCLE, SIGMA_A * config.axes, 0.0, rng=own), WINDOW)
+        spans = CYCLE * np.arange(len(belief.trail))[::-1]
         seen = measure(truth, cycle, std, rng=rng)
         if cycle <= FIRST:
             history.append(seen)
         if cycle == FIRST:
-            particles = born(particles, truth, np.array(history), std, rng=own)
+            belief = born(belief, truth, np.array(history), std, spans, config.nested, engine, rng=own)
         if cycle > FIRST:
-            wide = np.tile(std, (len(seen), 1))
-            told = operations.update(particles, truth.returns, truth.returns, truth.anchor, BODY, seen, wide, rng=own)
-            particles = told.particles
-        particles, done = operations.resample(particles, config, rng=own)
+            told = Seen(truth.returns, truth.anchor, BODY, seen, np.tile(std**2, (len(seen), 1)))
+            belief = update(belief, told, config.nested, engine).belief
+        belief, done = renew(belief, spans, config.nested, engine, rng=own)
         resampled += done
-        moments.append(operations.moments(particles))
-        nees.append(pose_nees(moments[-1], truth, cycle))
-    return Run(moments, np.array(nees), particles, resampled)
+        moments.append(gaussian(belief))
+        nees.append(pose_nees(*moments[-1], truth, cycle))
+    return Run(moments, np.array(nees), resampled)
 
 
-def pose_nees(moments: Moments, truth: Truth, cycle: int) -> float:
+def pose_nees(mean: Floats, covariance: Floats, truth: Truth, cycle: int) -> float:
     """Normalised squared error of horizontal position and velocity."""
     columns = np.array([0, 1, 3, 4])
-    error = moments.mean[columns] - np.concatenate([truth.position[cycle], truth.velocity[cycle]])[columns]
-    return float(error @ np.linalg.solve(moments.covariance[np.ix_(columns, columns)], error))
+    error = mean[columns] - np.concatenate([truth.position[cycle], truth.velocity[cycle]])[columns]
+    return float(error @ np.linalg.solve(covariance[np.ix_(columns, columns)], error))
 
 
 def born(
-    particles: operations.PointParticles, truth: Truth, history: Floats, std: Floats, *, rng: np.random.Generator
-) -> operations.PointParticles:
-    """Landmarks from the first cycles, as the front end would hand them over."""
-    slots = np.arange(1, FIRST + 1)
-    position, heading = operations.trail(particles, slots)
-    poses = poses_of(position, heading, BODY)
-    known = operations.moments(particles).position
+    belief: Nested, truth: Truth, history: Floats, std: Floats, spans: Floats, config: NestedConfig,
+    engine: CloudEngine, *, rng: np.random.Generator,
+) -> Nested:  # fmt: skip
+    """Landmarks from the first cycles, as the front end would hand them over: sought 0.1 m from where they are, walls
+    known to be upright."""
     for row in range(history.shape[1]):
         wall = row >= len(POINTS)
-        kind, parent = (IMAGE, 0) if wall else (POINT, -1)
-        point = operations.moments(particles).features[0] if wall else None
-        past = History(history[:, row], np.tile(std, (FIRST, 1)), poses, np.zeros(FIRST), 0.0, np.zeros((6, 0)))
-        anchor = truth.anchor[row]
-        first = initial_value(kind, point, anchor, past)
-        assert first is not None
-        fit = fit_feature(kind, first, point, anchor, past, 10)
-        birth = Birth(BirthDecision(kind, parent, fit), anchor, slots, past.seen, past.std)
-        particles = operations.initialise_landmark(particles, birth, BODY, rng=rng)
-    assert known.shape == (3,)
-    return particles
+        way = np.array([[0, NONE, NONE, int(wall) or NONE, NONE]])
+        known = np.array([0] if wall else [], dtype=np.int64)
+        anchor = np.array([np.zeros(3), truth.anchor[row]]) if wall else np.zeros((1, 3))
+        upright = 0.1 if wall else 10.0
+        place = truth.features[row] + np.array([0.1, 0.1, min(upright, 0.1)]) * rng.standard_normal(3)
+        prior, variance = np.diag([100.0, 100.0, upright**2]), np.tile(std**2, (FIRST, 1))
+        past = LandmarkHistory(
+            compile_forms(way), known, anchor, place, prior, np.arange(1, FIRST + 1), history[:, row], variance
+        )  # fmt: skip
+        belief = initialise_landmark(belief, past, BODY, spans, config, engine, rng=rng)
+    return belief

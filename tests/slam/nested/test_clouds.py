@@ -5,8 +5,8 @@ import pytest
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.slam.nested.particles.backend import pick_engine
 from rislam_rt.slam.nested.particles.cloud import HOPELESS, Cloud, CloudEngine, Kernel, kernel_width, restoring_map
+from rislam_rt.slam.nested.particles.engine_choice import pick_engine
 from rislam_rt.slam.nested.particles.numpy_engine import NumpyEngine
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, pack, trace_sightline
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, observe
@@ -49,7 +49,7 @@ def sighting_of(owner: int, pair: tuple[int, int], rng: np.random.Generator) -> 
     line = trace_sightline(returns, 0, owner, features, ANCHOR, poses)
     seen = observe(returns, FEATURES, ANCHOR, poses_near(np.array([[0.5, 0.7, 0.5]]))).seen[0, 0]
     spread = rng.standard_normal((3, 3))
-    return Sighting((line,), seen, 1e-3 * (spread @ spread.T + np.eye(3)))
+    return Sighting(line, seen, 1e-3 * (spread @ spread.T + np.eye(3)))
 
 
 @pytest.mark.parametrize("pair", PAIRS)
@@ -70,8 +70,8 @@ def test_every_return_is_weighed_as_the_front_end_predicts_it(
     poses = poses_near(position)
     line = trace_sightline(returns, 0, owner, features, ANCHOR, poses)
     seen = observe(returns, FEATURES, ANCHOR, poses_near(position[:1])).seen[0, 0]
-    sighting = Sighting((line,), seen, np.diag([0.03, 0.02, 0.04]) ** 2)
-    after, sums = engine.weigh(cloud, (sighting.kind,), pack([sighting], N))
+    sighting = Sighting(line, seen, np.diag([0.03, 0.02, 0.04]) ** 2)
+    after, sums = engine.weigh(cloud, (sighting.line.kind,), pack([sighting], N))
     points, before = engine.read(cloud)
     every = np.repeat(features[:, None], M, axis=1)
     every[:, :, owner] += points
@@ -88,9 +88,7 @@ def test_every_return_is_weighed_as_the_front_end_predicts_it(
 @pytest.mark.parametrize("pairs", [PAIRS[:1], PAIRS[:4], PAIRS[4:8]])
 def test_engines_agree_to_single_precision(pairs: list[tuple[int, int]], rng: np.random.Generator) -> None:
     sightings = [sighting_of(1, pair, rng) for pair in pairs]
-    both = Sighting(sightings[0].lines + sightings[-1].lines, sightings[0].seen, sightings[0].covariance)
-    sightings = [*sightings, both]
-    kinds, constants = tuple(sighting.kind for sighting in sightings), pack(sightings, N)
+    kinds, constants = tuple(sighting.line.kind for sighting in sightings), pack(sightings, N)
     found = []
     for name in ("numpy", "drjit"):
         engine = pick_engine(name)
@@ -109,8 +107,8 @@ def test_engines_agree_to_single_precision(pairs: list[tuple[int, int]], rng: np
 def test_weights_of_shared_rows_become_each_agents_own(engine: CloudEngine, rng: np.random.Generator) -> None:
     cloud = cloud_of(engine, rng)
     agents = 0.05 * rng.standard_normal((N, 3))
-    sighting = Sighting((linear_sightline(np.zeros((N, 3)), agents),), np.zeros(3), 0.01 * np.eye(3))
-    cloud, _ = engine.weigh(cloud, (sighting.kind,), pack([sighting], N))
+    sighting = Sighting(linear_sightline(np.zeros((N, 3)), agents), np.zeros(3), 0.01 * np.eye(3))
+    cloud, _ = engine.weigh(cloud, (sighting.line.kind,), pack([sighting], N))
     inherit = np.array([3, 3, 0])
     child = cloud._replace(block=cloud.block[inherit], row=cloud.row[inherit], log_total=cloud.log_total[inherit])
     points, log_weight = engine.read(cloud)
@@ -172,9 +170,9 @@ def _parents(children: Floats, points: Floats, weight: Floats) -> Floats:
 
 def test_impossible_measurements_leave_numbers(engine: CloudEngine, rng: np.random.Generator) -> None:
     cloud = cloud_of(engine, rng)
-    far = Sighting((linear_sightline(np.zeros((N, 3)), np.full((N, 3), 1e25)),), np.zeros(3), 1e-6 * np.eye(3))
+    far = Sighting(linear_sightline(np.zeros((N, 3)), np.full((N, 3), 1e25)), np.zeros(3), 1e-6 * np.eye(3))
     for _ in range(3):
-        cloud, sums = engine.weigh(cloud, (far.kind,), pack([far], N))
+        cloud, sums = engine.weigh(cloud, (far.line.kind,), pack([far], N))
         assert np.all(sums.log_total <= 0.1 * HOPELESS)
         assert all(np.isfinite(part).all() for part in sums)
     fresh = engine.resample(cloud, sums.covariance, M, Kernel(np.full(N, 0.5), 7, 32, 0.3))
@@ -188,8 +186,8 @@ def test_landmark_on_top_of_the_device_leaves_numbers(engine: CloudEngine) -> No
     poses = Poses(here, here, np.zeros(2))
     returns = Returns(LEGS[:1], np.array([0]), np.array([0]))
     line = trace_sightline(returns, 0, 0, here[:, None], ANCHOR[:1], poses)
-    sighting = Sighting((line,), np.array([1.0, 0.5, 0.5]), np.eye(3))
-    _, sums = engine.weigh(cloud, (sighting.kind,), pack([sighting], 2))
+    sighting = Sighting(line, np.array([1.0, 0.5, 0.5]), np.eye(3))
+    _, sums = engine.weigh(cloud, (sighting.line.kind,), pack([sighting], 2))
     assert all(np.isfinite(part).all() for part in sums)
 
 

@@ -6,13 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.geometry.angles import unit
-from rislam_rt.slam.nested.belief_moments import POSE, Moments, normalised, where
 from rislam_rt.slam.nested.particles import agents
-from rislam_rt.slam.nested.particles.cloud import HOPELESS, Cloud, CloudEngine, Kernel, kernel_width
+from rislam_rt.slam.nested.particles.cloud import HOPELESS, LEAST_STD, Cloud, CloudEngine, Kernel, kernel_width
 from rislam_rt.slam.nested.particles.kld_sampling import num_agents, num_points
 from rislam_rt.slam.nested.particles.sightline import Sighting, pack
 from rislam_rt.slam.nested_config import NestedConfig
+from rislam_rt.slam.window.smoother.steps import HEAD
 
 PRIMES = (7919, 5003, 3001, 1009, 409, 211, 101, 53, 29, 13, 7, 5, 3)
 """Strides of the permutations; one that does not divide M is taken."""
@@ -34,7 +33,7 @@ class Nested(NamedTuple):
     log_weight: Floats
     """(N,), normalised."""
     trail: Floats
-    """(W, N, 4) positions [m] and headings [rad] of the last W cycles, each cycle at row `cycle % W`."""
+    """(K, N, 4) positions [m] and headings [rad] of the last K cycles, the present one last."""
     clouds: tuple[Cloud, ...]
     """F of them."""
     centre: Floats
@@ -47,12 +46,6 @@ class Nested(NamedTuple):
     """(F,) effective share of landmark particles, over the agent particles on average."""
     updates: Integers
     """(F,) measurements that each landmark has had."""
-    shift: Floats
-    """(3, 3) [m^2] covariance of a shift of everything together, about which no return says anything: the error of the
-    start's position. It is kept aside and exact, so that no resampling can wear it out."""
-    follow: Floats
-    """(F, 3, 3) how a landmark moves with such a shift: a point as it does, the image of a fixed anchor in a wall by
-    twice its part across the wall."""
 
     @property
     def weight(self) -> Floats:
@@ -60,41 +53,21 @@ class Nested(NamedTuple):
         return np.exp(self.log_weight)
 
 
-def start(pose: Floats, shift: Floats, window: int) -> Nested:
+def begin(pose: Floats) -> Nested:
     """Agent particles (N, 7) of equal weight (position, velocity, heading), and an empty map."""
     count = len(pose)
-    trail = np.tile(pose[:, [0, 1, 2, 6]], (window, 1, 1))
+    weight, trail = np.full(count, -np.log(count)), pose[None, :, [0, 1, 2, 6]]
     empty, none, spread = np.zeros((count, 0, 3)), np.zeros(0, dtype=np.int64), np.zeros((count, 0, 3, 3))
-    weight = np.full(count, -np.log(count))
-    return Nested(
-        pose[:, :3],
-        pose[:, 3:6],
-        pose[:, 6],
-        weight,
-        trail,
-        (),
-        empty,
-        empty,
-        spread,
-        np.zeros(0),
-        none,
-        shift,
-        np.zeros((0, 3, 3)),
-    )
+    return Nested(pose[:, :3], pose[:, 3:6], pose[:, 6], weight, trail, (), empty, empty, spread, np.zeros(0), none)
 
 
-def draw_start(mean: Floats, std: Floats, count: int, window: int, *, rng: np.random.Generator) -> Nested:
-    """Agent particles from a Gaussian over position, velocity and heading (7,), with its moments exactly.
-
-    The position's error is a shift of everything and is not sampled.
-    """
-    normal = agents.standardise(np.full(count, 1.0 / count), rng.standard_normal((count, 7)))
-    normal[:, :3] = 0.0
-    return start(mean + std * normal, np.diag(std[:3] ** 2), window)
+def draw(mean: Floats, std: Floats, count: int, *, rng: np.random.Generator) -> Nested:
+    """Agent particles from a Gaussian over position, velocity and heading (7,), with its moments exactly."""
+    return begin(mean + std * agents.standardise(np.full(count, 1.0 / count), rng.standard_normal((count, 7))))
 
 
 def propagate(belief: Nested, dt: float, accelerate: Floats, turn: float, *, rng: np.random.Generator) -> Nested:
-    """Belief after white acceleration, constant over the cycle, of deviations `accelerate` (3,) [m/s^2].
+    """Belief after white acceleration, constant over `dt` [s], of deviations `accelerate` (3,) [m/s^2].
 
     `turn` [rad] is that of a random step of the heading.
     """
@@ -105,6 +78,12 @@ def propagate(belief: Nested, dt: float, accelerate: Floats, turn: float, *, rng
     return belief._replace(position=position, velocity=velocity, heading=heading)
 
 
+def remember(belief: Nested, most: int) -> Nested:
+    """Belief whose trail ends with the present pose, and holds `most` poses at most."""
+    here = np.column_stack([belief.position, belief.heading])
+    return belief._replace(trail=np.concatenate([belief.trail, here[None]])[-most:])
+
+
 def absorb(belief: Nested, owner: int, sightings: Sequence[Sighting], engine: CloudEngine) -> tuple[Nested, float]:
     """The particles' belief, reweighted by returns that speak of landmark `owner`, and the log evidence of these.
 
@@ -112,11 +91,11 @@ def absorb(belief: Nested, owner: int, sightings: Sequence[Sighting], engine: Cl
     as it was and the evidence is minus infinity.
     """
     cloud, count = belief.clouds[owner], len(belief.log_weight)
-    cloud, sums = engine.weigh(cloud, tuple(sighting.kind for sighting in sightings), pack(sightings, count))
+    cloud, sums = engine.weigh(cloud, tuple(sighting.line.kind for sighting in sightings), pack(sightings, count))
     possible = np.where(sums.log_total > 0.1 * HOPELESS, sums.log_total, -np.inf)
     likely = belief.log_weight + possible
     top = float(likely.max())
-    log_weight, evidence = normalised(likely - top if np.isfinite(top) else likely)
+    log_weight, evidence = _normalised(likely - top if np.isfinite(top) else likely)
     if not np.isfinite(evidence):
         return belief, -np.inf
     mean, covariance = belief.mean.copy(), belief.covariance.copy()
@@ -138,7 +117,7 @@ def renew(
     Parameters
     ----------
     spans
-        (W,) time [s] from each row of the trail to now.
+        (K,) time [s] from each row of the trail to now.
     """
     for owner in np.flatnonzero(belief.ess < config.resample_below):
         belief = _renew_cloud(belief, int(owner), config, engine, rng=rng)
@@ -147,16 +126,10 @@ def renew(
     return _renew_agents(belief, spans, config, engine, rng=rng), True
 
 
-def initialise_landmark(
-    belief: Nested,
-    mean: Floats,
-    covariance: Floats,
-    config: NestedConfig,
-    engine: CloudEngine,
-    *,
-    wall: Floats | None = None,
-    rng: np.random.Generator,
-) -> Nested:
+def place_landmark(
+    belief: Nested, mean: Floats, covariance: Floats, config: NestedConfig, engine: CloudEngine,
+    *, rng: np.random.Generator,
+) -> Nested:  # fmt: skip
     """A new landmark, of which nothing is known: particles about a Gaussian, weighed to stand for a flat prior.
 
     They are drawn `PROPOSAL` times as wide as the Gaussian that the landmark's measurements will give, so that these
@@ -168,8 +141,6 @@ def initialise_landmark(
         (N, 3) [m], one for each agent particle.
     covariance
         (3, 3) [m^2] of the landmark given an agent particle's trajectory.
-    wall
-        (3,) anchor of a wall; None for a point.
     """
     count, features = len(belief.log_weight), len(belief.clouds)
     size = num_points(covariance, count, features + 1, config)
@@ -186,7 +157,6 @@ def initialise_landmark(
         covariance=np.concatenate([belief.covariance, sums.covariance[:, None]], axis=1),
         ess=np.append(belief.ess, 1.0),
         updates=np.append(belief.updates, 0),
-        follow=np.concatenate([belief.follow, _follow(mean.mean(axis=0), wall)[None]]),
     )
 
 
@@ -200,18 +170,19 @@ def drop(belief: Nested, keep: Booleans) -> Nested:
         covariance=belief.covariance[:, rows],
         ess=belief.ess[rows],
         updates=belief.updates[rows],
-        follow=belief.follow[rows],
     )
 
 
-def gaussian(belief: Nested) -> Moments:
-    """Joint mean and covariance: the agent particles' own, their clouds' on average, and the common shift's."""
+def gaussian(belief: Nested) -> tuple[Floats, Floats]:
+    """Mean (7 + 3F,) and covariance of pose and landmarks: the agent particles' own, and their clouds' on average.
+
+    No cloud, single precision as it is, counts as known to better than `LEAST_STD`.
+    """
     mean, covariance = agents.moments(belief.weight, joint(belief))
-    moves = np.concatenate([np.eye(3), np.zeros((POSE - 3, 3)), belief.follow.reshape(-1, 3)])
-    covariance = covariance + moves @ belief.shift @ moves.T
     for feature, block in enumerate(mean_covariances(belief)):
-        covariance[where(feature), where(feature)] += block
-    return Moments(mean, covariance)
+        own = slice(HEAD + 3 * feature, HEAD + 3 * feature + 3)
+        covariance[own, own] += block + LEAST_STD**2 * np.eye(3)
+    return mean, covariance
 
 
 def mean_covariances(belief: Nested) -> Floats:
@@ -254,7 +225,7 @@ def _renew_agents(
     count = num_agents(agents.moments(belief.weight, belief.position)[1], config)
     ancestors, moved = agents.resample(belief.log_weight, joint(belief), count, rng=rng)
     position, velocity, heading = moved[:, :3], moved[:, 3:6], moved[:, 6]
-    mean = moved[:, POSE:].reshape(count, -1, 3)
+    mean = moved[:, HEAD:].reshape(count, -1, 3)
     trail = belief.trail[:, ancestors]
     slew = velocity - belief.velocity[ancestors]
     trail[..., :3] += position - belief.position[ancestors] - spans[:, None, None] * slew
@@ -271,8 +242,6 @@ def _renew_agents(
         belief.covariance[ancestors],
         belief.ess,
         belief.updates,
-        belief.shift,
-        belief.follow,
     )
 
 
@@ -284,12 +253,13 @@ def _inherit(cloud: Cloud, ancestors: Integers, engine: CloudEngine) -> Cloud:
     return engine.compact(cloud) if len(np.unique(block)) < SPARSE * written else cloud
 
 
-def _follow(mean: Floats, wall: Floats | None) -> Floats:
-    """(3, 3) motion of a landmark when everything is shifted."""
-    if wall is None:
-        return np.eye(3)
-    across = unit(mean - wall)
-    return 2.0 * np.outer(across, across)
+def _normalised(log_weight: Floats) -> tuple[Floats, float]:
+    """Log weights that sum to one, and the logarithm of what they summed to; hopeless weights become equal ones."""
+    top = float(np.max(log_weight))
+    if not np.isfinite(top):
+        return np.full(len(log_weight), -np.log(len(log_weight))), -np.inf
+    total = top + float(np.log(np.sum(np.exp(log_weight - top))))
+    return log_weight - total, total
 
 
 def _root(covariance: Floats) -> Floats:

@@ -4,37 +4,29 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.nested.particles import agents
-from rislam_rt.slam.nested.particles.belief import Nested, absorb, initialise_landmark
+from rislam_rt.slam.nested.particles.belief import Nested, absorb, place_landmark
 from rislam_rt.slam.nested.particles.cloud import LEAST_STD, CloudEngine
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline
 from rislam_rt.slam.nested_config import NestedConfig
 
-SEED = 7
-"""Of the draws that spread a given map over the agent particles: the map is data, and the same each time."""
-
 
 def set_prior_map(
-    belief: Nested, features: Floats, covariance: Floats, config: NestedConfig, engine: CloudEngine
-) -> Nested:
+    belief: Nested, features: Floats, covariance: Floats, config: NestedConfig, engine: CloudEngine,
+    *, rng: np.random.Generator,
+) -> Nested:  # fmt: skip
     """Particles given a prior map: F landmarks (F, 3) with a joint covariance (3F, 3F).
 
-    What landmarks have in common is spread over the agent particles, the rest over their clouds. A known map fixes the
-    place of everything, so that the common shift is no longer kept aside but sampled as well.
+    What landmarks have in common is spread over the agent particles, the rest over their clouds.
     """
-    rng = np.random.default_rng(SEED)
-    count, dims = len(belief.log_weight), covariance.shape[0]
-    normal = agents.standardise(np.full(count, 1.0 / count), rng.standard_normal((count, 3 + dims)))
-    drift = normal[:, :3] @ _root(belief.shift).T
-    trail = belief.trail.copy()
-    trail[..., :3] += drift
-    belief = belief._replace(position=belief.position + drift, trail=trail, shift=np.zeros((3, 3)))
+    count = len(belief.log_weight)
+    normal = agents.standardise(np.full(count, 1.0 / count), rng.standard_normal((count, features.size)))
     own = _own_part(covariance)
-    means = features.ravel() + normal[:, 3:] @ _root(covariance - own).T
+    means = features.ravel() + normal @ _root(covariance - own).T
+    line = linear_sightline(np.zeros((count, 3)), np.zeros(3))
     for row in range(len(features)):
         block = own[3 * row : 3 * row + 3, 3 * row : 3 * row + 3] + LEAST_STD**2 * np.eye(3)
-        belief = initialise_landmark(belief, means[:, 3 * row : 3 * row + 3], block, config, engine, rng=rng)
-        line = linear_sightline(np.zeros((count, 3)), np.zeros(3))
-        belief, _ = absorb(belief, len(belief.clouds) - 1, [Sighting((line,), np.zeros(3), block)], engine)
+        belief = place_landmark(belief, means[:, 3 * row : 3 * row + 3], block, config, engine, rng=rng)
+        belief, _ = absorb(belief, row, [Sighting(line, np.zeros(3), block)], engine)
     return belief
 
 

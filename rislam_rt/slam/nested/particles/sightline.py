@@ -34,8 +34,8 @@ class Kind(NamedTuple):
     rx: Leg
 
 
-Kinds = tuple[tuple[Kind, ...], ...]
-"""Of every return its path, or the two paths that came out as one, halfway between."""
+Kinds = tuple[Kind, ...]
+"""Of every return."""
 
 
 class Sightline(NamedTuple):
@@ -51,10 +51,9 @@ class Sightline(NamedTuple):
 
 
 class Sighting(NamedTuple):
-    """A measurement, the paths that made it, and the error that is expected of it."""
+    """A measurement, the path that made it, and the error that is expected of it."""
 
-    lines: tuple[Sightline, ...]
-    """One, or two that are not resolved."""
+    line: Sightline
     seen: Floats
     """(3,) length [m] and two cosines."""
     covariance: Floats
@@ -63,11 +62,6 @@ class Sighting(NamedTuple):
     """Exponent of the likelihood."""
     log_factor: float = 0.0
     """Logarithm of a factor on the likelihood."""
-
-    @property
-    def kind(self) -> tuple[Kind, ...]:
-        """Of the paths."""
-        return tuple(line.kind for line in self.lines)
 
 
 NUM_LEG = {Leg.FIXED: (1, 3), Leg.POINT: (3, 3), Leg.WALL: (9, 9), Leg.LINEAR: (0, 3)}
@@ -80,15 +74,14 @@ NUM_NOISE = 10
 
 def num_constants(kinds: Kinds) -> int:
     """Constants an agent particle of some returns."""
-    return sum(NUM_NOISE + sum(NUM_LEG[k.tx][0] + NUM_LEG[k.rx][1] + NUM_AXES for k in kind) for kind in kinds)
+    return sum(NUM_NOISE + NUM_LEG[kind.tx][0] + NUM_LEG[kind.rx][1] + NUM_AXES for kind in kinds)
 
 
 def pack(sightings: Sequence[Sighting], count: int) -> Floats:
     """Constants (K, N) float32 of several returns of one owner, for `count` agent particles."""
     columns = [np.zeros((count, 0))]
     for sighting in sightings:
-        for line in sighting.lines:
-            columns += [line.tx, line.rx, line.axes]
+        columns += [sighting.line.tx, sighting.line.rx, sighting.line.axes]
         columns.append(np.broadcast_to(_noise_constants(sighting), (count, NUM_NOISE)))
     return np.ascontiguousarray(np.concatenate(columns, axis=1).T, dtype=np.float32)
 
@@ -116,8 +109,7 @@ def log_likelihood(
     take = (constant(k) for k in range(num_constants(kinds)))
     total: Any = None
     for kind in kinds:
-        paths = [_predict(path, take, x, y, z, rsqrt) for path in kind]
-        seen = paths[0] if len(paths) == 1 else [0.5 * (a + b) for a, b in zip(*paths, strict=True)]
+        seen = _predict(kind, take, x, y, z, rsqrt)
         gap = [s - next(take) for s in seen]
         white = [next(take) for _ in range(6)]
         first = white[0] * gap[0]

@@ -12,11 +12,11 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import SensorModel
 from rislam_rt.model.sensor import merged_pull
-from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, log_normal
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
-from rislam_rt.slam.schemes.bp_slam_aoa.features import GaussianFeatures, PredictedReturns, spread_over
+from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, log_normal
+from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import GaussianFeatures, PredictedReturns, spread_over
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
-from rislam_rt.slam.schemes.shared.association import Association, associate
+from rislam_rt.slam.schemes.shared.loopy_association import Association, associate
 
 GATE = 40.0
 """Squared Mahalanobis distance beyond which nothing associates (chi^2, 3 dof: 1e-8)."""

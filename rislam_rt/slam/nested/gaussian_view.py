@@ -1,0 +1,65 @@
+"""The particles as the front end looks at them: their mean and covariance as a Gaussian over a window of poses.
+
+Prediction, association, births and the map ask a belief for its present mean and covariance and for the way that led
+there (`slam.window`). A window whose accelerations follow the trail of the particles, and whose first pose is as
+uncertain as the present one makes it, tells just that.
+"""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.nested.particles.belief import Nested, gaussian
+from rislam_rt.slam.window.smoother.factor import inverse
+from rislam_rt.slam.window.smoother.steps import HEAD, POSE, TURN, basis, latest
+from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, no_holds
+
+FOLLOWED, MET = 1e-4, 1e-8
+"""Deviations [m, rad] with which the window follows the trail, and [m, m/s, rad] with which it meets the present."""
+ROUNDING = 1e-14
+"""Variance [m^2, ...] up to which a thing is known exactly: what rounding makes of none."""
+STILL = 1e-5
+"""[m/s^2] Acceleration of an axis that is known to be still."""
+
+
+def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamConfig) -> Window:
+    """The particles' Gaussian, with K poses `step` (K - 1,) [s] apart; `heading` (K,) [rad] as the compass told."""
+    mean, covariance = gaussian(belief)
+    exact = np.diag(covariance) < ROUNDING
+    covariance[exact] = covariance[:, exact] = 0.0
+    trail = np.einsum("n,knj->kj", belief.weight, belief.trail)
+    trail[:, 3] -= heading
+    mean[6] -= heading[-1]
+    turns = config.heading != "known"
+    std = np.append(np.where(config.axes > 0.0, config.sigma_a, STILL), max(config.turn_std, STILL) * 10.0)[: 3 + turns]
+    head, accel = _motion(step, trail, mean, std, turns)
+    size, count, slim = len(mean), len(heading), POSE + len(mean) - HEAD
+    back = np.eye(size)
+    back[:HEAD, :HEAD] = np.linalg.inv(latest(step.tobytes(), turns)[:, :HEAD])
+    whole = np.zeros((size + accel.size,) * 2)
+    whole[:size, :size] = back @ covariance @ back.T
+    prior = Quadratic(inverse(whole[:size, :size] + ROUNDING * np.eye(size)), np.zeros(size), head)
+    slots = Quadratic(np.zeros((count, slim, slim)), np.zeros((count, slim)), np.zeros((count, slim)))
+    precision = np.tile(std**-2.0, (count - 1, 1))
+    return Window(
+        head, accel, precision, np.zeros(accel.shape), step, prior, np.zeros((size, size)), slots, whole, no_holds()
+    )
+
+
+def _motion(step: Floats, trail: Floats, mean: Floats, std: Floats, turns: bool) -> tuple[Floats, Floats]:
+    """Head (7 + 3F,) and accelerations (K - 1, A) of the smoothest way along the trail (K, 4) to the present."""
+    count, head = len(trail), mean.copy()
+    accel = np.zeros((count - 1, len(std)))
+    weight = np.append(np.full(count - 1, 1.0 / FOLLOWED), 1.0 / MET)
+    for axis, along in enumerate(basis(step.tobytes(), turns)):
+        speed = np.concatenate([[0.0, 1.0], step]) / MET
+        calm = np.eye(count - 1, count + 1, 2) / std[axis]
+        rows = np.concatenate([weight[:, None] * along, speed[None], calm])
+        values = np.concatenate([weight * trail[:, axis], [mean[3 + axis] / MET if axis < TURN else 0.0]])
+        if axis == TURN:
+            rows[count] = 0.0
+        found = np.linalg.lstsq(rows, np.append(values, np.zeros(count - 1)), rcond=None)[0]
+        head[6 if axis == TURN else axis], accel[:, axis] = found[0], found[2:]
+        if axis < TURN:
+            head[3 + axis] = found[1]
+    return head, accel

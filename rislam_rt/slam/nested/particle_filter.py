@@ -1,0 +1,258 @@
+"""The paper's particle filter, one cycle of it: predict, classify, associate, weigh, resample, births and deaths.
+
+What is expected, what comes out as one, who is who, what a track is and which point is the panel is asked of the window
+filter's parts, which see the particles by their mean and covariance (`gaussian_view`); pose and map are the particles'.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
+from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.moments import poses_of
+from rislam_rt.slam.nested.gaussian_view import gaussian_view
+from rislam_rt.slam.nested.particles.belief import Nested, draw, drop, effective_size, propagate, remember, renew
+from rislam_rt.slam.nested.particles.engine_choice import pick_engine
+from rislam_rt.slam.nested.particles.new_landmark import LandmarkHistory, initialise_landmark
+from rislam_rt.slam.nested.particles.prior_map import set_prior_map
+from rislam_rt.slam.nested.particles.weights import FLOOR, Seen, update
+from rislam_rt.slam.nested.wall_return_removal import wall_returns
+from rislam_rt.slam.observations import is_los, observations_of, stranger_density
+from rislam_rt.slam.returns import AXES, TX, observe
+from rislam_rt.slam.start_prior import StartPrior
+from rislam_rt.slam.step_checks import check_sides, check_step
+from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
+from rislam_rt.slam.window import WindowState
+from rislam_rt.slam.window import init as window_init
+from rislam_rt.slam.window import revisit as window_revisit
+from rislam_rt.slam.window.births.feature_removal import release
+from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes
+from rislam_rt.slam.window.cycle_explanation import explain, follow, grow, names, squares, unexplained
+from rislam_rt.slam.window.divergence import divergence_monitor
+from rislam_rt.slam.window.landmarks.landmark_update import learn
+from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
+from rislam_rt.slam.window.measurement_log import Log, append
+from rislam_rt.slam.window.measurement_log import renew as renew_slots
+from rislam_rt.slam.window.numerics import REFRESH
+from rislam_rt.slam.window.ris_candidate import weigh_tracks
+from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother.steps import HEAD
+
+BROAD = 10.0
+"""Standard deviation [m] of a landmark before its measurements."""
+WALL_CYCLES = 20
+"""Measurements that a track needs where walls are found by points alone: two legs leave more room for error."""
+HELD = 1e-4
+"""Deviation [m, m/s, rad] of the start up to which a number is held and not sampled."""
+
+
+class NestedState(NamedTuple):
+    """All that the filter knows."""
+
+    front: WindowState
+    """What is known beside pose and places; its window is the particles' Gaussian."""
+    belief: Nested
+
+
+def init(
+    start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: SlamConfig,
+    *, rng: np.random.Generator,
+) -> NestedState:  # fmt: skip
+    """Particles drawn from the start prior, and an empty map."""
+    return _begin(window_init(start, body, ris, sensor, config, rng=rng), config, rng=rng)
+
+
+def revisit(state: NestedState, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> NestedState:
+    """The particle filter of another run, or another agent, on the map of an earlier one (see `window.revisit`)."""
+    return _begin(window_revisit(state.front, start, config, rng=rng), config, rng=rng)
+
+
+def _begin(front: WindowState, config: SlamConfig, *, rng: np.random.Generator) -> NestedState:
+    """Particles with the mean and covariance of a front end's single pose and map."""
+    mean, covariance = window_gaussian.now(front.window)
+    std = np.sqrt(np.diag(covariance))[:HEAD]
+    mean[6] += front.heading[-1]
+    belief = draw(mean[:HEAD], np.where(std > HELD, std, 0.0), config.nested.num_agents, rng=rng)
+    engine, features = pick_engine(config.nested.engine), mean[HEAD:].reshape(-1, 3)
+    return NestedState(front, set_prior_map(belief, features, covariance[HEAD:, HEAD:], config.nested, engine, rng=rng))
+
+
+def step(
+    state: NestedState, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: SlamConfig,
+    *, rng: np.random.Generator,
+) -> tuple[NestedState, StepInfo]:  # fmt: skip
+    """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied.
+
+    Raises
+    ------
+    ConfigError
+        One of them is no number, or not of the panel; or a component's panel is not named.
+    """
+    check_step(dt, heading, code, state.front.scene.ris)
+    check_sides(measurement, state.front.scene.ris)
+    if config.heading != "known":
+        heading = float(state.front.heading[-1])
+    turn = heading - float(state.front.heading[-1])
+    front, belief = _move(state, dt, heading, code, config, rng=rng)
+    scene, landmarks, engine = front.scene, front.landmarks, pick_engine(config.nested.engine)
+    observed = observations_of(measurement, scene.radio)
+    landmark = np.where(is_los(observed, scene.body), REMOVED, UNUSED)
+    order = np.lexsort(observed.seen.T[::-1])
+    free = order[landmark[order] == UNUSED]
+    free = free[~echoes(observed.take(free), scene.sensor.cell_length)]
+    observed = observed.take(free)
+
+    strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(front, observed)))
+    view = associate_cycle(front.window, landmarks, front.visibility, heading, scene, code, observed, strangers)
+    expected, groups, row, pick = view.expected, view.groups, view.row, view.pick
+    used = np.ones(len(row), dtype=np.bool_) if config.use_vt else expected.forms[groups.leader[row], 0] != TX
+    log = append(front.log, observed, front.cycle, front.cycle - front.window.num_poses + 1)
+    log = explain(log, expected, groups, landmarks, view.scatter, row[used], pick[used], len(observed.seen))
+    told = update(belief, _seen(front, log, view, row[used], pick[used]), config.nested, engine)
+    front = _look(front._replace(log=log), told.belief, config)
+    slots = np.arange(front.window.num_poses)[0 if front.cycle % REFRESH == 0 else -1 :]
+    left = renew_slots(front.window, log, landmarks, scene.body, front.heading, slots)[1]
+    raw = view.scatter[groups.leader[row]]
+    raw[used] = squares(left, log, len(log.cycle) - len(observed.seen) + pick[used])
+
+    taken = np.zeros(len(observed.seen), dtype=np.bool_)
+    taken[pick] = True
+    turn += float(np.diff(window_gaussian.poses(front.window)[-2:, 3]).sum())
+    followed = follow(front, view.mean, observed, (~taken).nonzero()[0], dt, turn, config.sigma_a)
+    front = front._replace(tracks=followed.tracks, log=followed.log)
+    if len(expected.seen) and len(observed.seen):
+        odds = divergence_monitor.advance(front.lost_log_odds, view.score, followed.followed, followed.kept)
+        front = front._replace(lost_log_odds=odds)
+    if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
+        front = front._replace(tracks=weigh_tracks(front.tracks, front.cycle, view.poses, scene, code))
+    visibility, landmarks = learn(
+        front.visibility, landmarks, front.window, expected, groups, view.shows, row, pick, raw, observed, view.poses,
+        scene, code,
+    )  # fmt: skip
+    landmark[free[pick]] = np.where(used, names(landmarks, expected, groups, row), REMOVED)
+    front, removed = _classify(front._replace(visibility=visibility, landmarks=landmarks), config)
+    landmark[free[removed[len(log.cycle) - len(observed.seen) :]]] = REMOVED
+
+    grown = grow(front, left, expected, groups)
+    # a wall found by a point that it stands before is gone with it
+    found = grown.landmarks.ident
+    grown = release(grown, (found < landmarks.next_ident) | np.isin(found, grown.log.form[:, 0]))
+    belief = _follow_map(told.belief, front, grown, config, rng=rng)
+    ess = effective_size(belief)
+    belief, resampled = renew(belief, _spans(grown), config.nested, engine, rng=rng)
+    outcome = _outcome(len(measurement), grown)
+    front = _look(grown._replace(cycle=grown.cycle + 1), belief, config)
+    count = len(front.landmarks.points)
+    info = StepInfo(landmark, ess, resampled, told.nis, 3 * int(used.sum()), told.log_evidence, count, outcome)
+    return NestedState(front, belief), info
+
+
+def _move(
+    state: NestedState, dt: float, heading: float, code: RisCode | None, config: SlamConfig, *, rng: np.random.Generator
+) -> tuple[WindowState, Nested]:
+    """The belief carried to the next cycle, whose pose joins the trail."""
+    front, belief = state
+    first = dt <= 0.0 and front.cycle == 0
+    if not first:
+        turn = config.turn_std * np.sqrt(dt) if config.heading == "estimated" else 0.0
+        belief = propagate(belief, dt, config.sigma_a * config.axes, turn, rng=rng)
+    if config.heading == "known":
+        belief = belief._replace(heading=np.full_like(belief.heading, heading))
+    elif config.heading == "velocity":
+        belief = belief._replace(heading=np.arctan2(belief.velocity[:, 1], belief.velocity[:, 0]))
+    belief = remember(belief, 1 if first else CONSTANTS.window)
+    keep = len(belief.trail)
+    step = np.zeros(0) if first else np.append(front.window.step, dt)[1 - keep :]
+    headings = np.append(front.heading[:0] if first else front.heading, heading)[-keep:]
+    front = front._replace(
+        window=front.window._replace(step=step), heading=headings, codes=(*front.codes, code)[-keep:]
+    )  # fmt: skip
+    return _look(front, belief, config), belief
+
+
+def _look(front: WindowState, belief: Nested, config: SlamConfig) -> WindowState:
+    """The front end's state after the particles have changed."""
+    return front._replace(window=gaussian_view(belief, front.window.step, front.heading, config))
+
+
+def _spans(front: WindowState) -> Floats:
+    """(K,) time [s] from each pose of the trail to now."""
+    return np.append(np.cumsum(front.window.step[::-1])[::-1], 0.0)
+
+
+def _seen(front: WindowState, log: Log, view: CycleAssociation, row: Integers, pick: Integers) -> Seen:
+    """Clusters `row` (A,) seen as the cycle's components `pick` (A,): each as its strongest return, moved by what the
+    partner in its cell is expected to pull."""
+    at = np.searchsorted(log.cycle, front.cycle) + pick
+    returns = compile_forms(front.landmarks.rows(log.form[at, 0]))
+    seen = log.seen[at] - log.share[at, None] * view.groups.gap[row]
+    crowd = np.maximum(view.scatter[view.groups.leader[row]], 1.0)[:, None] - 1.0
+    noise = log.std[at] ** 2 + log.extra[at] + (1.0 - CONSTANTS.memory) * crowd * log.std[at] ** 2 + FLOOR**2
+    return Seen(returns, front.landmarks.anchor, front.scene.body, seen, noise)
+
+
+def _classify(front: WindowState, config: SlamConfig) -> tuple[WindowState, Booleans]:
+    """Which tracks are not examined: young ones, and wall returns, where these are thrown away; and which of the log's
+    components (N,) are such returns."""
+    tracks, scene = front.tracks, front.scene
+    need = config.nested.birth_cycles if config.use_vt or not len(front.landmarks.ident) else WALL_CYCLES
+    looked = np.maximum(tracks.looked, 2 * need // 3)  # looked at again when their measurements have grown by a half
+    removed = np.zeros(len(tracks.ident), dtype=np.bool_)
+    if not config.use_vt:
+        poses = window_gaussian.poses(front.window)
+        poses[:, 3] += front.heading
+        removed = wall_returns(tracks, front.log, front.cycle, poses, scene.body, scene.radio, config.nested)
+        looked = np.where(removed, tracks.hits, looked)
+    return front._replace(tracks=tracks._replace(looked=looked)), np.isin(front.log.track, tracks.ident[removed])
+
+
+def _follow_map(
+    belief: Nested, before: WindowState, after: WindowState, config: SlamConfig, *, rng: np.random.Generator
+) -> Nested:
+    """The particles with the landmarks that the front end holds now: some have gone, one may be new."""
+    keep = np.isin(before.landmarks.ident, after.landmarks.ident)
+    belief = belief if keep.all() else drop(belief, keep)
+    for row in range(len(belief.clouds), len(after.landmarks.ident)):
+        engine, history = pick_engine(config.nested.engine), _history(after, row)
+        belief = initialise_landmark(belief, history, after.scene.body, _spans(after), config.nested, engine, rng=rng)
+    return belief
+
+
+def _history(front: WindowState, row: int) -> LandmarkHistory:
+    """What a new feature of the front end's map was found by."""
+    landmarks, log, window = front.landmarks, front.log, front.window
+    at = (log.form[:, 0] == landmarks.ident[row]).any(axis=1).nonzero()[0]
+    forms = landmarks.rows(log.form[at[0]])
+    slots = log.cycle[at] - (front.cycle - window.num_poses + 1)
+    known = np.unique(forms[0, (forms[0] >= 0) & (forms[0] != row)])
+    local = np.append(known, row)
+    own = np.where(forms[0] >= 0, np.searchsorted(known, forms[0]), forms[0])
+    own = np.where(forms[0] == row, len(known), own)
+    seen = log.seen[at]
+    if forms[1, 0] != UNKNOWN:  # it comes out as one with another return: moved by what that pulls
+        place = window_gaussian.poses(window)[slots]
+        poses = poses_of(place[:, :3], front.heading[slots] + place[:, 3], front.scene.body)
+        both = np.stack([observe(compile_forms(forms[[k]]), window.features, landmarks.anchor, poses).seen[:, 0]
+                         for k in range(2)])  # fmt: skip
+        seen = seen - log.share[at, None] * (both[1] - both[0])
+    holds = window.holds
+    mine = (holds.feature == row).nonzero()[0]
+    axis, weight = holds.axis[mine], holds.probability[mine] / holds.std[mine] ** 2
+    information = BROAD**-2.0 * AXES + (axis.T * weight) @ axis
+    place = BROAD**-2.0 * window.features[row] + axis.T @ (weight * holds.aim[mine])
+    prior = np.linalg.inv(information)
+    return LandmarkHistory(
+        compile_forms(own[None]), known, landmarks.anchor[local], prior @ place, prior, slots, seen,
+        log.std[at] ** 2 + log.extra[at] / CONSTANTS.memory,
+    )  # fmt: skip
+
+
+def _outcome(heard: int, front: WindowState) -> StepOutcome:
+    if not heard:
+        return StepOutcome.NO_MEASUREMENTS
+    if front.lost_log_odds >= 0.0:
+        return StepOutcome.DIVERGED
+    return StepOutcome.OK if len(front.landmarks.ident) else StepOutcome.NO_LANDMARKS
