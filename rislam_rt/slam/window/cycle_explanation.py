@@ -33,7 +33,7 @@ from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
 
 
-class Heard(NamedTuple):
+class HeardCycle(NamedTuple):
     """M components of a cycle that need an explanation: neither the direct path nor echoes."""
 
     observed: Observations
@@ -43,14 +43,14 @@ class Heard(NamedTuple):
     """(N,) label of every component of the measurement."""
 
 
-def listen(measurement: Measurement, scene: KnownEnvironment) -> Heard:
+def listen(measurement: Measurement, scene: KnownEnvironment) -> HeardCycle:
     """What a measurement leaves to explain, by delay and direction, so that nothing hangs on its order."""
     observed = observations_of(measurement, scene.radio)
     landmark = np.where(is_los(observed, scene.body), REMOVED, UNUSED)
     order = np.lexsort(observed.seen.T[::-1])
     free = order[landmark[order] == UNUSED]
     free = free[~echoes(observed.take(free), scene.sensor.cell_length)]
-    return Heard(observed.take(free), free, landmark)
+    return HeardCycle(observed.take(free), free, landmark)
 
 
 def take_in(state: WindowState, observed: Observations, view: CycleAssociation) -> tuple[WindowState, Booleans]:
@@ -68,7 +68,7 @@ def take_in(state: WindowState, observed: Observations, view: CycleAssociation) 
 
 
 def learn_cycle(
-    state: WindowState, heard: Heard, view: CycleAssociation, used: Booleans, left: Residuals, dt: float, turn: float,
+    state: WindowState, heard: HeardCycle, view: CycleAssociation, used: Booleans, left: Residuals, dt: float, turn: float,
     bend: float, code: RisCode | None,
 ) -> tuple[WindowState, Integers]:  # fmt: skip
     """All that a cycle tells beside pose and places: tracks, whether the agent is lost, what is hidden, strengths, the
