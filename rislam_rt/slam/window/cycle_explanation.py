@@ -68,8 +68,8 @@ def take_in(state: WindowState, observed: Observations, view: CycleAssociation) 
 
 
 def learn_cycle(
-    state: WindowState, heard: HeardCycle, view: CycleAssociation, used: Booleans, left: Residuals, dt: float, turn: float,
-    bend: float, code: RisCode | None,
+    state: WindowState, heard: HeardCycle, view: CycleAssociation, used: Booleans, left: Residuals, dt: float,
+    turn: float, bend: float, code: RisCode | None,
 ) -> tuple[WindowState, Integers]:  # fmt: skip
     """All that a cycle tells beside pose and places: tracks, whether the agent is lost, what is hidden, strengths, the
     panel; and the labels (N,) of the measurement. `left` are the components' residuals once the belief has moved.
