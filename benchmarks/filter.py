@@ -26,8 +26,8 @@ from rislam_rt.model import Body
 from rislam_rt.slam import NestedConfig
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.particles import belief
-from rislam_rt.slam.nested.particles.backend import pick_engine
 from rislam_rt.slam.nested.particles.cloud import CloudEngine, Kernel, kernel_width
+from rislam_rt.slam.nested.particles.engine_choice import pick_engine
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, pack, trace_sightline
 from rislam_rt.slam.nested.particles.weights import Seen, update
 from rislam_rt.slam.returns import NONE, Returns, observe

@@ -69,7 +69,7 @@ MUTANTS = (
         '        if method == "random":  # looks at no belief', "        if not is_own(method):", 5, 3,
     ),
     Mutant(
-        "never diverged", "slam/window/filter.py",
+        "never diverged", "slam/window/cycle_explanation.py",
         "        return StepOutcome.DIVERGED\n", "        return StepOutcome.OK\n", 5, 3,
     ),
     Mutant(

@@ -27,7 +27,7 @@ from rislam_rt.report.style import save_figure, styled
 from rislam_rt.ris import leg_response
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.scene import load_scene
-from rislam_rt.slam.identity import (
+from rislam_rt.slam.panel_evidence import (
     STRENGTHS,
     add_evidence,
     log_panel,

@@ -97,7 +97,7 @@ def single(received: Received) -> NoiselessComponents:
 
 
 def lone_errors(parts: NoiselessComponents, radio: RadioConfig, draws: Floats) -> ComponentErrors:
-    """Each component as if it were alone."""
+    """Errors of components, and what is reported of them, each as if it were alone in its cell."""
     tau, cosines = path_std(radio.integrated_snr(parts.gain), radio)
     deviation = np.column_stack([tau, cosines])
     gain_std = np.full(len(tau), np.sqrt(2.0) * amplitude_std(radio))

@@ -21,7 +21,8 @@ from rislam_rt.pipeline.cycle import (
     run_cycle,
 )
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
-from rislam_rt.pipeline.record import gather, given_of
+from rislam_rt.pipeline.record import gather
+from rislam_rt.pipeline.recordings.recorded_inputs import given_of
 from rislam_rt.pipeline.room.diffuse_clutter import received_clutter
 from rislam_rt.pipeline.room.front_end import prepare_front_end
 from rislam_rt.pipeline.schemes import SCHEMES

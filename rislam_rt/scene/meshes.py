@@ -6,7 +6,7 @@ import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,34 +50,6 @@ def as_mesh(triangles: Floats) -> Mesh:
     """Triangles (T, 3, 3) as a mesh with shared corners."""
     vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     return Mesh(vertices, index.reshape(-1, 3).astype(np.int64))
-
-
-def read_inside(folder: Path, name: str, limit: int) -> bytes:
-    """Content of a file that a scene names, which must lie inside the scene's folder, links followed.
-
-    Raises
-    ------
-    Fault
-        The name leaves the folder, or the file is missing, too large or unreadable.
-    """
-    relative = PurePosixPath(name)
-    if not name or relative.is_absolute() or ".." in relative.parts or "\\" in name or not name.isprintable():
-        raise Fault(f"'{one_line(name)[:80]}' does not stay inside the scene's folder", "give a relative path below it")
-    path = folder / relative
-    try:
-        if not path.resolve().is_relative_to(folder.resolve()):
-            raise Fault(f"'{name[:80]}' leads out of the scene's folder by a link", "copy the file into the folder")
-        if not path.is_file():
-            kind = "is not a file" if path.exists() else "does not exist"
-            raise Fault(f"'{name[:80]}' {kind}", "put the file there or mend the path")
-        with path.open("rb") as file:
-            content = file.read(limit + 1)
-    except (OSError, ValueError, RuntimeError) as error:
-        cause = one_line(str(error))[:60]
-        raise Fault(f"'{name[:80]}' cannot be read ({cause})", "check the file and its permissions") from None
-    if len(content) > limit:
-        raise Fault(f"'{name[:80]}' is larger than {limit} bytes", "give a smaller file")
-    return content
 
 
 class MeshReader:

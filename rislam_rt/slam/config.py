@@ -7,6 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
 from rislam_rt.slam.nested_config import NestedConfig
+from rislam_rt.slam.setting_checks import check_inside, check_named, check_not_negative
 
 FILTERS = ("window", "nested")
 """Filters with the same inputs and outputs."""
@@ -47,24 +48,15 @@ class SlamConfig:
     """What only the filter `nested` takes."""
 
     def __post_init__(self) -> None:
-        for name, value, allowed in (
-            ("filter", self.filter, FILTERS),
-            ("heading", self.heading, ("known", "velocity", "estimated")),
-            ("motion", self.motion, ("learnt", "told")),
-            ("height", self.height, ("known", "estimated")),
-        ):
-            if value not in allowed:
-                raise ConfigError(f"slam.{name}: '{value}' received; give one of {', '.join(allowed)}")
+        states = ("known", "estimated")
+        choices = {"filter": FILTERS, "heading": (*states, "velocity"), "motion": ("learnt", "told"), "height": states}
+        check_named("slam", self, choices)
         if self.filter == "window" and self.heading == "velocity":
             raise ConfigError("slam.heading: 'velocity' received; the filter 'window' takes 'known' or 'estimated'")
         if not 1 <= self.num_samples <= MAX_SAMPLES:
             raise ConfigError(f"slam.num_samples: {self.num_samples} received; give 1 to {MAX_SAMPLES}")
-        for name in ("sigma_a", "new_density"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ConfigError(f"slam.{name}: {value} received; give a positive number")
-        if not (np.isfinite(self.turn_std) and self.turn_std >= 0.0):
-            raise ConfigError(f"slam.turn_std: {self.turn_std} received; give a spread of at least 0")
+        check_inside("slam", self, ("sigma_a", "new_density"), np.inf, "a positive number")
+        check_not_negative("slam", self, ("turn_std",))
         if not 0 <= self.max_bounces <= 2:
             raise ConfigError(f"slam.max_bounces: {self.max_bounces} received; give 0, 1 or 2")
 

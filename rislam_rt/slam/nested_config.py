@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.slam.setting_checks import check_counts, check_inside, check_named
 
 WEIGHTINGS = ("crlb", "power", "paper")
 """How an amplitude counts: its own standard deviations through the bound, an exponent, or the paper's common factor."""
@@ -14,8 +15,6 @@ CLASSIFIERS = ("amplitude", "geometric", "network")
 """Rules by which components are taken for wall returns."""
 MOST = {"num_agents": 1_000_000, "num_points": 1_000_000, "birth_cycles": 40}
 """Largest counts: of particles ten times and more what any study of this package takes; of cycles, those kept."""
-LEAST = {"num_agents": 4, "num_points": 4, "min_agents": 4, "min_points": 4, "capacity": 4, "birth_cycles": 1}
-"""Least counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,22 +56,13 @@ class NestedConfig:
     """Measurements that a track needs before a landmark can come of it."""
 
     def __post_init__(self) -> None:
-        for name, value, allowed in (
-            ("weighting", self.weighting, WEIGHTINGS),
-            ("engine", self.engine, ENGINES),
-            ("classifier", self.classifier, CLASSIFIERS),
-        ):
-            if value not in allowed:
-                raise ConfigError(f"nested.{name}: '{value}' received; give one of {', '.join(allowed)}")
-        for name, least in LEAST.items():
-            if getattr(self, name) < least:
-                raise ConfigError(f"nested.{name}: {getattr(self, name)} received; give at least {least}")
+        check_named("nested", self, {"weighting": WEIGHTINGS, "engine": ENGINES, "classifier": CLASSIFIERS})
+        check_counts("nested", self, ("num_agents", "num_points", "min_agents", "min_points", "capacity"), 4)
+        check_counts("nested", self, ("birth_cycles",))
         for name, most in MOST.items():
             if getattr(self, name) > most:
                 raise ConfigError(f"nested.{name}: {getattr(self, name)} received; give at most {most}")
-        for name in ("agent_cell", "point_cell", "common_length_std", "common_cosine_std", "specular_ratio"):
-            number = getattr(self, name)
-            if not (np.isfinite(number) and number > 0.0):
-                raise ConfigError(f"nested.{name}: {number} received; give a positive number")
+        positive = ("agent_cell", "point_cell", "common_length_std", "common_cosine_std", "specular_ratio")
+        check_inside("nested", self, positive, np.inf, "a positive number")
         if not 0.0 < self.resample_below <= 1.0:
             raise ConfigError(f"nested.resample_below: {self.resample_below} received; give a number in (0, 1]")

@@ -29,16 +29,12 @@ class Observations(NamedTuple):
     """(M,)."""
     log_amplitude_std: Floats
     """(M,)."""
-    amplitude_std: Floats
-    """(M,)."""
     ratio: Floats
     """(M,) amplitude over that of free space of the same length."""
     side: Integers | None = None
     """(M,) `PANEL`, `OTHER` or, where either may be, `UNTOLD`; None where the receiver does not tell."""
     panel_odds: Floats | None = None
     """(M,) log odds of having run over the panel, of several the likeliest, likewise."""
-    panel: Integers | None = None
-    """(M,) which panel that is; None where there is one."""
 
     @property
     def sides(self) -> Integers:
@@ -49,11 +45,6 @@ class Observations(NamedTuple):
     def odds(self) -> Floats:
         """(M,) log odds of having run over the panel, 0 where the receiver does not tell."""
         return np.zeros(len(self.ratio)) if self.panel_odds is None else self.panel_odds
-
-    def odds_of(self, panels: int) -> Floats:
-        """(M, Q) log odds of having run over each of the panels; over those that are not the likeliest: no better."""
-        number = np.zeros(len(self.ratio), dtype=np.int64) if self.panel is None else self.panel
-        return np.where(number[:, None] == np.arange(panels), self.odds[:, None], -np.abs(self.odds)[:, None])
 
     def take(self, rows: Integers) -> "Observations":
         """Only some of the observations."""
@@ -76,10 +67,8 @@ def observations_of(measurement: Measurement, radio: RadioConfig) -> Observation
         np.clip(std, 1e-5, FAR),
         np.log(amplitude),
         np.minimum(measurement.amplitude_std / amplitude, 1.0),
-        np.clip(measurement.amplitude_std, 1e-30, 1e30),
         amplitude / free,
         *side_of(measurement.from_panel, measurement.panel),
-        measurement.panel,
     )
 
 

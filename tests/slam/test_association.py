@@ -5,8 +5,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rislam_rt.arrays import Floats
-from rislam_rt.slam.associate import Candidates, associate, inverse_3x3, pair_costs
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.slam.assignment import Candidates, cheapest, inverse_3x3, pair_costs
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 
 GATE, CLUTTER = 16.3, 0.016
@@ -30,12 +30,18 @@ def draw_candidates(count: int, *, rng: np.random.Generator) -> Candidates:
     )
 
 
+def associate(candidates: Candidates, observations: Observations, clutter: float = CLUTTER) -> Integers:
+    """Measurement (C,) of each candidate, -1 for none."""
+    chosen = np.full(len(candidates.seen), -1)
+    rows, columns = cheapest(pair_costs(candidates, observations, GATE, clutter))
+    chosen[rows] = columns
+    return chosen
+
+
 def observed(seen: Floats, log_amplitude: Floats, std: float = 0.02) -> Observations:
     """Measurements as the filter looks at them."""
     count = len(seen)
-    return Observations(
-        seen, np.full((count, 3), std), log_amplitude, np.full(count, 0.1), np.ones(count), np.zeros(count)
-    )
+    return Observations(seen, np.full((count, 3), std), log_amplitude, np.full(count, 0.1), np.zeros(count))
 
 
 def test_assignment_is_the_best_of_all() -> None:
@@ -49,7 +55,7 @@ def test_assignment_is_the_best_of_all() -> None:
             found.seen[rng.integers(here, size=there)] + 0.05 * rng.normal(size=(there, 3)), np.zeros(there)
         )
         cost = pair_costs(found, seen, GATE, CLUTTER)
-        chosen = associate(found, seen, GATE, CLUTTER)
+        chosen = associate(found, seen)
         best = min(
             sum(cost[row, column] for row, column in enumerate(choice) if column >= 0)
             for choice in product(range(-1, there), repeat=int(here))
@@ -90,15 +96,15 @@ def test_beyond_the_gate_nothing_is_paired(axis: int) -> None:
         else:
             fade[0] = factor * np.sqrt(GATE * (0.05**2 + 0.1**2))
         # clutter is made so rare that only the gate stands between the two
-        assert (associate(found, observed(seen, fade), GATE, 1e-9)[0] == 0) == paired
+        assert (associate(found, observed(seen, fade), 1e-9)[0] == 0) == paired
 
 
 def test_nothing_to_assign() -> None:
     rng = np.random.default_rng(1)
     none = observed(np.zeros((0, 3)), np.zeros(0))
-    np.testing.assert_array_equal(associate(draw_candidates(3, rng=rng), none, GATE, CLUTTER), [-1, -1, -1])
+    np.testing.assert_array_equal(associate(draw_candidates(3, rng=rng), none), [-1, -1, -1])
     empty = Candidates._make(field[:0] for field in draw_candidates(1, rng=rng))
-    assert len(associate(empty, observed(np.zeros((2, 3)), np.zeros(2)), GATE, CLUTTER)) == 0
+    assert len(associate(empty, observed(np.zeros((2, 3)), np.zeros(2)))) == 0
 
 
 def test_small_inverses(rng: np.random.Generator) -> None:
@@ -118,4 +124,4 @@ def test_what_runs_over_the_panel_is_not_paired_with_what_does_not(mine: int, ot
         np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, 0.05), np.zeros(1), np.full(1, mine)
     )
     seen = observed(np.zeros((1, 3)), np.zeros(1))._replace(side=np.full(1, other))
-    assert (associate(found, seen, GATE, 1e-9)[0] == 0) == paired
+    assert (associate(found, seen, 1e-9)[0] == 0) == paired

@@ -7,7 +7,8 @@ import pytest
 
 from rislam_rt.model import RadioConfig, RisCode, RisSpec
 from rislam_rt.ris.path_gain import panel_path_gain, point_amplitude
-from rislam_rt.slam.identity import (
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.panel_evidence import (
     STRENGTHS,
     add_evidence,
     log_missed,
@@ -19,7 +20,6 @@ from rislam_rt.slam.identity import (
     panel_probabilities,
     weigh_silence,
 )
-from rislam_rt.slam.model_constants import CONSTANTS
 
 RADIO = RadioConfig()
 PANEL = RisSpec(6, 6, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))

@@ -1,9 +1,7 @@
 """Lengths below which the tracer's float32 rays say nothing."""
 
-import numpy as np
-
 from rislam_rt.arrays import Floats
-from rislam_rt.constants import RAY_OFFSET
+from rislam_rt.geometry.coplanar import tracer_gap
 from rislam_rt.model import Scene
 
 SEGMENT_LIMIT = 1e-5
@@ -25,4 +23,4 @@ def shortest_segment(scene: Scene) -> float:
     segment shortened, whose start and whose end it moves off their surfaces. 0.06 mm in a room of 6 m, 0.6 mm in one of
     100 m. Longer ones are lost to float32 as well, where they run along a surface or end close to a corner: the path
     certificate computes that path by path."""
-    return SEGMENT_LIMIT + 2.0 * RAY_OFFSET * (1.0 + float(np.abs(scene.bounds - room_center(scene)).max()))
+    return SEGMENT_LIMIT + 2.0 * tracer_gap(scene.bounds)

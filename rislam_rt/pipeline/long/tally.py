@@ -19,8 +19,8 @@ from rislam_rt.pipeline.scores.summary import (
     nees_per_dof,
     over_budget,
     path_sources,
-    wall_scores,
 )
+from rislam_rt.pipeline.scores.walls import wall_scores
 
 CLUTTER = None
 

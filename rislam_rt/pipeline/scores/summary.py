@@ -4,10 +4,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy
 
-from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.walls import Walls, build_walls
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.evaluate import (
     align,
     association_score,
@@ -22,6 +20,7 @@ from rislam_rt.model import NOTHING, STEPS, MapEstimate, PathKind, Paths, Scene,
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.scores.bound import SchemeBound, scheme_bound
+from rislam_rt.pipeline.scores.walls import wall_scores
 
 DIVERGED = 0.5
 """Position error [m] that no run may reach unless the bound is of that size: a fraction of the room."""
@@ -29,8 +28,6 @@ FAR_OVER = 5.0
 """Error over bound that chance does not explain: five standard deviations even if all error is along one line."""
 NEAR_LANDMARK = 1.0
 """Distance [m] from a true landmark beyond which an estimate is not held for it."""
-NEAR_WALL = 0.5
-"""RMS distance [m] from a true wall, over its surface, beyond which an estimated plane is not held for it."""
 
 
 Source = tuple[int, int]
@@ -169,64 +166,6 @@ def landmark_scores(scene: Scene, scheme: SchemeResult, least: SchemeBound | Non
             entry["cycles_identified"] = int(np.sum(scheme.named(panel)[cycles, column[cycles]]))
         scores[name] = entry
     return scores
-
-
-def wall_scores(scene: Scene, estimate: MapEstimate, least: SchemeBound | None = None) -> dict[str, dict[str, Any]]:
-    """Scores of each wall of the last map: RMS distance over its true surface, angle, offset; null if missing.
-
-    With the deviation of the angle, both tilts together, that the map itself reckons with, and the bounds of angle and
-    offset. A wall that no path meets cannot be found: it has no bound, and no plane stands for it.
-    """
-    walls = build_walls(scene)
-    heard = None if least is None else np.array([name in least.walls for name in walls.names], dtype=np.bool_)
-    match = match_walls(walls, estimate, heard)
-    scores: dict[str, dict[str, Any]] = {}
-    for number, name in enumerate(walls.names):
-        row, bound = match[number], least.walls.get(name) if least else None
-        bounds = {
-            "bound_deg": float(np.degrees(bound.angle)) if bound else None,
-            "bound_m": bound.distance if bound else None,
-        }
-        if row < 0:
-            scores[name] = {"rmse_m": None, "angle_deg": None, "offset_m": None, "std_deg": None, **bounds}
-            continue
-        normal, offset = estimate.wall_normal[row], estimate.wall_offset[row]
-        cosine = abs(float(normal @ walls.normal[number]))
-        sine = float(np.linalg.norm(np.cross(normal, walls.normal[number])))
-        middle, _ = walls.surface(number)
-        scores[name] = {
-            "rmse_m": surface_rms(walls, number, normal, offset),
-            "angle_deg": float(np.degrees(np.arctan2(sine, cosine))),
-            "offset_m": abs(float(normal @ middle - offset)),
-            "std_deg": float(np.degrees(np.sqrt(2.0) * estimate.wall_std[row, 0])),
-            **bounds,
-        }
-    return scores
-
-
-def match_walls(walls: Walls, estimate: MapEstimate, heard: Booleans | None = None) -> Integers:
-    """Row (W,) of the estimated plane that stands for each true wall that is `heard` (W,), -1 for none; one to one."""
-    match = np.full(len(walls), -1)
-    asked = np.arange(len(walls)) if heard is None else np.flatnonzero(heard)
-    planes = list(zip(estimate.wall_normal, estimate.wall_offset, strict=True))
-    if not planes or not len(asked):
-        return match
-    cost = np.array([[surface_rms(walls, int(w), n, float(d)) for n, d in planes] for w in asked])
-    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(cost, 10.0 * NEAR_WALL))
-    good = cost[rows, columns] <= NEAR_WALL
-    match[asked[rows[good]]] = columns[good]
-    return match
-
-
-def surface_rms(walls: Walls, number: int, normal: Floats, offset: float) -> float:
-    """Score of a wall: RMS distance [m] of a plane from it, over its surface.
-
-    The distance is linear in the point: over a triangle its mean square is (sum of squares + square of the sum) / 12.
-    """
-    _, weight = walls.surface(number)
-    distance = walls.triangles[walls.wall_of_triangle == number] @ normal - offset
-    square = (np.sum(distance**2, axis=1) + np.sum(distance, axis=1) ** 2) / 12.0
-    return float(np.sqrt(weight @ square))
 
 
 def component_labels(paths: Paths, scheme: SchemeResult) -> tuple[Integers, Integers]:

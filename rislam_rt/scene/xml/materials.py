@@ -7,8 +7,8 @@ from rislam_rt.errors import SceneError
 from rislam_rt.model import Material
 from rislam_rt.model.itu import ITU_MATERIALS
 from rislam_rt.scene.findings import Fault, one_line
-from rislam_rt.scene.xml.parse import children
 from rislam_rt.scene.xml.shapes import number
+from rislam_rt.scene.xml.untrusted_xml import children
 
 DEFAULT_THICKNESS = 0.1
 """[m] What Sionna takes where a scene gives none."""

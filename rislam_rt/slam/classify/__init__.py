@@ -1,6 +1,5 @@
 """Which multipath components came over a landmark: a small network, its features, and a geometric baseline."""
 
-from rislam_rt.slam.classify.features import FEATURES, MotionFit, Sightings, fit_motion, track_features
 from rislam_rt.slam.classify.geometric import classify_geometric
 from rislam_rt.slam.classify.network import (
     Network,
@@ -11,6 +10,7 @@ from rislam_rt.slam.classify.network import (
     network_arrays,
     read_network,
 )
+from rislam_rt.slam.classify.sighting_features import FEATURES, MotionFit, Sightings, fit_motion, track_features
 
 __all__ = [
     "FEATURES",

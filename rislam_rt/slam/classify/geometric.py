@@ -7,8 +7,8 @@ A corner of two walls at right angles moves as a point does, and is taken for on
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.classify.features import FEATURES
-from rislam_rt.slam.classify.still import stillness
+from rislam_rt.slam.classify.sighting_features import FEATURES
+from rislam_rt.slam.classify.stillness import stillness
 
 TURN, TURN_STD = FEATURES.index("turn"), FEATURES.index("turn_std")
 APPROACH, APPROACH_STD = FEATURES.index("approach"), FEATURES.index("approach_std")

@@ -10,7 +10,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.errors import ConfigError
-from rislam_rt.slam.classify.features import FEATURES
+from rislam_rt.slam.classify.sighting_features import FEATURES
 
 NUM_LAYERS = 3
 WEIGHTS = "weights.npz"

@@ -8,36 +8,32 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.gaussian_view import gaussian_view
-from rislam_rt.slam.nested.particles.backend import pick_engine
 from rislam_rt.slam.nested.particles.belief import Nested, draw, drop, effective_size, propagate, remember, renew
+from rislam_rt.slam.nested.particles.engine_choice import pick_engine
 from rislam_rt.slam.nested.particles.new_landmark import LandmarkHistory, initialise_landmark
 from rislam_rt.slam.nested.particles.prior_map import set_prior_map
 from rislam_rt.slam.nested.particles.weights import FLOOR, Seen, update
 from rislam_rt.slam.nested.wall_return_removal import wall_returns
-from rislam_rt.slam.observations import is_los, observations_of, stranger_density
-from rislam_rt.slam.returns import AXES, TX, observe
+from rislam_rt.slam.observations import stranger_density
+from rislam_rt.slam.returns import AXES, observe
 from rislam_rt.slam.start_prior import StartPrior
-from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
+from rislam_rt.slam.step_checks import check_sides, check_step
+from rislam_rt.slam.step_info import REMOVED, StepInfo
 from rislam_rt.slam.window import WindowState
 from rislam_rt.slam.window import init as window_init
 from rislam_rt.slam.window import revisit as window_revisit
 from rislam_rt.slam.window.births.feature_removal import release
-from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes
-from rislam_rt.slam.window.divergence import divergence_monitor
-from rislam_rt.slam.window.explanation import explain, follow, grow, names, squares, unexplained
-from rislam_rt.slam.window.landmarks.landmark_update import learn
+from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle
+from rislam_rt.slam.window.cycle_explanation import grow, learn_cycle, listen, outcome_of, take_in, unexplained
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.measurement_log import Log, append
 from rislam_rt.slam.window.measurement_log import renew as renew_slots
 from rislam_rt.slam.window.numerics import REFRESH
-from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.steps import HEAD
 
@@ -98,52 +94,27 @@ def step(
     turn = heading - float(state.front.heading[-1])
     front, belief = _move(state, dt, heading, code, config, rng=rng)
     scene, landmarks, engine = front.scene, front.landmarks, pick_engine(config.nested.engine)
-    observed = observations_of(measurement, scene.radio)
-    landmark = np.where(is_los(observed, scene.body), REMOVED, UNUSED)
-    order = np.lexsort(observed.seen.T[::-1])
-    free = order[landmark[order] == UNUSED]
-    free = free[~echoes(observed.take(free), scene.sensor.cell_length)]
-    observed = observed.take(free)
-
+    heard = listen(measurement, scene)
+    observed = heard.observed
     strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(front, observed)))
     view = associate_cycle(front.window, landmarks, front.visibility, heading, scene, code, observed, strangers)
-    expected, groups, row, pick = view.expected, view.groups, view.row, view.pick
-    used = np.ones(len(row), dtype=np.bool_) if config.use_vt else expected.forms[groups.leader[row], 0] != TX
-    log = append(front.log, observed, front.cycle, front.cycle - front.window.num_poses + 1)
-    log = explain(log, expected, groups, landmarks, view.scatter, row[used], pick[used], len(observed.seen))
-    told = update(belief, _seen(front, log, view, row[used], pick[used]), config.nested, engine)
-    front = _look(front._replace(log=log), told.belief, config)
+    front, used = take_in(front, observed, view)
+    told = update(belief, _seen(front, view, used), config.nested, engine)
+    front = _look(front, told.belief, config)
     slots = np.arange(front.window.num_poses)[0 if front.cycle % REFRESH == 0 else -1 :]
-    left = renew_slots(front.window, log, landmarks, scene.body, front.heading, slots)[1]
-    raw = view.scatter[groups.leader[row]]
-    raw[used] = squares(left, log, len(log.cycle) - len(observed.seen) + pick[used])
+    left = renew_slots(front.window, front.log, landmarks, scene.body, front.heading, slots)[1]
+    front, landmark = learn_cycle(front, heard, view, used, left, dt, turn, config.sigma_a, code)
+    front, removed = _classify(front, config)
+    landmark[heard.free[removed[len(removed) - len(observed.seen) :]]] = REMOVED
 
-    taken = np.zeros(len(observed.seen), dtype=np.bool_)
-    taken[pick] = True
-    turn += float(np.diff(window_gaussian.poses(front.window)[-2:, 3]).sum())
-    followed = follow(front, view.mean, observed, (~taken).nonzero()[0], dt, turn, config.sigma_a)
-    front = front._replace(tracks=followed.tracks, log=followed.log)
-    if len(expected.seen) and len(observed.seen):
-        odds = divergence_monitor.advance(front.lost_log_odds, view.score, followed.followed, followed.kept)
-        front = front._replace(lost_log_odds=odds)
-    if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
-        front = front._replace(tracks=weigh_tracks(front.tracks, front.cycle, view.poses, scene, code))
-    visibility, landmarks = learn(
-        front.visibility, landmarks, front.window, expected, groups, view.shows, row, pick, raw, observed, view.poses,
-        scene, code,
-    )  # fmt: skip
-    landmark[free[pick]] = np.where(used, names(landmarks, expected, groups, row), REMOVED)
-    front, removed = _classify(front._replace(visibility=visibility, landmarks=landmarks), config)
-    landmark[free[removed[len(log.cycle) - len(observed.seen) :]]] = REMOVED
-
-    grown = grow(front, left, expected, groups)
+    grown = grow(front, left, view.expected, view.groups)
     # a wall found by a point that it stands before is gone with it
     found = grown.landmarks.ident
     grown = release(grown, (found < landmarks.next_ident) | np.isin(found, grown.log.form[:, 0]))
     belief = _follow_map(told.belief, front, grown, config, rng=rng)
     ess = effective_size(belief)
     belief, resampled = renew(belief, _spans(grown), config.nested, engine, rng=rng)
-    outcome = _outcome(len(measurement), grown)
+    outcome = outcome_of(len(measurement), len(grown.landmarks.ident), grown.lost_log_odds >= 0.0)
     front = _look(grown._replace(cycle=grown.cycle + 1), belief, config)
     count = len(front.landmarks.points)
     info = StepInfo(landmark, ess, resampled, told.nis, 3 * int(used.sum()), told.log_evidence, count, outcome)
@@ -183,10 +154,11 @@ def _spans(front: WindowState) -> Floats:
     return np.append(np.cumsum(front.window.step[::-1])[::-1], 0.0)
 
 
-def _seen(front: WindowState, log: Log, view: CycleAssociation, row: Integers, pick: Integers) -> Seen:
-    """Clusters `row` (A,) seen as the cycle's components `pick` (A,): each as its strongest return, moved by what the
-    partner in its cell is expected to pull."""
-    at = np.searchsorted(log.cycle, front.cycle) + pick
+def _seen(front: WindowState, view: CycleAssociation, used: Booleans) -> Seen:
+    """What was seen and is used (A,): each cluster as its strongest return, moved by what the partner in its cell is
+    expected to pull."""
+    log, row = front.log, view.row[used]
+    at = np.searchsorted(log.cycle, front.cycle) + view.pick[used]
     returns = compile_forms(front.landmarks.rows(log.form[at, 0]))
     seen = log.seen[at] - log.share[at, None] * view.groups.gap[row]
     crowd = np.maximum(view.scatter[view.groups.leader[row]], 1.0)[:, None] - 1.0
@@ -248,11 +220,3 @@ def _history(front: WindowState, row: int) -> LandmarkHistory:
         compile_forms(own[None]), known, landmarks.anchor[local], prior @ place, prior, slots, seen,
         log.std[at] ** 2 + log.extra[at] / CONSTANTS.memory,
     )  # fmt: skip
-
-
-def _outcome(heard: int, front: WindowState) -> StepOutcome:
-    if not heard:
-        return StepOutcome.NO_MEASUREMENTS
-    if front.lost_log_odds >= 0.0:
-        return StepOutcome.DIVERGED
-    return StepOutcome.OK if len(front.landmarks.ident) else StepOutcome.NO_LANDMARKS

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
-from rislam_rt.slam.associate import Candidates, cheapest, pair_costs, within
+from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs, within
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations

@@ -5,22 +5,28 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.inputs import check_sides, check_step
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.observations import Observations, is_los, observations_of, stranger_density
-from rislam_rt.slam.returns import TX
+from rislam_rt.slam.observations import Observations, stranger_density
 from rislam_rt.slam.start_prior import StartPrior
-from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo, StepOutcome
+from rislam_rt.slam.step_checks import check_sides, check_step
+from rislam_rt.slam.step_info import StepInfo
 from rislam_rt.slam.window import tracks
-from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, echoes, score_again
+from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again
+from rislam_rt.slam.window.cycle_explanation import (
+    grow,
+    learn_cycle,
+    listen,
+    outcome_of,
+    take_in,
+    unexplained,
+    weigh_again,
+)
 from rislam_rt.slam.window.divergence import divergence_monitor, recovery
-from rislam_rt.slam.window.explanation import explain, follow, grow, names, squares, unexplained, weigh_again
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
-from rislam_rt.slam.window.landmarks.landmark_update import learn, no_observations
+from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.measurement_log import Residuals, append, empty_log, renew
+from rislam_rt.slam.window.measurement_log import Residuals, empty_log, renew
 from rislam_rt.slam.window.numerics import DAMPING, LATELY, MISSED, REFRESH
-from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
@@ -64,53 +70,24 @@ def step(
     turn = heading - float(state.heading[-1])
     state = _move(state, dt, heading)
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
-    scene, landmarks = state.scene, state.landmarks
-    observed = observations_of(measurement, scene.radio)
-    landmark = np.where(is_los(observed, scene.body), REMOVED, UNUSED)
-    order = np.lexsort(observed.seen.T[::-1])
-    free = order[landmark[order] == UNUSED]
-    free = free[~echoes(observed.take(free), scene.sensor.cell_length)]
-    observed = observed.take(free)
-
+    scene = state.scene
+    heard = listen(measurement, scene)
+    observed = heard.observed
     strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(state, observed)))
     state, view = _notice(state, heading, code, observed, strangers)
-    mean, poses, expected, groups = view.mean, view.poses, view.expected, view.groups
-    shows, scatter, row, pick = view.shows, view.scatter, view.row, view.pick
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
-
-    log = append(state.log, observed, state.cycle, state.cycle - state.window.num_poses + 1)
-    # wall returns that are thrown away are known for what they are, and move nothing
-    used = np.ones(len(row), dtype=np.bool_) if config.use_vt else expected.forms[groups.leader[row], 0] != TX
-    log = explain(log, expected, groups, landmarks, scatter, row[used], pick[used], len(observed.seen))
-    state = state._replace(log=log)
+    state, used = take_in(state, observed, view)
     state, left, nis = _solve(state)
-    raw = scatter[groups.leader[row]]
-    raw[used] = squares(left, log, len(log.cycle) - len(observed.seen) + pick[used])
-
-    taken = np.zeros(len(observed.seen), dtype=np.bool_)
-    taken[pick] = True
-    turn += float(np.diff(window_gaussian.poses(state.window)[-2:, 3]).sum())
-    followed = follow(state, mean, observed, (~taken).nonzero()[0], dt, turn, bend)
-    state = state._replace(tracks=followed.tracks, log=followed.log)
     jumped = state.lost_log_odds == 0.0
-    if len(expected.seen) and len(observed.seen):
-        state = state._replace(
-            lost_log_odds=divergence_monitor.advance(state.lost_log_odds, view.score, followed.followed, followed.kept)
-        )
-    if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
-        state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, poses, scene, code))
-    visibility, landmarks = learn(
-        state.visibility, landmarks, state.window, expected, groups, shows, row, pick, raw, observed, poses, scene, code
-    )
-    state = state._replace(visibility=visibility, landmarks=landmarks)
-    landmark[free[pick]] = np.where(used, names(state.landmarks, expected, groups, row), REMOVED)
-
+    state, landmark = learn_cycle(state, heard, view, used, left, dt, turn, bend, code)
+    if state.cycle % REFRESH == 0 and scene.use_vt:  # without wall returns the fit is too free to show a scatter
+        state = state._replace(log=weigh_again(state.log, left, state.window.num_poses))
     state, wrong = recovery.ask(state)
-    state = grow(state, left, expected, groups)
-    outcome = _outcome(len(measurement), len(state.landmarks.ident), wrong or jumped or state.lost_log_odds >= 0.0)
+    state = grow(state, left, view.expected, view.groups)
+    outcome = outcome_of(len(measurement), len(state.landmarks.ident), wrong or jumped or state.lost_log_odds >= 0.0)
     if divergence_monitor.is_lost(state.lost_log_odds) and len(state.landmarks.ident):
         state = recovery.restart(state)
-    info = StepInfo(landmark, 1.0, False, nis, 3 * len(row), 0.0, len(state.landmarks.points), outcome)
+    info = StepInfo(landmark, 1.0, False, nis, 3 * len(view.row), 0.0, len(state.landmarks.points), outcome)
     return state._replace(cycle=state.cycle + 1), info
 
 
@@ -227,10 +204,7 @@ def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
     slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else last
     window, left = renew(window, log, landmarks, body, state.heading, slots)
     window = window_gaussian.weigh_holds(window_gaussian.solve(window))
-    state = state._replace(window=window)
-    if state.cycle % REFRESH == 0 and state.scene.use_vt:  # else the fit is too free to show a scatter
-        state = state._replace(log=weigh_again(log, left, window.num_poses))
-    return widen_motion(state), left, nis
+    return widen_motion(state._replace(window=window)), left, nis
 
 
 def widen_motion(state: WindowState) -> WindowState:
@@ -245,11 +219,3 @@ def widen_motion(state: WindowState) -> WindowState:
     # the covariance is that of the precisions before
     surplus = _surplus(window.precision, posterior)
     return state._replace(window=window._replace(precision=precision, surplus=surplus), level=level)
-
-
-def _outcome(heard: int, features: int, lost: bool) -> StepOutcome:
-    if not heard:
-        return StepOutcome.NO_MEASUREMENTS
-    if lost:
-        return StepOutcome.DIVERGED
-    return StepOutcome.OK if features else StepOutcome.NO_LANDMARKS

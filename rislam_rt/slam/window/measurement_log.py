@@ -30,7 +30,7 @@ class Log(NamedTuple):
     log_amplitude_std: Floats
     """(N,)."""
     side: Integers
-    """(N,) (see `tracks.Observations`)."""
+    """(N,) (see `slam.observations`)."""
     track: Integers
     """(N,) ident of the track that it belongs to, -1 for none."""
     form: Integers

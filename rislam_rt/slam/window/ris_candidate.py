@@ -5,17 +5,24 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import PanelCandidate, RisCode
+from rislam_rt.slam.arrival_rays import places
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import even_draws
 from rislam_rt.slam.observations import OTHER
 from rislam_rt.slam.returns import Poses, reflect
-from rislam_rt.slam.ris_candidate import DEEP, DISMISSAL, PATIENCE, places
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, weigh
 from rislam_rt.slam.window.numerics import DRAWS
 from rislam_rt.slam.window.smoother.steps import HEAD
 from rislam_rt.slam.window.tracks import WindowTracks
+
+DISMISSAL = -2.0
+"""Log odds of panel against scatterer below which a suspect is none: under one code they tell little."""
+DEEP = 0.5
+"""Distance [m] behind a mirror at which what is seen there is held for an image; the panel hangs on a mirror itself."""
+PATIENCE = 2
+"""Cycles for which a track that is silent is still a suspect, if it was seen more often than that."""
 
 
 def weigh_tracks(

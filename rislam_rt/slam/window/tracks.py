@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.associate import Candidates, cheapest, pair_costs
+from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown

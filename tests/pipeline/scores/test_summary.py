@@ -13,12 +13,10 @@ from rislam_rt.pipeline.scores.bound import SchemeBound
 from rislam_rt.pipeline.scores.summary import (
     component_labels,
     landmark_track,
-    match_walls,
     over_budget,
     summarise,
-    surface_rms,
-    wall_scores,
 )
+from rislam_rt.pipeline.scores.walls import match_walls, surface_rms, wall_scores
 
 PER_CYCLE = [
     name

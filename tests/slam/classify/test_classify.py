@@ -21,8 +21,8 @@ from rislam_rt.slam.classify import (
     read_network,
     track_features,
 )
-from rislam_rt.slam.classify.echo import FAR, echo_misfit
-from rislam_rt.slam.classify.images import image_misfit
+from rislam_rt.slam.classify.echo_misfit import FAR, echo_misfit
+from rislam_rt.slam.classify.image_misfit import image_misfit
 
 RADIO, BODY, WINDOW = RadioConfig(), Body(), 40
 START, HEADING = np.array([1.0, 1.2, 0.5]), 0.4

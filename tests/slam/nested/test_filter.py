@@ -9,9 +9,9 @@ from rislam_rt.slam import NestedConfig, SlamConfig
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.gaussian_view import gaussian_view
 from rislam_rt.slam.nested.particles import agents, belief
-from rislam_rt.slam.nested.particles.backend import pick_engine
 from rislam_rt.slam.nested.particles.belief import Nested
 from rislam_rt.slam.nested.particles.cloud import CloudEngine
+from rislam_rt.slam.nested.particles.engine_choice import pick_engine
 from rislam_rt.slam.nested.particles.prior_map import set_prior_map
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline
 from rislam_rt.slam.nested.particles.weights import Seen, update

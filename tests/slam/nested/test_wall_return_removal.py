@@ -80,6 +80,6 @@ def test_whatever_was_measured_is_judged(case: int) -> None:
         seen = np.column_stack([10.0 ** rng.uniform(-6.0, 5.0, count), cosines])
         seen = np.broadcast_to(seen[:1], seen.shape) if case % 3 == 0 else seen
         std, level = 10.0 ** rng.uniform(-5.0, 5.0, (count, 3)), rng.uniform(-69.0, 69.0, count)
-        looks.append(Observations(seen, std, level, *(ones[:count],) * 3))
+        looks.append(Observations(seen, std, level, ones[:count], ones[:count]))
     for classifier in ("amplitude", "network", "geometric"):
         assert found(looks, position, classifier).shape == (count,)

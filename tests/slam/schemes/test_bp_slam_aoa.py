@@ -14,10 +14,18 @@ from rislam_rt.model import Measurement, SensorModel
 from rislam_rt.slam import StartPrior, StepOutcome
 from rislam_rt.slam.observations import free_space
 from rislam_rt.slam.schemes import bp_slam_aoa
-from rislam_rt.slam.schemes.bp_slam_aoa.association import CandidatePairs, View, claims, likelihoods, spread_of
-from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, born, hypothesise
-from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, Ends, GaussianFeatures, look, prune, returns_of
-from rislam_rt.slam.schemes.bp_slam_aoa.update import absorb
+from rislam_rt.slam.schemes.bp_slam_aoa.feature_association import CandidatePairs, View, claims, likelihoods, spread_of
+from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, born, hypothesise
+from rislam_rt.slam.schemes.bp_slam_aoa.feature_update import absorb
+from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import (
+    POINT,
+    WALL,
+    Ends,
+    GaussianFeatures,
+    look,
+    prune,
+    returns_of,
+)
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.step_info import REMOVED
 

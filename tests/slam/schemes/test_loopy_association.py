@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.schemes.shared.association import associate
+from rislam_rt.slam.schemes.shared.loopy_association import associate
 
 
 def enumerate_marginals(missed: Floats, pair: Floats, fresh: Floats) -> Floats:

@@ -21,7 +21,7 @@ def test_returns_out_of_reach_change_nothing(monkeypatch):
     std, own = np.full((heard, 3), 0.01), np.arange(heard)
     level = expected.log_amplitude[own] + 0.1 * rng.standard_normal(heard)
     place, one = seen[own] + 0.02 * rng.standard_normal((heard, 3)), np.ones(heard)
-    observed = Observations(place, std, level, 0.1 * one, one, one)
+    observed = Observations(place, std, level, 0.1 * one, one)
     groups = cluster(expected, CELL, np.ones(count))
     given = (
         expected, groups, np.full(len(groups.leader), 0.9), np.ones(count), root @ root.T, observed, None,

@@ -13,6 +13,7 @@ from rislam_rt.model import RadioConfig, SensorModel
 from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
+from rislam_rt.slam.window.divergence import recovery
 
 ROOM, CYCLES = Path(__file__).parents[3] / "scenes" / "paper_room", 70
 CONFIG = SlamConfig(filter="window", use_vt=True)
@@ -188,6 +189,19 @@ def test_a_second_run_on_the_map_finds_out_where_it_began(run):
     # not surer of its place than the map was told of its own
     assert 0.008 < np.sqrt(found.covariance[0, 0]) < 0.015
     assert error[:2] @ np.linalg.solve(found.covariance[:2, :2], error[:2]) < 9.2  # chi^2, 2 dof: 0.99
+
+
+def test_a_new_beginning_is_as_sure_of_its_place_as_the_pose_was_and_a_metre_less(run):
+    """Of the height too, which is filtered, unless the motion is told."""
+    *_, (state, _, _) = run
+    before = slam.estimate(state, CONFIG)
+    for motion, up in (("learnt", 1.0), ("told", 0.0)):
+        config = replace(CONFIG, motion=motion)
+        fresh = slam.estimate(recovery.restart(state._replace(config=config)), config)
+        np.testing.assert_array_equal(fresh.position, before.position)
+        wider = np.diag(fresh.covariance - before.covariance)[:3]
+        np.testing.assert_allclose(wider, [1.0, 1.0, up], atol=1e-8)  # a tenth of a millimetre, squared
+        assert not len(fresh.map.wall_offset)
 
 
 def test_motion_that_is_told_stays_told(run):

@@ -11,13 +11,12 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
-from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
-from rislam_rt.slam.schemes.shared.association import Association
-from rislam_rt.slam.schemes.shared.correct import absorb, claims, newborn
 from rislam_rt.slam.schemes.shared.delay_agent import DelayAgent, begin_agent, hear_ranges, move_agent, reported
+from rislam_rt.slam.schemes.shared.loopy_association import Association
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
 from rislam_rt.slam.schemes.shared.scan import Odds, Scan, birth_ratio
+from rislam_rt.slam.schemes.shared.sum_correction import absorb, claims, newborn
 from rislam_rt.slam.schemes.shared.sums import (
     PredictedRanges,
     Sums,
@@ -31,6 +30,7 @@ from rislam_rt.slam.schemes.shared.sums import (
     range_moments,
 )
 from rislam_rt.slam.start_prior import StartPrior
+from rislam_rt.slam.step_checks import check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 FEWEST_FALSE = 1e-3

@@ -8,19 +8,27 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
-from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.observations import free_space, is_los, observations_of
-from rislam_rt.slam.schemes.bp_slam_aoa.association import View, claims, expect_scan, likelihoods, spread_of
-from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, born, hypothesise
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
-from rislam_rt.slam.schemes.bp_slam_aoa.features import Ends, GaussianFeatures, carry, join, look, no_features, prune
-from rislam_rt.slam.schemes.bp_slam_aoa.report import known_map, pose_moments
-from rislam_rt.slam.schemes.bp_slam_aoa.update import absorb
+from rislam_rt.slam.schemes.bp_slam_aoa.feature_association import View, claims, expect_scan, likelihoods, spread_of
+from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, born, hypothesise
+from rislam_rt.slam.schemes.bp_slam_aoa.feature_update import absorb
+from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import (
+    Ends,
+    GaussianFeatures,
+    carry,
+    join,
+    look,
+    no_features,
+    prune,
+)
+from rislam_rt.slam.schemes.bp_slam_aoa.pose_and_map import known_map, pose_moments
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step, advance
-from rislam_rt.slam.schemes.shared.association import Association
-from rislam_rt.slam.schemes.shared.correct import is_strong
+from rislam_rt.slam.schemes.shared.loopy_association import Association
 from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of
+from rislam_rt.slam.schemes.shared.sum_correction import is_strong
 from rislam_rt.slam.start_prior import StartPrior
+from rislam_rt.slam.step_checks import check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 LIVELY_STRIDE = 5

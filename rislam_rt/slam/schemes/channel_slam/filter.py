@@ -14,17 +14,16 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
-from rislam_rt.slam.inputs import check_step
 from rislam_rt.slam.schemes.channel_slam import tracker
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
 from rislam_rt.slam.schemes.channel_slam.tracker import RangeTracks, assign, follow, no_tracks
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
-from rislam_rt.slam.schemes.shared.association import Association
-from rislam_rt.slam.schemes.shared.correct import absorb
 from rislam_rt.slam.schemes.shared.delay_agent import DelayAgent, begin_agent, hear_ranges, move_agent, reported
+from rislam_rt.slam.schemes.shared.loopy_association import Association
 from rislam_rt.slam.schemes.shared.ranges import Bistatic
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
 from rislam_rt.slam.schemes.shared.scan import Scan
+from rislam_rt.slam.schemes.shared.sum_correction import absorb
 from rislam_rt.slam.schemes.shared.sums import (
     PredictedRanges,
     Sums,
@@ -38,6 +37,7 @@ from rislam_rt.slam.schemes.shared.sums import (
     range_moments,
 )
 from rislam_rt.slam.start_prior import StartPrior
+from rislam_rt.slam.step_checks import check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 STRAIN_RATE = 0.1

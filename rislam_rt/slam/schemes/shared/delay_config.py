@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
-from rislam_rt.slam.schemes.shared.checks import check_counts, check_inside, check_not_negative
+from rislam_rt.slam.setting_checks import check_counts, check_inside, check_named, check_not_negative
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +46,7 @@ class DelayConfig:
         check_inside(name, self, ("specular_ratio",), np.inf, "a positive number, or none")
         check_inside(name, self, ("share_threshold",), 1.0, "a number in (0, 1)")
         check_not_negative(name, self, ("drift_length_std", "drift_angle_std"))
-        if self.height not in ("known", "estimated"):
-            raise ConfigError(f"{name}.height: '{self.height}' received; give 'known' or 'estimated'")
+        check_named(name, self, {"height": ("known", "estimated")})
         if not 0.0 <= self.wanderers < 1.0:
             raise ConfigError(f"{name}.wanderers: {self.wanderers} received; give a share below 1")
 

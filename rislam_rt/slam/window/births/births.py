@@ -3,10 +3,10 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.returns import TX, linearise
-from rislam_rt.slam.ris_candidate import rays
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.feature_removal import behind, release, resolve
 from rislam_rt.slam.window.births.hypotheses import BESIDE, known_features

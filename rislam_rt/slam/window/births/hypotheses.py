@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.moments import square_root
-from rislam_rt.slam.returns import AXES, NONE, reflect
+from rislam_rt.slam.returns import AXES, NONE, by_wall, reflect
 from rislam_rt.slam.window.births.hypothesis_fits import Trials
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -70,15 +70,6 @@ def known_features(mean: Floats, covariance: Floats, landmarks: WindowTable, mid
         root = square_root(blocks[row])
         roots[row, :, : root.shape[1]] = root
     return KnownFeatures(place, roots, turn, shift)
-
-
-def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
-    """Derivatives (..., 3, 3) of the mirror images of points (..., 3) by the walls (..., 3)."""
-    span = wall - anchor
-    scaled = span / np.vecdot(span, span)[..., None]
-    depth = np.vecdot(scaled, point - 0.5 * (wall + anchor))[..., None]
-    mirrored = point - 2.0 * depth * span
-    return np.asarray(-2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]))
 
 
 def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:

@@ -12,7 +12,7 @@ from rislam_rt.model import RadioConfig
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import square_root
-from rislam_rt.slam.returns import AXES, NONE, reflect
+from rislam_rt.slam.returns import AXES, NONE, by_wall, reflect
 from rislam_rt.slam.window.births.hypotheses import (
     BOTH_LEGS,
     FAR,
@@ -24,7 +24,6 @@ from rislam_rt.slam.window.births.hypotheses import (
     WALL_THEN,
     Hypotheses,
     KnownFeatures,
-    by_wall,
 )
 from rislam_rt.slam.window.births.hypothesis_fits import Trials
 from rislam_rt.slam.window.births.track_summary import TrackSummary

@@ -142,7 +142,7 @@ def judge(
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
     none += np.logaddexp(np.log1p(-CONSTANTS.panels), np.log(CONSTANTS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
-    evidence += _shared(table, fits, evidence, none, explained, digest.middle)
+    evidence += _shared(table, fits, evidence, none, explained, digest.middle, _concurrent(context, ats))
     verdicts, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
     for row in range(len(digest.seen)):
         own = (track == row).nonzero()[0]
@@ -220,8 +220,9 @@ come out as one."""
 
 
 def _shared(
-    table: Hypotheses, fits: Fits, evidence: Floats, none: Floats, explained: list[tuple[int, float]], middle: Floats
-) -> Floats:
+    table: Hypotheses, fits: Fits, evidence: Floats, none: Floats, explained: list[tuple[int, float]], middle: Floats,
+    concurrent: Booleans,
+) -> Floats:  # fmt: skip
     """Gain (H,) of hypotheses whose new feature other tracks ask for as well: shared planes and points decide.
 
     A second track that the same feature explains has nothing free left: instead of a density over the volume it counts
@@ -239,6 +240,8 @@ def _shared(
     same = (wall[:, None] == wall) & (track[good][:, None] != track[good])
     off = fits.place[good][:, None] - fits.place[good]
     same &= (np.abs(off) < NEARBY).all(axis=-1)
+    way = np.stack([table.kind[good], table.known[good], table.over[good]], axis=1)
+    same &= ~((way[:, None] == way).all(axis=-1) & concurrent[track[good][:, None], track[good]])
     gain = np.zeros(len(evidence))
     first, second = same.nonzero()
     if not len(first):
@@ -253,6 +256,12 @@ def _shared(
     np.logaddexp.at(odds, (first, other), evidence[good[second]] + log_same - total[other])
     gain[good] = np.minimum(np.logaddexp(0.0, odds), CONSTANTS.max_log_ratio).sum(axis=1)
     return gain
+
+
+def _concurrent(context: WindowState, ats: list[Integers]) -> Booleans:
+    """(T, T) which tracks, rows of the log each, were heard in one cycle."""
+    cycles = [context.log.cycle[at] for at in ats]
+    return np.array([[bool(np.isin(one, other).any()) for other in cycles] for one in cycles])
 
 
 ASIDE = 10.0

@@ -10,10 +10,10 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
+from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import PANEL
-from rislam_rt.slam.ris_candidate import rays
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.numerics import POINTS
 from rislam_rt.slam.window.smoother.steps import TURN

@@ -50,14 +50,18 @@ def restart(state: WindowState) -> WindowState:
     mean, covariance = window_gaussian.now(window)
     lively = np.sqrt(motion.expected_variance(state.level))[[0, 0, 1]]
     std = np.sqrt(np.concatenate([np.full(3, 1e-10), np.diag(covariance)[3:6] + lively**2, [covariance[6, 6]]]))
-    away = CONSTANTS.walk * np.array([1.0, 1.0, float(state.config.height == "estimated")])
+    # a height known at the start is filtered from then on, unless the motion is told
+    away = CONSTANTS.walk * np.array(
+        [1.0, 1.0, float(state.config.height == "estimated" or state.config.motion == "learnt")]
+    )
+    shift = np.sqrt(state.shift**2 + np.diag(covariance)[:3] + away**2)
     fresh = window_gaussian.begin(mean[:3], mean[3:6], std, turns=window.turns)
     fresh = fresh._replace(head=mean[:HEAD], prior=fresh.prior._replace(middle=mean[:HEAD]))
     return state._replace(
         window=fresh, landmarks=empty_table(state.scene.num_panels)._replace(next_ident=state.landmarks.next_ident),
         log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), visibility=no_observations(),
         motion_mode=state.level,
-        heading=state.heading[-1:], shift=np.hypot(state.shift, away), lost_log_odds=0.0, asked=False,
+        heading=state.heading[-1:], shift=shift, lost_log_odds=0.0, asked=False,
         codes=state.codes[-1:], passed=np.concatenate([state.passed, window_gaussian.poses(window)[:-1, :3]]),
     )  # fmt: skip
 

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.identity import STRENGTHS, panel_rows, ris_probabilities, strength_moments
 from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.panel_evidence import STRENGTHS, panel_rows, ris_probabilities, strength_moments
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity
 
 
@@ -28,7 +28,7 @@ class WindowTable(NamedTuple):
     ratio_variance: Floats
     """(F,)."""
     log_grid: Floats
-    """(F, G) log posterior of a point's strength (see `identity`)."""
+    """(F, G) log posterior of a point's strength (see `panel_evidence`)."""
     log_ris: Floats
     """(F, Q) log odds of each of Q panels against scatterer; of no meaning for walls."""
     hidden: Floats

@@ -15,7 +15,10 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import amplitude_std
 from rislam_rt.model import DataSheet, RadioConfig, RisCode, SensorModel
 from rislam_rt.ris.path_gain import panel_path_gain
-from rislam_rt.slam.identity import (
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.moments import even_draws, square_root
+from rislam_rt.slam.observations import PANEL, UNTOLD
+from rislam_rt.slam.panel_evidence import (
     STRENGTHS,
     add_evidence,
     log_panel,
@@ -24,9 +27,6 @@ from rislam_rt.slam.identity import (
     log_scatterer_missed,
     weigh_silence,
 )
-from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.moments import even_draws, square_root
-from rislam_rt.slam.observations import PANEL, UNTOLD
 from rislam_rt.slam.window.numerics import CERTAIN, DRAWS
 
 
@@ -34,7 +34,7 @@ class PanelIdentity(NamedTuple):
     """What N points are held to be."""
 
     log_grid: Floats
-    """(N, G) log posterior of their strength, were they scatterers (see `identity`)."""
+    """(N, G) log posterior of their strength, were they scatterers (see `panel_evidence`)."""
     log_ris: Floats
     """(N, Q) log odds of each of Q panels against scatterer."""
     hidden: Floats
@@ -90,7 +90,7 @@ class PanelObservation(NamedTuple):
     amplitude: Floats
     """(N,) measured; what it is without a measurement does not matter."""
     side: Integers
-    """(N,) of the measurement (see `tracks.Observations`)."""
+    """(N,) of the measurement (see `slam.observations`)."""
     seen: Booleans
     """(N,) whether there is a measurement."""
 

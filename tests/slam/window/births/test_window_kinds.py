@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import NONE, TX
 from rislam_rt.slam.window.births import births, track_classification
-from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, POINT, WALL, WALL_KNOWN
+from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, OVER_RX, POINT, WALL, WALL_KNOWN
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import empty_log
@@ -15,7 +15,7 @@ from rislam_rt.slam.window.measurement_log import empty_log
 
 def _table(kind, pair=None):
     count = len(kind)
-    walls = np.array(kind) != POINT
+    walls = ~np.isin(kind, (POINT, OVER_RX))
     pair = np.zeros(count, dtype=bool) if pair is None else np.array(pair)
     return SimpleNamespace(
         kind=np.array(kind), trials=SimpleNamespace(is_wall=walls & ~pair, is_pair=pair, far=pair & False)
@@ -66,3 +66,27 @@ def test_two_components_at_a_time_are_not_the_same_return():
     assert not births._taken(context, np.arange(1, 12, 2), np.array([TX, NONE, NONE, 4, NONE]))
     log.form[4:, 0] = UNKNOWN  # only in two of six cycles
     assert not births._taken(context, np.arange(1, 12, 2), form)
+
+
+def test_tracks_of_one_cycle_do_not_come_by_one_way_and_speak_for_each_other_by_two():
+    place, spread = np.array([[2.0, 1.0, 1.0], [2.02, 1.0, 1.0]]), np.tile(0.05**2 * np.eye(3), (2, 1, 1))
+    fits = Fits(place, spread, spread, np.ones(2), np.zeros(2), np.zeros(2))
+    evidence, none, apart = np.zeros(2), np.full(2, -5.0), ~np.eye(2, dtype=bool)
+
+    def gain(kinds, walls, concurrent):
+        table = _table(kinds)
+        table.trials.track, table.known, table.over = np.arange(2), np.array(walls), np.full(2, NONE)
+        return track_classification._shared(table, fits, evidence, none, [], np.zeros(3), concurrent)
+
+    one_after_the_other = gain([POINT, POINT], [NONE, NONE], apart & False)
+    assert (one_after_the_other > 1.0).all()
+    assert (gain([POINT, POINT], [NONE, NONE], apart) == 0.0).all()
+    np.testing.assert_array_equal(gain([POINT, OVER_RX], [NONE, 4], apart), one_after_the_other)
+    assert (gain([OVER_RX, OVER_RX], [4, 4], apart) == 0.0).all()
+    assert (gain([OVER_RX, OVER_RX], [4, 5], apart) > 1.0).all()
+
+
+def test_tracks_are_concurrent_that_were_heard_in_one_cycle():
+    context = SimpleNamespace(log=empty_log()._replace(cycle=np.array([1, 2, 2, 3, 5, 5])))
+    found = track_classification._concurrent(context, [np.array([0, 1]), np.array([2, 3]), np.array([4])])
+    assert found.tolist() == [[True, True, False], [True, True, False], [False, False, True]]

@@ -1,4 +1,4 @@
-"""Data association: one assignment a cycle of measurements to expected returns, tracks, or neither."""
+"""Assignment of measurements to what is expected, to tracks, or to neither: what pairs cost, and the best of all."""
 
 from typing import NamedTuple
 
@@ -25,21 +25,7 @@ class Candidates(NamedTuple):
     log_odds: Floats
     """(C,) logarithm of the probability that it shows at all."""
     side: Integers
-    """(C,) (see `tracks.Observations`)."""
-
-
-def associate(candidates: Candidates, observations: Observations, gate: float, strangers: Floats | float) -> Integers:
-    """Measurement (C,) of each candidate, -1 for none: the assignment of the highest likelihood.
-
-    A pair competes against "the candidate is missed and the measurement is new or false", of which `strangers` (M,) are
-    to be expected per metre, unit of each cosine and e-fold of amplitude; pairs beyond the gate (on
-    delay and cosines) do not compete at all.
-    """
-    chosen = np.full(len(candidates.seen), -1)
-    if len(chosen) and len(observations.seen):
-        rows, columns = cheapest(pair_costs(candidates, observations, gate, strangers))
-        chosen[rows] = columns
-    return chosen
+    """(C,) (see `slam.observations`)."""
 
 
 def cheapest(cost: Floats) -> tuple[Integers, Integers]:
@@ -50,7 +36,12 @@ def cheapest(cost: Floats) -> tuple[Integers, Integers]:
 
 
 def pair_costs(candidates: Candidates, observations: Observations, gate: float, strangers: Floats | float) -> Floats:
-    """(C, M): -2 log of the likelihood ratio of each pair against a stranger, 0 where it cannot be."""
+    """(C, M): -2 log of the likelihood ratio of each pair against a stranger, 0 where it cannot be.
+
+    A pair competes against "the candidate is missed and the measurement is new or false", of which `strangers` (M,) are
+    to be expected per metre, unit of each cosine and e-fold of amplitude; pairs beyond the gate (on
+    delay and cosines) do not compete at all.
+    """
     noise = np.zeros((len(observations.seen), 3, 3))
     noise[:, DIAGONAL, DIAGONAL] = observations.std**2
     variance = candidates.log_amplitude_std[:, None] ** 2 + observations.log_amplitude_std**2

@@ -1,6 +1,6 @@
 """Could a track be the image of another one, a point, in walls whose own returns are there too?
 
-The counterpart of `echo.py` for landmarks: a wall's return says where the wall is, a point's where the point is; so
+The counterpart of `echo_misfit` for landmarks: a wall's return says where the wall is, a point's where the point is; so
 each path over the point and up to two of the walls, on either leg, is known in place and in strength. What lies behind
 a mirror is an image as well, for no way over a wall is shorter than the straight one. Needs no map.
 """

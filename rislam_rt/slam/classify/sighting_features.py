@@ -5,8 +5,8 @@ distance 1/q turn by `-q P d`, P the projection across h; its length changes by 
 q = 2/length and a = 2; for its images and their reciprocals both differ; for one wall's return q = 0 and a = 2 (the
 image moves along with the agent). A wall and a level ceiling turn a path as a point does along its own azimuth, and
 not across it. Two upright walls at right angles are a corner reflector: a point but for its strength, for its place on
-the horizon, and for being where the returns of both walls say (`echo.py`). Images of a point are where its own path and
-the walls' returns say (`images.py`). Nothing here needs a map or the truth.
+the horizon, and for being where the returns of both walls say (`echo_misfit`). Images of a point are where its own path
+and the walls' returns say (`image_misfit`). Nothing here needs a map or the truth.
 """
 
 from typing import NamedTuple
@@ -17,9 +17,9 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, RadioConfig
 from rislam_rt.ris.path_gain import image_amplitude
-from rislam_rt.slam.classify.echo import echo_misfit
-from rislam_rt.slam.classify.images import image_misfit
-from rislam_rt.slam.classify.still import stillness
+from rislam_rt.slam.classify.echo_misfit import echo_misfit
+from rislam_rt.slam.classify.image_misfit import image_misfit
+from rislam_rt.slam.classify.stillness import stillness
 
 FEATURES = (
     "strength",

@@ -1,4 +1,4 @@
-"""The backend of the particles: Dr.Jit where the machine has what it needs, else numpy."""
+"""Choice of the engine that weighs the particles: Dr.Jit where the machine has what it needs, else numpy."""
 
 from functools import cache
 
@@ -9,7 +9,7 @@ from rislam_rt.slam.nested.particles.numpy_engine import NumpyEngine
 
 @cache
 def pick_engine(name: str) -> CloudEngine:
-    """The backend that weighs particles: `auto`, `drjit` or `numpy`; Dr.Jit is imported here and not before.
+    """The engine that weighs particles: `auto`, `drjit` or `numpy`; Dr.Jit is imported here and not before.
 
     Raises
     ------

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.explanation import scatter_variance, weigh_again
+from rislam_rt.slam.window.cycle_explanation import scatter_variance, weigh_again
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals
 

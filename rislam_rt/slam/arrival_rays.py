@@ -1,17 +1,10 @@
-"""Where a component would end if it came straight from a point, and when such a point is a candidate for a panel."""
+"""Rays along which components arrive, and where they would end if they came straight from a point."""
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.slam.returns import Poses
-
-DISMISSAL = -2.0
-"""Log odds of panel against scatterer below which a suspect is none: under one code they tell little."""
-DEEP = 0.5
-"""Distance [m] behind a mirror at which what is seen there is held for an image; the panel hangs on a mirror itself."""
-PATIENCE = 2
-"""Cycles for which a track that is silent is still a suspect, if it was seen more often than that."""
 
 
 def places(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:

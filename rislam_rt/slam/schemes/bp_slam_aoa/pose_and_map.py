@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import MapEstimate
-from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, GaussianFeatures, spread_over
+from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import POINT, WALL, GaussianFeatures, spread_over
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.report import position_errors
 from rislam_rt.slam.start_prior import StartPrior

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
-from rislam_rt.slam.schemes.bp_slam_aoa.features import POINT, WALL, WANDERER, Ends, GaussianFeatures
+from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import POINT, WALL, WANDERER, Ends, GaussianFeatures
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 
 NUDGE = 1e-6

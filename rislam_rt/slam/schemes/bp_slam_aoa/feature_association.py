@@ -11,12 +11,12 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import SensorModel
-from rislam_rt.model.sensor import merged_pull
-from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan, log_normal
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
-from rislam_rt.slam.schemes.bp_slam_aoa.features import GaussianFeatures, PredictedReturns, spread_over
+from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, log_normal
+from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import GaussianFeatures, PredictedReturns, spread_over
+from rislam_rt.slam.schemes.bp_slam_aoa.merging import unresolved_neighbours
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
-from rislam_rt.slam.schemes.shared.association import Association, associate
+from rislam_rt.slam.schemes.shared.loopy_association import Association, associate
 
 GATE = 40.0
 """Squared Mahalanobis distance beyond which nothing associates (chi^2, 3 dof: 1e-8)."""
@@ -69,7 +69,7 @@ def expect_scan(
     snr = sensor.radio.integrated_snr(np.exp(np.clip(loud, -60.0, 5.0)))
     detection = config.visible * predicted.in_view * (sensor.detection_probability(snr) @ HERMITE[1])
     inside = np.where(predicted.seen[:, 0] < sensor.window[1] * SPEED_OF_LIGHT, 1.0, 0.0)
-    hidden, pull, disturbance = _neighbours(features, predicted, detection, sensor)
+    hidden, pull, disturbance = unresolved_neighbours(features, predicted, detection, sensor)
     seen = predicted._replace(seen=predicted.seen + pull)
     detection = np.clip(detection * inside * (1.0 - hidden), 1e-4, 1.0 - 1e-4)
     spread = seen.own[:, 0, 0] + disturbance[:, 0, 0]
@@ -84,27 +84,6 @@ def expect_scan(
         gaussian, component, noise[gaussian, None] * scan.std[component] ** 2, loudness, log_loudness
     )
     return View(seen, detection, disturbance, pairs)
-
-
-def _neighbours(
-    features: GaussianFeatures, predicted: PredictedReturns, detection: Floats, sensor: SensorModel
-) -> tuple[Floats, ...]:
-    """Probability (C,) that a return merges into a louder one before association; mean (C, 3), covariance of the
-    pull."""
-    weight = features.existence[features.owner] * features.share * detection
-    sure = np.flatnonzero(weight > 0.1)
-    weight = weight[sure]
-    gap = predicted.seen[sure] - predicted.seen[:, None]
-    close = sensor.may_merge(gap / np.array([SPEED_OF_LIGHT, 1.0, 1.0]))
-    close &= features.owner[:, None] != features.owner[sure]
-    louder = predicted.log_amplitude[sure] - predicted.log_amplitude[:, None]
-    held = np.where(close, weight, 0.0)
-    hidden = 1.0 - np.prod(1.0 - np.where(louder > 0.0, held, 0.0), axis=1)
-    mean, variance = merged_pull(np.exp(np.minimum(louder, 0.0)))
-    fainter = np.where(louder > 0.0, 0.0, held)
-    pull = np.einsum("co,coi->ci", fainter * mean, gap)
-    second = fainter * (variance + (1.0 - fainter) * mean**2)
-    return hidden, pull, np.einsum("co,coi,coj->cij", second, gap, gap)
 
 
 def spread_of(predicted: PredictedReturns, course: AgentTrajectory) -> Floats:

@@ -4,28 +4,102 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.model import Measurement, RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.observations import Observations
+from rislam_rt.slam.observations import Observations, is_los, observations_of
+from rislam_rt.slam.returns import TX
+from rislam_rt.slam.step_info import REMOVED, UNUSED, StepOutcome
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.births import births
 from rislam_rt.slam.window.births.feature_removal import condemned, release
+from rislam_rt.slam.window.cycle_association import CycleAssociation, echoes
+from rislam_rt.slam.window.divergence import divergence_monitor
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, image_ident
+from rislam_rt.slam.window.landmarks.landmark_update import learn
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,
+    KnownEnvironment,
     UnresolvedClusters,
     conditioned_share,
 )
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
-from rislam_rt.slam.window.measurement_log import Log, Residuals, unique_forms
+from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique_forms
 from rislam_rt.slam.window.numerics import LOUDEST, REFRESH
+from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
 
 
-def explain(
+class HeardCycle(NamedTuple):
+    """M components of a cycle that need an explanation: neither the direct path nor echoes."""
+
+    observed: Observations
+    free: Integers
+    """(M,) which component of the measurement each is."""
+    landmark: Integers
+    """(N,) label of every component of the measurement."""
+
+
+def listen(measurement: Measurement, scene: KnownEnvironment) -> HeardCycle:
+    """What a measurement leaves to explain, by delay and direction, so that nothing hangs on its order."""
+    observed = observations_of(measurement, scene.radio)
+    landmark = np.where(is_los(observed, scene.body), REMOVED, UNUSED)
+    order = np.lexsort(observed.seen.T[::-1])
+    free = order[landmark[order] == UNUSED]
+    free = free[~echoes(observed.take(free), scene.sensor.cell_length)]
+    return HeardCycle(observed.take(free), free, landmark)
+
+
+def take_in(state: WindowState, observed: Observations, view: CycleAssociation) -> tuple[WindowState, Booleans]:
+    """The log with the cycle's components and what they were taken for; which of those seen (A,) move the belief.
+
+    Wall returns that are thrown away are known for what they are, and move nothing.
+    """
+    forms, row, pick = view.expected.forms, view.row, view.pick
+    used = np.ones(len(row), dtype=np.bool_) if state.scene.use_vt else forms[view.groups.leader[row], 0] != TX
+    log = append(state.log, observed, state.cycle, state.cycle - state.window.num_poses + 1)
+    log = _explain(
+        log, view.expected, view.groups, state.landmarks, view.scatter, row[used], pick[used], len(observed.seen)
+    )
+    return state._replace(log=log), used
+
+
+def learn_cycle(
+    state: WindowState, heard: HeardCycle, view: CycleAssociation, used: Booleans, left: Residuals, dt: float,
+    turn: float, bend: float, code: RisCode | None,
+) -> tuple[WindowState, Integers]:  # fmt: skip
+    """All that a cycle tells beside pose and places: tracks, whether the agent is lost, what is hidden, strengths, the
+    panel; and the labels (N,) of the measurement. `left` are the components' residuals once the belief has moved.
+
+    `turn` [rad] is what the compass told of the turn, `bend` [m/s^2] how much a step's velocity may change.
+    """
+    observed, expected, groups, row, pick = heard.observed, view.expected, view.groups, view.row, view.pick
+    landmarks, log = state.landmarks, state.log
+    raw = view.scatter[groups.leader[row]]
+    raw[used] = _squares(left, log, len(log.cycle) - len(observed.seen) + pick[used])
+    taken = np.zeros(len(observed.seen), dtype=np.bool_)
+    taken[pick] = True
+    turn += float(np.diff(window_gaussian.poses(state.window)[-2:, 3]).sum())
+    followed = _follow(state, view.mean, observed, (~taken).nonzero()[0], dt, turn, bend)
+    state = state._replace(tracks=followed.tracks, log=followed.log)
+    if len(expected.seen) and len(observed.seen):
+        odds = divergence_monitor.advance(state.lost_log_odds, view.score, followed.followed, followed.kept)
+        state = state._replace(lost_log_odds=odds)
+    if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
+        state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, view.poses, state.scene, code))
+    visibility, landmarks = learn(
+        state.visibility, landmarks, state.window, expected, groups, view.shows, row, pick, raw, observed, view.poses,
+        state.scene, code,
+    )  # fmt: skip
+    landmark = heard.landmark.copy()
+    landmark[heard.free[pick]] = np.where(used, _names(landmarks, expected, groups, row), REMOVED)
+    return state._replace(visibility=visibility, landmarks=landmarks), landmark
+
+
+def _explain(
     log: Log,
     expected: ExpectedComponents,
     groups: UnresolvedClusters,
@@ -76,7 +150,7 @@ def weigh_again(log: Log, left: Residuals, num_poses: int) -> Log:
     return log._replace(extra=extra)
 
 
-def squares(left: Residuals, log: Log, rows: Integers) -> Floats:
+def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:
     """Mean squares (A,) of the residuals of some explained rows of the log, in reported deviations."""
     if not len(rows):
         return np.zeros(0)
@@ -94,7 +168,7 @@ def unexplained(state: WindowState, observed: Observations) -> float:
     return count / (window * np.pi * max(float(loudness), 1.0))
 
 
-class Followed(NamedTuple):
+class _Followed(NamedTuple):
     """Tracks after a cycle, and the log that names them."""
 
     tracks: WindowTracks
@@ -105,9 +179,9 @@ class Followed(NamedTuple):
     """...and those among them that go on."""
 
 
-def follow(
+def _follow(
     state: WindowState, mean: Floats, observed: Observations, free: Integers, dt: float, turn: float, bend: float
-) -> Followed:
+) -> _Followed:
     """Tracks extended, begun and ended by the components that nothing explains."""
     speed = float(np.linalg.norm(mean[3:6]))
     length = np.maximum(state.tracks.mean[:, 0, 0], 0.5) if len(state.tracks.ident) else np.ones(1)
@@ -126,10 +200,10 @@ def follow(
     track = state.log.track.copy()
     track[base + picks], track[base + spare] = found.ident[rows], fresh
     found = found.keep(tracks.alive(found, state.cycle))
-    return Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()))
+    return _Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()))
 
 
-def names(landmarks: WindowTable, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers) -> Integers:
+def _names(landmarks: WindowTable, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers) -> Integers:
     """Ident of what each of the clusters `row` (A,) came over first: a point, its image in a wall, a wall."""
     if not len(row):
         return np.zeros(0, dtype=np.int64)
@@ -147,3 +221,12 @@ def grow(state: WindowState, left: Residuals, expected: ExpectedComponents, grou
         gone = condemned(state.landmarks, left, state.log, expected, window_gaussian.now(state.window)[1])
         state, fresh = release(state, ~gone), not gone.any()
     return births(state, expected, groups) if fresh else state
+
+
+def outcome_of(heard: int, features: int, lost: bool) -> StepOutcome:
+    """How a cycle went, in which so many components were heard and so many features are known."""
+    if not heard:
+        return StepOutcome.NO_MEASUREMENTS
+    if lost:
+        return StepOutcome.DIVERGED
+    return StepOutcome.OK if features else StepOutcome.NO_LANDMARKS

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.schemes.bp_slam_aoa.association import View, log_density
-from rislam_rt.slam.schemes.bp_slam_aoa.birth import ComponentScan
-from rislam_rt.slam.schemes.bp_slam_aoa.features import GaussianFeatures, through
+from rislam_rt.slam.schemes.bp_slam_aoa.feature_association import View, log_density
+from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan
+from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import GaussianFeatures, through
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
-from rislam_rt.slam.schemes.shared.association import Association
+from rislam_rt.slam.schemes.shared.loopy_association import Association
 
 NO_VARIANCE = 1e12
 """Variance of a measurement that tells nothing, in units of what it is about."""
