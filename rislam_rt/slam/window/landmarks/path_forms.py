@@ -119,10 +119,10 @@ def _margin_std(
             moved = places.copy()
             moved[:, wall, axis] += STEP
             slope[:, wall, axis] = (_margin(base, device, anchor, moved)[0] - first) / STEP
-    slope = slope.reshape(len(walls), 6)
+    along = slope.reshape(len(walls), 6)
     rows = (3 * walls[:, :, None] + np.arange(3)).reshape(len(walls), 6)
     block = covariance[rows[:, :, None], rows[:, None, :]]
-    return np.asarray(np.sqrt(np.maximum(np.vecdot(slope, (block @ slope[..., None])[..., 0]), STEP**2)))
+    return np.asarray(np.sqrt(np.maximum(np.vecdot(along, (block @ along[..., None])[..., 0]), STEP**2)))
 
 
 STEP = 1e-6
