@@ -130,10 +130,12 @@ def scatter_variance(scatter: Floats, std: Floats) -> Floats:
 
 
 def weigh_again(log: Log, left: Residuals, num_poses: int) -> Log:
-    """The log with every component's scatter as its form shows it before and after; at first nothing is known of it.
+    """The log with every wall return's scatter as its form shows it before and after; at first nothing is known of it.
 
-    What is known beforehand (`crowd`) counts as one measurement.
+    Who a point is hangs on what it is held to scatter by: those stay as they were weighed. What is known beforehand
+    (`crowd`) counts as one measurement.
     """
+    left = left.take(log.form[left.row, 0, 0] == TX)
     if not len(left.row):
         return log
     std = log.std[left.row]

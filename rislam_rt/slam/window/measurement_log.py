@@ -93,6 +93,10 @@ class Residuals(NamedTuple):
     jacobian: Floats
     """(A, 3, 4 + 3F) of the prediction by its pose and the features, likewise."""
 
+    def take(self, rows: Any) -> "Residuals":
+        """Only some of the residuals."""
+        return Residuals._make(field[rows] for field in self)
+
 
 def residuals(
     log: Log, window: Window, landmarks: WindowTable, body: Body, heading: Floats, rows: Integers
