@@ -45,7 +45,7 @@ CASES = [
     Case("default", "random", {}, 233, 0.05, 20.0, 0.55),
     Case("default", "random", {}, 266, 0.05, 20.0, 0.55),
     Case("landmarks", "random", LANDMARKS, 103, 0.1, 10.0, 1.0),
-    Case("landmarks", "random", LANDMARKS, 233, 0.2, 7.0, 1.1),
+    Case("landmarks", "random", LANDMARKS, 266, 0.2, 7.0, 0.6),
     Case("nested", "random", NESTED, 233, 0.2, 7.0, 1.6),
     Case("bp_slam", "bp_slam", {}, 233, 0.5, 1.5, 0.7),
     Case("bp_slam", "bp_slam", {}, 266, 0.8, 6.0, 2.5),
