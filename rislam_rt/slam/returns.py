@@ -12,6 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.model import Body
 
 TX = -1
 """In the first column of `Returns.legs`: the base of the leg is the transmitter itself."""
@@ -58,6 +59,11 @@ class Poses(NamedTuple):
     """(..., 3) [m]."""
     heading: Floats
     """Broadcasts against the leading axes [rad]."""
+
+
+def poses_of(position: Floats, heading: Floats, body: Body) -> Poses:
+    """Ends of agents at positions (..., 3) with headings that broadcast against the leading axes."""
+    return Poses(*body.ends(position, heading), np.asarray(heading))
 
 
 def reflect(point: Floats, wall: Floats, anchor: Floats) -> Floats:

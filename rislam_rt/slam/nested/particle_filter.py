@@ -12,7 +12,6 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.gaussian_view import gaussian_view
 from rislam_rt.slam.nested.particles.belief import Nested, draw, drop, effective_size, propagate, remember, renew
 from rislam_rt.slam.nested.particles.engine_choice import pick_engine
@@ -21,7 +20,7 @@ from rislam_rt.slam.nested.particles.prior_map import set_prior_map
 from rislam_rt.slam.nested.particles.weights import FLOOR, Seen, update
 from rislam_rt.slam.nested.wall_return_removal import wall_returns
 from rislam_rt.slam.observations import stranger_density
-from rislam_rt.slam.returns import AXES, observe
+from rislam_rt.slam.returns import AXES, observe, poses_of
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_sides, check_step
 from rislam_rt.slam.step_info import REMOVED, StepInfo
@@ -33,9 +32,9 @@ from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_
 from rislam_rt.slam.window.cycle_explanation import grow, learn_cycle, listen, outcome_of, take_in, unexplained
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.measurement_log import renew as renew_slots
-from rislam_rt.slam.window.numerics import REFRESH
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.solver_limits import REFRESH
 
 BROAD = 10.0
 """Standard deviation [m] of a landmark before its measurements."""

@@ -8,9 +8,8 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs, within
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
-from rislam_rt.slam.returns import TX, Poses
+from rislam_rt.slam.returns import TX, Poses, poses_of
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, visible
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
@@ -20,10 +19,10 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     cluster,
     predict_returns,
 )
-from rislam_rt.slam.window.numerics import GATE
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.steps import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
+from rislam_rt.slam.window.solver_limits import GATE
 
 
 class CycleAssociation(NamedTuple):

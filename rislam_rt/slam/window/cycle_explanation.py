@@ -26,9 +26,9 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
 )
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique_forms
-from rislam_rt.slam.window.numerics import LOUDEST, REFRESH
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.solver_limits import LOUDEST, REFRESH
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
 

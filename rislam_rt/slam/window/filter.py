@@ -26,10 +26,10 @@ from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.measurement_log import Residuals, empty_log, renew
-from rislam_rt.slam.window.numerics import DAMPING, LATELY, MISSED, REFRESH
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
+from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, MISSED, REFRESH
 from rislam_rt.slam.window.state import WindowState
 
 

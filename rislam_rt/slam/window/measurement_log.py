@@ -7,9 +7,8 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.returns import linearise
+from rislam_rt.slam.returns import linearise, poses_of
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.smoother.steps import POSE

@@ -9,7 +9,7 @@ from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
-from rislam_rt.slam.window.numerics import GATE
+from rislam_rt.slam.window.solver_limits import GATE
 
 WANDER = 1.0
 """Spread of an unexplained path's log amplitude from cycle to cycle: a panel's code may change."""

@@ -7,13 +7,12 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
 from rislam_rt.slam import NestedConfig, SlamConfig
-from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.particles.belief import Nested, draw, gaussian, propagate, remember, renew
 from rislam_rt.slam.nested.particles.cloud import CloudEngine
 from rislam_rt.slam.nested.particles.engine_choice import pick_engine
 from rislam_rt.slam.nested.particles.new_landmark import LandmarkHistory, initialise_landmark
 from rislam_rt.slam.nested.particles.weights import Seen, update
-from rislam_rt.slam.returns import NONE, Returns, observe
+from rislam_rt.slam.returns import NONE, Returns, observe, poses_of
 from rislam_rt.slam.window.landmarks.path_forms import compile_forms
 
 BODY = Body(np.array([-0.04388, -0.02397, 0.0]), np.array([0.04388, 0.02397, 0.0]))

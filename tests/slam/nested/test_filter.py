@@ -6,7 +6,6 @@ from known_walk import BODY, CYCLE, HEADING, STD, room, walk
 
 from rislam_rt.arrays import Floats
 from rislam_rt.slam import NestedConfig, SlamConfig
-from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.gaussian_view import gaussian_view
 from rislam_rt.slam.nested.particles import agents, belief
 from rislam_rt.slam.nested.particles.belief import Nested
@@ -15,7 +14,7 @@ from rislam_rt.slam.nested.particles.engine_choice import pick_engine
 from rislam_rt.slam.nested.particles.prior_map import set_prior_map
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline
 from rislam_rt.slam.nested.particles.weights import Seen, update
-from rislam_rt.slam.returns import Returns, observe
+from rislam_rt.slam.returns import Returns, observe, poses_of
 from rislam_rt.slam.window.smoother import window_gaussian
 
 LANDMARKS = np.array([[2.0, 1.0, 1.0], [3.0, 3.0, 3.0]])

@@ -6,13 +6,12 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
-from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.nested.particles.belief import Nested, absorb, mean_covariances, place_landmark, renew
 from rislam_rt.slam.nested.particles.cloud import CloudEngine
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, trace_sightline
 from rislam_rt.slam.nested.particles.weights import FLOOR, trusted
 from rislam_rt.slam.nested_config import NestedConfig
-from rislam_rt.slam.returns import Returns, linearise
+from rislam_rt.slam.returns import Returns, linearise, poses_of
 
 ITERATIONS = 4
 """Gauss-Newton steps of each agent particle's fit."""

@@ -16,9 +16,9 @@ from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
 from rislam_rt.slam.window.landmarks.landmark_update import seed
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, UnresolvedClusters
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.numerics import ALIGNED, MOST, NEAR, STRIDE
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.solver_limits import ALIGNED, MOST, NEAR, STRIDE
 from rislam_rt.slam.window.state import WindowState
 
 

@@ -10,8 +10,8 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedCompo
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log, Residuals, renew
-from rislam_rt.slam.window.numerics import FEWEST, RECENT
 from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.solver_limits import FEWEST, RECENT
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
 

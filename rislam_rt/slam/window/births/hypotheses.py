@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.moments import square_root
+from rislam_rt.slam.gaussian_draws import square_root
 from rislam_rt.slam.returns import AXES, NONE, by_wall, reflect
 from rislam_rt.slam.window.births.hypothesis_fits import Trials
 from rislam_rt.slam.window.births.track_summary import TrackSummary

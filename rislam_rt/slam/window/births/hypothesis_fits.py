@@ -15,7 +15,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window.births.track_summary import TrackSummary
-from rislam_rt.slam.window.numerics import HOPELESS, RIDGE, STEPS
+from rislam_rt.slam.window.solver_limits import HOPELESS, RIDGE, STEPS
 
 
 class Trials(NamedTuple):

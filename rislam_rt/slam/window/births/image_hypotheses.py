@@ -10,8 +10,8 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RadioConfig
 from rislam_rt.ris.path_gain import point_amplitude
+from rislam_rt.slam.gaussian_draws import square_root
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.moments import square_root
 from rislam_rt.slam.returns import AXES, NONE, by_wall, reflect
 from rislam_rt.slam.window.births.hypotheses import (
     BOTH_LEGS,

@@ -7,9 +7,10 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RisCode
+from rislam_rt.slam.gaussian_draws import even_draws
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.moments import even_draws, poses_of
 from rislam_rt.slam.observations import OTHER, UNTOLD
+from rislam_rt.slam.returns import poses_of
 from rislam_rt.slam.window.births.hypotheses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -21,8 +22,8 @@ from rislam_rt.slam.window.landmarks.ris_identification import (
     unknown,
     weigh,
 )
-from rislam_rt.slam.window.numerics import CERTAIN
 from rislam_rt.slam.window.smoother.window_gaussian import poses
+from rislam_rt.slam.window.solver_limits import CERTAIN
 from rislam_rt.slam.window.state import WindowState
 
 ASIDE = 12.0

@@ -1,43 +1,39 @@
-"""What could a track be? Every hypothesis with at most one new feature, its prior, and its evidence."""
+"""What a track is held to be: the posterior over all hypotheses with at most one new feature."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
-    BESIDE,
     IMAGES,
-    LEVEL_TURN,
-    OVER_SAME,
-    OVER_TX,
-    POINT,
     TWO_WALLS,
-    WALL,
     WALLS,
     Hypotheses,
     KnownFeatures,
     hypotheses,
 )
+from rislam_rt.slam.window.births.hypothesis_evidence import (
+    MORE_UNKNOWN,
+    concurrent,
+    direction_beliefs,
+    log_amplitudes,
+    log_beside,
+    log_kind,
+    log_opacity,
+    log_place,
+    log_shared,
+    log_upright,
+)
 from rislam_rt.slam.window.births.hypothesis_fits import Fits, smooth_paths, try_all
-from rislam_rt.slam.window.births.image_hypotheses import fitted_twice, image_amplitudes, with_images
+from rislam_rt.slam.window.births.image_hypotheses import fitted_twice, with_images
 from rislam_rt.slam.window.births.point_identification import identify
 from rislam_rt.slam.window.births.track_summary import TrackSummary
-from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
-from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
-from rislam_rt.slam.window.numerics import NEARBY
 from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors, no_holds
 from rislam_rt.slam.window.state import WindowState
-
-MORE_WALLS = np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 1, 1, 2, 2, 2, 2])
-"""Walls on the way of each kind beyond the first one of a wall return: each takes its share of the power, and so of the
-paths that are heard. Over known walls, of all walls together; of known points in walls, of all points together."""
-MORE_UNKNOWN = 2
-"""The same of a path of no kind here: over walls that the map lacks."""
 
 
 class TrackDecision(NamedTuple):
@@ -116,15 +112,14 @@ def judge(
         table = with_images(table, digest, known, landmarks)
     fits = try_all(table.trials, digest)
     track = table.trials.track
-    rivals = np.where(table.known >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
-    rivals[np.isin(table.kind, IMAGES)] = np.log(max(len(landmarks.points), 1))
-    rivals += np.where(table.over >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
     evidence = fits.log_evidence + log_place(table, fits.place, digest.middle)
-    evidence += 2.0 * CONSTANTS.wall_ratio * MORE_WALLS[table.kind] - rivals
+    evidence += log_kind(table, landmarks)
     evidence += np.where(table.trials.is_pair, lonely[track], 0.0)
-    evidence += _amplitudes(table, fits, digest, landmarks, scene) + _opacity(table, fits, digest, known, landmarks)
-    evidence += _beside(table, digest, known, landmarks, scene)
-    gain = _upright(table, fits, digest, known, landmarks)
+    evidence += log_amplitudes(table, fits, digest, landmarks, scene) + log_opacity(
+        table, fits, digest, known, landmarks
+    )
+    evidence += log_beside(table, digest, known, landmarks, scene)
+    gain = log_upright(table, fits, digest, known, landmarks)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
     evidence[fitted_twice(table, fits.place, evidence)] = -np.inf
     over = identify(context, ats, table, fits, evidence)
@@ -142,7 +137,7 @@ def judge(
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
     none += np.logaddexp(np.log1p(-CONSTANTS.panels), np.log(CONSTANTS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
-    evidence += _shared(table, fits, evidence, none, explained, digest.middle, _concurrent(context, ats))
+    evidence += log_shared(table, fits, evidence, none, explained, digest.middle, concurrent(context, ats))
     verdicts, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
     for row in range(len(digest.seen)):
         own = (track == row).nonzero()[0]
@@ -164,7 +159,7 @@ def judge(
             TrackDecision(
                 int(table.kind[at]), probability, int(table.known[at]), int(table.over[at]), fits.place[at],
                 fits.held[at],
-                beliefs(fits.place[at], digest, known, landmarks) if table.trials.is_wall[at] else no_holds(),
+                direction_beliefs(fits.place[at], digest, known, landmarks) if table.trials.is_wall[at] else no_holds(),
                 float(fits.share[at]), float(misfit), over.identity.take(np.array([at])),
             )
         )  # fmt: skip
@@ -183,203 +178,8 @@ def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:
     return np.asarray(near & (wall[own] == wall[at]) & ~pair[own] & np.isfinite(fits.cost[own]) & (own != at))
 
 
-def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
-    """(H,) log prior density [1/m^3] of the places: points anywhere in a ball, what two walls do in one twice as wide.
-
-    Walls at any distance up to the ball's radius, in any direction: their places are images of the agent's, `middle`.
-    """
-    reach = np.maximum(np.linalg.norm(place - middle, axis=1), 2.0 * CONSTANTS.depth)
-    wall = -np.log(4.0 * np.pi * reach**2 * 2.0 * CONSTANTS.size)
-    return np.where(
-        table.trials.is_wall, wall, -CONSTANTS.log_volume - np.where(table.trials.is_pair, np.log(8.0), 0.0)
-    )
-
-
-def _beside(
-    table: Hypotheses, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, scene: KnownEnvironment
-) -> Floats:
-    """(H,) log probability that a wall's return comes out by itself, or as one with its edge at a level wall.
-
-    It hangs on how far apart the two would be.
-    """
-    track, found = table.trials.track, np.zeros(len(table.kind))
-    length, cell = digest.mean[0][track, 0], float(scene.sensor.cell_length[0])
-    for wall in landmarks.walls[np.abs(known.turn[landmarks.walls, 2, 2]) > LEVEL_TURN]:
-        rise = float(np.linalg.norm(known.place[wall] - digest.middle))
-        gap = np.hypot(length, rise) - length
-        found += np.where((table.kind == WALL) & (gap < CLOSE * cell), LOG_ALONE, 0.0)
-        found += np.where((table.kind == BESIDE) & (table.known == wall) & (gap > cell), LOG_APART, 0.0)
-    return found
-
-
-CLOSE = 0.8
-"""Gap in cells below which two paths come out as one beyond doubt."""
-LOG_ALONE, LOG_APART = np.log(0.1), np.log(1e-4)
-"""Log probability that two of one cell come out as one of them alone (the other is hidden), and that two that lie apart
-come out as one."""
-
-
-def _shared(
-    table: Hypotheses, fits: Fits, evidence: Floats, none: Floats, explained: list[tuple[int, float]], middle: Floats,
-    concurrent: Booleans,
-) -> Floats:  # fmt: skip
-    """Gain (H,) of hypotheses whose new feature other tracks ask for as well: shared planes and points decide.
-
-    A second track that the same feature explains has nothing free left: instead of a density over the volume it counts
-    that of one place given the other, against all else that it may be.
-    """
-    track, count = table.trials.track, len(none)
-    total = none.copy()
-    np.logaddexp.at(total, track, evidence)
-    for row, value in explained:
-        total[row] = np.logaddexp(total[row], value)
-    best = np.full(count, -np.inf)
-    np.maximum.at(best, track, evidence)
-    good = np.flatnonzero(np.isfinite(evidence) & (evidence > best[track] - ASIDE) & ~table.trials.is_pair)
-    wall = table.trials.is_wall[good]
-    same = (wall[:, None] == wall) & (track[good][:, None] != track[good])
-    off = fits.place[good][:, None] - fits.place[good]
-    same &= (np.abs(off) < NEARBY).all(axis=-1)
-    way = np.stack([table.kind[good], table.known[good], table.over[good]], axis=1)
-    same &= ~((way[:, None] == way).all(axis=-1) & concurrent[track[good][:, None], track[good]])
-    gain = np.zeros(len(evidence))
-    first, second = same.nonzero()
-    if not len(first):
-        return gain
-    spread = fits.covariance[good[first]] + fits.covariance[good[second]]
-    gap = off[first, second]
-    log_same = -0.5 * np.vecdot(gap, np.linalg.solve(spread, gap[..., None])[..., 0])
-    log_same -= 0.5 * np.linalg.slogdet(spread)[1] + 1.5 * np.log(2.0 * np.pi)
-    log_same -= log_place(table, fits.place, middle)[good[second]]
-    other = track[good[second]]
-    odds = np.full((len(good), count), -np.inf)
-    np.logaddexp.at(odds, (first, other), evidence[good[second]] + log_same - total[other])
-    gain[good] = np.minimum(np.logaddexp(0.0, odds), CONSTANTS.max_log_ratio).sum(axis=1)
-    return gain
-
-
-def _concurrent(context: WindowState, ats: list[Integers]) -> Booleans:
-    """(T, T) which tracks, rows of the log each, were heard in one cycle."""
-    cycles = [context.log.cycle[at] for at in ats]
-    return np.array([[bool(np.isin(one, other).any()) for other in cycles] for one in cycles])
-
-
-ASIDE = 10.0
-"""Log evidence behind a track's best from which on a hypothesis does not speak for others."""
 COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(4 + 3) log(1 + chi^2 / 4)` for chi^2 with 3 degrees of freedom."""
-
-
-def _amplitudes(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, landmarks: WindowTable, scene: KnownEnvironment
-) -> Floats:
-    """(H,) log density of the tracks' mean amplitudes, given what walls leave and how points scatter."""
-    radio, track = scene.radio, table.trials.track
-    level, seen, rx = digest.log_amplitude[track], digest.mean[0][track], digest.mean[2][track]
-    free = np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * seen[:, 0]))
-    has = (table.known >= 0) & (table.kind != BESIDE)
-    ratio = np.where(has, landmarks.ratio[table.known], 0.0) if len(landmarks.ident) else np.zeros(len(track))
-    variance = (
-        np.where(has, landmarks.ratio_variance[table.known], 0.0) if len(landmarks.ident) else np.zeros(len(track))
-    )
-    mirror = free + ratio + CONSTANTS.wall_ratio
-    spread = variance + CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
-    surplus = np.maximum(level - free - 0.2, 0.0)  # a mirror does not amplify
-    wall = -0.5 * (level - mirror) ** 2 / spread - 0.5 * np.log(spread) - 20.0 * surplus**2
-    reach = np.linalg.norm(fits.place - rx, axis=1)
-    far = np.where(np.isin(table.kind, (POINT, OVER_TX)), reach, 0.5 * seen[:, 0])
-    far = np.clip(far, 0.05, np.maximum(seen[:, 0] - 0.05, 0.06))
-    unit = np.log(point_amplitude(np.ones(len(far)), np.maximum(seen[:, 0] - far, 0.05), far, radio))
-    bounces = np.where(table.kind == OVER_SAME, 2.0, 1.0)
-    mean = unit + np.log(CONSTANTS.strength) + ratio * bounces
-    spread = CONSTANTS.strength_std**2 + variance * bounces**2 + CONSTANTS.fading**2
-    point = -0.5 * (level - mean) ** 2 / spread - 0.5 * np.log(spread)
-    double, wide = free + 2.0 * CONSTANTS.wall_ratio, 2.0 * CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
-    pair = -0.5 * (level - double) ** 2 / wide - 0.5 * np.log(wide) - 20.0 * surplus**2
-    amplitude = np.where(table.trials.is_wall, wall, np.where(table.trials.is_pair, pair, point))
-    rows, image = image_amplitudes(table, digest, landmarks, scene.radio)
-    amplitude[rows] = image
-    return amplitude
-
-
-def _opacity(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
-) -> Floats:
-    """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known."""
-    middle, walls, wall = digest.middle, landmarks.walls, table.trials.is_wall
-    pair, tx = table.trials.is_pair[:, None], digest.mean[1][table.trials.track]
-    image = (table.trials.turn[:, 0] @ tx[..., None])[..., 0] + fits.place
-    # the last of two walls is somewhere on the ray to the image of both: as far as a single wall would be
-    foot = np.where(wall[:, None], 0.5 * (fits.place + middle), np.where(pair, 0.5 * (image + middle), fits.place))
-    slack = CONSTANTS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
-    total = np.zeros(len(foot))
-    span = fits.place - middle
-    normal = span / np.maximum(np.linalg.norm(span, axis=1), 1e-6)[:, None]
-    if len(walls):
-        out = known.place[walls] - middle
-        reach = np.linalg.norm(out, axis=1)
-        feet = 0.5 * (known.place[walls] + middle)
-        depth = foot @ (out / reach[:, None]).T - np.vecdot(feet, out) / reach
-        total += CONSTANTS.log_rare * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
-        before = normal @ feet.T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, CONSTANTS.log_rare, 0.0) * (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
-    if len(landmarks.points):
-        depth = normal @ known.place[landmarks.points].T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, CONSTANTS.log_rare, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
-    return total
-
-
-def beliefs(place: Floats, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> DirectionPriors:
-    """What may be held beforehand of a wall at `place` (3,): upright, at right angles to another; or level."""
-    span = place - digest.middle
-    reach = max(float(np.linalg.norm(span)), 0.1)
-    rise, std = abs(span[2]) / reach, CONSTANTS.lean * reach
-    axes: list[Floats] = []
-    log_odds: list[float] = []
-    if rise > 0.9:
-        axes += [AXES[0], AXES[1]]
-        log_odds += 2 * [CONSTANTS.log_upright + np.log(reach)]
-    elif rise < 0.35:
-        axes.append(AXES[2])
-        log_odds.append(CONSTANTS.log_upright + np.log(reach))
-        others = known.place[landmarks.walls] - digest.middle
-        if len(others):
-            flat = np.linalg.norm(others[:, :2], axis=1) > 0.95 * np.linalg.norm(others, axis=1)
-            off = np.arctan2(others[flat, 1], others[flat, 0]) - np.arctan2(span[1], span[0])
-            off = (off + np.pi / 4.0) % (np.pi / 2.0) - np.pi / 4.0
-            if len(off) and np.min(np.abs(off)) < 0.15:
-                aim = np.arctan2(span[1], span[0]) + off[np.argmin(np.abs(off))]
-                axes.append(np.array([-np.sin(aim), np.cos(aim), 0.0]))
-                log_odds.append(np.log(CONSTANTS.square / (1.0 - CONSTANTS.square)) + np.log(np.pi / 2.0 * reach))
-    count = len(axes)
-    axis = np.array(axes).reshape(count, 3)
-    return DirectionPriors(
-        np.zeros(count, dtype=np.int64), axis, axis @ digest.middle, np.full(count, std), np.array(log_odds),
-        np.full(count, 0.5),
-    )  # fmt: skip
-
-
-def _upright(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
-) -> Floats:
-    """Gain (H,) in log evidence by what walls are beforehand: each direction held, or anywhere in its width."""
-    gain = np.zeros(len(fits.cost))
-    trials, tx = table.trials, digest.mean[1]
-    for row in ((trials.is_wall | trials.is_pair) & np.isfinite(fits.cost)).nonzero()[0]:
-        place, turn = fits.place[row], trials.turn[row, 0]
-        if trials.is_pair[row]:  # what two walls do together goes across them both
-            if turn[2, 2] < 0.0:
-                continue  # an edge under the ceiling: any elevation
-            at = tx[trials.track[row]]
-            place = digest.middle + turn @ at + place - at
-        holds = beliefs(place, digest, known, landmarks)
-        span = place - digest.middle
-        variance = np.vecdot(holds.axis, holds.axis @ fits.covariance[row]) + holds.std**2
-        log_right = -0.5 * (holds.axis @ span) ** 2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
-        # odds hold the width: right against a density of one over it
-        each = np.logaddexp(0.0, holds.log_odds + log_right) - np.logaddexp(0.0, CONSTANTS.log_upright)
-        gain[row] = (each[:1] if trials.is_pair[row] and turn[0, 0] < 0.0 else each).sum()
-    return gain
 
 
 def wanted(verdict: TrackDecision, length: float) -> bool:

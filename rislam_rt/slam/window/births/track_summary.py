@@ -12,12 +12,12 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
 from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.moments import poses_of
 from rislam_rt.slam.observations import PANEL
+from rislam_rt.slam.returns import poses_of
 from rislam_rt.slam.window.measurement_log import Log
-from rislam_rt.slam.window.numerics import POINTS
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window, now, pose_covariance, poses
+from rislam_rt.slam.window.solver_limits import POINTS
 
 TOGETHER = 10.0
 """Measurements over which the pull of neighbours keeps its sign."""

@@ -14,8 +14,8 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.path_forms import enumerate_forms, forms_of, possible_legs
-from rislam_rt.slam.window.numerics import EDGE, FAINT, LEVEL
 from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.solver_limits import EDGE, FAINT, LEVEL
 
 PANEL_STD = float(np.pi / np.sqrt(24.0))
 """Spread of the panel's predicted log amplitude: that of a Rayleigh variable, as phases hang on millimetres."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.numerics import MODES
+from rislam_rt.slam.window.solver_limits import MODES
 
 
 def ladder() -> Floats:

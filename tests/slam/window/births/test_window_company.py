@@ -6,8 +6,8 @@ import numpy as np
 
 from rislam_rt.slam.observations import OTHER, PANEL
 from rislam_rt.slam.window.births.births import _company
-from rislam_rt.slam.window.numerics import ALIGNED
 from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.solver_limits import ALIGNED
 
 HEADING = 0.7
 RAYS = np.array([[0.3, 0.4], [0.3, 0.4], [-0.5, 0.1], [0.3, 0.4]])

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import NONE, TX
-from rislam_rt.slam.window.births import births, track_classification
+from rislam_rt.slam.window.births import births, hypothesis_evidence, track_classification
 from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, OVER_RX, POINT, WALL, WALL_KNOWN
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
@@ -29,7 +29,7 @@ def test_places_of_walls_and_points_have_densities_that_integrate_to_one():
         reach = rng.uniform(0.0, radius, 20_000)
         way = rng.standard_normal((len(reach), 3))
         place = middle + reach[:, None] * way / np.linalg.norm(way, axis=1)[:, None]
-        density = np.exp(track_classification.log_place(_table([kind] * len(reach)), place, middle))
+        density = np.exp(hypothesis_evidence.log_place(_table([kind] * len(reach)), place, middle))
         share = radius * density * 4.0 * np.pi * reach**2
         # within the depth of a surface a wall is no likelier: two thirds of the share of that shell are missing
         missing = 2.0 / 3.0 * 2.0 * CONSTANTS.depth / radius if kind == WALL else 0.0
@@ -38,7 +38,7 @@ def test_places_of_walls_and_points_have_densities_that_integrate_to_one():
 
 def test_a_wall_twice_as_far_is_as_likely_in_the_same_step_of_distance():
     far = np.array([[4.0, 0.0, 0.0], [8.0, 0.0, 0.0]])
-    density = np.exp(track_classification.log_place(_table([WALL, WALL]), far, np.zeros(3)))
+    density = np.exp(hypothesis_evidence.log_place(_table([WALL, WALL]), far, np.zeros(3)))
     assert np.isclose(density[0] * 4.0**2, density[1] * 8.0**2)
 
 
@@ -76,7 +76,7 @@ def test_tracks_of_one_cycle_do_not_come_by_one_way_and_speak_for_each_other_by_
     def gain(kinds, walls, concurrent):
         table = _table(kinds)
         table.trials.track, table.known, table.over = np.arange(2), np.array(walls), np.full(2, NONE)
-        return track_classification._shared(table, fits, evidence, none, [], np.zeros(3), concurrent)
+        return hypothesis_evidence.log_shared(table, fits, evidence, none, [], np.zeros(3), concurrent)
 
     one_after_the_other = gain([POINT, POINT], [NONE, NONE], apart & False)
     assert (one_after_the_other > 1.0).all()
@@ -88,5 +88,5 @@ def test_tracks_of_one_cycle_do_not_come_by_one_way_and_speak_for_each_other_by_
 
 def test_tracks_are_concurrent_that_were_heard_in_one_cycle():
     context = SimpleNamespace(log=empty_log()._replace(cycle=np.array([1, 2, 2, 3, 5, 5])))
-    found = track_classification._concurrent(context, [np.array([0, 1]), np.array([2, 3]), np.array([4])])
+    found = hypothesis_evidence.concurrent(context, [np.array([0, 1]), np.array([2, 3]), np.array([4])])
     assert found.tolist() == [[True, True, False], [True, True, False], [False, False, True]]

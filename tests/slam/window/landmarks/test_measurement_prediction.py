@@ -5,7 +5,7 @@ import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, cluster
-from rislam_rt.slam.window.numerics import EDGE
+from rislam_rt.slam.window.solver_limits import EDGE
 
 CELL = np.array([0.3, 0.5, 0.5])
 

@@ -1,4 +1,4 @@
-"""Draws with given moments (Gaussians without a random number), and the ends of the agent at its poses."""
+"""Gaussian draws without a random number, and square roots of covariances."""
 
 from functools import lru_cache
 
@@ -6,13 +6,6 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Floats
-from rislam_rt.model import Body
-from rislam_rt.slam.returns import Poses
-
-
-def poses_of(position: Floats, heading: Floats, body: Body) -> Poses:
-    """Ends of agents at positions (..., 3) with headings that broadcast against the leading axes."""
-    return Poses(*body.ends(position, heading), np.asarray(heading))
 
 
 def square_root(covariance: Floats) -> Floats:
