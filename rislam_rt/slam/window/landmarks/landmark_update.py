@@ -48,9 +48,16 @@ def recall(
     visibility: VisibilityObservations, expected: ExpectedComponents, landmarks: WindowTable
 ) -> tuple[Floats, Floats]:
     """Probability (R,) that nothing stands in the way of each return now, and its scatter (R,)."""
-    first, scatter = CONSTANTS.steady ** (1.0 + expected.bounces), np.full(len(expected.seen), CONSTANTS.crowd)
+    return recall_forms(visibility, expected.forms, expected.bounces, landmarks)
+
+
+def recall_forms(
+    visibility: VisibilityObservations, forms: Integers, bounces: Integers, landmarks: WindowTable
+) -> tuple[Floats, Floats]:
+    """The same of forms (R, 5) over so many walls (R,)."""
+    first, scatter = CONSTANTS.steady ** (1.0 + bounces), np.full(len(forms), CONSTANTS.crowd)
     if len(visibility.code):
-        code = pack(expected.forms, landmarks)
+        code = pack(forms, landmarks)
         place = np.minimum(np.searchsorted(visibility.code, code), len(visibility.code) - 1)
         known = visibility.code[place] == code
         first = np.where(known, visibility.clear[place], first)
