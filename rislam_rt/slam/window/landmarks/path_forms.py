@@ -28,11 +28,12 @@ class FormLegs(NamedTuple):
     """(R,) on both legs together."""
 
 
-def compile_forms(forms: Integers) -> Returns:
-    """Forms (R, 5) as returns over the legs that they need."""
+def compile_forms(forms: Integers, slot: Integers | int = 0) -> Returns:
+    """Forms (R, 5) as returns over the legs that they need; those of the Tx itself are shared within a slot (R,)."""
     legs = np.concatenate([forms[:, :3], forms[:, [0, 3, 4]]])
     base = int(legs.max(initial=0)) + 3
     code = ((legs[:, 0] + 1) * base + legs[:, 1] + 1) * base + legs[:, 2] + 1
+    code += np.where(legs[:, 0] == TX, base**3 * np.tile(slot, 2 if np.ndim(slot) else 1), 0)
     _, first, place = np.unique(code, return_index=True, return_inverse=True)
     return Returns(legs[first], place[: len(forms)], place[len(forms) :])
 

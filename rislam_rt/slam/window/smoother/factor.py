@@ -23,11 +23,11 @@ class Factor(NamedTuple):
 def factorise(matrix: Floats) -> Factor:
     """The factor, damped where rounding made the matrix indefinite."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-30))
-    scaled = matrix * scale * scale[:, None]
     for damping in (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3):
-        factor, bad = scipy.linalg.lapack.dpotrf(
-            (scaled + damping * np.eye(len(scaled)) if damping else scaled).T, lower=1
-        )
+        scaled = matrix * scale * scale[:, None]
+        if damping:
+            scaled += damping * np.eye(len(scaled))
+        factor, bad = scipy.linalg.lapack.dpotrf(scaled.T, lower=1, overwrite_a=1)
         if not bad:
             break
     return Factor(factor, scale)
@@ -36,7 +36,7 @@ def factorise(matrix: Floats) -> Factor:
 def inverse(matrix: Floats) -> Floats:
     """Of a symmetric positive matrix, damped where rounding made it indefinite."""
     factor, scale = factorise(matrix)
-    inside, _ = scipy.linalg.lapack.dpotri(factor, lower=1)
+    inside, _ = scipy.linalg.lapack.dpotri(factor, lower=1, overwrite_c=1)
     inside *= scale * scale[:, None]
     full = inside + inside.T
     np.fill_diagonal(full, np.diag(inside))
