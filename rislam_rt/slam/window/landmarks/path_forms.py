@@ -113,15 +113,10 @@ def _margin_std(
     base: Floats, device: Floats, anchor: Floats, features: Floats, walls: Integers, covariance: Floats
 ) -> Floats:
     """Standard deviations (N,) [m] of the margins over walls (N, 2), by what these are uncertain by."""
-    places, anchor = features[walls], anchor[walls]
-    first = _margin(base, device, anchor, places)[0]
-    slope = np.empty((len(walls), 2, 3))
-    for wall in range(2):
-        for axis in range(3):
-            moved = places.copy()
-            moved[:, wall, axis] += STEP
-            slope[:, wall, axis] = (_margin(base, device, anchor, moved)[0] - first) / STEP
-    along = slope.reshape(len(walls), 6)
+    moves = STEP * np.concatenate([np.zeros((1, 6)), np.eye(6)]).reshape(7, 1, 2, 3)
+    places = (features[walls] + moves).reshape(-1, 2, 3)
+    every = _margin(np.tile(base, (7, 1)), device, np.tile(anchor[walls], (7, 1, 1)), places)[0].reshape(7, -1)
+    along = ((every[1:] - every[0]) / STEP).T
     rows = (3 * walls[:, :, None] + np.arange(3)).reshape(len(walls), 6)
     block = covariance[rows[:, :, None], rows[:, None, :]]
     return np.asarray(np.sqrt(np.maximum(np.vecdot(along, (block @ along[..., None])[..., 0]), STEP**2)))
