@@ -168,13 +168,13 @@ def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Float
     count = by_feature.shape[-2]
     wide = by_feature.reshape(*image.shape, 3 * count)
     features_jacobian = by_rx @ wide[..., returns.rx, :, :]
-    features_jacobian[..., 0, :] += (by_tx[..., None, :] @ wide[..., returns.tx, :, :])[..., 0, :]
-    features_jacobian = features_jacobian.reshape(*features_jacobian.shape[:-1], count, 3)
     moving = returns.legs[:, 0] == TX
+    rows = (~moving[returns.tx]).nonzero()[0]  # the Tx leg of a moving base is the Tx itself
+    toward = by_tx[..., rows, None, :] @ wide[..., returns.tx[rows], :, :]
+    features_jacobian[..., rows, 0, :] += toward[..., 0, :]
+    features_jacobian = features_jacobian.reshape(*features_jacobian.shape[:-1], count, 3)
     if moving.any():  # the images of a moving base move with it
-        moves = np.where(moving[:, None, None], by_base, 0.0)
-        tx_jacobian = by_rx @ moves[..., returns.rx, :, :]
-        tx_jacobian[..., 0, :] += (by_tx[..., None, :] @ moves[..., returns.tx, :, :])[..., 0, :]
+        tx_jacobian = by_rx @ np.where(moving[:, None, None], by_base, 0.0)[..., returns.rx, :, :]
     else:
         tx_jacobian = np.zeros(by_rx.shape)
     tx_jacobian[..., 0, :] -= by_tx
@@ -222,7 +222,7 @@ def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats
             near = legs[rows, 1]
             block[..., rows, near, :, :] = householder @ block[..., rows, near, :, :]
         by_wall = -2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :])
-        block[..., rows, walls, :, :] += by_wall
+        block[..., rows, walls, :, :] = by_wall
         image[..., rows, :] = mirrored
     rows = (~moving).nonzero()[0]
     block[..., rows, legs[rows, 0], :, :] += by_base[..., rows, :, :]

@@ -41,7 +41,17 @@ def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamCon
     slots = Quadratic(np.zeros((count, slim, slim)), np.zeros((count, slim)), np.zeros((count, slim)))
     precision = np.tile(std**-2.0, (count - 1, 1))
     return Window(
-        head, accel, precision, np.zeros(accel.shape), step, prior, np.zeros((size, size)), slots, whole, no_holds()
+        head,
+        accel,
+        precision,
+        precision,
+        np.zeros(accel.shape),
+        step,
+        prior,
+        np.zeros((size, size)),
+        slots,
+        whole,
+        no_holds(),
     )
 
 

@@ -104,10 +104,9 @@ class Residuals(NamedTuple):
 
 
 def residuals(
-    log: Log, window: Window, landmarks: WindowTable, body: Body, heading: Floats, rows: Integers
+    log: Log, window: Window, landmarks: WindowTable, body: Body, heading: Floats, rows: Integers, slot: Integers
 ) -> Residuals:
     """Of some explained rows of the log, at the present estimate; `heading` (K,) as the compass tells."""
-    slot = log.cycle[rows] - (int(log.cycle[-1]) - window.num_poses + 1)
     form, features = log.form[rows], window.features
     both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
     at = np.concatenate([slot, slot[both]])
@@ -144,20 +143,13 @@ def trust(left: Floats) -> Floats:
 
 
 def renew(
-    window: Window,
-    log: Log,
-    landmarks: WindowTable,
-    body: Body,
-    heading: Floats,
-    slots: Integers,
-    *,
-    even: bool = False,
+    window: Window, log: Log, landmarks: WindowTable, body: Body, heading: Floats, cycle: int, slots: Integers
 ) -> tuple[Window, Residuals]:
-    """The quadratics of some slots, made at the present estimate; `even`: every component counts in full."""
-    first = int(log.cycle[-1]) - window.num_poses + 1 if len(log.cycle) else 0
+    """The quadratics of some slots, made at the present estimate; the last pose is that of `cycle`."""
+    slot = log.cycle - (cycle - window.num_poses + 1)
     wanted = np.zeros(window.num_poses, dtype=np.bool_)
     wanted[slots] = True
-    rows = (log.explained & wanted[np.maximum(log.cycle - first, 0)]).nonzero()[0]
+    rows = (log.explained & wanted[np.maximum(slot, 0)]).nonzero()[0]
     size, place = POSE + window.features.size, poses(window)
     hessian, gradient, middle = (field.copy() for field in window.slots)
     hessian[slots], gradient[slots] = 0.0, 0.0
@@ -167,8 +159,8 @@ def renew(
     if not len(rows):
         nothing = Residuals(rows, rows, np.zeros((0, 3)), np.zeros((0, 3, size)))
         return window._replace(slots=Quadratic(hessian, gradient, middle)), nothing
-    found = residuals(log, window, landmarks, body, heading, rows)
-    weight = np.ones(len(rows)) if even else trust(found.left)
+    found = residuals(log, window, landmarks, body, heading, rows, slot[rows])
+    weight = trust(found.left)
     start = np.searchsorted(found.slot, slots)
     stop = np.searchsorted(found.slot, slots, side="right")
     most = int((stop - start).max())

@@ -118,8 +118,11 @@ def log_shared(
 
 def concurrent(context: WindowState, ats: list[Integers]) -> Booleans:
     """(T, T) which tracks, rows of the log each, were heard in one cycle."""
-    cycles = [context.log.cycle[at] for at in ats]
-    return np.array([[bool(np.isin(one, other).any()) for other in cycles] for one in cycles])
+    cycle = context.log.cycle - context.log.cycle.min()
+    heard = np.zeros((len(ats), cycle.max() + 1))
+    for row, at in enumerate(ats):
+        heard[row, cycle[at]] = 1.0
+    return np.asarray(heard @ heard.T > 0.0)
 
 
 def log_amplitudes(
