@@ -103,7 +103,7 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         window, headings = window_gaussian.slide(window), headings[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)
     if state.config.motion == "told":
-        window = window_gaussian.extend(window, dt, _assumed_precision(state.config, dt))
+        window = window_gaussian.extend(window, dt, _assumed_precision(state.config, dt, window.turns))
     else:
         precision = _precisions(level)
         window = window_gaussian.extend(window, dt, precision, _surplus(precision, level))
@@ -189,11 +189,11 @@ def _surplus(precision: Floats, levels: Floats) -> Floats:
     return np.asarray(np.maximum(precision**2 * variance - precision, 0.0))
 
 
-def _assumed_precision(config: SlamConfig, dt: float) -> Floats:
-    """(A,) of a step's white acceleration and, where the heading is not known, rate of turn, as the agent is told."""
+def _assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:
+    """(A,) of a step's white acceleration and, if the compass is not trusted, rate of turn, as the agent is told."""
     upwards = config.sigma_a if config.height == "estimated" else STILL
-    turns = () if config.heading == "known" else (config.turn_std / np.sqrt(dt),)
-    return np.array([config.sigma_a, config.sigma_a, upwards, *turns]) ** -2.0
+    rates = (config.turn_std / np.sqrt(dt),) if turns else ()
+    return np.array([config.sigma_a, config.sigma_a, upwards, *rates]) ** -2.0
 
 
 def _solve(state: WindowState, view: CycleAssociation, used: Booleans) -> tuple[WindowState, Residuals, float]:

@@ -22,7 +22,7 @@ from rislam_rt.slam.window.births.image_hypotheses import image_amplitudes
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors
+from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors
 from rislam_rt.slam.window.solver_limits import NEARBY
 from rislam_rt.slam.window.state import WindowState
 

@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
 from rislam_rt.slam.window.smoother.factor import inverse, solution
 from rislam_rt.slam.window.smoother.steps import FIRST, HEAD, POSE, TURN, basis, carry_on, latest, starts
 
@@ -38,29 +39,6 @@ class Quadratic(NamedTuple):
     def slope(self, x: Floats) -> Floats:
         """Gradient (..., D) at x (..., D)."""
         return self.gradient + (self.hessian @ (x - self.middle)[..., None])[..., 0]
-
-
-class DirectionPriors(NamedTuple):
-    """N beliefs about single directions of features: a wall is upright, level, at right angles to another, or not."""
-
-    feature: Integers
-    """(N,)."""
-    axis: Floats
-    """(N, 3) unit vectors."""
-    aim: Floats
-    """(N,) [m] where the feature lies along the axis, if the belief is right..."""
-    std: Floats
-    """(N,) [m] ...within so much."""
-    log_odds: Floats
-    """(N,) beforehand: of "right" against a place anywhere along the axis, times its width [m]."""
-    probability: Floats
-    """(N,) that it is right, at the last look: the weight with which it counts."""
-
-
-def no_holds() -> DirectionPriors:
-    """Nothing believed beforehand."""
-    none = np.zeros(0)
-    return DirectionPriors(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), none, none, none, none)
 
 
 class Window(NamedTuple):
@@ -323,7 +301,8 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
     hessian[:size, :size] += window.prior.hessian
     gradient[:size] += window.prior.slope(window.head)
-    for feature, force, information in zip(*_pulls(window), strict=True):
+    holds = window.holds
+    for feature, force, information in zip(holds.feature, *holds.pulls(window.features[holds.feature]), strict=True):
         own = slice(HEAD + 3 * feature, HEAD + 3 * feature + 3)
         hessian[own, own] += information
         gradient[own] += force
@@ -333,33 +312,14 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     return hessian, gradient
 
 
-def _pulls(window: Window) -> tuple[Integers, Floats, Floats]:
-    """Features (N,), gradients (N, 3) and information (N, 3, 3) of what is held of them."""
-    holds = window.holds
-    weight = holds.probability / holds.std**2
-    off = np.vecdot(holds.axis, window.features[holds.feature]) - holds.aim if len(weight) else weight
-    return (
-        holds.feature, (weight * off)[:, None] * holds.axis,
-        weight[:, None, None] * holds.axis[:, :, None] * holds.axis[:, None, :],
-    )  # fmt: skip
-
-
 def weigh_holds(window: Window) -> Window:
-    """Each belief about a direction by what all else tells of it (its cavity): is it right?"""
+    """With each belief about a direction weighed by what all else tells of it."""
     holds = window.holds
     if not len(holds.feature):
         return window
     rows = HEAD + 3 * holds.feature[:, None] + np.arange(3)
-    block = window.covariance[rows[:, :, None], rows[:, None, :]]
-    variance = np.vecdot(holds.axis, (block @ holds.axis[..., None])[..., 0])
-    middle = np.vecdot(holds.axis, window.features[holds.feature])
-    own = holds.probability / holds.std**2
-    left = np.maximum(1.0 / variance - own, 1e-3)
-    cavity = (middle / variance - own * holds.aim) / left
-    spread = 1.0 / left + holds.std**2
-    log_right = -0.5 * (cavity - holds.aim) ** 2 / spread - 0.5 * np.log(2.0 * np.pi * spread)
-    odds = np.clip(holds.log_odds + log_right, -30.0, 30.0)
-    return window._replace(holds=holds._replace(probability=1.0 / (1.0 + np.exp(-odds))))
+    blocks = window.covariance[rows[:, :, None], rows[:, None, :]]
+    return window._replace(holds=holds.weighed(window.features[holds.feature], blocks))
 
 
 def add_feature(window: Window, place: Floats, holds: DirectionPriors, ridge: float = 1e-6) -> Window:

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
 from rislam_rt.slam.window.smoother.steps import HEAD, POSE
-from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors, Quadratic
+from rislam_rt.slam.window.smoother.window_gaussian import Quadratic
 
 DT, CYCLES, SIGMA_A = 0.1, 12, 0.5
 
@@ -171,7 +172,7 @@ def _seen(turns):
     rng = np.random.default_rng(7)
     std = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2, 0.1 * turns])
     window = window_gaussian.begin(np.zeros(3), rng.standard_normal(3), std, turns=turns)
-    window = window_gaussian.add_feature(window, np.ones(3), window_gaussian.no_holds(), ridge=1.0)
+    window = window_gaussian.add_feature(window, np.ones(3), no_holds(), ridge=1.0)
     for cycle in range(6):
         if cycle:
             window = window_gaussian.extend(window, DT, rng.uniform(1.0, 100.0, 3 + turns))
