@@ -1,4 +1,4 @@
-"""What is believed of walls beforehand: that they are upright, level, or at right angles to another, or are not."""
+"""Direction priors: walls are believed to be upright, level, or at right angles to another, or are not."""
 
 from typing import NamedTuple
 
