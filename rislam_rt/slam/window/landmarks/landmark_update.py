@@ -103,8 +103,9 @@ def learn(
     landmarks = _existence(landmarks, expected, groups, hit & alone, ~hit & alone, shows)
     landmarks = _strengths(landmarks, window, expected, groups, row, pick, observed, poses, scene, code)
     fresh = pack(expected.forms, landmarks)
-    keep = ~np.isin(visibility.code, fresh)
-    kept = VisibilityObservations._make(field[keep] for field in visibility)
+    place, keep = np.searchsorted(visibility.code, fresh), np.ones(len(visibility.code) + 1, dtype=np.bool_)
+    keep[place[np.append(visibility.code, -1)[place] == fresh]] = False
+    kept = VisibilityObservations._make(field[keep[:-1]] for field in visibility)
     return _joined(kept, (fresh, after, scatter)), landmarks
 
 
