@@ -17,9 +17,10 @@ from rislam_rt.slam.window.tracks import WindowTracks
 
 def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, Residuals]:
     """Gauss-Newton over the whole window."""
-    window, every = context.window, np.arange(context.window.num_poses)
+    window, landmarks, body = context.window, context.landmarks, context.scene.body
+    every = np.arange(window.num_poses)
     for _ in range(steps):
-        window, left = renew(window, context.log, context.landmarks, context.scene.body, context.heading, every)
+        window, left = renew(window, context.log, landmarks, body, context.heading, context.cycle, every)
         window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return window, left
 
