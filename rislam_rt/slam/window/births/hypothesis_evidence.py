@@ -60,9 +60,7 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
     )
 
 
-def log_beside(
-    table: Hypotheses, digest: TrackSummary, known: KnownFeatures, context: WindowState
-) -> Floats:
+def log_beside(table: Hypotheses, digest: TrackSummary, known: KnownFeatures, context: WindowState) -> Floats:
     """(H,) log probability that a wall's return comes out by itself, or as one with its edge at a level wall.
 
     It hangs on how far apart the two would be, and on whether the level wall is heard by itself: where it ends, so does

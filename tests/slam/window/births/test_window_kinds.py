@@ -101,7 +101,9 @@ def test_a_wall_comes_out_with_its_edge_only_where_the_level_wall_is_heard():
     ceiling = np.array([[1.0, 1.0, 4.0]])  # the agent's image in it: 1.5 m above, 0.1 m longer beside a wall 20 m away
     known = known_features(ceiling, 1e-6 * np.eye(3), landmarks, middle)
     form = np.array([[TX, NONE, NONE, 0, NONE]])
-    table = SimpleNamespace(kind=np.array([WALL, BESIDE]), known=np.array([-1, 0]), trials=SimpleNamespace(track=np.zeros(2, dtype=int)))
+    table = SimpleNamespace(
+        kind=np.array([WALL, BESIDE]), known=np.array([-1, 0]), trials=SimpleNamespace(track=np.zeros(2, dtype=int))
+    )
     digest = SimpleNamespace(mean=(np.array([[40.0, 1.0, 0.0]]), None, None), middle=middle)
     scene = SimpleNamespace(sensor=SimpleNamespace(cell_length=np.array([0.75])))
     found = {}
