@@ -52,8 +52,7 @@ def posterior_bound(
     """
     axes, unknowns = motion.axes, len(unknown_std)
     size = 2 * axes + unknowns
-    start = np.repeat([motion.start_position, motion.start_velocity], axes)
-    spread = np.diag(np.concatenate([start, unknown_std]))
+    spread = np.diag(np.concatenate([motion.start, unknown_std]))
     agent = np.empty((len(time), 2 * axes, 2 * axes))
     unknown = np.empty((len(time), unknowns))
     for cycle, measured in enumerate(rows):
@@ -75,7 +74,7 @@ def _advance(spread: Floats, dt: float, motion: MotionPrior) -> Floats:
     moved = spread.copy()
     moved[:axes] += dt * spread[axes : 2 * axes]
     push = np.zeros((len(spread), axes))
-    push[:axes], push[axes : 2 * axes] = (np.eye(axes) * motion.acceleration * step for step in (0.5 * dt**2, dt))
+    push[:axes], push[axes : 2 * axes] = (np.diag(motion.accelerations) * step for step in (0.5 * dt**2, dt))
     return np.concatenate([moved, push], axis=1)
 
 

@@ -106,34 +106,51 @@ def test_wall_returns_equal_differences(room):
             np.testing.assert_allclose(unknown[0, :, model.wall_column[wall] + 2], difference, atol=1e-8)
 
 
-def test_recursion_equals_the_inverse_of_the_whole_trajectory():
+@pytest.mark.parametrize("climb", [None, 0.3])
+def test_recursion_equals_the_inverse_of_the_whole_trajectory(climb):
     """Five cycles, random measurements: the last block of one joint information matrix, built by hand."""
     rng = np.random.default_rng(1)
-    cycles, unknowns, axes, dt = 5, 4, 2, 0.3
-    motion = MotionPrior(acceleration=0.7, start_position=0.2, start_velocity=0.4, axes=axes)
+    cycles, unknowns, axes, dt = 5, 4, 2 if climb is None else 3, 0.3
+    motion = MotionPrior(acceleration=0.7, start_position=0.2, start_velocity=0.4, axes=axes, climb=climb)
+    own = np.array([0.7, 0.7, climb or 0.0])[:axes]
+    first = np.array([0.2, 0.2, 1e-9])[:axes], np.array([0.4, 0.4, 1e-9])[:axes]
     rows = [
         LinearMeasurements(rng.normal(size=(3, 3)), rng.normal(size=(3, unknowns)), rng.exponential(size=3))
         for _ in range(cycles)
     ]
     unknown_std = np.array([1.0, 2.0, 0.5, 3.0])
     bound = posterior_bound(rows, dt * np.arange(cycles), motion, unknown_std)
-    # unknowns: start state (4), one acceleration an axis and step (2 each), landmarks (4)
-    size = 4 + 2 * (cycles - 1) + unknowns
-    joint = np.diag(np.concatenate([[0.2] * 2, [0.4] * 2, [0.7] * (2 * (cycles - 1)), unknown_std]) ** -2.0)
-    state = np.zeros((4, size))
-    state[:, :4] = np.eye(4)
-    step = np.kron([[1, dt], [0, 1]], np.eye(2))
+    # unknowns: start state (2 an axis), one acceleration an axis and step, landmarks (4)
+    size = 2 * axes + axes * (cycles - 1) + unknowns
+    joint = np.diag(np.concatenate([*first, *([own] * (cycles - 1)), unknown_std]) ** -2.0)
+    state = np.zeros((2 * axes, size))
+    state[:, : 2 * axes] = np.eye(2 * axes)
+    step = np.kron([[1, dt], [0, 1]], np.eye(axes))
     for cycle, row in enumerate(rows):
         if cycle:
             state = step @ state
-            state[:, 4 + 2 * (cycle - 1) : 6 + 2 * (cycle - 1)] += np.kron([[dt**2 / 2], [dt]], np.eye(2))
-        slope = row.agent[:, :2] @ state[:2]
+            column = 2 * axes + axes * (cycle - 1)
+            state[:, column : column + axes] += np.kron([[dt**2 / 2], [dt]], np.eye(axes))
+        slope = row.agent[:, :axes] @ state[:axes]
         slope[:, -unknowns:] += row.unknown
         joint += slope.T * row.information @ slope
         inverse = np.linalg.inv(joint)
-        np.testing.assert_allclose(bound.agent[cycle], state @ inverse @ state.T, rtol=1e-9, atol=1e-12)
+        # a start known to 1e-9 stands for one known exactly: ten digits less of the inverse
+        rtol = 1e-9 if climb is None else 1e-7
+        np.testing.assert_allclose(bound.agent[cycle], state @ inverse @ state.T, rtol=rtol, atol=1e-12)
         np.testing.assert_allclose(bound.unknown[cycle], np.diag(inverse)[-unknowns:], rtol=1e-9)
     np.testing.assert_allclose(bound.last, inverse[-unknowns:, -unknowns:], rtol=1e-9, atol=1e-12)
+
+
+def test_who_does_not_climb_has_a_known_height():
+    rng = np.random.default_rng(2)
+    rows = [LinearMeasurements(rng.normal(size=(4, 3)), rng.normal(size=(4, 2)), rng.exponential(size=4))] * 6
+    level, known, climbing = (
+        posterior_bound(rows, 0.1 * np.arange(6), motion, np.ones(2)).rms
+        for motion in (MotionPrior(axes=3, climb=0.0), MotionPrior(), MotionPrior(axes=3, climb=0.5))
+    )
+    np.testing.assert_allclose(level, known, rtol=1e-12)
+    assert climbing[-1] > known[-1]
 
 
 def test_without_measurements_the_bound_is_the_motion_alone():
@@ -244,5 +261,7 @@ def test_bad_settings_are_refused(room):
         build(room, "guessed")
     with pytest.raises(ConfigError, match="axes: 4"):
         MotionPrior(axes=4)
+    with pytest.raises(ConfigError, match="climb"):
+        MotionPrior(axes=2, climb=0.1)
     with pytest.raises(ConfigError, match="acceleration"):
         MotionPrior(acceleration=-1.0)

@@ -8,6 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
+from rislam_rt.evaluate import root_mean_square
 from rislam_rt.information import posterior_bound
 from rislam_rt.model import PathKind, Paths, Scene, SchemeResult
 from rislam_rt.pipeline.scores.bound import bound_problem
@@ -79,15 +80,19 @@ def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: Pipeline
 def run_bounds(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineSpec) -> tuple[Floats, Floats]:
     """Bounds to hold a run against: least RMS position errors (K,) [m], absolute, and relative to the start.
 
-    The motion's law is white acceleration of the root mean square that this motion truly has, so that a lively one has
-    a looser bound; what a filter is told of it does not count. No measurement of an unknown room tells where it lies:
+    The motion's law is white acceleration of the root mean squares that this motion truly has, across and upwards, so
+    that a lively one has a looser bound; what a filter is told of it does not count. Nobody is told the height after
+    the start: that of an agent that climbs is not known. No measurement of an unknown room tells where it lies:
     relative to the start is what remains when the start is known exactly.
     """
     problem = bound_problem(scene, paths, result.gain, result.scheme, spec.model_dump(mode="json"))
     axes, time = problem.motion.axes, scene.agent.time
-    push = np.diff(scene.agent.velocity[:, :axes], axis=0) / np.diff(time)[:, None]
-    told = problem.motion.acceleration
-    motion = replace(problem.motion, acceleration=float(np.sqrt(np.mean(push**2))) if len(push) else told)
+    push = np.diff(scene.agent.velocity, axis=0) / np.diff(time)[:, None]
+    motion = problem.motion
+    if len(push):
+        motion = replace(motion, acceleration=root_mean_square(push[:, :axes]))
+    if len(push) and axes == 2:
+        motion = replace(motion, axes=3, climb=root_mean_square(push[:, 2]))
     found = [
         posterior_bound(problem.rows, time, law, problem.unknown_std).rms
         for law in (motion, replace(motion, start_position=0.0))
