@@ -25,7 +25,7 @@ from rislam_rt.slam.window.divergence import divergence_monitor, recovery
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.measurement_log import Residuals, empty_log, renew
+from rislam_rt.slam.window.measurement_log import Residuals, empty_log, from_above, renew
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
@@ -196,13 +196,14 @@ def _assumed_precision(config: SlamConfig, dt: float) -> Floats:
 
 def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
     """The window after this cycle's components: two Gauss-Newton steps; the whole of it again now and then."""
-    window, log, landmarks, body = state.window, state.log, state.landmarks, state.scene.body
+    window, log, landmarks, scene = state.window, state.log, state.landmarks, state.scene
     last = np.array([window.num_poses - 1])
-    window, found = renew(window, log, landmarks, body, state.heading, last, even=True)
+    window, found = renew(window, log, landmarks, scene, state.heading, last, even=True)
     nis = float(np.sum(found.left**2))
-    window = window_gaussian.solve(window, spread=False)
-    slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else last
-    window, left = renew(window, log, landmarks, body, state.heading, slots)
+    window, slots = window_gaussian.solve(window, spread=False), last
+    if state.cycle % REFRESH == 0:
+        window, slots = from_above(window, log, landmarks), np.arange(window.num_poses)
+    window, left = renew(window, log, landmarks, scene, state.heading, slots)
     window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return widen_motion(state._replace(window=window)), left, nis
 

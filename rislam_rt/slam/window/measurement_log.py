@@ -5,13 +5,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.model import Body
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.returns import linearise, poses_of
+from rislam_rt.slam.returns import NONE, linearise, poses_of, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
+from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.smoother.steps import POSE
+from rislam_rt.slam.window.smoother.steps import HEAD, POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, poses
 
 
@@ -98,14 +98,14 @@ class Residuals(NamedTuple):
 
 
 def residuals(
-    log: Log, window: Window, landmarks: WindowTable, body: Body, heading: Floats, rows: Integers
+    log: Log, window: Window, landmarks: WindowTable, scene: KnownEnvironment, heading: Floats, rows: Integers
 ) -> Residuals:
     """Of some explained rows of the log, at the present estimate; `heading` (K,) as the compass tells."""
     first = int(log.cycle[-1]) - window.num_poses + 1
     slot = log.cycle[rows] - first
     used, back = np.unique(slot, return_inverse=True)
     place = poses(window)[used]
-    ends = poses_of(place[:, :3], heading[used] + place[:, 3], body)
+    ends = poses_of(place[:, :3], heading[used] + place[:, 3], scene.body)
     features = window.features
     form = log.form[rows]
     both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
@@ -128,10 +128,14 @@ def residuals(
     if len(both):
         other, by_other = pick(back[both], column[count:])
         share = log.share[rows[both]]
-        seen[both] += share[:, None] * (other - seen[both])
+        gap = other - seen[both]
+        gap[:, 0] = scene.sensor.nearest(gap[:, 0])
+        seen[both] += share[:, None] * gap
         jacobian[both] += share[:, None, None] * (by_other - jacobian[both])
     std = np.sqrt(log.std[rows] ** 2 + log.extra[rows])
-    return Residuals(rows, slot, (log.seen[rows] - seen) / std, jacobian / std[..., None])
+    left = log.seen[rows] - seen
+    left[:, 0] = scene.sensor.nearest(left[:, 0])
+    return Residuals(rows, slot, left / std, jacobian / std[..., None])
 
 
 def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
@@ -149,11 +153,30 @@ def trust(left: Floats) -> Floats:
     return np.asarray((CONSTANTS.tail + 3.0) / (CONSTANTS.tail + np.vecdot(left, left)))
 
 
+def from_above(window: Window, log: Log, landmarks: WindowTable) -> Window:
+    """The window with those walls leaning the other way whose own returns, heard within it, would arrive from below.
+
+    Both are seen alike, but the array hears from above; where a return is level, noise takes a step to either side.
+    """
+    form, middle, features = log.form[:, 0], poses(window)[-1, :3], window.features
+    own = form[(form[:, [0, 1, 4]] == NONE).all(axis=1), 3]
+    span = features - landmarks.anchor
+    above = np.vecdot(0.5 * (features + landmarks.anchor) - middle, span) * span[:, 2]
+    rows = (landmarks.is_wall & np.isin(landmarks.ident, own) & (above < 0.0)).nonzero()[0]
+    if not len(rows):
+        return window
+    turn, lift = np.array([1.0, 1.0, -1.0]), np.array([0.0, 0.0, 2.0 * middle[2]])
+    anchor, head = landmarks.anchor[rows], window.head.copy()
+    mirrored = lift + turn * reflect(lift + turn * anchor, features[rows], anchor)
+    head[HEAD + 3 * rows[:, None] + np.arange(3)] = mirrored
+    return window._replace(head=head)
+
+
 def renew(
     window: Window,
     log: Log,
     landmarks: WindowTable,
-    body: Body,
+    scene: KnownEnvironment,
     heading: Floats,
     slots: Integers,
     *,
@@ -173,7 +196,7 @@ def renew(
     if not len(rows):
         nothing = Residuals(rows, rows, np.zeros((0, 3)), np.zeros((0, 3, size)))
         return window._replace(slots=Quadratic(hessian, gradient, middle)), nothing
-    found = residuals(log, window, landmarks, body, heading, rows)
+    found = residuals(log, window, landmarks, scene, heading, rows)
     weight = np.ones(len(rows)) if even else trust(found.left)
     start = np.searchsorted(found.slot, slots)
     stop = np.searchsorted(found.slot, slots, side="right")

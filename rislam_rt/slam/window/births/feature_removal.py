@@ -9,7 +9,7 @@ from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, remove_f
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
-from rislam_rt.slam.window.measurement_log import Log, Residuals, renew
+from rislam_rt.slam.window.measurement_log import Log, Residuals, from_above, renew
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.solver_limits import FEWEST, RECENT
 from rislam_rt.slam.window.state import WindowState
@@ -20,7 +20,8 @@ def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, R
     """Gauss-Newton over the whole window."""
     window, every = context.window, np.arange(context.window.num_poses)
     for _ in range(steps):
-        window, left = renew(window, context.log, context.landmarks, context.scene.body, context.heading, every)
+        window = from_above(window, context.log, context.landmarks)
+        window, left = renew(window, context.log, context.landmarks, context.scene, context.heading, every)
         window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return window, left
 

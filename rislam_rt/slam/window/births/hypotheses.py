@@ -1,6 +1,6 @@
 """Every hypothesis that a track is tried against, with its first guess; walls of the map as affine maps."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,10 @@ class KnownFeatures(NamedTuple):
     shift: Floats
     """(F, 3)."""
 
+    def is_ceiling(self, wall: int, middle: Floats) -> bool:
+        """Whether a level wall lies above the agent: an edge that the floor makes is heard from below, hence not."""
+        return bool(abs(self.turn[wall, 2, 2]) > LEVEL_TURN and self.place[wall, 2] > middle[2])
+
 
 class Hypotheses(NamedTuple):
     """H hypotheses for T tracks."""
@@ -49,6 +53,11 @@ class Hypotheses(NamedTuple):
     over: Integers
     """(H,) row of the known wall that an image of a known point runs over besides, -1 for none."""
     trials: Trials
+
+    def take(self, rows: Any) -> "Hypotheses":
+        """Only some of the hypotheses."""
+        trials = Trials._make(field[rows] for field in self.trials)
+        return Hypotheses(self.kind[rows], self.known[rows], self.over[rows], trials)
 
 
 def known_features(mean: Floats, covariance: Floats, landmarks: WindowTable, middle: Floats) -> KnownFeatures:
@@ -101,7 +110,7 @@ def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTabl
         add(OVER_RX, wall, mirrored, NONE, wall, (tx, mirrored))
         add(OVER_TX, wall, apparent, wall, NONE, (apparent, tx))
         add(OVER_SAME, wall, same, wall, wall, (same, same))
-        if abs(turn[2, 2]) > LEVEL_TURN:
+        if known.is_ceiling(wall, middle):
             upright = reflect(anchor, image, tx)
             upright[:, 2] = middle[2]  # what lies higher comes of the edge
             add(BESIDE, wall, upright, NONE, NONE, (tx, tx))

@@ -9,7 +9,6 @@ from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window.births.hypotheses import (
     BESIDE,
     IMAGES,
-    LEVEL_TURN,
     OVER_SAME,
     OVER_TX,
     POINT,
@@ -69,7 +68,9 @@ def log_beside(
     """
     track, found = table.trials.track, np.zeros(len(table.kind))
     length, cell = digest.mean[0][track, 0], float(scene.sensor.cell_length[0])
-    for wall in landmarks.walls[np.abs(known.turn[landmarks.walls, 2, 2]) > LEVEL_TURN]:
+    for wall in landmarks.walls:
+        if not known.is_ceiling(wall, digest.middle):
+            continue
         rise = float(np.linalg.norm(known.place[wall] - digest.middle))
         gap = np.hypot(length, rise) - length
         found += np.where((table.kind == WALL) & (gap < CLOSE * cell), LOG_ALONE, 0.0)
