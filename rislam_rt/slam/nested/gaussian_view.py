@@ -13,13 +13,12 @@ from rislam_rt.slam.nested.particles.belief import Nested, gaussian
 from rislam_rt.slam.window.smoother.factor import inverse
 from rislam_rt.slam.window.smoother.steps import HEAD, POSE, TURN, basis, latest
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, no_holds
+from rislam_rt.slam.window.solver_limits import STILL
 
 FOLLOWED, MET = 1e-4, 1e-8
 """Deviations [m, rad] with which the window follows the trail, and [m, m/s, rad] with which it meets the present."""
 ROUNDING = 1e-14
 """Variance [m^2, ...] up to which a thing is known exactly: what rounding makes of none."""
-STILL = 1e-5
-"""[m/s^2] Acceleration of an axis that is known to be still."""
 
 
 def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamConfig) -> Window:

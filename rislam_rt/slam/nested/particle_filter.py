@@ -163,9 +163,7 @@ def _seen(front: WindowState, view: CycleAssociation, used: Booleans) -> Seen:
     at = np.searchsorted(log.cycle, front.cycle) + view.pick[used]
     returns = compile_forms(front.landmarks.rows(log.form[at, 0]))
     seen = log.seen[at] - log.share[at, None] * view.groups.gap[row]
-    crowd = np.maximum(view.scatter[view.groups.leader[row]], 1.0)[:, None] - 1.0
-    noise = log.std[at] ** 2 + log.extra[at] + (1.0 - CONSTANTS.memory) * crowd * log.std[at] ** 2 + FLOOR**2
-    return Seen(returns, front.landmarks.anchor, front.scene.body, seen, noise)
+    return Seen(returns, front.landmarks.anchor, front.scene.body, seen, log.momentary[at] + FLOOR**2)
 
 
 def _classify(front: WindowState, config: SlamConfig) -> tuple[WindowState, Booleans]:
@@ -220,5 +218,5 @@ def _history(front: WindowState, row: int) -> LandmarkHistory:
     prior = np.linalg.inv(information)
     return LandmarkHistory(
         compile_forms(own[None]), known, landmarks.anchor[local], prior @ place, prior, slots, seen,
-        log.std[at] ** 2 + log.extra[at] / CONSTANTS.memory,
+        log.momentary[at],
     )  # fmt: skip

@@ -29,7 +29,7 @@ from rislam_rt.slam.window.measurement_log import Residuals, empty_log, from_abo
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
-from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, MISSED, REFRESH
+from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, MISSED, REFRESH, STILL
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -181,10 +181,6 @@ def _surplus(precision: Floats, levels: Floats) -> Floats:
     """(..., A) variance of the slopes of priors (..., A) that levels (N, ..., L) have beyond their precisions."""
     variance = np.stack([motion.expected_variance(levels[group]) for group in COLUMNS[: len(levels) + 1]], axis=-1)
     return np.asarray(np.maximum(precision**2 * variance - precision, 0.0))
-
-
-STILL = 1e-5
-"""[m/s^2] Acceleration of an axis that is known to be still."""
 
 
 def _assumed_precision(config: SlamConfig, dt: float) -> Floats:

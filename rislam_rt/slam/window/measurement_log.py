@@ -56,6 +56,12 @@ class Log(NamedTuple):
         return self._replace(form=form, share=shares, extra=variance, shared=known)
 
     @property
+    def momentary(self) -> Floats:
+        """(N, 3) variance of one cycle's measurement by itself: scatter counts `memory` times in `extra`, as its pull
+        keeps its sign for as long."""
+        return np.asarray(self.std**2 + self.shared + (self.extra - self.shared) / CONSTANTS.memory)
+
+    @property
     def explained(self) -> Booleans:
         """(N,) whether it is held to be a form."""
         return np.asarray(self.form[:, 0, 0] != UNKNOWN)

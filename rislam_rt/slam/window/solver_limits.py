@@ -51,3 +51,15 @@ MODES = 7
 """Motion modes, half a decade apart."""
 ALIGNED = 0.2
 """Share of the paths over unknown walls that have them on the Tx leg alone."""
+STILL = 1e-5
+"""[m/s^2] Acceleration of an axis that is known to be still."""
+ASTRAY = 0.3
+"""[m] by which a step of a fit may go where nothing is measured."""
+BEARINGS = 8
+"""Initial values, all around, of an upright wall whose bearing only a length tells."""
+REACH = 5.0
+"""Standard deviations by which a track may come from elsewhere than the point of which it may be an image."""
+APART = 0.5
+"""Distance [m] between two fits of one kind below which they are one."""
+STEP = 1e-6
+"""[m] by which walls are moved for the slope of a margin: its second derivative is of the order of one over metres."""

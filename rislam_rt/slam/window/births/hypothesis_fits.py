@@ -15,7 +15,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES
 from rislam_rt.slam.window.births.track_summary import TrackSummary
-from rislam_rt.slam.window.solver_limits import HOPELESS, RIDGE, STEPS
+from rislam_rt.slam.window.solver_limits import ASTRAY, HOPELESS, RIDGE, STEPS
 
 
 class Trials(NamedTuple):
@@ -109,8 +109,6 @@ def try_all(trials: Trials, digest: TrackSummary) -> Fits:
     return Fits(place, covariance, held, cost, share, evidence)
 
 
-ASTRAY = 0.3
-"""[m] by which a step may go where nothing is measured."""
 COMMON = 13
 """Unknowns beside the place: errors of pose and velocity, of the two maps, and of the share; headings come on top."""
 

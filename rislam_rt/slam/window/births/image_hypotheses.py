@@ -28,18 +28,10 @@ from rislam_rt.slam.window.births.hypotheses import (
 from rislam_rt.slam.window.births.hypothesis_fits import Trials
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
-
-BEARINGS = 8
-"""Initial values, all around, of an upright wall whose bearing only a length tells."""
-REACH = 5.0
-"""Standard deviations by which a track may come from elsewhere than the point of which it may be an image."""
-APART = 0.5
-"""Distance [m] between two fits of one kind below which they are one."""
+from rislam_rt.slam.window.solver_limits import APART, BEARINGS, REACH
 
 
-def with_images(
-    table: Hypotheses, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
-) -> Hypotheses:  # fmt: skip
+def with_images(table: Hypotheses, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:
     """The hypotheses (H,), and behind them the images of every known point in a new wall that are in reach."""
     ways = [(point, wall) for point in landmarks.points.tolist() for wall in (NONE, *landmarks.walls.tolist())]
     more = [_in_reach(_images(digest, known, point, wall), digest, known) for point, wall in ways]

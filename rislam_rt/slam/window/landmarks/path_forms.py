@@ -14,6 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, reflect
+from rislam_rt.slam.window.solver_limits import STEP
 
 UNKNOWN = -9
 """In a form's base: it is not known."""
@@ -123,10 +124,6 @@ def _margin_std(
     rows = (3 * walls[:, :, None] + np.arange(3)).reshape(len(walls), 6)
     block = covariance[rows[:, :, None], rows[:, None, :]]
     return np.asarray(np.sqrt(np.maximum(np.vecdot(along, (block @ along[..., None])[..., 0]), STEP**2)))
-
-
-STEP = 1e-6
-"""[m] by which walls are moved for the slope of a margin: its second derivative is of the order of one over metres."""
 
 
 def _swapped(legs: Integers, two: Integers) -> Integers:
