@@ -75,7 +75,6 @@ def try_all(trials: Trials, digest: TrackSummary) -> Fits:
     trust = np.ones((count, digest.seen.shape[1]))
     common = COMMON + digest.twist.shape[-1]
     place, error = trials.start.copy(), np.zeros((count, common))
-    plain = trials.is_wall & ~trials.fixed & (trials.turn == AXES).all(axis=(1, 2, 3))
     for turn in range(STEPS + 1):
         now = _equations(trials, digest, active, place[active], error[active], trust[active])
         cost[active] = now.cost
@@ -86,14 +85,12 @@ def try_all(trials: Trials, digest: TrackSummary) -> Fits:
             break
         trust[active] = now.trust
         stiff = now.normal.copy()
-        # a length alone leaves a ring of places, a level return its elevation: there a straight step leads astray
-        stiff[:, common:, common:] += trials.is_wall[active, None, None] * AXES / ASTRAY**2
+        # a length alone leaves a ring of places, along which a straight step leads astray
+        stiff[trials.far[active], common:, common:] += AXES / ASTRAY**2
         step = np.linalg.solve(stiff, now.slope[..., None])[..., 0]
         length = np.sqrt(np.vecdot(step[:, common:], step[:, common:]))[:, None]
         short = np.minimum(1.0, 1.5 / np.maximum(length, 1e-12))
         place[active] += short * step[:, common:]
-        # cosines are those of a ray from above, and of its image from below, which is not heard
-        place[plain, 2] = digest.middle[2] + np.abs(place[plain, 2] - digest.middle[2])
         error[active] += short * step[:, :common]
         if turn == 1:
             best = np.full(len(digest.seen), np.inf)

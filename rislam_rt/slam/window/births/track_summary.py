@@ -52,7 +52,8 @@ class TrackSummary(NamedTuple):
 
     def take(self, rows: Integers) -> "TrackSummary":
         """Only some of the tracks, or some more than once."""
-        return TrackSummary(*(field[rows] for field in self[:8]), self.middle, self.speed, self.twist[rows])
+        per_track = {name: field[rows] for name, field in self._asdict().items() if name not in ("middle", "speed")}
+        return self._replace(**per_track)
 
     def farther(self, sensor: SensorModel) -> tuple["TrackSummary", Integers]:
         """With a row more for every longer path that a track may be, were it heard so many periods of the sounding too
