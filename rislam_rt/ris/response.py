@@ -24,12 +24,17 @@ def leg_response(spec: RisSpec, center: Floats, device: Floats, coefficient: Com
 
     Each leg takes half (in dB) of the join's `sqrt(4 pi G dx dy) A / lambda`.
     """
+    amplitude, distance = leg_parts(spec, center, device, wavelength)
+    return np.asarray(coefficient)[..., None, None] * amplitude * phasor(-2.0 * np.pi / wavelength * distance)
+
+
+def leg_parts(spec: RisSpec, center: Floats, device: Floats, wavelength: float) -> tuple[Floats, Floats]:
+    """Amplitudes (..., N, M) of `leg_response` for a coefficient of 1, and the elements' distances [m] alike."""
     ray, offsets = np.asarray(device - center), spec.offsets()
     along = (ray @ offsets.reshape(-1, 3).T).reshape(*ray.shape[:-1], *offsets.shape[:-1])
     distance = np.sqrt(np.vecdot(ray, ray)[..., None, None] - 2.0 * along + np.vecdot(offsets, offsets))
     pattern = element_pattern(spec, (ray @ spec.normal)[..., None, None] / distance)
-    amplitude = _leg_share(spec, wavelength) * np.sqrt(pattern) * wavelength / (4.0 * np.pi * distance)
-    return np.asarray(coefficient)[..., None, None] * amplitude * phasor(-2.0 * np.pi / wavelength * distance)
+    return _leg_share(spec, wavelength) * np.sqrt(pattern) * wavelength / (4.0 * np.pi * distance), distance
 
 
 def far_field_response(

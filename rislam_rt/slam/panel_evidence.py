@@ -5,6 +5,8 @@ over the belief); "is a scatterer" predicts one unknown cross-section for all cy
 in which a landmark does not show count too: of a path near the threshold only the strong amplitudes are ever seen.
 """
 
+from functools import lru_cache
+
 import numpy as np
 import scipy
 
@@ -107,7 +109,14 @@ def panel_probabilities(log_ris: Floats) -> Floats:
     """
     if not len(log_ris):
         return np.zeros(log_ris.shape)
-    table = log_ris.reshape(len(log_ris), -1)
+    table = np.ascontiguousarray(log_ris, dtype=np.float64).reshape(len(log_ris), -1)
+    return _probabilities(table.tobytes(), table.shape[1]).reshape(log_ris.shape)
+
+
+@lru_cache(maxsize=16)
+def _probabilities(odds: bytes, panels: int) -> Floats:
+    """(P, Q), read-only: asked for several times in a cycle."""
+    table = np.frombuffer(odds).reshape(-1, panels)
     before, after = _log_ways(table), _log_ways(table[::-1])[::-1]
     total = np.logaddexp.reduce(before[-1, ::-1])
     probability = np.empty(table.shape)
@@ -117,7 +126,8 @@ def panel_probabilities(log_ris: Floats) -> Floats:
         apart = [(a, b) for a in sets for b in sets if not (a & b or (a | b) >> panel & 1)]
         rest = np.logaddexp.reduce([before[:-1, a] + after[1:, b] for a, b in apart], axis=0)
         probability[:, panel] = np.exp(table[:, panel] + rest - total)
-    return probability.reshape(log_ris.shape)
+    probability.flags.writeable = False
+    return probability
 
 
 def ris_probabilities(log_ris: Floats, points: Integers) -> Floats:

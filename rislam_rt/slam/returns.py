@@ -142,25 +142,39 @@ class Linear(NamedTuple):
         turned[..., 1], turned[..., 2] = self.seen[..., 2], -self.seen[..., 1]
         for jacobian, end in ((self.by_tx, poses.tx), (self.by_rx, poses.rx)):
             arm = end - position
-            turned += jacobian[..., 1] * arm[..., None, None, 0] - jacobian[..., 0] * arm[..., None, None, 1]
+            arm = arm if arm.ndim == turned.ndim else arm[..., None, :]
+            turned += jacobian[..., 1] * arm[..., None, 0] - jacobian[..., 0] * arm[..., None, 1]
         return turned
 
 
 def linearise(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Linear:
     """`observe(...).seen` with its derivatives by the features (..., F, 3) and by the agent's ends."""
-    image, by_feature, by_base = _leg_jacobian(returns, features, anchor, poses.tx)
+    ends = Poses(poses.tx[..., None, :], poses.rx[..., None, :], np.asarray(poses.heading)[..., None])
+    return _linearise(returns, features, anchor, ends.tx, ends)
+
+
+def linearise_each(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Linear:
+    """The same of R returns of which each has a pose of its own, of features (F, 3); a leg has one `TX` at most."""
+    tx = np.empty((len(returns.legs), 3))
+    tx[returns.tx] = tx[returns.rx] = poses.tx
+    return _linearise(returns, features, anchor, tx, poses)
+
+
+def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Floats, poses: Poses) -> Linear:
+    """With the Tx of each leg (..., G or 1, 3), and poses with an axis for the returns (..., R or 1)."""
+    image, by_feature, by_base = _leg_jacobian(returns, features, anchor, leg_tx)
     seen, by_tx, by_rx = _sight_jacobians(image, returns, poses)
     # features side by side, so that one product of matrices serves all of them
     count = by_feature.shape[-2]
     wide = by_feature.reshape(*image.shape, 3 * count)
     features_jacobian = by_rx @ wide[..., returns.rx, :, :]
-    features_jacobian[..., 0, :] += (by_tx[..., None, :] @ wide[..., returns.tx, :, :])[..., 0, :]
-    features_jacobian = features_jacobian.reshape(*features_jacobian.shape[:-1], count, 3)
     moving = returns.legs[:, 0] == TX
+    rows = (~moving[returns.tx]).nonzero()[0]  # the Tx leg of a moving base is the Tx itself
+    toward = by_tx[..., rows, None, :] @ wide[..., returns.tx[rows], :, :]
+    features_jacobian[..., rows, 0, :] += toward[..., 0, :]
+    features_jacobian = features_jacobian.reshape(*features_jacobian.shape[:-1], count, 3)
     if moving.any():  # the images of a moving base move with it
-        moves = np.where(moving[:, None, None], by_base, 0.0)
-        tx_jacobian = by_rx @ moves[..., returns.rx, :, :]
-        tx_jacobian[..., 0, :] += (by_tx[..., None, :] @ moves[..., returns.tx, :, :])[..., 0, :]
+        tx_jacobian = by_rx @ np.where(moving[:, None, None], by_base, 0.0)[..., returns.rx, :, :]
     else:
         tx_jacobian = np.zeros(by_rx.shape)
     tx_jacobian[..., 0, :] -= by_tx
@@ -169,11 +183,10 @@ def linearise(returns: Returns, features: Floats, anchor: Floats, poses: Poses) 
 
 def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Floats, Floats, Floats]:
     """What is seen (..., R, 3); the length's derivative by the Tx leg's image (..., R, 3); all by the Rx leg's."""
-    to_tx = image[..., returns.tx, :] - poses.tx[..., None, :]
-    to_rx = image[..., returns.rx, :] - poses.rx[..., None, :]
+    to_tx, to_rx = image[..., returns.tx, :] - poses.tx, image[..., returns.rx, :] - poses.rx
     tx_length, rx_length = _norm(to_tx)[..., None], np.maximum(_norm(to_rx), 1e-9)[..., None]
     by_tx, arrival = to_tx / np.maximum(tx_length, 1e-9), to_rx / rx_length
-    body = np.swapaxes(rotation_z(poses.heading), -1, -2)[..., None, :2, :]
+    body = np.swapaxes(rotation_z(poses.heading), -1, -2)[..., :2, :]
     cosines = (body @ arrival[..., None])[..., 0]
     by_rx = np.empty((*arrival.shape, 3))
     by_rx[..., 0, :] = arrival
@@ -190,7 +203,7 @@ def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats
     legs = returns.legs
     moving, image = legs[:, 0] == TX, features[..., legs[:, 0], :]
     if moving.any():  # only then do images differ from pose to pose
-        image = np.where(moving[:, None], tx[..., None, :], image)
+        image = np.where(moving[:, None], tx, image)
     by_feature = np.zeros((*image.shape, features.shape[-2], 3))
     block = np.swapaxes(by_feature, -3, -2)
     by_base = np.zeros((*image.shape, 3)) + AXES
@@ -209,10 +222,10 @@ def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats
             near = legs[rows, 1]
             block[..., rows, near, :, :] = householder @ block[..., rows, near, :, :]
         by_wall = -2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :])
-        block[..., rows, walls, :, :] += by_wall
+        block[..., rows, walls, :, :] = by_wall
         image[..., rows, :] = mirrored
-    held = (legs[:, 0, None] == np.arange(features.shape[-2])).astype(np.float64)
-    by_feature += by_base[..., None, :] * held[:, None, :, None]
+    rows = (~moving).nonzero()[0]
+    block[..., rows, legs[rows, 0], :, :] += by_base[..., rows, :, :]
     return image, by_feature, by_base
 
 

@@ -10,9 +10,10 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested.particles.belief import Nested, gaussian
+from rislam_rt.slam.window.smoother.direction_priors import no_holds
 from rislam_rt.slam.window.smoother.factor import inverse
 from rislam_rt.slam.window.smoother.steps import HEAD, POSE, TURN, basis, latest
-from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, no_holds
+from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.solver_limits import STILL
 
 FOLLOWED, MET = 1e-4, 1e-8
@@ -40,8 +41,9 @@ def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamCon
     prior = Quadratic(inverse(whole[:size, :size] + ROUNDING * np.eye(size)), np.zeros(size), head)
     slots = Quadratic(np.zeros((count, slim, slim)), np.zeros((count, slim)), np.zeros((count, slim)))
     precision = np.tile(std**-2.0, (count - 1, 1))
+    none = np.zeros(accel.shape)
     return Window(
-        head, accel, precision, np.zeros(accel.shape), step, prior, np.zeros((size, size)), slots, whole, no_holds()
+        head, accel, precision, precision, none, step, prior, np.zeros((size, size)), slots, whole, no_holds()
     )
 
 

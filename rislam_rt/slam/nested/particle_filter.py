@@ -104,7 +104,7 @@ def step(
     told = update(belief, _seen(front, view, used), config.nested, engine)
     front = _look(front, told.belief, config)
     slots = np.arange(front.window.num_poses)[0 if front.cycle % REFRESH == 0 else -1 :]
-    left = renew_slots(front.window, front.log, landmarks, scene, front.heading, slots)[1]
+    left = renew_slots(front.window, front.log, landmarks, scene, front.heading, front.cycle, slots)[1]
     front, landmark = learn_cycle(front, heard, view, used, left, dt, turn, config.sigma_a, code)
     front, removed = _classify(front, config)
     landmark[heard.free[removed[len(removed) - len(observed.seen) :]]] = REMOVED

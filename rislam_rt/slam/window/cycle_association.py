@@ -29,14 +29,22 @@ class CycleAssociation(NamedTuple):
     """A cycle as a belief sees it."""
 
     mean: Floats
-    """(7 + 3F,) of the present."""
+    """(7 + 3F,) of the present..."""
+    covariance: Floats
+    """(7 + 3F, 7 + 3F) ...the height's with what it may be off by."""
     poses: Poses
     expected: ExpectedComponents
     groups: UnresolvedClusters
+    clear: Floats
+    """(R,) probability that nothing stands in the way of each return..."""
+    scatter: Floats
+    """(R,) ...and its scatter."""
     shows: Floats
     """(C,) probability that each cluster shows."""
-    scatter: Floats
-    """(R,) of each return."""
+    extra: Floats
+    """(C, 3) variance of each beside the belief's own and the reported one."""
+    side: Integers
+    """(C,) which are heard over a panel (see `slam.observations`)."""
     row: Integers
     """(A,) clusters that were seen..."""
     pick: Integers
@@ -77,15 +85,24 @@ def associate_cycle(
     expected = predict_returns(
         mean[HEAD:].reshape(-1, 3), landmarks, poses, mean[:3], scene, code, covariance[HEAD:, HEAD:]
     )
-    sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
     clear, scatter = recall(visibility, expected, landmarks)
+    sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
     groups = cluster(expected, scene.sensor.cell_length, clear, None if sides is None else np.maximum(sides, OTHER))
-    shows = visible(expected, groups, clear)
-    row, pick, score = _associate(expected, groups, shows, scatter, covariance, observed, sides, strangers)
-    alone = groups.by_itself == 1.0
-    due, seen = shows[alone], np.isin(np.arange(len(shows)), row)[alone]
-    surprise = (due.sum() - seen.sum()) / np.sqrt((due * (1.0 - due)).sum() + 0.25)
-    return CycleAssociation(mean, poses, expected, groups, shows, scatter, row, pick, score, float(surprise))
+    lead = groups.leader
+    extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
+    if len(observed.seen):
+        extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(observed.std, axis=0) ** 2
+    nobody = np.zeros(0, dtype=np.int64)
+    view = CycleAssociation(
+        mean, covariance, poses, expected, groups, clear, scatter, visible(expected, groups, clear), extra,
+        np.full(len(lead), UNTOLD) if sides is None else sides[lead], nobody, nobody, 0.0, 0.0,
+    )  # fmt: skip
+    row, pick, score = _associate(view, expected.seen, covariance, observed, strangers)
+    alone, found = groups.by_itself == 1.0, np.zeros(len(lead), dtype=np.bool_)
+    found[row] = True
+    due = view.shows[alone]
+    surprise = (due.sum() - found[alone].sum()) / np.sqrt((due * (1.0 - due)).sum() + 0.25)
+    return view._replace(row=row, pick=pick, score=score, surprise=float(surprise))
 
 
 def _now(window: Window, scene: KnownEnvironment) -> tuple[Floats, Floats]:
@@ -101,14 +118,11 @@ def _now(window: Window, scene: KnownEnvironment) -> tuple[Floats, Floats]:
 
 
 def score_again(
-    view: CycleAssociation, window: Window, landmarks: WindowTable, scene: KnownEnvironment, observed: Observations,
-    strangers: Floats,
-) -> float:  # fmt: skip
+    view: CycleAssociation, mean: Floats, covariance: Floats, observed: Observations, strangers: Floats
+) -> float:
     """The cycle's score under another belief: what is expected moves with it to first order, clusters stay."""
-    mean, covariance = _now(window, scene)
-    expected = view.expected._replace(seen=view.expected.seen + view.expected.jacobian @ (mean - view.mean))
-    sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
-    return _associate(expected, view.groups, view.shows, view.scatter, covariance, observed, sides, strangers)[2]
+    seen = view.expected.seen + view.expected.jacobian @ (mean - view.mean)
+    return _associate(view, seen, covariance, observed, strangers)[2]
 
 
 def return_sides(forms: Integers, landmarks: WindowTable) -> Integers:
@@ -123,24 +137,20 @@ def return_sides(forms: Integers, landmarks: WindowTable) -> Integers:
 
 
 def _associate(
-    expected: ExpectedComponents, groups: UnresolvedClusters, shows: Floats, scatter: Floats, covariance: Floats,
-    observed: Observations,
-    sides: Integers | None, strangers: Floats,
-) -> tuple[Integers, Integers, float]:  # fmt: skip
+    view: CycleAssociation, places: Floats, covariance: Floats, observed: Observations, strangers: Floats
+) -> tuple[Integers, Integers, float]:
     """Rows of the clusters that were seen, the components that they were seen as, and the log likelihood of the cycle
-    over that of strangers alone: the best assignment."""
+    over that of strangers alone: the best assignment, with returns at `places` (R, 3)."""
+    (expected, groups), shows = (view.expected, view.groups), view.shows
     missed = groups.by_itself == 1.0
     if not len(groups.leader) or not len(observed.seen):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), float(np.log1p(-shows[missed]).sum())
     lead, mate = groups.leader, groups.partner
-    share = groups.share[:, None]
-    seen = expected.seen[lead] + share * groups.gap
-    extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
-    extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(observed.std, axis=0) ** 2
+    share, extra, side = groups.share[:, None], view.extra, view.side
+    seen = places[lead] + share * groups.gap
     most = np.abs(expected.jacobian) @ np.sqrt(np.diagonal(covariance))  # no correlation makes a deviation larger
     most = (most[lead] + share * (most[mate] - most[lead])) ** 2 + extra
     level, doubt = groups.log_amplitude, np.hypot(groups.log_amplitude_std, 0.5 * CONSTANTS.fading)
-    side = np.full(len(lead), UNTOLD) if sides is None else sides[lead]
     near = _within_reach(seen, most, level, doubt, side, observed)
     lead, mate, share, seen, every, shows = lead[near], mate[near], share[near], seen[near], shows, shows[near]
     jacobian = expected.jacobian[lead] + share[..., None] * (expected.jacobian[mate] - expected.jacobian[lead])

@@ -67,6 +67,18 @@ def take_in(state: WindowState, observed: Observations, view: CycleAssociation) 
     return state._replace(log=log), used
 
 
+def innovations(view: CycleAssociation, log: Log, used: Booleans, cycle: int) -> tuple[Floats, Floats]:
+    """Measured less predicted (N, 3) of what moves the belief, and the prediction's jacobian (N, 3, 7 + 3F) by the
+    present, both in standard deviations; the log holds what the cycle's components were taken for."""
+    row, at = view.row[used], int(np.searchsorted(log.cycle, cycle)) + view.pick[used]
+    lead, mate, share = view.groups.leader[row], view.groups.partner[row], log.share[at, None]
+    seen = view.expected.seen[lead] + share * view.groups.gap[row]
+    slope = view.expected.jacobian[lead]
+    slope = slope + share[..., None] * (view.expected.jacobian[mate] - slope)
+    std = np.sqrt(log.std[at] ** 2 + log.extra[at])
+    return (log.seen[at] - seen) / std, slope / std[..., None]
+
+
 def learn_cycle(
     state: WindowState, heard: HeardCycle, view: CycleAssociation, used: Booleans, left: Residuals, dt: float,
     turn: float, bend: float, code: RisCode | None,
@@ -91,7 +103,8 @@ def learn_cycle(
     if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, view.poses, state.scene, code))
     visibility, landmarks = learn(
-        state.visibility, landmarks, state.window, expected, groups, view.shows, row, pick, raw, observed, view.poses,
+        state.visibility, landmarks, state.window, expected, groups, view.clear, view.scatter, view.shows, row, pick,
+        raw, observed, view.poses,
         state.scene, code,
     )  # fmt: skip
     landmark = heard.landmark.copy()
@@ -192,7 +205,9 @@ def _follow(
     late = found.last == state.cycle - 1
     rows, picks = tracks.match(found, observed, free, state.cycle, state.config.new_density)
     found = tracks.extend(found, rows, observed, picks, state.cycle)
-    spare = np.setdiff1d(free, picks)
+    left = np.zeros(len(observed.seen), dtype=np.bool_)
+    left[free], left[picks] = True, False
+    spare = left.nonzero()[0]
     reach = np.maximum(observed.seen[spare, 0], 0.5)
     rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * (speed + 0.05)
     if len(state.level) > 2:  # what turns without a compass turns all that it sees

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.model_constants import CONSTANTS
@@ -14,6 +14,7 @@ from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again
 from rislam_rt.slam.window.cycle_explanation import (
     grow,
+    innovations,
     learn_cycle,
     listen,
     outcome_of,
@@ -77,7 +78,7 @@ def step(
     state, view = _notice(state, heading, code, observed, strangers)
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
     state, used = take_in(state, observed, view)
-    state, left, nis = _solve(state)
+    state, left, nis = _solve(state, view, used)
     jumped = state.lost_log_odds == 0.0
     state, landmark = learn_cycle(state, heard, view, used, left, dt, turn, bend, code)
     if state.cycle % REFRESH == 0 and scene.use_vt:  # without wall returns the fit is too free to show a scatter
@@ -102,7 +103,7 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         window, headings = window_gaussian.slide(window), headings[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)
     if state.config.motion == "told":
-        window = window_gaussian.extend(window, dt, _assumed_precision(state.config, dt))
+        window = window_gaussian.extend(window, dt, _assumed_precision(state.config, dt, window.turns))
     else:
         precision = _precisions(level)
         window = window_gaussian.extend(window, dt, precision, _surplus(precision, level))
@@ -132,12 +133,10 @@ def _notice(
     calm = best = view_of(state.window)
     window = state.window
     if state.config.motion == "learnt" and len(calm.groups.leader) and len(state.window.step):
-        precision = state.window.precision.copy()
-        lively = COLUMNS[: precision.shape[1]] != 1
-        precision[-LATELY:, lively] = np.minimum(precision[-LATELY:, lively], CONSTANTS.liveliest**-2.0)
-        trial = window_gaussian.solve(state.window._replace(precision=precision))
-        score = score_again(calm, trial, state.landmarks, state.scene, observed, strangers)
+        lively = window_gaussian.now_under(window, _livelier(window.solved))
+        score = score_again(calm, *lively, observed, strangers)
         if score + CONSTANTS.log_rare > calm.score:
+            trial = window_gaussian.solve(window._replace(precision=_livelier(window.precision)))
             view = view_of(trial)
             if view.score + CONSTANTS.log_rare > calm.score:
                 best, window = view, trial
@@ -147,6 +146,13 @@ def _notice(
         if view.score + divergence_monitor.log_jump() > max(best.score, CONSTANTS.log_lost):
             return recovery.landed(state, by), view
     return state._replace(window=window), best
+
+
+def _livelier(precision: Floats) -> Floats:
+    """(K - 1, A) with the last steps as lively as can be, but for climbs."""
+    found, lively = precision.copy(), COLUMNS[: precision.shape[1]] != 1
+    found[-LATELY:, lively] = np.minimum(found[-LATELY:, lively], CONSTANTS.liveliest**-2.0)
+    return found
 
 
 GROUPS = (np.array([0, 1]), np.array([2]), np.array([TURN]))
@@ -183,25 +189,25 @@ def _surplus(precision: Floats, levels: Floats) -> Floats:
     return np.asarray(np.maximum(precision**2 * variance - precision, 0.0))
 
 
-def _assumed_precision(config: SlamConfig, dt: float) -> Floats:
-    """(A,) of a step's white acceleration and, where the heading is not known, rate of turn, as the agent is told."""
+def _assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:
+    """(A,) of a step's white acceleration and, if the compass is not trusted, rate of turn, as the agent is told."""
     upwards = config.sigma_a if config.height == "estimated" else STILL
-    turns = () if config.heading == "known" else (config.turn_std / np.sqrt(dt),)
-    return np.array([config.sigma_a, config.sigma_a, upwards, *turns]) ** -2.0
+    rates = (config.turn_std / np.sqrt(dt),) if turns else ()
+    return np.array([config.sigma_a, config.sigma_a, upwards, *rates]) ** -2.0
 
 
-def _solve(state: WindowState) -> tuple[WindowState, Residuals, float]:
-    """The window after this cycle's components: two Gauss-Newton steps; the whole of it again now and then."""
+def _solve(state: WindowState, view: CycleAssociation, used: Booleans) -> tuple[WindowState, Residuals, float]:
+    """The window after this cycle's components: two Gauss-Newton steps, the first on what the association expected; the
+    whole of it again now and then."""
     window, log, landmarks, scene = state.window, state.log, state.landmarks, state.scene
-    last = np.array([window.num_poses - 1])
-    window, found = renew(window, log, landmarks, scene, state.heading, last, even=True)
-    nis = float(np.sum(found.left**2))
-    window, slots = window_gaussian.solve(window, spread=False), last
+    innovation, jacobian = innovations(view, log, used, state.cycle)
+    window = window_gaussian.solve(window_gaussian.with_present(window, innovation, jacobian), spread=False)
+    slots = np.array([window.num_poses - 1])
     if state.cycle % REFRESH == 0:
         window, slots = from_above(window, log, landmarks), np.arange(window.num_poses)
-    window, left = renew(window, log, landmarks, scene, state.heading, slots)
+    window, left = renew(window, log, landmarks, scene, state.heading, state.cycle, slots)
     window = window_gaussian.weigh_holds(window_gaussian.solve(window))
-    return widen_motion(state._replace(window=window)), left, nis
+    return widen_motion(state._replace(window=window)), left, float(np.sum(innovation**2))
 
 
 def widen_motion(state: WindowState) -> WindowState:

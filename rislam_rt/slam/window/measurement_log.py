@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.returns import NONE, linearise, poses_of, reflect
+from rislam_rt.slam.returns import NONE, linearise_each, poses_of, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
@@ -104,40 +104,33 @@ class Residuals(NamedTuple):
 
 
 def residuals(
-    log: Log, window: Window, landmarks: WindowTable, scene: KnownEnvironment, heading: Floats, rows: Integers
+    log: Log,
+    window: Window,
+    landmarks: WindowTable,
+    scene: KnownEnvironment,
+    heading: Floats,
+    rows: Integers,
+    slot: Integers,
 ) -> Residuals:
     """Of some explained rows of the log, at the present estimate; `heading` (K,) as the compass tells."""
-    first = int(log.cycle[-1]) - window.num_poses + 1
-    slot = log.cycle[rows] - first
-    used, back = np.unique(slot, return_inverse=True)
-    place = poses(window)[used]
-    ends = poses_of(place[:, :3], heading[used] + place[:, 3], scene.body)
-    features = window.features
-    form = log.form[rows]
+    form, features = log.form[rows], window.features
     both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
-    every = np.concatenate([form[:, 0], form[both, 1]])
-    distinct, column = unique_forms(every)
-    returns = compile_forms(landmarks.rows(distinct))
-    linear = linearise(returns, features, landmarks.anchor, ends)
-    by_heading = linear.by_heading(ends, place[:, :3]) if window.turns else None
-    count, size = len(rows), POSE + features.size
-
-    def pick(at: Integers, which: Integers) -> tuple[Floats, Floats]:
-        jacobian = np.zeros((len(at), 3, size))
-        jacobian[..., :3] = linear.by_tx[at, which] + linear.by_rx[at, which]
-        if by_heading is not None:
-            jacobian[..., 3] = by_heading[at, which]
-        jacobian[..., POSE:] = linear.by_feature[at, which].reshape(len(at), 3, features.size)
-        return linear.seen[at, which], jacobian
-
-    seen, jacobian = pick(back, column[:count])
-    if len(both):
-        other, by_other = pick(back[both], column[count:])
-        share = log.share[rows[both]]
-        gap = other - seen[both]
-        gap[:, 0] = scene.sensor.nearest(gap[:, 0])
-        seen[both] += share[:, None] * gap
-        jacobian[both] += share[:, None, None] * (by_other - jacobian[both])
+    at = np.concatenate([slot, slot[both]])
+    place = poses(window)[at]
+    ends = poses_of(place[:, :3], heading[at] + place[:, 3], scene.body)
+    returns = compile_forms(landmarks.rows(np.concatenate([form[:, 0], form[both, 1]])), at)
+    linear = linearise_each(returns, features, landmarks.anchor, ends)
+    jacobian = np.zeros((len(at), 3, POSE + features.size))
+    jacobian[..., :3] = linear.by_pose
+    if window.turns:
+        jacobian[..., 3] = linear.by_heading(ends, place[:, :3])
+    jacobian[..., POSE:] = linear.by_feature.reshape(len(at), 3, features.size)
+    count, share = len(rows), log.share[rows[both], None]
+    (seen, other), (jacobian, by_other) = ((each[:count], each[count:]) for each in (linear.seen, jacobian))
+    gap = other - seen[both]
+    gap[:, 0] = scene.sensor.nearest(gap[:, 0])
+    seen[both] += share * gap
+    jacobian[both] += share[..., None] * (by_other - jacobian[both])
     std = np.sqrt(log.std[rows] ** 2 + log.extra[rows])
     left = log.seen[rows] - seen
     left[:, 0] = scene.sensor.nearest(left[:, 0])
@@ -184,15 +177,14 @@ def renew(
     landmarks: WindowTable,
     scene: KnownEnvironment,
     heading: Floats,
+    cycle: int,
     slots: Integers,
-    *,
-    even: bool = False,
 ) -> tuple[Window, Residuals]:
-    """The quadratics of some slots, made at the present estimate; `even`: every component counts in full."""
-    first = int(log.cycle[-1]) - window.num_poses + 1 if len(log.cycle) else 0
+    """The quadratics of some slots, made at the present estimate; the last pose is that of `cycle`."""
+    slot = log.cycle - (cycle - window.num_poses + 1)
     wanted = np.zeros(window.num_poses, dtype=np.bool_)
     wanted[slots] = True
-    rows = (log.explained & wanted[np.maximum(log.cycle - first, 0)]).nonzero()[0]
+    rows = (log.explained & wanted[np.maximum(slot, 0)]).nonzero()[0]
     size, place = POSE + window.features.size, poses(window)
     hessian, gradient, middle = (field.copy() for field in window.slots)
     hessian[slots], gradient[slots] = 0.0, 0.0
@@ -202,8 +194,8 @@ def renew(
     if not len(rows):
         nothing = Residuals(rows, rows, np.zeros((0, 3)), np.zeros((0, 3, size)))
         return window._replace(slots=Quadratic(hessian, gradient, middle)), nothing
-    found = residuals(log, window, landmarks, scene, heading, rows)
-    weight = np.ones(len(rows)) if even else trust(found.left)
+    found = residuals(log, window, landmarks, scene, heading, rows, slot[rows])
+    weight = trust(found.left)
     start = np.searchsorted(found.slot, slots)
     stop = np.searchsorted(found.slot, slots, side="right")
     most = int((stop - start).max())

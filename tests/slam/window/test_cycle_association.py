@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from rislam_rt.slam.observations import Observations
+from rislam_rt.slam.observations import UNTOLD, Observations
+from rislam_rt.slam.returns import Poses
 from rislam_rt.slam.window import cycle_association
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, cluster
 
@@ -23,10 +24,12 @@ def test_returns_out_of_reach_change_nothing(monkeypatch):
     place, one = seen[own] + 0.02 * rng.standard_normal((heard, 3)), np.ones(heard)
     observed = Observations(place, std, level, 0.1 * one, one)
     groups = cluster(expected, CELL, np.ones(count))
-    given = (
-        expected, groups, np.full(len(groups.leader), 0.9), np.ones(count), root @ root.T, observed, None,
-        np.full(heard, 1e-3),
+    size, none = len(groups.leader), np.zeros(0, dtype=np.int64)
+    view = cycle_association.CycleAssociation(
+        np.zeros(10), root @ root.T, Poses(*np.zeros((2, 3)), np.zeros(())), expected, groups, np.ones(count),
+        np.ones(count), np.full(size, 0.9), groups.disturbance, np.full(size, UNTOLD), none, none, 0.0, 0.0,
     )  # fmt: skip
+    given = view, seen, root @ root.T, observed, np.full(heard, 1e-3)
     near = cycle_association._associate(*given)
     looked, within = [], cycle_association._within_reach
 

@@ -18,10 +18,11 @@ from rislam_rt.slam.window.tracks import WindowTracks
 
 def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, Residuals]:
     """Gauss-Newton over the whole window."""
-    window, every = context.window, np.arange(context.window.num_poses)
+    window, landmarks, scene = context.window, context.landmarks, context.scene
+    every = np.arange(window.num_poses)
     for _ in range(steps):
-        window = from_above(window, context.log, context.landmarks)
-        window, left = renew(window, context.log, context.landmarks, context.scene, context.heading, every)
+        window = from_above(window, context.log, landmarks)
+        window, left = renew(window, context.log, landmarks, scene, context.heading, context.cycle, every)
         window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return window, left
 

@@ -21,7 +21,7 @@ from rislam_rt.slam.window.births.image_hypotheses import image_amplitudes
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors
+from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors
 from rislam_rt.slam.window.solver_limits import NEARBY
 from rislam_rt.slam.window.state import WindowState
 
@@ -119,8 +119,11 @@ def log_shared(
 
 def concurrent(context: WindowState, ats: list[Integers]) -> Booleans:
     """(T, T) which tracks, rows of the log each, were heard in one cycle."""
-    cycles = [context.log.cycle[at] for at in ats]
-    return np.array([[bool(np.isin(one, other).any()) for other in cycles] for one in cycles])
+    cycle = context.log.cycle - context.log.cycle.min()
+    heard = np.zeros((len(ats), cycle.max() + 1))
+    for row, at in enumerate(ats):
+        heard[row, cycle[at]] = 1.0
+    return np.asarray(heard @ heard.T > 0.0)
 
 
 def log_amplitudes(

@@ -32,7 +32,7 @@ from rislam_rt.slam.window.births.image_hypotheses import fitted_twice, with_ima
 from rislam_rt.slam.window.births.point_identification import identify
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
-from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors, no_holds
+from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
 from rislam_rt.slam.window.state import WindowState
 
 

@@ -81,18 +81,20 @@ def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Flo
 
 def learn(
     visibility: VisibilityObservations, landmarks: WindowTable, window: Window, expected: ExpectedComponents,
-    groups: UnresolvedClusters, shows: Floats, row: Integers,
+    groups: UnresolvedClusters, clear: Floats, scatter: Floats, shows: Floats, row: Integers,
     pick: Integers, raw: Floats, observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
 ) -> tuple[VisibilityObservations, WindowTable]:  # fmt: skip
-    """After clusters `row` (A,) were seen as components `pick` (A,) with residuals of mean square `raw` (A,)."""
+    """After clusters `row` (A,) were seen as components `pick` (A,) with residuals of mean square `raw` (A,).
+
+    `clear` (R,) and `scatter` (R,) are what was recalled of the returns.
+    """
     if not len(expected.seen):
         return visibility, landmarks
     hit = np.zeros(len(groups.leader), dtype=np.bool_)
     hit[row] = True
-    before, scatter = recall(visibility, expected, landmarks)
     detection = CONSTANTS.shown * expected.detection
-    missed = before * (1.0 - detection) / (1.0 - before * detection)
-    after = before.copy()
+    missed = clear * (1.0 - detection) / (1.0 - clear * detection)
+    after, scatter = clear.copy(), scatter.copy()
     told = hit | (groups.by_itself == 1.0)
     after[groups.leader[told]] = np.where(hit, 0.995, missed[groups.leader])[told]
     lead = groups.leader[row]
@@ -144,9 +146,8 @@ def _strengths(
         walls = [part for part in form[1:] if part != NONE]
         if len(walls) == 1 and (form[0] == TX or expected.log_amplitude_std[lead[place]] < 0.5):
             surplus = observed.log_amplitude[pick[place]] - expected.log_amplitude[lead[place]]
-            landmarks = learn_ratio(
-                landmarks, int(walls[0]), float(np.clip(landmarks.ratio[walls[0]] + surplus, -3.0, 0.1))
-            )
+            ratio = min(max(float(landmarks.ratio[walls[0]] + surplus), -3.0), 0.1)
+            landmarks = learn_ratio(landmarks, int(walls[0]), ratio)
     return _identities(landmarks, window, expected, groups, row, pick, observed, poses, scene, code)
 
 

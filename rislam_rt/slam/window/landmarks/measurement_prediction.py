@@ -1,14 +1,15 @@
 """Prediction of measurements: which returns of the believed map should show now, where, how strong, which as one."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, RadioConfig, RisCode, RisSpec
 from rislam_rt.model.sensor import SensorModel
+from rislam_rt.model.sensor import detection_probability as detection_probability_of
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
@@ -147,8 +148,16 @@ def panel_gains(
 def detection_probability(log_amplitude: Floats, spread: Floats, sensor: SensorModel) -> Floats:
     """(R,) averaged over a log amplitude of that spread: three points carry its mean and variance."""
     level = log_amplitude[..., None] + spread[..., None] * np.sqrt(3.0) * np.array([-1.0, 0.0, 1.0])
-    each = sensor.detection_probability(sensor.radio.integrated_snr(np.exp(np.minimum(level, 10.0))))
+    snr = sensor.radio.integrated_snr(np.exp(np.minimum(level, 10.0)))
+    each = np.interp(np.sqrt(snr), *_detection_curve(sensor.threshold))
     return np.asarray(each @ np.array([1.0, 4.0, 1.0]) / 6.0)
+
+
+@lru_cache(maxsize=4)
+def _detection_curve(threshold: float) -> tuple[Floats, Floats]:
+    """Roots of the SNR and the probability of detection there, close enough for 1e-6 in between."""
+    root = np.arange(0.0, np.sqrt(threshold) + 7.0, 2e-3)
+    return root, detection_probability_of(root**2, threshold)
 
 
 class UnresolvedClusters(NamedTuple):
@@ -222,8 +231,18 @@ def _neighbours(place: Floats, strength: Floats, sides: Integers | None) -> tupl
 
     Row by row.
     """
-    pairs = scipy.spatial.cKDTree(place).query_pairs(EDGE, p=np.inf, output_type="ndarray")
-    first, second = pairs.T if sides is None else pairs[sides[pairs[:, 0]] == sides[pairs[:, 1]]].T
+    # along the first axis a return's neighbours behind it are the next ones, up to the first beyond its edge
+    order = np.argsort(place[:, 0], kind="stable")
+    axes = place[order].T
+    after = np.arange(len(place)) + 1
+    many = np.searchsorted(axes[0], axes[0] + EDGE, side="right") - after
+    first = np.repeat(after - 1, many)
+    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(many) - many, many)
+    close = (np.abs(axes[1][first] - axes[1][second]) <= EDGE) & (np.abs(axes[2][first] - axes[2][second]) <= EDGE)
+    first, second = order[first[close]], order[second[close]]
+    if sides is not None:
+        same = sides[first] == sides[second]
+        first, second = first[same], second[same]
     ahead, count = strength[first] - strength[second], len(place)
     pairs = np.concatenate([(first * count + second)[ahead >= 0.0], (second * count + first)[ahead <= 0.0]])
     pairs.sort()

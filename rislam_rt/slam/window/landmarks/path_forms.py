@@ -28,11 +28,12 @@ class FormLegs(NamedTuple):
     """(R,) on both legs together."""
 
 
-def compile_forms(forms: Integers) -> Returns:
-    """Forms (R, 5) as returns over the legs that they need."""
+def compile_forms(forms: Integers, slot: Integers | int = 0) -> Returns:
+    """Forms (R, 5) as returns over the legs that they need; those of the Tx itself are shared within a slot (R,)."""
     legs = np.concatenate([forms[:, :3], forms[:, [0, 3, 4]]])
     base = int(legs.max(initial=0)) + 3
     code = ((legs[:, 0] + 1) * base + legs[:, 1] + 1) * base + legs[:, 2] + 1
+    code += np.where(legs[:, 0] == TX, base**3 * np.tile(slot, 2 if np.ndim(slot) else 1), 0)
     _, first, place = np.unique(code, return_index=True, return_inverse=True)
     return Returns(legs[first], place[: len(forms)], place[len(forms) :])
 
@@ -112,15 +113,10 @@ def _margin_std(
     base: Floats, device: Floats, anchor: Floats, features: Floats, walls: Integers, covariance: Floats
 ) -> Floats:
     """Standard deviations (N,) [m] of the margins over walls (N, 2), by what these are uncertain by."""
-    places, anchor = features[walls], anchor[walls]
-    first = _margin(base, device, anchor, places)[0]
-    slope = np.empty((len(walls), 2, 3))
-    for wall in range(2):
-        for axis in range(3):
-            moved = places.copy()
-            moved[:, wall, axis] += STEP
-            slope[:, wall, axis] = (_margin(base, device, anchor, moved)[0] - first) / STEP
-    along = slope.reshape(len(walls), 6)
+    moves = STEP * np.concatenate([np.zeros((1, 6)), np.eye(6)]).reshape(7, 1, 2, 3)
+    places = (features[walls] + moves).reshape(-1, 2, 3)
+    every = _margin(np.tile(base, (7, 1)), device, np.tile(anchor[walls], (7, 1, 1)), places)[0].reshape(7, -1)
+    along = ((every[1:] - every[0]) / STEP).T
     rows = (3 * walls[:, :, None] + np.arange(3)).reshape(len(walls), 6)
     block = covariance[rows[:, :, None], rows[:, None, :]]
     return np.asarray(np.sqrt(np.maximum(np.vecdot(along, (block @ along[..., None])[..., 0]), STEP**2)))

@@ -1,42 +1,35 @@
 """Solutions and inverses of symmetric positive matrices, by Cholesky's factor of a matrix scaled to a unit diagonal."""
 
-from typing import NamedTuple
-
 import numpy as np
 import scipy
 
 from rislam_rt.arrays import Floats
 
 
-class Factor(NamedTuple):
-    """A Cholesky factor of a symmetric positive matrix that was scaled to a unit diagonal."""
-
-    factor: Floats
-    scale: Floats
-
-    def solve(self, right: Floats) -> Floats:
-        """The matrix's inverse times (D,)."""
-        found, _ = scipy.linalg.lapack.dpotrs(self.factor, right * self.scale, lower=1)
-        return np.asarray(found * self.scale)
-
-
-def factorise(matrix: Floats) -> Factor:
-    """The factor, damped where rounding made the matrix indefinite."""
+def _factorise(matrix: Floats) -> tuple[Floats, Floats]:
+    """The factor and the scale (D,), damped where rounding made the matrix indefinite."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-30))
-    scaled = matrix * scale * scale[:, None]
     for damping in (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3):
-        factor, bad = scipy.linalg.lapack.dpotrf(
-            (scaled + damping * np.eye(len(scaled)) if damping else scaled).T, lower=1
-        )
+        scaled = matrix * scale * scale[:, None]
+        if damping:
+            scaled += damping * np.eye(len(scaled))
+        factor, bad = scipy.linalg.lapack.dpotrf(scaled.T, lower=1, overwrite_a=1)
         if not bad:
             break
-    return Factor(factor, scale)
+    return factor, scale
+
+
+def solution(matrix: Floats, right: Floats) -> Floats:
+    """The matrix's inverse times (D,)."""
+    factor, scale = _factorise(matrix)
+    found, _ = scipy.linalg.lapack.dpotrs(factor, right * scale, lower=1)
+    return np.asarray(found * scale)
 
 
 def inverse(matrix: Floats) -> Floats:
-    """Of a symmetric positive matrix, damped where rounding made it indefinite."""
-    factor, scale = factorise(matrix)
-    inside, _ = scipy.linalg.lapack.dpotri(factor, lower=1)
+    """The matrix's inverse, symmetric."""
+    factor, scale = _factorise(matrix)
+    inside, _ = scipy.linalg.lapack.dpotri(factor, lower=1, overwrite_c=1)
     inside *= scale * scale[:, None]
     full = inside + inside.T
     np.fill_diagonal(full, np.diag(inside))

@@ -48,7 +48,7 @@ def transition(stay: float) -> Floats:
 
 def log_likelihood(accel: Floats, spread: Floats, precision: Floats) -> Floats:
     """Log likelihood (K, L) of each level from posterior means (K, A), covariances (K, A, A) and prior precisions."""
-    spread, vector = np.linalg.eigh(spread)
+    spread, vector = principal_axes(spread)
     along = (np.swapaxes(vector, 1, 2) @ accel[..., None])[..., 0] / spread
     # N(m; 0, C + s^2 I) through the cavity's information C^-1, which may be singular
     value = np.maximum(1.0 / spread - precision[:, None], 0.0)
@@ -56,6 +56,17 @@ def log_likelihood(accel: Floats, spread: Floats, precision: Floats) -> Floats:
     total = 1.0 + value[:, None] * variance[:, None]
     gain = (along**2)[:, None] * variance[:, None] / total
     return np.asarray(0.5 * (gain - np.log(total)).sum(axis=-1))
+
+
+def principal_axes(spread: Floats) -> tuple[Floats, Floats]:
+    """Variances (K, A) along the principal axes (K, A, A), columns, of covariances (K, A, A) of one or two numbers."""
+    if spread.shape[-1] == 1:
+        return spread[..., 0], np.ones(spread.shape)
+    one, two, both = spread[..., 0, 0], spread[..., 1, 1], spread[..., 0, 1]
+    angle = 0.5 * np.arctan2(2.0 * both, one - two)
+    large = 0.5 * (one + two) + np.hypot(0.5 * (one - two), both)
+    vector = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], axis=-1)
+    return np.stack([large, (one * two - both**2) / large], axis=-1), vector.reshape(*one.shape, 2, 2)
 
 
 def forward(before: Floats, log_like: Floats, stay: float) -> Floats:

@@ -20,8 +20,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.window.smoother.factor import factorise, inverse
+from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
+from rislam_rt.slam.window.smoother.factor import inverse, solution
 from rislam_rt.slam.window.smoother.steps import FIRST, HEAD, POSE, TURN, basis, carry_on, latest, starts
 
 
@@ -40,29 +41,6 @@ class Quadratic(NamedTuple):
         return self.gradient + (self.hessian @ (x - self.middle)[..., None])[..., 0]
 
 
-class DirectionPriors(NamedTuple):
-    """N beliefs about single directions of features: a wall is upright, level, at right angles to another, or not."""
-
-    feature: Integers
-    """(N,)."""
-    axis: Floats
-    """(N, 3) unit vectors."""
-    aim: Floats
-    """(N,) [m] where the feature lies along the axis, if the belief is right..."""
-    std: Floats
-    """(N,) [m] ...within so much."""
-    log_odds: Floats
-    """(N,) beforehand: of "right" against a place anywhere along the axis, times its width [m]."""
-    probability: Floats
-    """(N,) that it is right, at the last look: the weight with which it counts."""
-
-
-def no_holds() -> DirectionPriors:
-    """Nothing believed beforehand."""
-    none = np.zeros(0)
-    return DirectionPriors(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), none, none, none, none)
-
-
 class Window(NamedTuple):
     """The belief over the last K poses and F features, relative to the run's start."""
 
@@ -71,7 +49,9 @@ class Window(NamedTuple):
     accel: Floats
     """(K - 1, A) [m/s^2] over the steps between the poses, along the room's axes; of `TURN`, rates [rad/s]."""
     precision: Floats
-    """(K - 1, A) [s^4/m^2] of each acceleration's prior (see `motion`)."""
+    """(K - 1, A) [s^4/m^2] of each acceleration's prior (see `motion`), in the next solution..."""
+    solved: Floats
+    """(K - 1, A) [s^4/m^2] ...and in that of the covariance."""
     surplus: Floats
     """(K - 1, A) [s^4/m^2] variance of each prior's slope that `precision` leaves out (see `excess`)."""
     step: Floats
@@ -110,7 +90,7 @@ def begin(position: Floats, velocity: Floats, std: Floats, *, turns: bool = Fals
     slots = Quadratic(np.zeros((1, POSE, POSE)), np.zeros((1, POSE)), np.concatenate([position, [0.0]])[None])
     none = np.zeros((0, 3 + turns))
     return Window(
-        head, none, none, none, np.zeros(0), prior, np.zeros((HEAD, HEAD)), slots,
+        head, none, none, none, none, np.zeros(0), prior, np.zeros((HEAD, HEAD)), slots,
         np.diag(np.maximum(std, 1e-6) ** 2), no_holds(),
     )  # fmt: skip
 
@@ -145,19 +125,46 @@ def poses(window: Window) -> Floats:
     return found
 
 
+def _present(window: Window) -> Floats:
+    """(7 + 3F, D) covariance of the present with all numbers of the window."""
+    size, whole, design = len(window.head), window.covariance, latest(window.step.tobytes(), window.turns)
+    return np.concatenate([design[:, :HEAD] @ whole[:HEAD] + design[:, HEAD:] @ whole[size:], whole[HEAD:size]])
+
+
+def _among(window: Window, rows: Floats) -> Floats:
+    """(N, 7 + 3F) covariance with the present of what has covariances (N, D) with all numbers of the window."""
+    size, design = len(window.head), latest(window.step.tobytes(), window.turns)
+    moving = rows[:, :HEAD] @ design[:, :HEAD].T + rows[:, size:] @ design[:, HEAD:].T
+    return np.concatenate([moving, rows[:, HEAD:size]], axis=1)
+
+
 def now(window: Window) -> tuple[Floats, Floats]:
     """Mean (7 + 3F,) and covariance of the last pose, its velocity, the compass offset, and the features."""
-    size, whole = len(window.head), window.covariance
-    design = latest(window.step.tobytes(), window.turns)
-    start, later = design[:, :HEAD], design[:, HEAD:]
-    mean = window.head.copy()
-    mean[:HEAD] = start @ mean[:HEAD] + later @ window.accel.ravel()
-    rows = start @ whole[:HEAD] + later @ whole[size:]
-    covariance = whole[:size, :size].copy()
-    covariance[:HEAD, HEAD:] = rows[:, HEAD:size]
-    covariance[HEAD:, :HEAD] = rows[:, HEAD:size].T
-    covariance[:HEAD, :HEAD] = rows[:, :HEAD] @ start.T + rows[:, size:] @ later.T
-    return mean, covariance
+    return _among(window, np.append(window.head, window.accel)[None])[0], _among(window, _present(window))
+
+
+def now_under(window: Window, precision: Floats) -> tuple[Floats, Floats]:
+    """`now`, had the last solution had prior precisions (K - 1, A) that are not its own in a few steps.
+
+    By Woodbury's identity, so that nothing is solved anew.
+    """
+    (mean, covariance), change = now(window), (precision - window.solved).ravel()
+    at = change.nonzero()[0]
+    own, change = len(window.head) + at, change[at, None]
+    wide = window.covariance[own]
+    across = _among(window, wide)
+    weight = np.linalg.solve(np.eye(len(at)) + change * wide[:, own], change * across)
+    return mean - window.accel.ravel()[at] @ weight, covariance - across.T @ weight
+
+
+def with_present(window: Window, left: Floats, jacobian: Floats) -> Window:
+    """The last slot's quadratic from residuals (A, 3) of the present, in deviations, and their jacobian (A, 3, 7 + 3F):
+    every component counts in full."""
+    spot = np.concatenate([poses(window)[-1], window.head[HEAD:]])
+    flat = np.delete(jacobian, [3, 4, 5], axis=2).reshape(-1, len(spot))  # what is seen does not hang on the velocity
+    hessian, gradient, middle = (field.copy() for field in window.slots)
+    hessian[-1], gradient[-1], middle[-1] = flat.T @ flat, -left.ravel() @ flat, spot
+    return window._replace(slots=Quadratic(hessian, gradient, middle))
 
 
 def pose_covariance(window: Window, axis: int) -> Floats:
@@ -194,6 +201,7 @@ def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float
     return window._replace(
         accel=np.concatenate([window.accel, np.zeros((1, free))]),
         precision=np.concatenate([window.precision, precision[None]]),
+        solved=np.concatenate([window.solved, precision[None]]),
         surplus=np.concatenate([window.surplus, np.broadcast_to(surplus, (1, free))]),
         step=np.append(window.step, dt),
         slots=slots,
@@ -234,6 +242,7 @@ def slide(window: Window) -> Window:
         head=head,
         accel=window.accel[1:],
         precision=window.precision[1:],
+        solved=window.solved[1:],
         surplus=window.surplus[1:],
         step=window.step[1:],
         prior=prior,
@@ -254,13 +263,14 @@ def solve(window: Window, *, spread: bool = True) -> Window:
     size = len(window.head)
     hessian, gradient = _normal(window)
     if spread:
-        covariance = inverse(hessian)
+        covariance, solved = inverse(hessian), window.precision
         change = -covariance @ gradient
     else:
-        covariance, change = window.covariance, -factorise(hessian).solve(gradient)
+        covariance, solved, change = window.covariance, window.solved, -solution(hessian, gradient)
     return window._replace(
         head=window.head + change[:size],
         accel=window.accel + change[size:].reshape(window.accel.shape),
+        solved=solved,
         covariance=covariance,
     )
 
@@ -291,7 +301,8 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
     hessian[:size, :size] += window.prior.hessian
     gradient[:size] += window.prior.slope(window.head)
-    for feature, force, information in zip(*_pulls(window), strict=True):
+    holds = window.holds
+    for feature, force, information in zip(holds.feature, *holds.pulls(window.features[holds.feature]), strict=True):
         own = slice(HEAD + 3 * feature, HEAD + 3 * feature + 3)
         hessian[own, own] += information
         gradient[own] += force
@@ -301,33 +312,14 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     return hessian, gradient
 
 
-def _pulls(window: Window) -> tuple[Integers, Floats, Floats]:
-    """Features (N,), gradients (N, 3) and information (N, 3, 3) of what is held of them."""
-    holds = window.holds
-    weight = holds.probability / holds.std**2
-    off = np.vecdot(holds.axis, window.features[holds.feature]) - holds.aim if len(weight) else weight
-    return (
-        holds.feature, (weight * off)[:, None] * holds.axis,
-        weight[:, None, None] * holds.axis[:, :, None] * holds.axis[:, None, :],
-    )  # fmt: skip
-
-
 def weigh_holds(window: Window) -> Window:
-    """Each belief about a direction by what all else tells of it (its cavity): is it right?"""
+    """With each belief about a direction weighed by what all else tells of it."""
     holds = window.holds
     if not len(holds.feature):
         return window
     rows = HEAD + 3 * holds.feature[:, None] + np.arange(3)
-    block = window.covariance[rows[:, :, None], rows[:, None, :]]
-    variance = np.vecdot(holds.axis, (block @ holds.axis[..., None])[..., 0])
-    middle = np.vecdot(holds.axis, window.features[holds.feature])
-    own = holds.probability / holds.std**2
-    left = np.maximum(1.0 / variance - own, 1e-3)
-    cavity = (middle / variance - own * holds.aim) / left
-    spread = 1.0 / left + holds.std**2
-    log_right = -0.5 * (cavity - holds.aim) ** 2 / spread - 0.5 * np.log(2.0 * np.pi * spread)
-    odds = np.clip(holds.log_odds + log_right, -30.0, 30.0)
-    return window._replace(holds=holds._replace(probability=1.0 / (1.0 + np.exp(-odds))))
+    blocks = window.covariance[rows[:, :, None], rows[:, None, :]]
+    return window._replace(holds=holds.weighed(window.features[holds.feature], blocks))
 
 
 def add_feature(window: Window, place: Floats, holds: DirectionPriors, ridge: float = 1e-6) -> Window:

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
 from rislam_rt.slam.window.smoother.steps import HEAD, POSE
-from rislam_rt.slam.window.smoother.window_gaussian import DirectionPriors, Quadratic
+from rislam_rt.slam.window.smoother.window_gaussian import Quadratic
 
 DT, CYCLES, SIGMA_A = 0.1, 12, 0.5
 
@@ -164,3 +165,52 @@ def test_a_heading_that_turns_is_filtered_as_a_batch_does(keep):
     mean, spread = window_gaussian.now(window)
     np.testing.assert_allclose(mean[6], wanted[-1], atol=1e-9)
     np.testing.assert_allclose(spread[6, 6], rows[-1] @ covariance @ rows[-1], rtol=1e-9)
+
+
+def _seen(turns):
+    """A window of five poses and a feature, all seen and solved, and a sixth pose that is open as yet."""
+    rng = np.random.default_rng(7)
+    std = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2, 0.1 * turns])
+    window = window_gaussian.begin(np.zeros(3), rng.standard_normal(3), std, turns=turns)
+    window = window_gaussian.add_feature(window, np.ones(3), no_holds(), ridge=1.0)
+    for cycle in range(6):
+        if cycle:
+            window = window_gaussian.extend(window, DT, rng.uniform(1.0, 100.0, 3 + turns))
+        if cycle < 5:
+            window = window_gaussian.solve(_look(window, rng.standard_normal((3, POSE + 3)), rng.standard_normal(3)))
+    return window
+
+
+def _look(window, rows, value):
+    """With rows (N, 7) of the last pose and the feature that were measured as (N,), within one deviation."""
+    hessian, gradient, middle = (field.copy() for field in window.slots)
+    hessian[-1], gradient[-1] = rows.T @ rows, -rows.T @ value
+    middle[-1] = 0.0
+    return window._replace(slots=Quadratic(hessian, gradient, middle))
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_residuals_of_the_present_are_a_look_at_its_pose_and_features(turns):
+    window, rng = _seen(turns), np.random.default_rng(8)
+    rows, value = rng.standard_normal((3, POSE + 3)), rng.standard_normal(3)
+    jacobian = np.zeros((1, 3, HEAD + 3))
+    jacobian[..., [0, 1, 2, 6, 7, 8, 9]] = rows
+    spot = np.concatenate([window_gaussian.poses(window)[-1], window.features[0]])
+    found = window_gaussian.with_present(window, (value - rows @ spot)[None], jacobian)
+    wanted = window_gaussian.solve(_look(window, rows, value))
+    for spread in (False, True):  # without the covariance a solution is the same: condition of the matrix, 1e4
+        solved = window_gaussian.solve(found, spread=spread)
+        np.testing.assert_allclose(solved.head, wanted.head, atol=1e-10)
+        np.testing.assert_allclose(solved.accel, wanted.accel, atol=1e-9)
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_the_present_under_livelier_steps_is_that_of_a_solution_of_the_whole(turns):
+    window = _seen(turns)
+    precision = window.precision.copy()
+    precision[-2:, [0, 1]] = 0.01
+    mean, covariance = window_gaussian.now_under(window, precision)
+    wanted = window_gaussian.now(window_gaussian.solve(window._replace(precision=precision)))
+    np.testing.assert_allclose(mean, wanted[0], atol=1e-9)
+    np.testing.assert_allclose(covariance, wanted[1], atol=1e-9 * np.abs(wanted[1]).max())
+    assert np.abs(mean - window_gaussian.now(window)[0]).max() > 1e-3  # and not what it was

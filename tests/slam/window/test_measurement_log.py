@@ -1,0 +1,42 @@
+"""The log's components and the poses of the window that they were heard at."""
+
+import numpy as np
+
+from rislam_rt.model import Body
+from rislam_rt.slam import SlamConfig
+from rislam_rt.slam.observations import Observations
+from rislam_rt.slam.returns import NONE, TX
+from rislam_rt.slam.window import filter as window_filter
+from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
+from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
+from rislam_rt.slam.window.landmarks.ris_identification import unknown
+from rislam_rt.slam.window.measurement_log import append, empty_log, renew
+from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother.direction_priors import no_holds
+
+BODY = Body(np.array([-0.05, 0.0, 0.0]), np.array([0.05, 0.0, 0.0]))
+
+
+def test_a_cycle_in_which_nothing_was_heard_takes_nothing_of_the_one_before():
+    window = window_gaussian.begin(np.zeros(3), np.zeros(3), np.full(7, 0.1))
+    window = window_gaussian.add_feature(window, np.array([4.0, 0.0, 0.0]), no_holds())
+    window = window_gaussian.extend(window, 0.1, np.ones(3))
+    landmarks = enter(empty_table(), True, np.zeros(3), 5, 5.0, unknown(1))
+    observed = Observations(
+        np.array([[4.0, 1.0, 0.0]]), np.full((1, 3), 0.01), np.zeros(1), np.full(1, 0.1), np.ones(1)
+    )
+    form = np.array([[[TX, NONE, NONE, 0, NONE], [UNKNOWN] * 5]])
+    log = append(empty_log(), observed, 3, 0).explain(np.array([0]), form, 0.0, 0.0, np.zeros((1, 3)))
+    for cycle, heard in ((3, True), (4, False)):
+        found, left = renew(window, log, landmarks, BODY, np.zeros(2), cycle, np.array([1]))
+        assert len(left.row) == heard
+        assert found.slots.hessian[-1].any() == heard
+    # the whole window then: it is the pose before that heard it
+    found, left = renew(window, log, landmarks, BODY, np.zeros(2), 4, np.array([0, 1]))
+    np.testing.assert_array_equal(left.slot, [0])
+
+
+def test_told_motion_has_a_rate_of_turn_once_the_compass_was_found_wrong():
+    config = SlamConfig(motion="told", sigma_a=0.1, turn_std=0.02)
+    assert len(window_filter._assumed_precision(config, 0.1, False)) == 3
+    np.testing.assert_allclose(window_filter._assumed_precision(config, 0.1, True)[3], 0.1 / 0.02**2)
