@@ -15,6 +15,7 @@ from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import empty_log, from_above
 from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother.direction_priors import no_holds
 
 CYCLES, START, SPEED = 40, np.array([14.0, 9.0, 1.1]), np.array([0.08, 0.05, 0.0])
 BODY = Body()
@@ -65,7 +66,7 @@ def test_a_wall_that_leans_little_leans_the_way_from_which_it_is_heard():
     for _ in range(2):  # one is heard by itself, the other over the first alone
         normal = np.array([0.9992, 0.0, -0.04])
         wall = anchor + 2.0 * (18.0 - normal @ anchor) * normal / (normal @ normal)
-        window = window_gaussian.add_feature(window, wall, window_gaussian.no_holds())
+        window = window_gaussian.add_feature(window, wall, no_holds())
         landmarks = enter(landmarks, True, anchor, 9, 5.0, unknown(1, 1))
     first, second = landmarks.ident
     log = empty_log()._replace(form=np.full((2, 2, 5), UNKNOWN))

@@ -231,9 +231,6 @@ def log_upright(
             at = tx[trials.track[row]]
             place = digest.middle + turn @ at + place - at
         holds = direction_beliefs(place, digest, known, landmarks)
-        if not len(holds.std) and trials.is_wall[row]:  # neither upright nor level
-            gain[row] = -np.logaddexp(0.0, CONSTANTS.log_upright)
-            continue
         span = place - digest.middle
         variance = np.vecdot(holds.axis, holds.axis @ fits.covariance[row]) + holds.std**2
         log_right = -0.5 * (holds.axis @ span) ** 2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
