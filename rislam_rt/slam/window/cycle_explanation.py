@@ -235,7 +235,7 @@ def grow(state: WindowState, left: Residuals, expected: ExpectedComponents, grou
     """With what the evidence has turned against taken back, or else with what is born."""
     fresh = True
     if state.cycle % REFRESH == 0 and len(state.landmarks.ident):
-        gone = condemned(state.landmarks, left, state.log, expected, window_gaussian.now(state.window)[1])
+        gone = condemned(state.landmarks, left, state.log)
         state, fresh = release(state, ~gone), not gone.any()
     return births(state, expected, groups) if fresh else state
 

@@ -8,7 +8,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.returns import TX, linearise
 from rislam_rt.slam.window import tracks
-from rislam_rt.slam.window.births.feature_removal import behind, release, resolve
+from rislam_rt.slam.window.births.feature_removal import resolve
 from rislam_rt.slam.window.births.hypotheses import BESIDE, known_features
 from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, judge, wanted
 from rislam_rt.slam.window.births.track_summary import TrackSummary, summarise_tracks
@@ -244,6 +244,4 @@ def _enter(
         return context, False
     square = float(np.mean(histories.scatter[row] ** 2))
     grown = grown._replace(window=window, visibility=seed(context.visibility, forms[:1], landmarks, square))
-    if verdict.is_wall:
-        grown = release(grown, ~behind(grown, new))
     return grown, True

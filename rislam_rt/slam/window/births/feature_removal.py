@@ -4,9 +4,8 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import NONE, TX
+from rislam_rt.slam.returns import NONE
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, remove_features
-from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log, Residuals, from_above, renew
@@ -72,10 +71,8 @@ def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Fl
     return WindowTracks._make([*joined, ident]), log._replace(track=track)
 
 
-def condemned(
-    landmarks: WindowTable, left: Residuals, log: Log, expected: ExpectedComponents, covariance: Floats
-) -> Booleans:
-    """(F,) features to take back: that do not exist, that their measurements contradict, or that follow from others."""
+def condemned(landmarks: WindowTable, left: Residuals, log: Log) -> Booleans:
+    """(F,) features to take back: that do not exist, or that their measurements contradict."""
     gone = landmarks.log_odds < np.log(CONSTANTS.dead / (1.0 - CONSTANTS.dead))
     square = np.vecdot(left.left, left.left)
     form = log.form[left.row, 0]
@@ -84,52 +81,4 @@ def condemned(
         alone = own & ((form[:, 1:] != NONE).sum(axis=1) <= int(landmarks.is_wall[row]))
         if alone.sum() >= FEWEST and np.median(square[alone]) > CONSTANTS.against:
             gone[row] = True
-    return np.asarray(gone | derived(landmarks, expected, covariance))
-
-
-def derived(landmarks: WindowTable, expected: ExpectedComponents, covariance: Floats) -> Booleans:
-    """(F,) young features whose own return is one that others throw as well, without anything free in it."""
-    found = np.zeros(len(landmarks.ident), dtype=np.bool_)
-    forms = expected.forms
-    for row in (landmarks.hits < 3 * CONSTANTS.window).nonzero()[0]:
-        own = [row, NONE, NONE, NONE, NONE] if not landmarks.is_wall[row] else [TX, NONE, NONE, row, NONE]
-        place = (forms == own).all(axis=1).nonzero()[0]
-        if not len(place):
-            continue
-        others = ~(forms == row).any(axis=1)
-        # of two that may stand for each other the younger goes
-        elder = np.where(forms >= 0, forms, -1).max(axis=1) < row
-        rivals = (others & elder).nonzero()[0]
-        gap = expected.seen[rivals] - expected.seen[place[0]]
-        near = (np.abs(gap) < [0.15, 0.1, 0.1]).all(axis=1)
-        near &= np.abs(expected.log_amplitude[rivals] - expected.log_amplitude[place[0]]) < 1.5
-        for rival, off in zip(rivals[near], gap[near], strict=True):
-            slope = expected.jacobian[rival] - expected.jacobian[place[0]]
-            spread = slope @ covariance @ slope.T + np.diag([0.005, 0.005, 0.005]) ** 2
-            if off @ np.linalg.solve(spread, off) < 9.0:
-                found[row] = True
-    return found
-
-
-def behind(context: WindowState, wall: int) -> Booleans:
-    """(F,) features that the newest wall stands before: what was held for them may be its doing."""
-    landmarks, features = context.landmarks, context.window.features
-    middle = window_gaussian.now(context.window)[0][:3]
-    anchor = landmarks.anchor[wall]
-    span = features[wall] - anchor
-    normal = span / np.linalg.norm(span)
-    depth = (0.5 * (features[wall] + anchor) - middle) @ normal
-    sign = 1.0 if depth > 0 else -1.0
-    found = np.zeros(len(landmarks.ident), dtype=np.bool_)
-    for row in range(len(landmarks.ident)):
-        if row == wall or landmarks.hits[row] > 2 * CONSTANTS.window:
-            continue  # what has stood for long stands: rooms that are not convex have walls before walls
-        foot = features[row]
-        if landmarks.is_wall[row]:
-            out = features[row] - landmarks.anchor[row]
-            out = out / np.linalg.norm(out)
-            foot = middle + ((0.5 * (features[row] + landmarks.anchor[row]) - middle) @ out) * out
-        at = slice(7 + 3 * row, 10 + 3 * row)
-        slack = CONSTANTS.depth + 2.0 * float(np.sqrt(np.trace(context.window.covariance[at, at])))
-        found[row] = sign * ((foot - middle) @ normal) > abs(depth) + slack
-    return found
+    return np.asarray(gone)

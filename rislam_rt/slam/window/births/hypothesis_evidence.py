@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import AXES
+from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
     BESIDE,
     IMAGES,
@@ -20,6 +20,7 @@ from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.births.image_hypotheses import image_amplitudes
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
+from rislam_rt.slam.window.landmarks.landmark_update import recall_forms
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors
 from rislam_rt.slam.window.solver_limits import NEARBY
@@ -32,9 +33,8 @@ MORE_UNKNOWN = 2
 """The same of a path of no kind here: over walls that the map lacks."""
 CLOSE = 0.8
 """Gap in cells below which two paths come out as one beyond doubt."""
-LOG_ALONE, LOG_APART = np.log(0.1), np.log(1e-4)
-"""Log probability that two of one cell come out as one of them alone (the other is hidden), and that two that lie apart
-come out as one."""
+LOG_APART = np.log(1e-4)
+"""Log probability that two that lie apart come out as one."""
 ASIDE = 10.0
 """Log evidence behind a track's best from which on a hypothesis does not speak for others."""
 
@@ -59,21 +59,24 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
     )
 
 
-def log_beside(
-    table: Hypotheses, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, scene: KnownEnvironment
-) -> Floats:
+def log_beside(table: Hypotheses, digest: TrackSummary, known: KnownFeatures, context: WindowState) -> Floats:
     """(H,) log probability that a wall's return comes out by itself, or as one with its edge at a level wall.
 
-    It hangs on how far apart the two would be.
+    It hangs on how far apart the two would be, and on whether the level wall is heard by itself: where it ends, so does
+    its edge.
     """
+    landmarks, scene = context.landmarks, context.scene
     track, found = table.trials.track, np.zeros(len(table.kind))
     length, cell = digest.mean[0][track, 0], float(scene.sensor.cell_length[0])
-    for wall in landmarks.walls:
-        if not known.is_ceiling(wall, digest.middle):
-            continue
+    ceilings = [known.is_ceiling(wall, digest.middle) for wall in landmarks.walls.tolist()]
+    level = landmarks.walls[np.array(ceilings, dtype=np.bool_)]
+    forms = np.array([[TX, NONE, NONE, wall, NONE] for wall in level], dtype=np.int64).reshape(-1, 5)
+    heard, _ = recall_forms(context.visibility, forms, np.ones(len(level), dtype=np.int64), landmarks)
+    for wall, clear in zip(level, heard, strict=True):
         rise = float(np.linalg.norm(known.place[wall] - digest.middle))
         gap = np.hypot(length, rise) - length
-        found += np.where((table.kind == WALL) & (gap < CLOSE * cell), LOG_ALONE, 0.0)
+        found += np.where((table.kind == WALL) & (gap < CLOSE * cell), np.log1p(-CONSTANTS.shown * clear), 0.0)
+        found += np.where((table.kind == BESIDE) & (table.known == wall), np.log(clear), 0.0)
         found += np.where((table.kind == BESIDE) & (table.known == wall) & (gap > cell), LOG_APART, 0.0)
     return found
 

@@ -139,7 +139,7 @@ def _equations(
     by_wall = -2.0 * (
         depth[..., None, None] * AXES + scaled[:, None, :, None] * (mirrored - place[:, None])[..., None, :]
     )
-    by_place = second[:, None] @ np.where(wall[:, None, None, None], np.where(out[..., None], 0.0, by_wall), AXES)
+    inside = np.where(wall[:, None, None, None], np.where(out[..., None], 0.0, by_wall), AXES)
     flip = AXES - 2.0 * span[:, :, None] * scaled[:, None, :]
     by_tx = np.where(wall[:, None, None], second @ flip @ first, np.where(pair[:, None, None], first, 0.0))
     to_rx = image - rx
@@ -153,24 +153,23 @@ def _equations(
     leg = np.sqrt(np.vecdot(to_tx, to_tx))
     toward = to_tx / np.maximum(leg, 1e-6)[..., None]
     seen = np.concatenate([(reach + leg)[..., None], arrival[..., :2]], axis=-1)
-    new = by_image @ by_place
-    by_far = np.where(out[..., None], by_wall, first[:, None])
-    new[..., 0, :] += (toward[..., None, :] @ by_far)[..., 0, :]
-    pose = by_image @ (by_tx[:, None] - AXES)
+    new = _through(by_image, second) @ inside
+    new[..., 0, :] += np.where(out, (toward[..., None, :] @ by_wall)[..., 0, :], toward @ first)
+    pose = _through(by_image, by_tx - AXES)
     pose[..., 0, :] -= toward
     maps = _by_maps(trials, rows, by_image, toward, flip)
-    split = _mix(trials, rows, rx, image, error, (by_place, by_tx), (seen, new, pose))
+    split = _mix(trials, rows, rx, image, error, (second, inside, by_tx), (seen, new, pose))
     wide = np.concatenate(
         [digest.twist[track], pose @ digest.uncertainty[track], *maps, split, new], axis=-1
     )  # fmt: skip
     weight = digest.weight[track]
     wide *= weight[..., None]
     # the share stands in the prediction itself, the other errors are linear
-    left = (digest.seen[track] - seen) * weight - (wide[..., : error.shape[1] - 1] @ error[:, None, :-1, None])[..., 0]
-    squared = np.vecdot(left, left)
-    heavy = wide * trust[..., None, None]
-    size = wide.shape[-1]
+    size, heavy = wide.shape[-1], wide * trust[..., None, None]
     flat, thick = wide.reshape(len(rows), -1, size), heavy.reshape(len(rows), -1, size)
+    told = flat[..., : error.shape[1] - 1] @ error[:, :-1, None]
+    left = (digest.seen[track] - seen) * weight - told.reshape(seen.shape)
+    squared = np.vecdot(left, left)
     normal = np.swapaxes(thick, 1, 2) @ flat
     slope = (np.swapaxes(thick, 1, 2) @ left.reshape(len(rows), -1, 1))[..., 0]
     common, own = np.arange(error.shape[1]), np.arange(error.shape[1], size)
@@ -192,19 +191,25 @@ def _by_maps(trials: Trials, rows: Integers, by_image: Floats, toward: Floats, f
     far, wall, aside = (field[rows][:, None, None] for field in (trials.far, trials.is_wall, trials.aside))
     mirrored = flip @ near
     heard = np.where(far, second @ near, np.where(wall, second @ mirrored, 0.0))
-    first, last = by_image @ heard[:, None], by_image @ np.where(aside, 0.0, behind)[:, None]
-    first[..., 0, :] += (toward[..., None, :] @ np.where(far, mirrored, near)[:, None])[..., 0, :]
-    last[..., 0, :] += (toward[..., None, :] @ np.where(aside, behind, 0.0)[:, None])[..., 0, :]
+    first, last = _through(by_image, heard), _through(by_image, np.where(aside, 0.0, behind))
+    first[..., 0, :] += toward @ np.where(far, mirrored, near)
+    last[..., 0, :] += toward @ np.where(aside, behind, 0.0)
     return first, last
 
 
+def _through(slopes: Floats, maps: Floats) -> Floats:
+    """Slopes (H, B, 3, 3) by what maps (H, 3, 3) move: one product of matrices for each hypothesis."""
+    count, points = slopes.shape[:2]
+    return np.asarray((slopes.reshape(count, 3 * points, 3) @ maps).reshape(count, points, 3, 3))
+
+
 def _mix(
-    trials: Trials, rows: Integers, rx: Floats, image: Floats, error: Floats, slopes: tuple[Floats, Floats],
+    trials: Trials, rows: Integers, rx: Floats, image: Floats, error: Floats, maps: tuple[Floats, Floats, Floats],
     seen: tuple[Floats, Floats, Floats],
 ) -> Floats:  # fmt: skip
     """What is seen, and its slopes by place and pose, moved towards what a known wall makes of it; the slope
     (H, B, 3, 1) by the share's error. `seen` is changed in place."""
-    (by_place, by_tx), (value, new, pose) = slopes, seen
+    (second, inside, by_tx), (value, new, pose) = maps, seen
     split = np.zeros((*value.shape, 1))
     both = trials.mixed[rows].nonzero()[0]
     if not len(both):
@@ -218,8 +223,8 @@ def _mix(
     value[both] += share * gap
     split[both] = CONSTANTS.weaker * gap[..., None]
     across = _by_image(ray, length)
-    turned = across @ mirror[:, None, :, :3]
-    by_new, by_agent = turned @ by_place[both], turned @ by_tx[both][:, None] - across
+    turned = _through(across, mirror[..., :3])
+    by_new, by_agent = _through(turned, second[both]) @ inside[both], _through(turned, by_tx[both]) - across
     new[both] += share[..., None] * (by_new - new[both])
     pose[both] += share[..., None] * (by_agent - pose[both])
     return split

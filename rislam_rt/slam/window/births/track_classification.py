@@ -123,7 +123,7 @@ def judge(
     evidence += log_amplitudes(table, fits, digest, landmarks, scene) + log_opacity(
         table, fits, digest, known, landmarks
     )
-    evidence += log_beside(table, digest, known, landmarks, scene)
+    evidence += log_beside(table, digest, known, context)
     gain = log_upright(table, fits, digest, known, landmarks)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
     evidence[fitted_twice(table, fits.place, evidence)] = -np.inf

@@ -48,9 +48,16 @@ def recall(
     visibility: VisibilityObservations, expected: ExpectedComponents, landmarks: WindowTable
 ) -> tuple[Floats, Floats]:
     """Probability (R,) that nothing stands in the way of each return now, and its scatter (R,)."""
-    first, scatter = CONSTANTS.steady ** (1.0 + expected.bounces), np.full(len(expected.seen), CONSTANTS.crowd)
+    return recall_forms(visibility, expected.forms, expected.bounces, landmarks)
+
+
+def recall_forms(
+    visibility: VisibilityObservations, forms: Integers, bounces: Integers, landmarks: WindowTable
+) -> tuple[Floats, Floats]:
+    """The same of forms (R, 5) over so many walls (R,)."""
+    first, scatter = CONSTANTS.steady ** (1.0 + bounces), np.full(len(forms), CONSTANTS.crowd)
     if len(visibility.code):
-        code = pack(expected.forms, landmarks)
+        code = pack(forms, landmarks)
         place = np.minimum(np.searchsorted(visibility.code, code), len(visibility.code) - 1)
         known = visibility.code[place] == code
         first = np.where(known, visibility.clear[place], first)
@@ -103,8 +110,9 @@ def learn(
     landmarks = _existence(landmarks, expected, groups, hit & alone, ~hit & alone, shows)
     landmarks = _strengths(landmarks, window, expected, groups, row, pick, observed, poses, scene, code)
     fresh = pack(expected.forms, landmarks)
-    keep = ~np.isin(visibility.code, fresh)
-    kept = VisibilityObservations._make(field[keep] for field in visibility)
+    place, keep = np.searchsorted(visibility.code, fresh), np.ones(len(visibility.code) + 1, dtype=np.bool_)
+    keep[place[np.append(visibility.code, -1)[place] == fresh]] = False
+    kept = VisibilityObservations._make(field[keep[:-1]] for field in visibility)
     return _joined(kept, (fresh, after, scatter)), landmarks
 
 

@@ -7,9 +7,12 @@ import numpy as np
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import NONE, TX
 from rislam_rt.slam.window.births import births, hypothesis_evidence, track_classification
-from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, OVER_RX, POINT, WALL, WALL_KNOWN
+from rislam_rt.slam.window.births.hypotheses import BESIDE, KNOWN_WALL, OVER_RX, POINT, WALL, WALL_KNOWN, known_features
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
+from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
+from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, pack
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
+from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import empty_log
 
 
@@ -90,3 +93,27 @@ def test_tracks_are_concurrent_that_were_heard_in_one_cycle():
     context = SimpleNamespace(log=empty_log()._replace(cycle=np.array([1, 2, 2, 3, 5, 5])))
     found = hypothesis_evidence.concurrent(context, [np.array([0, 1]), np.array([2, 3]), np.array([4])])
     assert found.tolist() == [[True, True, False], [True, True, False], [False, False, True]]
+
+
+def test_a_wall_comes_out_with_its_edge_only_where_the_level_wall_is_heard():
+    middle = np.array([1.0, 1.0, 1.0])
+    landmarks = enter(empty_table(1), True, middle, 10, 5.0, unknown(1, 1))
+    ceiling = np.array([[1.0, 1.0, 4.0]])  # the agent's image in it: 1.5 m above, 0.1 m longer beside a wall 20 m away
+    known = known_features(ceiling, 1e-6 * np.eye(3), landmarks, middle)
+    form = np.array([[TX, NONE, NONE, 0, NONE]])
+    table = SimpleNamespace(
+        kind=np.array([WALL, BESIDE]), known=np.array([-1, 0]), trials=SimpleNamespace(track=np.zeros(2, dtype=int))
+    )
+    digest = SimpleNamespace(mean=(np.array([[40.0, 1.0, 0.0]]), None, None), middle=middle)
+    scene = SimpleNamespace(sensor=SimpleNamespace(cell_length=np.array([0.75])))
+    found = {}
+    for clear in (1.0, 0.0):
+        looked = VisibilityObservations(pack(form, landmarks), np.array([clear]), np.ones(1))
+        context = SimpleNamespace(landmarks=landmarks, scene=scene, visibility=looked)
+        found[clear] = hypothesis_evidence.log_beside(table, digest, known, context)
+    # heard a moment ago, the ceiling throws an edge too; never heard from here, it throws none
+    assert found[1.0][1] > found[1.0][0] + 2.0
+    assert found[0.0][0] > found[0.0][1] + 2.0
+    # one of both it is
+    clear = 1.0 - CONSTANTS.rare
+    assert np.allclose(np.exp(found[1.0]), [1.0 - CONSTANTS.shown * clear, clear])
