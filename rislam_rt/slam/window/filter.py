@@ -26,7 +26,7 @@ from rislam_rt.slam.window.divergence import divergence_monitor, recovery
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.measurement_log import Residuals, empty_log, from_above, renew
+from rislam_rt.slam.window.measurement_log import Residuals, empty_log, renew
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
@@ -202,9 +202,7 @@ def _solve(state: WindowState, view: CycleAssociation, used: Booleans) -> tuple[
     window, log, landmarks, scene = state.window, state.log, state.landmarks, state.scene
     innovation, jacobian = innovations(view, log, used, state.cycle)
     window = window_gaussian.solve(window_gaussian.with_present(window, innovation, jacobian), spread=False)
-    slots = np.array([window.num_poses - 1])
-    if state.cycle % REFRESH == 0:
-        window, slots = from_above(window, log, landmarks), np.arange(window.num_poses)
+    slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else np.array([window.num_poses - 1])
     window, left = renew(window, log, landmarks, scene, state.heading, state.cycle, slots)
     window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return widen_motion(state._replace(window=window)), left, float(np.sum(innovation**2))

@@ -7,11 +7,11 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.returns import NONE, linearise_each, poses_of, reflect
+from rislam_rt.slam.returns import linearise_each, poses_of
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.smoother.steps import HEAD, POSE
+from rislam_rt.slam.window.smoother.steps import POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, poses
 
 
@@ -150,25 +150,6 @@ def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
 def trust(left: Floats) -> Floats:
     """(A,) weight that Student's t gives residuals (A, 3)."""
     return np.asarray((CONSTANTS.tail + 3.0) / (CONSTANTS.tail + np.vecdot(left, left)))
-
-
-def from_above(window: Window, log: Log, landmarks: WindowTable) -> Window:
-    """The window with those walls leaning the other way whose own returns, heard within it, would arrive from below.
-
-    Both are seen alike, but the array hears from above; where a return is level, noise takes a step to either side.
-    """
-    form, middle, features = log.form[:, 0], poses(window)[-1, :3], window.features
-    own = form[(form[:, [0, 1, 4]] == NONE).all(axis=1), 3]
-    span = features - landmarks.anchor
-    above = np.vecdot(0.5 * (features + landmarks.anchor) - middle, span) * span[:, 2]
-    rows = (landmarks.is_wall & np.isin(landmarks.ident, own) & (above < 0.0)).nonzero()[0]
-    if not len(rows):
-        return window
-    turn, lift = np.array([1.0, 1.0, -1.0]), np.array([0.0, 0.0, 2.0 * middle[2]])
-    anchor, head = landmarks.anchor[rows], window.head.copy()
-    mirrored = lift + turn * reflect(lift + turn * anchor, features[rows], anchor)
-    head[HEAD + 3 * rows[:, None] + np.arange(3)] = mirrored
-    return window._replace(head=head)
 
 
 def renew(

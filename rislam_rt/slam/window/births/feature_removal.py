@@ -8,7 +8,7 @@ from rislam_rt.slam.returns import NONE
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, remove_features
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
-from rislam_rt.slam.window.measurement_log import Log, Residuals, from_above, renew
+from rislam_rt.slam.window.measurement_log import Log, Residuals, renew
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.solver_limits import FEWEST, RECENT
 from rislam_rt.slam.window.state import WindowState
@@ -20,7 +20,6 @@ def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, R
     window, landmarks, scene = context.window, context.landmarks, context.scene
     every = np.arange(window.num_poses)
     for _ in range(steps):
-        window = from_above(window, context.log, landmarks)
         window, left = renew(window, context.log, landmarks, scene, context.heading, context.cycle, every)
         window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return window, left

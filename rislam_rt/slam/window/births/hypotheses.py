@@ -38,10 +38,6 @@ class KnownFeatures(NamedTuple):
     shift: Floats
     """(F, 3)."""
 
-    def is_ceiling(self, wall: int, middle: Floats) -> bool:
-        """Whether a level wall lies above the agent: an edge that the floor makes is heard from below, hence not."""
-        return bool(abs(self.turn[wall, 2, 2]) > LEVEL_TURN and self.place[wall, 2] > middle[2])
-
 
 class Hypotheses(NamedTuple):
     """H hypotheses for T tracks."""
@@ -110,7 +106,7 @@ def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTabl
         add(OVER_RX, wall, mirrored, NONE, wall, (tx, mirrored))
         add(OVER_TX, wall, apparent, wall, NONE, (apparent, tx))
         add(OVER_SAME, wall, same, wall, wall, (same, same))
-        if known.is_ceiling(wall, middle):
+        if abs(turn[2, 2]) > LEVEL_TURN:
             upright = reflect(anchor, image, tx)
             upright[:, 2] = middle[2]  # what lies higher comes of the edge
             add(BESIDE, wall, upright, NONE, NONE, (tx, tx))

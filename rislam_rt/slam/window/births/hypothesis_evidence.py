@@ -9,6 +9,7 @@ from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
     BESIDE,
     IMAGES,
+    LEVEL_TURN,
     OVER_SAME,
     OVER_TX,
     POINT,
@@ -68,8 +69,7 @@ def log_beside(table: Hypotheses, digest: TrackSummary, known: KnownFeatures, co
     landmarks, scene = context.landmarks, context.scene
     track, found = table.trials.track, np.zeros(len(table.kind))
     length, cell = digest.mean[0][track, 0], float(scene.sensor.cell_length[0])
-    ceilings = [known.is_ceiling(wall, digest.middle) for wall in landmarks.walls.tolist()]
-    level = landmarks.walls[np.array(ceilings, dtype=np.bool_)]
+    level = landmarks.walls[np.abs(known.turn[landmarks.walls, 2, 2]) > LEVEL_TURN]
     forms = np.array([[TX, NONE, NONE, wall, NONE] for wall in level], dtype=np.int64).reshape(-1, 5)
     heard, _ = recall_forms(context.visibility, forms, np.ones(len(level), dtype=np.int64), landmarks)
     for wall, clear in zip(level, heard, strict=True):

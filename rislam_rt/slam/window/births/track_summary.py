@@ -18,7 +18,7 @@ from rislam_rt.slam.returns import poses_of
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window, now, pose_covariance, poses
-from rislam_rt.slam.window.solver_limits import POINTS
+from rislam_rt.slam.window.solver_limits import PERIODS, POINTS
 
 TOGETHER = 10.0
 """Measurements over which the pull of neighbours keeps its sign."""
@@ -60,7 +60,7 @@ class TrackSummary(NamedTuple):
         early: as long as a perfect mirror would be as loud. Also the track (T + E,) of each row."""
         period, count = SPEED_OF_LIGHT * sensor.period, len(self.seen)
         longest = np.exp(free_space(sensor.radio) - self.log_amplitude)
-        more = np.maximum(np.floor((longest - self.mean[0][:, 0]) / period), 0.0).astype(np.int64)
+        more = np.clip(np.floor((longest - self.mean[0][:, 0]) / period), 0.0, PERIODS).astype(np.int64)
         owner = np.repeat(np.arange(count), 1 + more)
         turn = np.arange(len(owner)) - np.searchsorted(owner, owner)
         order = np.argsort(turn > 0, kind="stable")
