@@ -96,18 +96,11 @@ _TEMPLATES = (
 """Form of each kind."""
 
 
-def judge(
-    context: WindowState, ats: list[Integers], digest: TrackSummary, known: KnownFeatures,
-    told: list[tuple[int, float, int]],
-    lonely: Floats, beside: Floats,
-) -> tuple[list[TrackDecision], Floats]:  # fmt: skip
-    """Verdicts of T tracks, and the posterior (E,) of each of the explanations by the map.
-
-    Of these `told` gives track, log evidence, and the number of the panel that they run over, -1 for none.
-
-    `ats` are the tracks' rows of the log; `lonely` (T,) is the log probability that two walls throw so few single
-    returns beside it, `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
-    """
+def _weigh(
+    context: WindowState, digest: TrackSummary, known: KnownFeatures, lonely: Floats
+) -> tuple[Hypotheses, Fits, Floats, Floats]:
+    """What T tracks may be, fitted, with log evidence (H,), and the length (H,) [m] that the path then has: as heard, or
+    by whole periods of the sounding more."""
     landmarks, scene, near = context.landmarks, context.scene, len(digest.seen)
     digest, owner = digest.farther(scene.sensor)
     table = hypotheses(digest, known, landmarks)
@@ -127,8 +120,25 @@ def judge(
     gain = log_upright(table, fits, digest, known, landmarks)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
     evidence[fitted_twice(table, fits.place, evidence)] = -np.inf
-    length, track = digest.mean[0][track, 0], owner[track]
-    table, digest = table._replace(trials=table.trials._replace(track=track)), digest.take(np.arange(near))
+    own = table._replace(trials=table.trials._replace(track=owner[track]))
+    return own, fits, evidence, digest.mean[0][track, 0]
+
+
+def judge(
+    context: WindowState, ats: list[Integers], digest: TrackSummary, known: KnownFeatures,
+    told: list[tuple[int, float, int]],
+    lonely: Floats, beside: Floats,
+) -> tuple[list[TrackDecision], Floats]:  # fmt: skip
+    """Verdicts of T tracks, and the posterior (E,) of each of the explanations by the map.
+
+    Of these `told` gives track, log evidence, and the number of the panel that they run over, -1 for none.
+
+    `ats` are the tracks' rows of the log; `lonely` (T,) is the log probability that two walls throw so few single
+    returns beside it, `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
+    """
+    landmarks, scene = context.landmarks, context.scene
+    table, fits, evidence, length = _weigh(context, digest, known, lonely)
+    track = table.trials.track
     over = identify(context, ats, table, fits, evidence)
     evidence += over.gain
     for number, panel in enumerate(landmarks.panels):
