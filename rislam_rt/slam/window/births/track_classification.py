@@ -99,8 +99,8 @@ _TEMPLATES = (
 def _weigh(
     context: WindowState, digest: TrackSummary, known: KnownFeatures, lonely: Floats
 ) -> tuple[Hypotheses, Fits, Floats, Floats]:
-    """What T tracks may be, fitted, with log evidence (H,), and the length (H,) [m] that the path then has: as heard, or
-    by whole periods of the sounding more."""
+    """What T tracks may be, fitted, with log evidence (H,), and the length (H,) [m] that the path then has: as heard,
+    or whole periods of the sounding more."""
     landmarks, scene, near = context.landmarks, context.scene, len(digest.seen)
     digest, owner = digest.farther(scene.sensor)
     table = hypotheses(digest, known, landmarks)
