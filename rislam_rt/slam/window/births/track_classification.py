@@ -102,7 +102,9 @@ def _weigh(
     """What T tracks may be, fitted, with log evidence (H,), and the length (H,) [m] that the path then has: as heard,
     or whole periods of the sounding more."""
     landmarks, scene, near = context.landmarks, context.scene, len(digest.seen)
-    digest, owner = digest.farther(scene.sensor)
+    owner = np.arange(near)
+    if scene.use_vt:  # without wall returns a longer way is one more thing that a point's track may be, and never born
+        digest, owner = digest.farther(scene.sensor)
     table = hypotheses(digest, known, landmarks)
     table = table.take((table.trials.track < near) | table.trials.is_wall | table.trials.is_pair)
     if not scene.use_vt:  # wall returns tell no walls
