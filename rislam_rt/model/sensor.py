@@ -18,6 +18,8 @@ from rislam_rt.model.radio import RadioConfig
 RESOLUTIONS = ("cell", "joint", "all")
 """What two paths must be to come out apart: outside each other's cell; certain of their amplitudes when all else is
 unknown (`information.resolved_probability`); anything at all."""
+ONE_PULSE = 1.0
+"""[s] Period of a sounding that does not repeat: longer than any path."""
 CERTAIN_SNR = 10.0
 """Standard deviations above the threshold from which on the detection probability is 1 to double precision."""
 
@@ -34,13 +36,16 @@ class SensorModel:
     """Mean number of false components a cycle."""
     window: tuple[float, float] = (0.0, 80e-9)
     """First and last delay [s] that are reported."""
+    period: float = ONE_PULSE
+    """Time [s] after which a sounding of tones repeats: what comes later is heard as if it came earlier by whole
+    periods."""
     resolution: str = "cell"
     """What two paths must be to come out apart (`RESOLUTIONS`)."""
     alternation: bool = False
     """Whether components come with the probability that they ran over the panel."""
 
     def __post_init__(self) -> None:
-        for name, least in (("threshold", 1e-300), ("false_alarms", 0.0)):
+        for name, least in (("threshold", 1e-300), ("false_alarms", 0.0), ("period", 1e-300)):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= least):
                 raise ConfigError(f"sensor.{name}: {value} received; give a finite number of at least {least:g}")
@@ -60,6 +65,15 @@ class SensorModel:
     def cell_length(self) -> Floats:
         """(3,) the same with the delay as a length [m]."""
         return self.cell * np.array([SPEED_OF_LIGHT, 1.0, 1.0])
+
+    def heard_as(self, length: Floats) -> Floats:
+        """Lengths [m] as which paths of lengths (...,) [m] are heard, less than a period."""
+        return np.asarray(np.mod(length, SPEED_OF_LIGHT * self.period))
+
+    def nearest(self, gap: Floats) -> Floats:
+        """Differences (...,) of lengths [m] without whole periods."""
+        period = SPEED_OF_LIGHT * self.period
+        return np.asarray(gap - period * np.round(gap / period))
 
     def detection_probability(self, snr: ArrayLike) -> Floats:
         """Probability (...,) that a lone path of this expected SNR is reported (see `detection_probability`)."""

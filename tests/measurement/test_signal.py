@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.measurement import ReceiverConfig
+from rislam_rt.measurement import ReceiverConfig, build_sensor
 from rislam_rt.measurement.estimation.sounding import build_sounding
 from rislam_rt.measurement.estimation.spherical_waves import correlate_waves, wave_signals
 from rislam_rt.measurement.received import receive
@@ -34,6 +34,17 @@ def test_tones_span_the_delay_window(bandwidth, count):
     assert num_tones(radio, CONFIG) == count
     assert count / bandwidth >= CONFIG.max_delay
     assert num_tones(radio, ReceiverConfig(num_subcarriers=100)) == 100
+
+
+def test_tones_repeat_after_the_period_that_the_sensor_model_tells(make_paths, make_gain):
+    period, gain = SPEED_OF_LIGHT * build_sensor(RADIO, CONFIG).period, make_gain(40.0, RADIO)
+    near, far = (
+        tones(received(make_paths([(PathKind.VT, 7.0 + turn, UP, gain)])), RADIO, CONFIG) for turn in (0.0, period)
+    )
+    # the carrier's phase is the gain's: what is left is a common sign, as the tones lie about zero
+    np.testing.assert_allclose(np.abs(np.vdot(near, far)), np.vdot(near, near).real, rtol=1e-9)
+    half = tones(received(make_paths([(PathKind.VT, 7.0 + 0.5 * period, UP, gain)])), RADIO, CONFIG)
+    assert np.abs(np.vdot(near, half)) < 1e-6 * np.vdot(near, near).real
 
 
 def test_tones_are_the_sum_of_their_paths(make_paths, make_gain):

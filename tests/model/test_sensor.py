@@ -60,3 +60,13 @@ def test_paths_merge_within_a_cell_of_all_three_or_never() -> None:
 def test_unusable_values_are_refused_in_one_line(wrong: dict[str, object]) -> None:
     with pytest.raises(ConfigError, match=f"sensor.{next(iter(wrong))}"):
         SensorModel(RadioConfig(), **wrong)  # type: ignore[arg-type]
+
+
+def test_what_comes_a_period_later_is_heard_as_it():
+    sensor = SensorModel(RadioConfig(), period=128e-9)
+    period = 299792458.0 * 128e-9
+    np.testing.assert_allclose(sensor.heard_as(np.array([12.0, 12.0 + period, 12.0 + 2.0 * period])), 12.0, atol=1e-12)
+    np.testing.assert_allclose(
+        sensor.nearest(np.array([0.4, 0.4 - period, -0.4 + period])), [0.4, 0.4, -0.4], atol=1e-12
+    )
+    assert float(SENSOR.heard_as(np.array(500.0))) == 500.0

@@ -4,12 +4,14 @@ What is expected, what comes out as one, who is who, what a track is and which p
 filter's parts, which see the particles by their mean and covariance (`gaussian_view`); pose and map are the particles'.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
+from rislam_rt.model.sensor import ONE_PULSE
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.nested.gaussian_view import gaussian_view
@@ -57,7 +59,8 @@ def init(
     *, rng: np.random.Generator,
 ) -> NestedState:  # fmt: skip
     """Particles drawn from the start prior, and an empty map."""
-    return _begin(window_init(start, body, ris, sensor, config, rng=rng), config, rng=rng)
+    once = replace(sensor, period=ONE_PULSE)  # particles know nothing of what is heard a period too early
+    return _begin(window_init(start, body, ris, once, config, rng=rng), config, rng=rng)
 
 
 def revisit(state: NestedState, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> NestedState:
@@ -101,7 +104,7 @@ def step(
     told = update(belief, _seen(front, view, used), config.nested, engine)
     front = _look(front, told.belief, config)
     slots = np.arange(front.window.num_poses)[0 if front.cycle % REFRESH == 0 else -1 :]
-    left = renew_slots(front.window, front.log, landmarks, scene.body, front.heading, front.cycle, slots)[1]
+    left = renew_slots(front.window, front.log, landmarks, scene, front.heading, front.cycle, slots)[1]
     front, landmark = learn_cycle(front, heard, view, used, left, dt, turn, config.sigma_a, code)
     front, removed = _classify(front, config)
     landmark[heard.free[removed[len(removed) - len(observed.seen) :]]] = REMOVED

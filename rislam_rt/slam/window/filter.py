@@ -199,11 +199,11 @@ def _assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:
 def _solve(state: WindowState, view: CycleAssociation, used: Booleans) -> tuple[WindowState, Residuals, float]:
     """The window after this cycle's components: two Gauss-Newton steps, the first on what the association expected; the
     whole of it again now and then."""
-    window, log, landmarks, body = state.window, state.log, state.landmarks, state.scene.body
+    window, log, landmarks, scene = state.window, state.log, state.landmarks, state.scene
     innovation, jacobian = innovations(view, log, used, state.cycle)
     window = window_gaussian.solve(window_gaussian.with_present(window, innovation, jacobian), spread=False)
     slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else np.array([window.num_poses - 1])
-    window, left = renew(window, log, landmarks, body, state.heading, state.cycle, slots)
+    window, left = renew(window, log, landmarks, scene, state.heading, state.cycle, slots)
     window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return widen_motion(state._replace(window=window)), left, float(np.sum(innovation**2))
 

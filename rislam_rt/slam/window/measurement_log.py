@@ -5,11 +5,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.model import Body
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.returns import linearise_each, poses_of
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
+from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.smoother.steps import POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, poses
@@ -104,14 +104,20 @@ class Residuals(NamedTuple):
 
 
 def residuals(
-    log: Log, window: Window, landmarks: WindowTable, body: Body, heading: Floats, rows: Integers, slot: Integers
+    log: Log,
+    window: Window,
+    landmarks: WindowTable,
+    scene: KnownEnvironment,
+    heading: Floats,
+    rows: Integers,
+    slot: Integers,
 ) -> Residuals:
     """Of some explained rows of the log, at the present estimate; `heading` (K,) as the compass tells."""
     form, features = log.form[rows], window.features
     both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
     at = np.concatenate([slot, slot[both]])
     place = poses(window)[at]
-    ends = poses_of(place[:, :3], heading[at] + place[:, 3], body)
+    ends = poses_of(place[:, :3], heading[at] + place[:, 3], scene.body)
     returns = compile_forms(landmarks.rows(np.concatenate([form[:, 0], form[both, 1]])), at)
     linear = linearise_each(returns, features, landmarks.anchor, ends)
     jacobian = np.zeros((len(at), 3, POSE + features.size))
@@ -121,10 +127,14 @@ def residuals(
     jacobian[..., POSE:] = linear.by_feature.reshape(len(at), 3, features.size)
     count, share = len(rows), log.share[rows[both], None]
     (seen, other), (jacobian, by_other) = ((each[:count], each[count:]) for each in (linear.seen, jacobian))
-    seen[both] += share * (other - seen[both])
+    gap = other - seen[both]
+    gap[:, 0] = scene.sensor.nearest(gap[:, 0])
+    seen[both] += share * gap
     jacobian[both] += share[..., None] * (by_other - jacobian[both])
     std = np.sqrt(log.std[rows] ** 2 + log.extra[rows])
-    return Residuals(rows, slot, (log.seen[rows] - seen) / std, jacobian / std[..., None])
+    left = log.seen[rows] - seen
+    left[:, 0] = scene.sensor.nearest(left[:, 0])
+    return Residuals(rows, slot, left / std, jacobian / std[..., None])
 
 
 def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
@@ -143,7 +153,13 @@ def trust(left: Floats) -> Floats:
 
 
 def renew(
-    window: Window, log: Log, landmarks: WindowTable, body: Body, heading: Floats, cycle: int, slots: Integers
+    window: Window,
+    log: Log,
+    landmarks: WindowTable,
+    scene: KnownEnvironment,
+    heading: Floats,
+    cycle: int,
+    slots: Integers,
 ) -> tuple[Window, Residuals]:
     """The quadratics of some slots, made at the present estimate; the last pose is that of `cycle`."""
     slot = log.cycle - (cycle - window.num_poses + 1)
@@ -159,7 +175,7 @@ def renew(
     if not len(rows):
         nothing = Residuals(rows, rows, np.zeros((0, 3)), np.zeros((0, 3, size)))
         return window._replace(slots=Quadratic(hessian, gradient, middle)), nothing
-    found = residuals(log, window, landmarks, body, heading, rows, slot[rows])
+    found = residuals(log, window, landmarks, scene, heading, rows, slot[rows])
     weight = trust(found.left)
     start = np.searchsorted(found.slot, slots)
     stop = np.searchsorted(found.slot, slots, side="right")

@@ -63,3 +63,5 @@ APART = 0.5
 """Distance [m] between two fits of one kind below which they are one."""
 STEP = 1e-6
 """[m] by which walls are moved for the slope of a margin: its second derivative is of the order of one over metres."""
+PERIODS = 3
+"""Most periods of the sounding by which a path may be longer than it is heard: 115 m at 128 tones over 1 GHz."""

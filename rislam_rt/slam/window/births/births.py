@@ -62,12 +62,12 @@ def births(context: WindowState, expected: ExpectedComponents, groups: Unresolve
         if not returns and verdict.is_return:
             looked[rows[row]] = context.tracks.hits[rows[row]]
             continue
-        if born < 0 and wanted(verdict, float(histories.mean[0][row, 0])):
+        if born < 0 and wanted(verdict):
             context, fine = _enter(context, ats[row], verdict, histories, row)
             if fine:
                 born, gone[rows[row]] = row, True
                 continue
-        elif born >= 0 and wanted(verdict, float(histories.mean[0][row, 0])):
+        elif born >= 0 and wanted(verdict):
             continue  # its turn comes in the next cycle, with the new feature known
         looked[rows[row]] = context.tracks.hits[rows[row]]
     more = len(context.tracks.ident) - len(gone)  # what was taken back for the new feature
@@ -178,6 +178,9 @@ def _explain(
     linear = linearise(compile_forms(parts), features, context.landmarks.anchor, poses)
     weight = np.array([1.0 - groups.share[column], groups.share[column]])[: len(parts)]
     weight = weight / weight.sum()
+    linear.seen[..., 0] = linear.seen[..., :1, 0] + context.scene.sensor.nearest(
+        linear.seen[..., 0] - linear.seen[..., :1, 0]
+    )
     value = np.einsum("r,krj->kj", weight, linear.seen)
     by_pose = np.einsum("r,krij->kij", weight, linear.by_pose) @ histories.uncertainty[row, used]
     by_pose = np.concatenate([by_pose, histories.twist[row, used]], axis=-1)
@@ -187,7 +190,9 @@ def _explain(
     reported = histories.weight[row, used] ** -1.0
     std = np.sqrt(reported**2 + extra)
     jacobian = np.concatenate([by_pose, by_map], axis=-1) / std[..., None]
-    left = (histories.seen[row, used] - value) / std
+    left = histories.seen[row, used] - value
+    left[:, 0] = context.scene.sensor.nearest(left[:, 0])
+    left = left / std
     flat, trust = jacobian.reshape(-1, jacobian.shape[-1]), np.ones(len(left))
     for _ in range(2):
         heavy = flat * np.repeat(trust, 3)[:, None]

@@ -17,10 +17,10 @@ from rislam_rt.slam.window.tracks import WindowTracks
 
 def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, Residuals]:
     """Gauss-Newton over the whole window."""
-    window, landmarks, body = context.window, context.landmarks, context.scene.body
+    window, landmarks, scene = context.window, context.landmarks, context.scene
     every = np.arange(window.num_poses)
     for _ in range(steps):
-        window, left = renew(window, context.log, landmarks, body, context.heading, context.cycle, every)
+        window, left = renew(window, context.log, landmarks, scene, context.heading, context.cycle, every)
         window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return window, left
 

@@ -1,6 +1,6 @@
 """Every hypothesis that a track is tried against, with its first guess; walls of the map as affine maps."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,6 +49,11 @@ class Hypotheses(NamedTuple):
     over: Integers
     """(H,) row of the known wall that an image of a known point runs over besides, -1 for none."""
     trials: Trials
+
+    def take(self, rows: Any) -> "Hypotheses":
+        """Only some of the hypotheses."""
+        trials = Trials._make(field[rows] for field in self.trials)
+        return Hypotheses(self.kind[rows], self.known[rows], self.over[rows], trials)
 
 
 def known_features(mean: Floats, covariance: Floats, landmarks: WindowTable, middle: Floats) -> KnownFeatures:

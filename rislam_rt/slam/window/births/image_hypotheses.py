@@ -120,8 +120,7 @@ def _in_reach(table: Hypotheses, digest: TrackSummary, known: KnownFeatures) -> 
     leg = np.linalg.norm(other - tx[track], axis=1)
     aligned = (np.abs(gap) < REACH * std).all(axis=1) & (seen[track, 0] > reach + straight)
     keep = np.where(table.trials.far, aligned, seen[track, 0] > leg + straight)
-    trials = Trials._make(field[keep] for field in table.trials)
-    return Hypotheses(table.kind[keep], table.known[keep], table.over[keep], trials)
+    return table.take(keep)
 
 
 def fitted_twice(table: Hypotheses, place: Floats, evidence: Floats) -> Integers:

@@ -58,6 +58,8 @@ class TrackDecision(NamedTuple):
     """Standard deviations by which it costs more than noise makes it."""
     identity: PanelIdentity
     """(1,) who it is, if it is a point."""
+    length: float
+    """[m] of its path."""
 
     @property
     def form(self) -> tuple[int, int, int, int, int]:
@@ -94,6 +96,36 @@ _TEMPLATES = (
 """Form of each kind."""
 
 
+def _weigh(
+    context: WindowState, digest: TrackSummary, known: KnownFeatures, lonely: Floats
+) -> tuple[Hypotheses, Fits, Floats, Floats]:
+    """What T tracks may be, fitted, with log evidence (H,), and the length (H,) [m] that the path then has: as heard,
+    or whole periods of the sounding more."""
+    landmarks, scene, near = context.landmarks, context.scene, len(digest.seen)
+    owner = np.arange(near)
+    if scene.use_vt:  # without wall returns a longer way is one more thing that a point's track may be, and never born
+        digest, owner = digest.farther(scene.sensor)
+    table = hypotheses(digest, known, landmarks)
+    table = table.take((table.trials.track < near) | table.trials.is_wall | table.trials.is_pair)
+    if not scene.use_vt:  # wall returns tell no walls
+        table = with_images(table, digest.take(np.arange(near)), known, landmarks)
+    fits = try_all(table.trials, digest)
+    track = table.trials.track
+    evidence = fits.log_evidence + log_place(table, fits.place, digest.middle)
+    evidence += log_kind(table, landmarks)
+    # of what is heard too early, single returns may lie beyond the window
+    evidence += np.where(table.trials.is_pair & (track < near), lonely[owner[track]], 0.0)
+    evidence += log_amplitudes(table, fits, digest, landmarks, scene) + log_opacity(
+        table, fits, digest, known, landmarks
+    )
+    evidence += log_beside(table, digest, known, context)
+    gain = log_upright(table, fits, digest, known, landmarks)
+    evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
+    evidence[fitted_twice(table, fits.place, evidence)] = -np.inf
+    own = table._replace(trials=table.trials._replace(track=owner[track]))
+    return own, fits, evidence, digest.mean[0][track, 0]
+
+
 def judge(
     context: WindowState, ats: list[Integers], digest: TrackSummary, known: KnownFeatures,
     told: list[tuple[int, float, int]],
@@ -107,21 +139,8 @@ def judge(
     returns beside it, `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
     """
     landmarks, scene = context.landmarks, context.scene
-    table = hypotheses(digest, known, landmarks)
-    if not scene.use_vt:  # wall returns tell no walls
-        table = with_images(table, digest, known, landmarks)
-    fits = try_all(table.trials, digest)
+    table, fits, evidence, length = _weigh(context, digest, known, lonely)
     track = table.trials.track
-    evidence = fits.log_evidence + log_place(table, fits.place, digest.middle)
-    evidence += log_kind(table, landmarks)
-    evidence += np.where(table.trials.is_pair, lonely[track], 0.0)
-    evidence += log_amplitudes(table, fits, digest, landmarks, scene) + log_opacity(
-        table, fits, digest, known, landmarks
-    )
-    evidence += log_beside(table, digest, known, context)
-    gain = log_upright(table, fits, digest, known, landmarks)
-    evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
-    evidence[fitted_twice(table, fits.place, evidence)] = -np.inf
     over = identify(context, ats, table, fits, evidence)
     evidence += over.gain
     for number, panel in enumerate(landmarks.panels):
@@ -150,7 +169,9 @@ def judge(
         weighed = np.append(weight[best], weight[1 : 1 + len(own)][same])
         probability = float(np.exp(np.logaddexp.reduce(weighed) - total))
         if best == 0:
-            verdicts.append(TrackDecision(-1, probability, -1, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody))
+            verdicts.append(
+                TrackDecision(-1, probability, -1, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody, 0.0)
+            )
             continue
         at = own[best - 1]
         count = int((digest.weight[row, :, 0] > 0.0).sum())
@@ -160,7 +181,7 @@ def judge(
                 int(table.kind[at]), probability, int(table.known[at]), int(table.over[at]), fits.place[at],
                 fits.held[at],
                 direction_beliefs(fits.place[at], digest, known, landmarks) if table.trials.is_wall[at] else no_holds(),
-                float(fits.share[at]), float(misfit), over.identity.take(np.array([at])),
+                float(fits.share[at]), float(misfit), over.identity.take(np.array([at])), float(length[at]),
             )
         )  # fmt: skip
     return verdicts, shares
@@ -182,11 +203,13 @@ COST_MEAN, COST_STD = 3.56, 2.17
 """Mean and standard deviation of `(4 + 3) log(1 + chi^2 / 4)` for chi^2 with 3 degrees of freedom."""
 
 
-def wanted(verdict: TrackDecision, length: float) -> bool:
+def wanted(verdict: TrackDecision) -> bool:
     """Whether a verdict is clear enough to enter the map: likely, a fit, and known well enough to be linear in."""
     if verdict.kind < 0 or verdict.kind == TWO_WALLS:
         return False
     holds = verdict.holds
     information = np.linalg.inv(verdict.covariance) + (holds.axis.T / holds.std**2) @ holds.axis
     worst = np.sqrt(1.0 / np.linalg.eigvalsh(information)[0])
-    return bool(verdict.probability > CONSTANTS.born and verdict.misfit < CONSTANTS.fit and worst < 0.1 * length)
+    return bool(
+        verdict.probability > CONSTANTS.born and verdict.misfit < CONSTANTS.fit and worst < 0.1 * verdict.length
+    )

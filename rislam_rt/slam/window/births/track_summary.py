@@ -9,15 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.model import Body
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.model import Body, SensorModel
 from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.observations import PANEL
+from rislam_rt.slam.observations import PANEL, free_space
 from rislam_rt.slam.returns import poses_of
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window, now, pose_covariance, poses
-from rislam_rt.slam.window.solver_limits import POINTS
+from rislam_rt.slam.window.solver_limits import PERIODS, POINTS
 
 TOGETHER = 10.0
 """Measurements over which the pull of neighbours keeps its sign."""
@@ -48,6 +49,25 @@ class TrackSummary(NamedTuple):
     """[m/s] of the agent, and something for its uncertainty."""
     twist: Floats
     """(T, B, 3, H) square root of the covariance with which the heading's error moves what is seen; H = 0 if known."""
+
+    def take(self, rows: Integers) -> "TrackSummary":
+        """Only some of the tracks, or some more than once."""
+        per_track = {name: field[rows] for name, field in self._asdict().items() if name not in ("middle", "speed")}
+        return self._replace(**per_track)
+
+    def farther(self, sensor: SensorModel) -> tuple["TrackSummary", Integers]:
+        """With a row more for every longer path that a track may be, were it heard so many periods of the sounding too
+        early: as long as a perfect mirror would be as loud. Also the track (T + E,) of each row."""
+        period, count = SPEED_OF_LIGHT * sensor.period, len(self.seen)
+        longest = np.exp(free_space(sensor.radio) - self.log_amplitude)
+        more = np.clip(np.floor((longest - self.mean[0][:, 0]) / period), 0.0, PERIODS).astype(np.int64)
+        owner = np.repeat(np.arange(count), 1 + more)
+        turn = np.arange(len(owner)) - np.searchsorted(owner, owner)
+        order = np.argsort(turn > 0, kind="stable")
+        owner, turn = owner[order], turn[order]
+        found = self.take(owner)
+        found.seen[..., 0] += period * turn[:, None]
+        return found, owner
 
     @property
     def mean(self) -> tuple[Floats, Floats, Floats]:

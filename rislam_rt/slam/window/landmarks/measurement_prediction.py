@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, RadioConfig, RisCode, RisSpec
 from rislam_rt.model.sensor import SensorModel
 from rislam_rt.model.sensor import detection_probability as detection_probability_of
@@ -44,7 +45,7 @@ class ExpectedComponents(NamedTuple):
     forms: Integers
     """(R, 5) feature rows."""
     seen: Floats
-    """(R, 3) length [m] and two cosines."""
+    """(R, 3) length [m] as it is heard and two cosines."""
     jacobian: Floats
     """(R, 3, 7 + 3F) by the present: position, velocity, compass offset, features."""
     log_amplitude: Floats
@@ -75,13 +76,16 @@ def predict_returns(
     sight = observe(returns, features, landmarks.anchor, poses)
     level, spread = amplitudes(returns, features, landmarks, sight.tx_length, sight.rx_length, poses, scene, code)
     strong = scene.radio.integrated_snr(np.exp(level + spread)) > FAINT
-    audible = ((sight.up > -LEVEL) & strong).nonzero()[0]
+    heard = scene.sensor.heard_as(sight.seen[:, 0]) / SPEED_OF_LIGHT
+    reported = (heard >= scene.sensor.window[0]) & (heard <= scene.sensor.window[1])
+    audible = ((sight.up > -LEVEL) & strong & reported).nonzero()[0]
     returns = compact(returns, audible)
     linear, level, spread = linearise(returns, features, landmarks.anchor, poses), level[audible], spread[audible]
     count = len(audible)
     jacobian = np.zeros((count, 3, HEAD + 3 * len(features)))
     jacobian[..., :3], jacobian[..., 6] = linear.by_pose, linear.by_heading(poses, position)
     jacobian[..., HEAD:] = linear.by_feature.reshape(count, 3, features.size)
+    linear.seen[:, 0] = scene.sensor.heard_as(linear.seen[:, 0])
     return ExpectedComponents(
         forms_of(returns), linear.seen, jacobian, level, spread, bounces[audible],
         detection_probability(level, spread, scene.sensor),
