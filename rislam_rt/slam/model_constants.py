@@ -41,8 +41,9 @@ class ModelConstants(NamedTuple):
     """Posterior probability of a kind from which on a feature enters the map."""
     fit: float = 3.0
     """Standard deviations of its cost above which a hypothesis does not fit at all."""
-    crowd: float = 9.0
-    """Mean square of a residual in reported deviations beforehand: 1 + the SNR (9 dB) of what a cell holds besides."""
+    company: float = 0.25
+    """Probability that a new track shares its cell with another path: 0.2 to 0.35 of traced components, whatever their
+    SNR (docs/slam_measured.md)."""
     memory: float = 4.0
     """Cycles over which the pull of such neighbours keeps its sign: phases turn once in half a wavelength of motion."""
     cleared: float = 0.05
@@ -101,6 +102,11 @@ class ModelConstants(NamedTuple):
     def steady(self) -> float:
         """Probability that nothing stands in the way of a leg that was not looked for before."""
         return self.cleared / (self.cleared + self.rare)
+
+    @property
+    def crowd(self) -> float:
+        """Mean square of a residual in reported deviations beforehand: as much as still fits."""
+        return self.fit**2
 
     @property
     def against(self) -> float:

@@ -65,3 +65,5 @@ STEP = 1e-6
 """[m] by which walls are moved for the slope of a margin: its second derivative is of the order of one over metres."""
 PERIODS = 3
 """Most periods of the sounding by which a path may be longer than it is heard: 115 m at 128 tones over 1 GHz."""
+STRENGTHS = 13
+"""Strengths of a neighbour over which a track's expected scatter is averaged."""

@@ -35,7 +35,15 @@ def births(context: WindowState, expected: ExpectedComponents, groups: Unresolve
     rows, ats = rows[full], [ats[place] for place in full]
     mean, covariance = window_gaussian.now(context.window)
     known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.landmarks, mean[:3])
-    histories = summarise_tracks(context.log, ats, context.window, context.scene.body, context.heading, context.cycle)
+    histories = summarise_tracks(
+        context.log,
+        ats,
+        context.window,
+        context.scene.body,
+        context.heading,
+        context.cycle,
+        use_vt=context.scene.use_vt,
+    )
     told = explanations(context, rows, histories, expected, groups, mean, covariance)
     panels = context.landmarks.panels
     lonely = _missing_legs(context, histories, mean)

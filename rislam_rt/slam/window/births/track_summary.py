@@ -18,7 +18,7 @@ from rislam_rt.slam.returns import poses_of
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window, now, pose_covariance, poses
-from rislam_rt.slam.window.solver_limits import PERIODS, POINTS
+from rislam_rt.slam.window.solver_limits import PERIODS, POINTS, STRENGTHS
 
 TOGETHER = 10.0
 """Measurements over which the pull of neighbours keeps its sign."""
@@ -84,9 +84,9 @@ class TrackSummary(NamedTuple):
 
 
 def summarise_tracks(
-    log: Log, rows: list[Integers], window: Window, body: Body, heading: Floats, cycle: int
+    log: Log, rows: list[Integers], window: Window, body: Body, heading: Floats, cycle: int, *, use_vt: bool
 ) -> TrackSummary:
-    """The histories `rows` of T tracks (rows of the log each, in time)."""
+    """The histories `rows` of T tracks (rows of the log each, in time); `use_vt`: wall returns are among them."""
     mean, covariance = now(window)
     place, time = poses(window), np.concatenate([[0.0], np.cumsum(window.step)])
     ends = poses_of(place[:, :3], heading + place[:, 3], body)
@@ -95,14 +95,19 @@ def summarise_tracks(
     scatter = np.array([
         scatter_of(track, log.std[at], time[slot]) for track, at, slot in zip(seen, rows, slots, strict=True)
     ])  # fmt: skip
-    # what the others show is what a short history has yet to show; it counts as much as four measurements
-    crowd = max(CONSTANTS.crowd, float(np.mean(np.minimum(scatter, 10.0) ** 2)))
-    number = np.array([len(at) for at in rows])[:, None]
     # the difference of two alternated codes holds the panel's paths and nothing of the others
     pure = np.array([bool((log.side[at] >= PANEL).all()) for at in rows])[:, None]
-    around = np.where(pure, 1.0, crowd)
-    scatter = np.sqrt((4.0 * around + number * scatter**2) / (4.0 + number))
-    count = len(rows)
+    number, count = np.array([len(at) for at in rows])[:, None], len(rows)
+    shown = scatter**2
+    if use_vt:  # what the others show is what a short history has yet to show
+        around = max(CONSTANTS.crowd, float(np.mean(np.minimum(scatter, 10.0) ** 2)))
+        expected = (CONSTANTS.memory * around + number * shown) / (CONSTANTS.memory + number)
+    else:
+        amplitude_std = np.array([np.median(log.log_amplitude_std[at]) for at in rows])[:, None]
+        snr = 0.5 / np.maximum(amplitude_std, 1e-6) ** 2
+        expected = expected_scatter(shown, np.maximum(number - _terms(number), 0) / TOGETHER, snr)
+    alone = (CONSTANTS.memory + number * shown) / (CONSTANTS.memory + number)
+    scatter = np.sqrt(np.where(pure, alone, expected))
     found = TrackSummary(
         np.zeros((count, POINTS, 3)), np.zeros((count, POINTS, 3)), np.zeros((count, POINTS)),
         np.zeros((count, POINTS, 3)) + ends.tx[-1], np.zeros((count, POINTS, 3)) + ends.rx[-1],
@@ -145,12 +150,35 @@ def _turned(seen: Floats, heading: Floats) -> Floats:
     return np.stack([seen[:, 0], cos * seen[:, 1] - sin * seen[:, 2], sin * seen[:, 1] + cos * seen[:, 2]], axis=1)
 
 
+def expected_scatter(shown: Floats, free: Floats, snr: Floats) -> Floats:
+    """Mean square (T, 3) to expect of residuals, in reported deviations, at a linear SNR `snr` (T, 1).
+
+    `shown` (T, 3) is the mean square that the tracks have shown over so many independent residuals `free` (T, 1).
+
+    A neighbour in its cell of r times its amplitude moves a component by about r cells, of which the reported deviation
+    is one over the root of the SNR: the mean square is 1 + r^2 SNR. Most tracks have none, and 1; some (`company`) have
+    one, of any strength alike up to the track's own. The logarithm is averaged: a deviation, a variance and a weight
+    then come out alike.
+    """
+    share = np.linspace(0.0, 1.0, STRENGTHS)
+    log_square = np.log1p(snr)[..., None] * share
+    prior = np.where(share == 0.0, 1.0 - CONSTANTS.company, 0.0) + CONSTANTS.company / STRENGTHS
+    fit = np.log(prior) - 0.5 * free[..., None] * (log_square + shown[..., None] * np.exp(-log_square))
+    weight = np.exp(fit - fit.max(axis=-1, keepdims=True))
+    return np.asarray(np.exp((weight * log_square).sum(axis=-1) / weight.sum(axis=-1)))
+
+
+def _terms(number: Integers | int) -> Integers:
+    """Numbers that a smooth path takes on each axis of so many measurements: a line's, a quadratic's from nine on."""
+    return np.where(np.asarray(number) >= 9, 3, 2)
+
+
 def scatter_of(seen: Floats, std: Floats, time: Floats) -> Floats:
     """(3,) root mean square about a quadratic in time (a line, for short ones), in reported deviations; 1 at least.
 
     Weights of Student's t keep single outliers from speaking for all.
     """
-    order = 3 if len(time) >= 9 else 2
+    order = int(_terms(len(time)))
     x = time - time.mean()
     rows = np.stack([x**power for power in range(order)], axis=1)
     trust = np.ones(len(time))
