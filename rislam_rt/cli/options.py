@@ -59,9 +59,7 @@ RadioSettings = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="Change a setting radio.*, as in a pipeline; repeatable."),
 ]
 JsonFile = Annotated[
-    Path | None,
-    typer.Option("--json", metavar="FILE", help="Write what is printed to FILE, machine-readable."),
-    OUTPUT,
+    Path | None, typer.Option("--json", metavar="FILE", help="Write what is printed to FILE, machine-readable."), OUTPUT
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of all random draws.")]
 Depth = Annotated[int, typer.Option(min=0, max=4, help="Largest number of wall bounces on a path.")]

@@ -21,8 +21,7 @@ def command(
         Path, typer.Argument(metavar="MEASUREMENTS", help="CSV or NetCDF file of components.", show_default=False)
     ],
     config: Annotated[
-        Path,
-        typer.Option(metavar="PIPELINE", help="Radio, receiver and filter, as for `run`.", parser=pipeline_file),
+        Path, typer.Option(metavar="PIPELINE", help="Radio, receiver and filter, as for `run`.", parser=pipeline_file)
     ] = MAIN_JOB,
     set_: Settings = None,
     start: Annotated[

@@ -60,14 +60,7 @@ def slice_file(folder: Path, number: int, name: str) -> Path:
 
 
 def run_slices(
-    name: str,
-    scene: Scene,
-    body: Body,
-    spec: PipelineSpec,
-    seeds: Seeds,
-    folder: Path,
-    run: str,
-    tell: Tell,
+    name: str, scene: Scene, body: Body, spec: PipelineSpec, seeds: Seeds, folder: Path, run: str, tell: Tell
 ) -> float:
     """Lead one scheme through all slices, each written to `folder` when it is done. Returns the seconds of tracing.
 

@@ -29,11 +29,7 @@ INPUTS: dict[str, Entry] = {
     "amplitude_std": (("time", "component"), "1", "reported standard deviation of amplitude"),
     "from_panel": (("time", "component"), "1", "probability that it ran over the panel; left out without alternation"),
     "which_panel": (("time", "component"), "1", "number of that panel, the likeliest of several; left out with one"),
-    "code": (
-        ("time", "row", "col"),
-        "1",
-        "phase levels that the agent holds the panel to be set to; several: one row",
-    ),
+    "code": (("time", "row", "col"), "1", "phase levels that the agent holds the panel to be set to; several: one row"),
     "start_position": (("xyz",), "m", "told position at the start"),
     "start_velocity": (("xyz",), "m/s", "told velocity at the start"),
     "tx_offset": (("xyz",), "m", "Tx from the agent's position, body frame"),
