@@ -23,7 +23,7 @@ from rislam_rt.pipeline.dataset import (
     scheme_to_dataset,
     seal_dataset,
 )
-from rislam_rt.pipeline.recordings.recorded_inputs import given_to_dataset
+from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.store.exports import SUMMARY_FILE, export_files, json_text
 from rislam_rt.pipeline.store.identity import RunIdentity
 from rislam_rt.scene import load_scene
