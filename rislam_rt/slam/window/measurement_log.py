@@ -119,12 +119,11 @@ def residuals(
     place = poses(window)[at]
     ends = poses_of(place[:, :3], heading[at] + place[:, 3], scene.body)
     returns = compile_forms(landmarks.rows(np.concatenate([form[:, 0], form[both, 1]])), at)
-    linear = linearise_each(returns, features, landmarks.anchor, ends)
-    jacobian = np.zeros((len(at), 3, POSE + features.size))
+    linear = linearise_each(returns, features, landmarks.anchor, ends, POSE)
+    jacobian = linear.wide
     jacobian[..., :3] = linear.by_pose
     if window.turns:
         jacobian[..., 3] = linear.by_heading(ends, place[:, :3])
-    jacobian[..., POSE:] = linear.by_feature.reshape(len(at), 3, features.size)
     count, share = len(rows), log.share[rows[both], None]
     (seen, other), (jacobian, by_other) = ((each[:count], each[count:]) for each in (linear.seen, jacobian))
     gap = other - seen[both]

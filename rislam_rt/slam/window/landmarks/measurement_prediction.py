@@ -74,20 +74,19 @@ def predict_returns(
     rows = (fine[returns.tx] & fine[returns.rx]).nonzero()[0]
     returns, bounces = compact(returns, rows), bounces[rows]
     sight = observe(returns, features, landmarks.anchor, poses)
-    level, spread = amplitudes(returns, features, landmarks, sight.tx_length, sight.rx_length, poses, scene, code)
-    strong = scene.radio.integrated_snr(np.exp(level + spread)) > FAINT
     heard = scene.sensor.heard_as(sight.seen[:, 0]) / SPEED_OF_LIGHT
     reported = (heard >= scene.sensor.window[0]) & (heard <= scene.sensor.window[1])
-    audible = ((sight.up > -LEVEL) & strong & reported).nonzero()[0]
-    returns = compact(returns, audible)
-    linear, level, spread = linearise(returns, features, landmarks.anchor, poses), level[audible], spread[audible]
-    count = len(audible)
-    jacobian = np.zeros((count, 3, HEAD + 3 * len(features)))
+    rows = ((sight.up > -LEVEL) & reported).nonzero()[0]
+    returns, bounces, ways = compact(returns, rows), bounces[rows], (sight.tx_length[rows], sight.rx_length[rows])
+    level, spread = amplitudes(returns, features, landmarks, *ways, poses, scene, code)
+    rows = (scene.radio.integrated_snr(np.exp(level + spread)) > FAINT).nonzero()[0]
+    returns, bounces, level, spread = compact(returns, rows), bounces[rows], level[rows], spread[rows]
+    linear = linearise(returns, features, landmarks.anchor, poses, HEAD)
+    jacobian = linear.wide
     jacobian[..., :3], jacobian[..., 6] = linear.by_pose, linear.by_heading(poses, position)
-    jacobian[..., HEAD:] = linear.by_feature.reshape(count, 3, features.size)
     linear.seen[:, 0] = scene.sensor.heard_as(linear.seen[:, 0])
     return ExpectedComponents(
-        forms_of(returns), linear.seen, jacobian, level, spread, bounces[audible],
+        forms_of(returns), linear.seen, jacobian, level, spread, bounces,
         detection_probability(level, spread, scene.sensor),
     )  # fmt: skip
 
