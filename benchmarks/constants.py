@@ -22,7 +22,7 @@ from rislam_rt import read_recording, replay
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS, ModelConstants
 
-PROBABILITIES = ("rare", "cleared", "shown", "square", "upright", "born")
+PROBABILITIES = ("rare", "cleared", "shown", "square", "upright", "born", "company")
 """Constants whose odds are halved and doubled."""
 NUDGE = 1e-9
 """Reported deviations by which chance moves a measurement: next to nothing, but it decides what was undecided."""

@@ -28,17 +28,7 @@ from hard_kinds import CHANGES, GAP, SPOILERS, Case, Cycle, each
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import ReceiverConfig, measure
-from rislam_rt.model import (
-    Paths,
-    RadioConfig,
-    RisCode,
-    RisLegs,
-    RxArray,
-    Scene,
-    SensorModel,
-    SlamEstimate,
-    Trajectory,
-)
+from rislam_rt.model import Paths, RadioConfig, RisCode, RisLegs, RxArray, Scene, SensorModel, SlamEstimate, Trajectory
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import NestedConfig, SlamConfig, StartPrior, StepInfo, StepOutcome, estimate, init, predict, step

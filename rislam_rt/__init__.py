@@ -9,12 +9,7 @@ from typing import Any
 __version__ = "0.1.0"
 
 _HOMES = {
-    "rislam_rt.scene": (
-        "load_scene",
-        "check_scene",
-        "new_scene",
-        "write_scene",
-    ),
+    "rislam_rt.scene": ("load_scene", "check_scene", "new_scene", "write_scene"),
     "rislam_rt.model": (
         "Scene",
         "Trajectory",
@@ -35,24 +30,10 @@ _HOMES = {
     "rislam_rt.channel.traced": ("TracedChannel",),
     "rislam_rt.channel.image_source": ("ImageSourceChannel",),
     "rislam_rt.channel.compare": ("compare_paths",),
-    "rislam_rt.design": (
-        "design_code",
-        "DesignConfig",
-        "Design",
-    ),
-    "rislam_rt.measurement": (
-        "measure",
-        "ReceiverConfig",
-    ),
-    "rislam_rt.slam": (
-        "SlamConfig",
-        "StartPrior",
-    ),
-    "rislam_rt.pipeline": (
-        "load_spec",
-        "run_slam",
-        "build_radio",
-    ),
+    "rislam_rt.design": ("design_code", "DesignConfig", "Design"),
+    "rislam_rt.measurement": ("measure", "ReceiverConfig"),
+    "rislam_rt.slam": ("SlamConfig", "StartPrior"),
+    "rislam_rt.pipeline": ("load_spec", "run_slam", "build_radio"),
     "rislam_rt.pipeline.recordings": (
         "Inputs",
         "dataset_to_inputs",
@@ -62,16 +43,8 @@ _HOMES = {
         "replay",
         "answers_from_arrays",
     ),
-    "rislam_rt.studies.unseen": (
-        "read_recording",
-        "score_run",
-    ),
-    "rislam_rt.sweeps": (
-        "Axis",
-        "Sweep",
-        "SweepOptions",
-        "run_sweep",
-    ),
+    "rislam_rt.studies.unseen": ("read_recording", "score_run"),
+    "rislam_rt.sweeps": ("Axis", "Sweep", "SweepOptions", "run_sweep"),
 }
 _PUBLIC = {name: home for home, names in _HOMES.items() for name in names}
 """All that is public, and where it lives: docs/reference/api.md is this list, and says what it promises."""

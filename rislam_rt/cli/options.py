@@ -59,9 +59,7 @@ RadioSettings = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="Change a setting radio.*, as in a pipeline; repeatable."),
 ]
 JsonFile = Annotated[
-    Path | None,
-    typer.Option("--json", metavar="FILE", help="Write what is printed to FILE, machine-readable."),
-    OUTPUT,
+    Path | None, typer.Option("--json", metavar="FILE", help="Write what is printed to FILE, machine-readable."), OUTPUT
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of all random draws.")]
 Depth = Annotated[int, typer.Option(min=0, max=4, help="Largest number of wall bounces on a path.")]
@@ -145,8 +143,6 @@ def write_json(file: Path | None, content: dict[str, Any]) -> None:
     """
     if file is None:
         return
-    import json
+    from rislam_rt.storage.files import MARK, json_file, write_atomic
 
-    from rislam_rt.storage.files import MARK, write_atomic
-
-    write_atomic(file, (json.dumps({**content, "origin": MARK}, indent=2, allow_nan=False) + "\n").encode())
+    write_atomic(file, json_file({**content, "origin": MARK}, indent=2))

@@ -5,15 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.options import (
-    MAIN_JOB,
-    JsonFile,
-    PipelineFile,
-    SceneOption,
-    Settings,
-    StudyOptions,
-    write_json,
-)
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, StudyOptions, write_json
 from rislam_rt.cli.verbosity import warn
 
 if TYPE_CHECKING:

@@ -7,11 +7,7 @@ from rislam_rt.measurement.dataset import NO_COMPONENT, load_signals, signals_da
 from rislam_rt.measurement.false_alarms import detection_threshold, expected_false_alarms
 from rislam_rt.measurement.hardware import Correction, FrontEnd, HardwareConfig, build_front_end, expected_distortion
 from rislam_rt.measurement.measure import measure
-from rislam_rt.measurement.noise import (
-    paper_snr_db,
-    reference_gain,
-    with_reference_snr,
-)
+from rislam_rt.measurement.noise import paper_snr_db, reference_gain, with_reference_snr
 from rislam_rt.measurement.received import Clutter, Received, phase_reversed, receive
 from rislam_rt.measurement.sensor_model import build_sensor
 from rislam_rt.measurement.signal import num_tones, pulse_samples, to_samples, to_tones, tones

@@ -35,12 +35,7 @@ class Received(NamedTuple):
 
 
 def receive(
-    paths: Paths,
-    cycle: int,
-    heading: float,
-    radio: RadioConfig,
-    config: ReceiverConfig,
-    doppler: Floats | None = None,
+    paths: Paths, cycle: int, heading: float, radio: RadioConfig, config: ReceiverConfig, doppler: Floats | None = None
 ) -> Received:
     """Received paths of a cycle: those that the array hears.
 

@@ -156,13 +156,7 @@ def to_measurement(found: DetectedComponents, radio: RadioConfig, config: Receiv
         seen = ComponentSides(points, deviation, found.gain, np.sqrt(2.0) * found.amplitude_std, found.capture)
         told = panel_probability(seen, radio, config)
     return Measurement(
-        found.tau,
-        found.cosines,
-        np.abs(found.gain),
-        found.tau_std,
-        found.cosines_std,
-        found.amplitude_std,
-        *told,
+        found.tau, found.cosines, np.abs(found.gain), found.tau_std, found.cosines_std, found.amplitude_std, *told
     )
 
 

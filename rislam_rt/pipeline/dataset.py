@@ -46,11 +46,7 @@ SCHEME: dict[str, Entry] = {
     "applied": (("time", "row", "col"), "1", "phase levels while the signals were taken"),
     "gain": (("time", "path"), "1", "true complex gain under the applied code"),
     "component_path": (("time", "component"), "1", "truth: path of each component, -1 clutter, -9 no component"),
-    "component_landmark": (
-        ("time", "component"),
-        "1",
-        "landmark taken for it, -1 unused, -2 removed, -9 no component",
-    ),
+    "component_landmark": (("time", "component"), "1", "landmark taken for it, -1 unused, -2 removed, -9 no component"),
     "ident": (("landmark",), "1", "number of each landmark ever held"),
     "parent": (("landmark",), "1", "number of the landmark whose mirror image this is, -1 for a point"),
     "held": (("time", "landmark"), "1", "whether the landmark was in the map"),

@@ -3,10 +3,4 @@
 from rislam_rt.waveform.flat import autocorrelation, effective_bandwidth, flat_pulse
 from rislam_rt.waveform.multicarrier import delay_response, subcarrier_frequencies
 
-__all__ = [
-    "autocorrelation",
-    "delay_response",
-    "effective_bandwidth",
-    "flat_pulse",
-    "subcarrier_frequencies",
-]
+__all__ = ["autocorrelation", "delay_response", "effective_bandwidth", "flat_pulse", "subcarrier_frequencies"]

@@ -40,11 +40,7 @@ def test_several_faults_are_several_lines(run, tmp_path):
     assert len(lines) == 4
     assert all(line.startswith("error: ") for line in lines)
     told = " ".join(lines)
-    for place, meant in (
-        ("scheems", "schemes"),
-        ("radio.carier_ghz", "carrier_ghz"),
-        ("radio.num_samples", "slam."),
-    ):
+    for place, meant in (("scheems", "schemes"), ("radio.carier_ghz", "carrier_ghz"), ("radio.num_samples", "slam.")):
         assert f"mine.toml: {place}: unknown key; did you mean '{meant}" in told
     assert "error: --set: depth: " in told
 

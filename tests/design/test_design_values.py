@@ -159,9 +159,7 @@ def test_a_settled_suspect_is_doubted_beam_by_beam(make_belief, make_spec, radio
     """Every `LOOK_ROUND` codes the next beam of the sweep, round and round."""
     spec, beams = make_spec(), sweep_codes(make_spec(), radio.wavelength)
     belief = replace(
-        make_belief(POSITION, rng),
-        map=empty_map(),
-        suspects=(PanelCandidate(np.array([3.0, 3.0, 3.0]), SETTLED),),
+        make_belief(POSITION, rng), map=empty_map(), suspects=(PanelCandidate(np.array([3.0, 3.0, 3.0]), SETTLED),)
     )
     last = RisCode(np.zeros((6, 6), dtype=np.int64), 4)
     for turn in (1, 5, len(beams) + 3):

@@ -6,14 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rislam_rt.design import (
-    DESIGNERS,
-    DesignConfig,
-    DesignProblem,
-    build_objective,
-    designer,
-    exact_code,
-)
+from rislam_rt.design import DESIGNERS, DesignConfig, DesignProblem, build_objective, designer, exact_code
 from rislam_rt.design import genetic as genetic_module
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import Outcome, position_bound

@@ -5,13 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rislam_rt.geometry.angles import (
-    angle_between,
-    angles_from_direction,
-    rotation_z,
-    unit,
-    wrap,
-)
+from rislam_rt.geometry.angles import angle_between, angles_from_direction, rotation_z, unit, wrap
 
 azimuth = st.floats(-np.pi, np.pi, exclude_min=True)
 

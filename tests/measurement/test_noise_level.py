@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from rislam_rt.measurement import (
-    ReceiverConfig,
-    paper_snr_db,
-    reference_gain,
-    with_reference_snr,
-)
+from rislam_rt.measurement import ReceiverConfig, paper_snr_db, reference_gain, with_reference_snr
 from rislam_rt.model import PathKind, RadioConfig
 
 RADIO = RadioConfig()

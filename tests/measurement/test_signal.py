@@ -8,15 +8,7 @@ from rislam_rt.measurement import ReceiverConfig, build_sensor
 from rislam_rt.measurement.estimation.sounding import build_sounding
 from rislam_rt.measurement.estimation.spherical_waves import correlate_waves, wave_signals
 from rislam_rt.measurement.received import receive
-from rislam_rt.measurement.signal import (
-    add_noise,
-    convert,
-    num_tones,
-    pulse_samples,
-    to_samples,
-    to_tones,
-    tones,
-)
+from rislam_rt.measurement.signal import add_noise, convert, num_tones, pulse_samples, to_samples, to_tones, tones
 from rislam_rt.model import PathKind, Paths, RadioConfig, RxArray
 
 RADIO = RadioConfig()

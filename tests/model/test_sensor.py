@@ -54,8 +54,7 @@ def test_paths_merge_within_a_cell_of_all_three_or_never() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [{"threshold": 0.0}, {"false_alarms": -1.0}, {"window": (1e-9, 1e-9)}, {"resolution": "eye"}],
+    "wrong", [{"threshold": 0.0}, {"false_alarms": -1.0}, {"window": (1e-9, 1e-9)}, {"resolution": "eye"}]
 )
 def test_unusable_values_are_refused_in_one_line(wrong: dict[str, object]) -> None:
     with pytest.raises(ConfigError, match=f"sensor.{next(iter(wrong))}"):

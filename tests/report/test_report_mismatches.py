@@ -10,20 +10,8 @@ from rislam_rt.studies.swept import HardwareSpec, RobustnessSpec
 from rislam_rt.sweeps.store import Row
 from rislam_rt.sweeps.sweep import Cell
 
-COMPASS = {
-    "name": "compass",
-    "key": "told.compass_bias_deg",
-    "levels": [1.0, 2.0],
-    "ordinary": 1.0,
-    "cure": "steel",
-}
-CLOCK = {
-    "name": "clock",
-    "key": "told.clock_offset_ns",
-    "levels": [0.1, 1.0],
-    "ordinary": 1.0,
-    "cure": "zero",
-}
+COMPASS = {"name": "compass", "key": "told.compass_bias_deg", "levels": [1.0, 2.0], "ordinary": 1.0, "cure": "steel"}
+CLOCK = {"name": "clock", "key": "told.clock_offset_ns", "levels": [0.1, 1.0], "ordinary": 1.0, "cure": "zero"}
 NOISE = {"name": "noise", "key": "told.noise_db", "levels": [3.0], "ordinary": 3.0}
 WORTH = {"reference": 1.0, "compass_1.0": 1.5, "compass_2.0": 9.0, "clock_0.1": 1.0, "clock_1.0": 3.0, "noise_3.0": 0.9}
 

@@ -5,13 +5,7 @@ import pytest
 
 from rislam_rt.errors import ConfigError, GeometryError
 from rislam_rt.model import RisCode
-from rislam_rt.ris import (
-    PanelErrors,
-    PanelTolerance,
-    draw_panel,
-    flip_bits,
-    quantise,
-)
+from rislam_rt.ris import PanelErrors, PanelTolerance, draw_panel, flip_bits, quantise
 
 ROUGH = PanelTolerance(amplitude_std=0.2, phase_std=0.5, dead=0.1, stuck=0.2)
 

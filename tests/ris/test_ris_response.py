@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.model import RisCode, RisSpec
-from rislam_rt.ris import (
-    element_gain_area,
-    element_pattern,
-    far_field_response,
-    leg_response,
-    panel_gain,
-    zero_code,
-)
+from rislam_rt.ris import element_gain_area, element_pattern, far_field_response, leg_response, panel_gain, zero_code
 
 WAVELENGTH = 299_792_458.0 / 10e9
 CENTER = np.array([3.0, 3.0, 3.0])

@@ -142,12 +142,7 @@ def _certify(certifier: DifferenceExplainer, identity: Identity, cycle: int, is_
     return OneSidedPath(cycle, certifier.label(identity), side, proof.reason, proof.text, proof.size)
 
 
-def _report(
-    traced: Paths,
-    analytic: Paths,
-    matched: Matched,
-    one_sided: list[OneSidedPath],
-) -> PathReport:
+def _report(traced: Paths, analytic: Paths, matched: Matched, one_sided: list[OneSidedPath]) -> PathReport:
     """Errors of the matched paths."""
     at_traced, at_analytic = (matched.cycle, matched.traced), (matched.cycle, matched.analytic)
     gain_t, gain_a = traced.gain[at_traced], analytic.gain[at_analytic]

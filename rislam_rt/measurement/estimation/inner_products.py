@@ -77,11 +77,7 @@ def inner_of(sounding: Sounding, waves: PathSignals) -> InnerProducts:
     """All inner products, parameter by parameter."""
     (f0, f1, f2), (x0, x1, x2), (y0, y1, y2) = (
         _axis_products(wave, place)
-        for wave, place in (
-            (waves.delay, -sounding.frequency),
-            (waves.row, sounding.row),
-            (waves.col, sounding.col),
-        )
+        for wave, place in ((waves.delay, -sounding.frequency), (waves.row, sounding.row), (waves.col, sounding.col))
     )
     count = len(f0)
     fx, fy, xy = f0 * x0, f0 * y0, x0 * y0

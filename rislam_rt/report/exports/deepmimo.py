@@ -29,12 +29,7 @@ NO_FLAGS = (
     "terrain_diffraction",
     "terrain_scattering",
 )
-NO_SCATTERING = (
-    "cross_polarization_coefficient",
-    "roughness",
-    "vertical_attenuation",
-    "horizontal_attenuation",
-)
+NO_SCATTERING = ("cross_polarization_coefficient", "roughness", "vertical_attenuation", "horizontal_attenuation")
 """Settings that the format wants and that have no meaning here: paths are specular or run over a point."""
 METAL = 1e7
 """[S/m] of a metal in ITU-R P.2040."""

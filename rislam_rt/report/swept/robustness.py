@@ -115,14 +115,7 @@ def _worst_rows(content: Mapping[str, Any]) -> list[list[str]]:
         mine = [entry for entry in content["entries"] if entry["mismatch"] == name and entry["ordinary"]]
         entry = next(entry for entry in mine if entry["scheme"] == first)
         note = f"`{name}`: {mismatch['note']}"
-        rows.append(
-            [
-                note,
-                _level(content, name, entry["level"]),
-                percent_between(entry, "change"),
-                mismatch["cure"],
-            ]
-        )
+        rows.append([note, _level(content, name, entry["level"]), percent_between(entry, "change"), mismatch["cure"]])
     return rows
 
 

@@ -94,8 +94,7 @@ def _tee(sides: Floats, rng: np.random.Generator) -> Floats:
     left = rng.uniform(0.3, 0.7) * (a - u)
     right = left + u
     return np.array(
-        [[left, 0], [right, 0], [right, b - v], [a, b - v], [a, b], [0, b], [0, b - v], [left, b - v]],
-        dtype=np.float64,
+        [[left, 0], [right, 0], [right, b - v], [a, b - v], [a, b], [0, b], [0, b - v], [left, b - v]], dtype=np.float64
     )
 
 
@@ -103,8 +102,7 @@ def _horseshoe(sides: Floats, rng: np.random.Generator) -> Floats:
     (a, b), floor = sides, rng.uniform(*ARM) * sides[1]
     left, right = rng.uniform(ARM[0], 0.38, size=2) * a
     return np.array(
-        [[0, 0], [a, 0], [a, b], [a - right, b], [a - right, floor], [left, floor], [left, b], [0, b]],
-        dtype=np.float64,
+        [[0, 0], [a, 0], [a, b], [a - right, b], [a - right, floor], [left, floor], [left, b], [0, b]], dtype=np.float64
     )
 
 

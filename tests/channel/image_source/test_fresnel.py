@@ -8,11 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.image_source.fresnel import (
-    polarisation_basis,
-    relative_permittivity,
-    slab_coefficients,
-)
+from rislam_rt.channel.image_source.fresnel import polarisation_basis, relative_permittivity, slab_coefficients
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, PathKind, RadioConfig

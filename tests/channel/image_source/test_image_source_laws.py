@@ -78,11 +78,7 @@ def moved(scene, rotation, shift):
 
 
 @settings(max_examples=12, deadline=None)
-@given(
-    st.sampled_from(NAMES),
-    st.tuples(*[st.floats(-np.pi, np.pi)] * 3),
-    st.tuples(*[st.floats(-30.0, 30.0)] * 3),
-)
+@given(st.sampled_from(NAMES), st.tuples(*[st.floats(-np.pi, np.pi)] * 3), st.tuples(*[st.floats(-30.0, 30.0)] * 3))
 def test_rotation_and_translation(rooms, name, angles, shift):
     """Rounding the turned meshes moves planes by some 1e-14 m; the tolerances of `assert_same` allow for it."""
     scene, here = getattr(rooms, name)(), rooms.at(SPOTS)

@@ -14,10 +14,7 @@ from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import prepare_setup
 from rislam_rt.pipeline.scheme_simulation import without_panel
-from rislam_rt.pipeline.scores.bound import (
-    over_distortion,
-    scheme_bound,
-)
+from rislam_rt.pipeline.scores.bound import over_distortion, scheme_bound
 from rislam_rt.pipeline.scores.summary import map_score, summarise
 from rislam_rt.pipeline.specification.spec import build_settings
 

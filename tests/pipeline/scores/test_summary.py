@@ -10,12 +10,7 @@ from rislam_rt.information import WallSpread
 from rislam_rt.model import MapEstimate
 from rislam_rt.pipeline.dataset import SCHEME
 from rislam_rt.pipeline.scores.bound import SchemeBound
-from rislam_rt.pipeline.scores.summary import (
-    component_labels,
-    landmark_track,
-    over_budget,
-    summarise,
-)
+from rislam_rt.pipeline.scores.summary import component_labels, landmark_track, over_budget, summarise
 from rislam_rt.pipeline.scores.walls import match_walls, surface_rms, wall_scores
 
 PER_CYCLE = [
@@ -47,8 +42,7 @@ def test_surface_rms_is_the_mean_over_the_wall(room):
 def test_shifted_and_tilted_walls_are_scored(room):
     tilt = np.radians(2.0)
     estimate = map_of_walls(
-        [[-1.0, 0.0, 0.0], [np.sin(tilt), np.cos(tilt), 0.0]],
-        [0.05, 6.0 * np.cos(tilt) + 3.0 * np.sin(tilt)],
+        [[-1.0, 0.0, 0.0], [np.sin(tilt), np.cos(tilt), 0.0]], [0.05, 6.0 * np.cos(tilt) + 3.0 * np.sin(tilt)]
     )
     scores = wall_scores(room, estimate)
     assert scores["wall_x0"]["rmse_m"] == pytest.approx(0.05)

@@ -12,17 +12,7 @@ from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, observe
 
 N, M = 12, 240
-LEGS = np.array(
-    [
-        [0, NONE, NONE],
-        [0, 1, NONE],
-        [0, 1, 2],
-        [0, 2, 1],
-        [TX, NONE, NONE],
-        [TX, 1, NONE],
-        [TX, 2, 1],
-    ]
-)
+LEGS = np.array([[0, NONE, NONE], [0, 1, NONE], [0, 1, 2], [0, 2, 1], [TX, NONE, NONE], [TX, 1, NONE], [TX, 2, 1]])
 """Point 0; walls 1 and 2."""
 PAIRS = [(0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (2, 3), (3, 1), (4, 5), (4, 6)]
 FEATURES = np.array([[2.0, 1.0, 1.0], [0.5, 11.3, 0.5], [11.5, 0.7, 0.5]])

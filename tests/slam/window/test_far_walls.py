@@ -11,6 +11,8 @@ from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.observations import free_space
 from rislam_rt.slam.returns import AXES, poses_of
 
+REPEAT = SPEED_OF_LIGHT * 128 / 1e9
+"""[m] after which 128 tones over 1 GHz repeat."""
 CYCLES, START, SPEED = 40, np.array([14.0, 9.0, 1.1]), np.array([0.08, 0.05, 0.0])
 BODY = Body()
 
@@ -30,11 +32,9 @@ def _go(ways, *, seed):
         span = np.array(images)
         length = np.linalg.norm(span, axis=1)
         cosines = (span / length[:, None])[:, :2] + 0.004 * rng.standard_normal((len(length), 2))
-        heard = sensor.heard_as(length) + 0.005 * rng.standard_normal(len(length))
-        level, every = (
-            np.exp(free_space(radio) - 0.6 * np.array([len(way) for way in ways])) / length,
-            np.ones(len(length)),
-        )
+        heard = length % REPEAT + 0.005 * rng.standard_normal(len(length))
+        level = np.exp(free_space(radio) - 0.6 * np.array([len(way) for way in ways])) / length
+        every = np.ones(len(length))
         measurement = Measurement(
             heard / SPEED_OF_LIGHT, cosines / np.maximum(np.linalg.norm(cosines, axis=1), 1.0)[:, None], level,
             0.005 / SPEED_OF_LIGHT * every, 0.004 * np.ones((len(length), 2)), 0.03 * level,

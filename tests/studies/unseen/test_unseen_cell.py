@@ -10,14 +10,7 @@ from rislam_rt.errors import ConfigError, StoreError
 from rislam_rt.model import empty_map
 from rislam_rt.scene import load_scene
 from rislam_rt.studies import UnseenSpec, load_any
-from rislam_rt.studies.unseen import (
-    answers_from_arrays,
-    build_unseen,
-    count_tests,
-    read_recording,
-    replay,
-    score_run,
-)
+from rislam_rt.studies.unseen import answers_from_arrays, build_unseen, count_tests, read_recording, replay, score_run
 from rislam_rt.studies.unseen.cell import find_setup, run_cell
 from rislam_rt.sweeps import build_cells
 

@@ -78,8 +78,6 @@ def births(context: WindowState, expected: ExpectedComponents, groups: Unresolve
         elif born >= 0 and wanted(verdict):
             continue  # its turn comes in the next cycle, with the new feature known
         looked[rows[row]] = context.tracks.hits[rows[row]]
-    more = len(context.tracks.ident) - len(gone)  # what was taken back for the new feature
-    looked, gone = np.append(looked, np.zeros(more, dtype=np.int64)), np.append(gone, np.zeros(more, dtype=np.bool_))
     return context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
 
 

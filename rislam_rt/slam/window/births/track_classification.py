@@ -106,9 +106,10 @@ def _weigh(
     if scene.use_vt:  # without wall returns a longer way is one more thing that a point's track may be, and never born
         digest, owner = digest.farther(scene.sensor)
     table = hypotheses(digest, known, landmarks)
-    table = table.take((table.trials.track < near) | table.trials.is_wall | table.trials.is_pair)
+    if len(owner) > near:
+        table = table.take((table.trials.track < near) | table.trials.is_wall | table.trials.is_pair)
     if not scene.use_vt:  # wall returns tell no walls
-        table = with_images(table, digest.take(np.arange(near)), known, landmarks)
+        table = with_images(table, digest, known, landmarks)
     fits = try_all(table.trials, digest)
     track = table.trials.track
     evidence = fits.log_evidence + log_place(table, fits.place, digest.middle)

@@ -61,6 +61,8 @@ class TrackSummary(NamedTuple):
         period, count = SPEED_OF_LIGHT * sensor.period, len(self.seen)
         longest = np.exp(free_space(sensor.radio) - self.log_amplitude)
         more = np.clip(np.floor((longest - self.mean[0][:, 0]) / period), 0.0, PERIODS).astype(np.int64)
+        if not more.any():
+            return self, np.arange(count)
         owner = np.repeat(np.arange(count), 1 + more)
         turn = np.arange(len(owner)) - np.searchsorted(owner, owner)
         order = np.argsort(turn > 0, kind="stable")

@@ -114,6 +114,6 @@ def test_a_wall_comes_out_with_its_edge_only_where_the_level_wall_is_heard():
     # heard a moment ago, the ceiling throws an edge too; never heard from here, it throws none
     assert found[1.0][1] > found[1.0][0] + 2.0
     assert found[0.0][0] > found[0.0][1] + 2.0
-    # one of both it is
+    # by itself, or as one with its edge wherever that is not hidden
     clear = 1.0 - CONSTANTS.rare
     assert np.allclose(np.exp(found[1.0]), [1.0 - CONSTANTS.shown * clear, clear])
