@@ -143,9 +143,9 @@ def _starts(found: Rates, told: Floats) -> Floats:
     x = (aim[:, 0] * pair[:, 1, 1] - aim[:, 1] * pair[:, 0, 1])[fine] / det[fine]
     y = (aim[:, 1] * pair[:, 0, 0] - aim[:, 0] * pair[:, 1, 0])[fine] / det[fine]
     every = np.stack([x, y], axis=1)[np.hypot(x, y) < 3.0 * CONSTANTS.walk]
-    level, cell = _agreement(found, every, told[2])[0].sum(axis=1), np.round(every / NEAR)
+    level, cell = _agreement(found, every, told[2])[0].sum(axis=1), np.round(every / NEAR) @ [1.0, 1e6]
     order = np.argsort(-level, kind="stable")
-    _, first = np.unique(cell[order], axis=0, return_index=True)
+    _, first = np.unique(cell[order], return_index=True)
     return np.concatenate([told[None, :2], every[order[np.sort(first)[:MOST]]]])
 
 

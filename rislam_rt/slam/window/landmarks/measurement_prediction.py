@@ -258,22 +258,21 @@ def _taken_in(
     """Which of R returns are taken in, the strongest that each took in, the probability that each comes out by itself,
     and its power with what it took in; `second` lies in the cell of `first` and is weaker.
     """
-    count = len(strength)
-    taken, partner, by_itself, total = np.zeros(count, np.bool_), np.full(count, -1), np.ones(count), power.copy()
+    count, level, weaker = len(strength), strength.tolist(), second.tolist()
+    owner, partner = [-1] * count, np.full(count, -1)
     begin = np.flatnonzero(np.diff(first, prepend=-1))
     crowded, end = first[begin], np.append(begin[1:], len(first))
     order = np.argsort(-strength[crowded], kind="stable")
     for leader, low, high in zip(crowded[order].tolist(), begin[order].tolist(), end[order].tolist(), strict=True):
-        if taken[leader]:
-            continue
-        members = second[low:high]
-        members = members[~taken[members]]
-        if len(members):
-            taken[members] = True
-            by_itself[members] = max(1.0 - clear[leader], CONSTANTS.rare)
-            partner[leader] = members[strength[members].argmax()]
-            total[leader] += power[members].sum()
-    return taken, partner, by_itself, total
+        members = [] if owner[leader] >= 0 else [member for member in weaker[low:high] if owner[member] < 0]
+        for member in members:
+            owner[member] = leader
+        if members:
+            partner[leader] = max(members, key=level.__getitem__)
+    of = np.array(owner, dtype=np.int64)
+    taken = of >= 0
+    by_itself = np.where(taken, np.maximum(1.0 - clear[of], CONSTANTS.rare), 1.0)
+    return taken, partner, by_itself, power + np.bincount(of[taken], power[taken], count)
 
 
 TWIN_STD = 0.03
