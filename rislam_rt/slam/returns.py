@@ -165,9 +165,7 @@ def linearise_each(returns: Returns, features: Floats, anchor: Floats, poses: Po
     return _linearise(returns, features, anchor, tx, poses, spare)
 
 
-def _linearise(
-    returns: Returns, features: Floats, anchor: Floats, leg_tx: Floats, poses: Poses, spare: int
-) -> Linear:
+def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Floats, poses: Poses, spare: int) -> Linear:
     """With the Tx of each leg (..., G or 1, 3), and poses with an axis for the returns (..., R or 1)."""
     image, slopes = _leg_jacobian(returns.legs, features, anchor, leg_tx)
     seen, by_tx, by_rx = _sight_jacobians(image, returns, poses)

@@ -162,23 +162,20 @@ def renew(
 ) -> tuple[Window, Residuals]:
     """The quadratics of some slots, made at the present estimate; the last pose is that of `cycle`."""
     slot = log.cycle - (cycle - window.num_poses + 1)
-    wanted = np.zeros(window.num_poses, dtype=np.bool_)
-    wanted[slots] = True
-    rows = (log.explained & wanted[np.maximum(slot, 0)]).nonzero()[0]
+    rows = (log.explained & np.isin(slot, slots)).nonzero()[0]
     size, place = POSE + window.features.size, poses(window)
     hessian, gradient, middle = (field.copy() for field in window.slots)
     middle[slots] = np.concatenate(
         [place[slots], np.broadcast_to(window.features.ravel(), (len(slots), size - POSE))], 1
     )
     found, slopes = residuals(log, window, landmarks, scene, heading, rows, slot[rows])
-    pull = np.sqrt(trust(found.left))[:, None]
     # the components of each slot side by side
     of, first = np.searchsorted(slots, found.slot), np.searchsorted(found.slot, slots)
     at = np.arange(len(rows)) - first[of]
     most = int(at.max(initial=-1)) + 1
-    left, wide = np.zeros((len(slots), most, 3)), np.zeros((len(slots), most, 3, size))
-    slopes *= pull[..., None]
-    left[of, at], wide[of, at] = pull * found.left, slopes
-    wide, left = wide.reshape(len(slots), 3 * most, size), left.reshape(len(slots), 1, 3 * most)
-    hessian[slots], gradient[slots] = np.swapaxes(wide, 1, 2) @ wide, -(left @ wide)[:, 0]
+    wide, heavy, left = (np.zeros((len(slots), most, 3, width)) for width in (size, 1, 1))
+    wide[of, at], heavy[of, at], left[of, at, :, 0] = slopes, trust(found.left)[:, None, None], found.left
+    flat, thick = (each.reshape(len(slots), 3 * most, size) for each in (wide, heavy * wide))
+    hessian[slots] = np.swapaxes(thick, 1, 2) @ flat
+    gradient[slots] = -(np.swapaxes(thick, 1, 2) @ left.reshape(len(slots), 3 * most, 1))[..., 0]
     return window._replace(slots=Quadratic(hessian, gradient, middle)), found

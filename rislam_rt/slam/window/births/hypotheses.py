@@ -96,7 +96,7 @@ def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTabl
     mirrored, level = mirror(apparent), walls[np.abs(turn[:, 2, 2]) > LEVEL_TURN]
     upright = np.column_stack([alone[:, :2], np.full(count, middle[2])])  # what lies higher comes of the edge
     # kind, known walls (W,), first guesses (W, T, 3), the walls on either leg, and about where these are met
-    kinds: list[tuple[int, Integers, Floats, Integers | int, Integers | int, Floats, Floats]] = [
+    kinds: list[Any] = [
         (WALL, once, alone, NONE, NONE, tx, tx),
         (POINT, once, direct, NONE, NONE, tx, tx),
         (KNOWN_WALL, walls, wall_of(image, tx_image), walls, NONE, tx, tx),
@@ -107,14 +107,10 @@ def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTabl
         (BESIDE, level, upright, NONE, NONE, tx, tx),
         (TWO_WALLS, np.full(len(pairs), NONE), image - (pairs @ tx[..., None])[..., 0], NONE, NONE, tx, tx),
     ]
-    kind = np.concatenate([np.full(len(rows), number) for number, rows, *_ in kinds])
-    walled = np.concatenate([rows for _, rows, *_ in kinds])
-    start = np.concatenate([np.broadcast_to(first, (len(rows), count, 3)) for _, rows, first, *_ in kinds])
-    legs, spots = (
-        [np.concatenate([np.broadcast_to(each[at], (len(each[1]), *shape)) for each in kinds]) for at in (first, first + 1)]
-        for first, shape in ((3, ()), (5, (count, 3)))
-    )
-    turns, shifts, spreads = _over(known, np.stack(legs, axis=1), np.stack(spots, axis=1), middle)
+    kind, walled = _every(kinds, 0, ()), _every(kinds, 1, ())
+    start, *spots = (_every(kinds, column, (count, 3)) for column in (2, 5, 6))
+    legs = np.stack([_every(kinds, column, ()) for column in (3, 4)], axis=1)
+    turns, shifts, spreads = _over(known, legs, np.stack(spots, axis=1), middle)
     turns[kind == TWO_WALLS, :, 0] = pairs
     kind, walled = np.repeat(kind, count), np.repeat(walled, count)
     none = np.zeros(len(kind), dtype=np.bool_)
@@ -124,6 +120,11 @@ def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTabl
         _beyond(kind, walled, known), none, none, none, np.zeros((len(kind), 3)),
     )  # fmt: skip
     return Hypotheses(kind, walled, np.full(len(kind), NONE), trials)
+
+
+def _every(kinds: list[Any], column: int, shape: tuple[int, ...]) -> Any:
+    """A column of the table of kinds, of that shape for each of their walls."""
+    return np.concatenate([np.broadcast_to(kind[column], (len(kind[1]), *shape)) for kind in kinds])
 
 
 def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
