@@ -8,7 +8,7 @@ import re
 import tempfile
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from errno import EACCES, ENOTDIR
+from errno import EACCES, ELOOP, ENOTDIR
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
@@ -86,6 +86,7 @@ def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
             with os.fdopen(os.open(path, os.O_WRONLY | os.O_APPEND), "wb") as device:
                 device.writelines(pieces)
             return
+        path = led_to(path)
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=path.parent)
         try:
@@ -100,6 +101,20 @@ def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
             raise
     except OSError as error:
         raise refused(path, error) from None
+
+
+def led_to(path: Path) -> Path:
+    """The file that writing to a path makes or replaces: a link stays, what it leads to does not.
+
+    Raises
+    ------
+    StoreError
+        It is a link that leads to itself.
+    """
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():
+        raise refused(path, OSError(ELOOP, os.strerror(ELOOP)))
+    return target
 
 
 def is_device(path: Path) -> bool:
