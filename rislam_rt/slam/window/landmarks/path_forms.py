@@ -132,7 +132,7 @@ def _swapped(legs: Integers, two: Integers) -> Integers:
 
 
 def _planes(wall: Floats, anchor: Floats) -> tuple[Floats, Floats]:
-    """Unit normals (..., 3) of walls (..., 3), images of anchors (..., 3), and their offsets (...,): `n . x = offset`."""
+    """Unit normals (..., 3) of walls (..., 3), images of anchors alike, and their offsets (...,): `n . x = offset`."""
     span = wall - anchor
     normal = np.asarray(span / np.sqrt(np.vecdot(span, span))[..., None])
     return normal, 0.5 * np.vecdot(wall + anchor, normal)
