@@ -8,8 +8,8 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
     BESIDE,
-    IMAGES,
-    LEVEL_TURN,
+    IS_IMAGE,
+    ALIGNED_TURN,
     OVER_SAME,
     OVER_TX,
     POINT,
@@ -43,7 +43,7 @@ ASIDE = 10.0
 def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:
     """(H,) log prior of the kinds: walls on the way; over known features, of all of them together."""
     rivals = np.where(table.known >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
-    rivals[np.isin(table.kind, IMAGES)] = np.log(max(len(landmarks.points), 1))
+    rivals[IS_IMAGE[table.kind]] = np.log(max(len(landmarks.points), 1))
     rivals += np.where(table.over >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
     return np.asarray(2.0 * CONSTANTS.wall_ratio * MORE_WALLS[table.kind] - rivals)
 
@@ -61,18 +61,18 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
 
 
 def log_beside(table: Hypotheses, digest: TrackSummary, known: KnownFeatures, context: WindowState) -> Floats:
-    """(H,) log probability that a wall's return comes out by itself, or as one with its edge at a level wall.
+    """(H,) log probability that a wall's return comes out by itself, or as one with its edge at another wall.
 
-    It hangs on how far apart the two would be, and on whether the level wall is heard by itself: where it ends, so does
+    It hangs on how far apart the two would be, and on whether that other wall is heard by itself: where it ends, so does
     its edge.
     """
     landmarks, scene = context.landmarks, context.scene
     track, found = table.trials.track, np.zeros(len(table.kind))
     length, cell = digest.mean[0][track, 0], float(scene.sensor.cell_length[0])
-    level = landmarks.walls[np.abs(known.turn[landmarks.walls, 2, 2]) > LEVEL_TURN]
-    forms = np.array([[TX, NONE, NONE, wall, NONE] for wall in level], dtype=np.int64).reshape(-1, 5)
-    heard, _ = recall_forms(context.visibility, forms, np.ones(len(level), dtype=np.int64), landmarks)
-    for wall, clear in zip(level, heard, strict=True):
+    aligned = landmarks.walls[np.abs(known.turn[landmarks.walls, 2, 2]) > ALIGNED_TURN]
+    forms = np.array([[TX, NONE, NONE, wall, NONE] for wall in aligned], dtype=np.int64).reshape(-1, 5)
+    heard, _ = recall_forms(context.visibility, forms, np.ones(len(aligned), dtype=np.int64), landmarks)
+    for wall, clear in zip(aligned, heard, strict=True):
         rise = float(np.linalg.norm(known.place[wall] - digest.middle))
         gap = np.hypot(length, rise) - length
         found += np.where((table.kind == WALL) & (gap < CLOSE * cell), np.log1p(-CONSTANTS.shown * clear), 0.0)
@@ -146,7 +146,7 @@ def log_amplitudes(
     surplus = np.maximum(level - free - 0.2, 0.0)  # a mirror does not amplify
     wall = -0.5 * (level - mirror) ** 2 / spread - 0.5 * np.log(spread) - 20.0 * surplus**2
     reach = np.linalg.norm(fits.place - rx, axis=1)
-    far = np.where(np.isin(table.kind, (POINT, OVER_TX)), reach, 0.5 * seen[:, 0])
+    far = np.where((table.kind == POINT) | (table.kind == OVER_TX), reach, 0.5 * seen[:, 0])
     far = np.clip(far, 0.05, np.maximum(seen[:, 0] - 0.05, 0.06))
     unit = np.log(point_amplitude(np.ones(len(far)), np.maximum(seen[:, 0] - far, 0.05), far, radio))
     bounces = np.where(table.kind == OVER_SAME, 2.0, 1.0)
