@@ -133,7 +133,7 @@ def _notice(
     calm = best = view_of(state.window)
     window = state.window
     if state.config.motion == "learnt" and len(calm.groups.leader) and len(state.window.step):
-        lively = window_gaussian.now_under(window, _livelier(window.solved))
+        lively = window_gaussian.now_under(window, _livelier(window.solved), (calm.mean, calm.covariance))
         score = score_again(calm, *lively, observed, strangers)
         if score + CONSTANTS.log_rare > calm.score:
             trial = window_gaussian.solve(window._replace(precision=_livelier(window.precision)))
