@@ -1,4 +1,4 @@
-"""Quadratics of the window's measurements on poses and features, made at the present estimate."""
+"""Relinearisation: the quadratics of the window's measurements on poses and features, at the present estimate."""
 
 import numpy as np
 
