@@ -7,9 +7,9 @@ from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
+    ALIGNED_TURN,
     BESIDE,
     IS_IMAGE,
-    ALIGNED_TURN,
     OVER_SAME,
     OVER_TX,
     POINT,
@@ -63,8 +63,8 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
 def log_beside(table: Hypotheses, digest: TrackSummary, known: KnownFeatures, context: WindowState) -> Floats:
     """(H,) log probability that a wall's return comes out by itself, or as one with its edge at another wall.
 
-    It hangs on how far apart the two would be, and on whether that other wall is heard by itself: where it ends, so does
-    its edge.
+    It hangs on how far apart the two would be, and on whether that other wall is heard by itself: where it ends,
+    so does its edge.
     """
     landmarks, scene = context.landmarks, context.scene
     track, found = table.trials.track, np.zeros(len(table.kind))
