@@ -19,6 +19,7 @@ from rislam_rt.slam.window.births.hypotheses import (
 )
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.births.image_hypotheses import image_amplitudes
+from rislam_rt.slam.window.births.path_feasibility import bounces, log_possible
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import recall_forms
@@ -170,6 +171,8 @@ def log_opacity(
     image = (table.trials.turn[:, 0] @ tx[..., None])[..., 0] + fits.place
     # the last of two walls is somewhere on the ray to the image of both: as far as a single wall would be
     foot = np.where(wall[:, None], 0.5 * (fits.place + middle), np.where(pair, 0.5 * (image + middle), fits.place))
+    rows, spot = bounces(table, fits.place, digest, known)
+    foot[rows] = spot
     slack = CONSTANTS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
     total = np.zeros(len(foot))
     span = fits.place - middle
@@ -223,9 +226,11 @@ def direction_beliefs(
 def log_upright(
     table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
 ) -> Floats:
-    """Gain (H,) in log evidence by what walls are beforehand: each direction held, or anywhere in its width."""
+    """Gain (H,) in log evidence by what walls are beforehand: each direction held, or anywhere in its width; and by
+    whether the path can be, with the wall as held or as it is fitted."""
     gain = np.zeros(len(fits.cost))
     trials, tx = table.trials, digest.mean[1]
+    right, spread, odds = fits.place.copy(), fits.covariance.copy(), np.full(len(fits.cost), -np.inf)
     for row in ((trials.is_wall | trials.is_pair) & np.isfinite(fits.cost)).nonzero()[0]:
         place, turn = fits.place[row], trials.turn[row, 0]
         if trials.is_pair[row]:  # what two walls do together goes across them both
@@ -240,4 +245,12 @@ def log_upright(
         # odds hold the width: right against a density of one over it
         each = np.logaddexp(0.0, holds.log_odds + log_right) - np.logaddexp(0.0, CONSTANTS.log_upright)
         gain[row] = (each[:1] if trials.is_pair[row] and turn[0, 0] < 0.0 else each).sum()
-    return gain
+        if len(holds.axis) and not trials.is_pair[row]:
+            level = np.abs(holds.axis[:, 2]) > 0.5 if np.abs(holds.axis[:, 2]).max() > 0.5 else holds.std > 0.0
+            axis = holds.axis[level]
+            pull = np.linalg.solve(axis @ spread[row] @ axis.T + np.diag(holds.std[level] ** 2), axis @ spread[row]).T
+            right[row] -= pull @ (axis @ span)
+            spread[row] -= pull @ axis @ spread[row]
+            odds[row] = -np.logaddexp.reduce(np.append(0.0, -(holds.log_odds + log_right)[level])) if False else min(holds.log_odds[level] + log_right[level])
+    held, free = log_possible(table, right, spread, digest, known), log_possible(table, fits.place, fits.covariance, digest, known)
+    return gain + np.logaddexp(held + odds, free) - np.logaddexp(odds, 0.0)
