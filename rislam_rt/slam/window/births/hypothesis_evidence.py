@@ -240,17 +240,27 @@ def log_upright(
             place = digest.middle + turn @ at + place - at
         holds = direction_beliefs(place, digest, known, landmarks)
         span = place - digest.middle
-        variance = np.vecdot(holds.axis, holds.axis @ fits.covariance[row]) + holds.std**2
-        log_right = -0.5 * (holds.axis @ span) ** 2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
+        if not len(holds.axis):  # it slants
+            gain[row] = -np.logaddexp(0.0, CONSTANTS.log_upright)
+            continue
+        level = holds.axis[0, 2] == 0.0
+        axis, std, share = holds.axis, holds.std[0], holds.log_odds
+        if not level and trials.is_pair[row] and turn[0, 0] < 0.0:
+            axis, share = axis[:1], share[:1]
+        block = axis @ fits.covariance[row] @ axis.T + std**2 * np.eye(len(axis))
+        off = axis @ span
+        if level:  # along both axes at once
+            log_right = -0.5 * off @ np.linalg.solve(block, off) - 0.5 * np.linalg.slogdet(2.0 * np.pi * block)[1]
+            each = np.array([CONSTANTS.log_upright + 2.0 * np.log(np.linalg.norm(span)) + log_right])
+        else:
+            each = share - 0.5 * off**2 / np.diag(block) - 0.5 * np.log(2.0 * np.pi * np.diag(block))
         # odds hold the width: right against a density of one over it
-        each = np.logaddexp(0.0, holds.log_odds + log_right) - np.logaddexp(0.0, CONSTANTS.log_upright)
-        gain[row] = (each[:1] if trials.is_pair[row] and turn[0, 0] < 0.0 else each).sum()
-        if len(holds.axis) and not trials.is_pair[row]:
-            level = np.abs(holds.axis[:, 2]) > 0.5 if np.abs(holds.axis[:, 2]).max() > 0.5 else holds.std > 0.0
-            axis = holds.axis[level]
-            pull = np.linalg.solve(axis @ spread[row] @ axis.T + np.diag(holds.std[level] ** 2), axis @ spread[row]).T
-            right[row] -= pull @ (axis @ span)
-            spread[row] -= pull @ axis @ spread[row]
-            odds[row] = -np.logaddexp.reduce(np.append(0.0, -(holds.log_odds + log_right)[level])) if False else min(holds.log_odds[level] + log_right[level])
+        gain[row] = (np.logaddexp(0.0, each) - np.logaddexp(0.0, CONSTANTS.log_upright)).sum()
+        if not trials.is_pair[row]:
+            keep = slice(None) if level else slice(1)
+            pull = np.linalg.solve(block[keep, keep], axis[keep] @ spread[row]).T
+            right[row] -= pull @ off[keep]
+            spread[row] -= pull @ axis[keep] @ spread[row]
+            odds[row] = each[0]
     held, free = log_possible(table, right, spread, digest, known), log_possible(table, fits.place, fits.covariance, digest, known)
     return gain + np.logaddexp(held + odds, free) - np.logaddexp(odds, 0.0)
