@@ -1,5 +1,7 @@
 """Prior and evidence of what tracks may be: kind, place, amplitude, what stands in the way, what others speak for."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
@@ -19,7 +21,7 @@ from rislam_rt.slam.window.births.hypotheses import (
 )
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.births.image_hypotheses import image_amplitudes
-from rislam_rt.slam.window.births.path_feasibility import bounces, log_possible
+from rislam_rt.slam.window.births.path_feasibility import bounces
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import recall_forms
@@ -223,11 +225,23 @@ def direction_beliefs(
     )  # fmt: skip
 
 
+class HeldWalls(NamedTuple):
+    """H hypotheses by what walls are beforehand."""
+
+    gain: Floats
+    """(H,) in log evidence."""
+    place: Floats
+    """(H, 3) of new walls that are upright or level, as they are held to be..."""
+    covariance: Floats
+    """(H, 3, 3) ...and theirs."""
+    log_odds: Floats
+    """(H,) of that."""
+
+
 def log_upright(
     table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
-) -> Floats:
-    """Gain (H,) in log evidence by what walls are beforehand: each direction held, or anywhere in its width; and by
-    whether the path can be, with the wall as held or as it is fitted."""
+) -> HeldWalls:
+    """What walls are beforehand: each direction held, or anywhere in its width."""
     gain = np.zeros(len(fits.cost))
     trials, tx = table.trials, digest.mean[1]
     right, spread, odds = fits.place.copy(), fits.covariance.copy(), np.full(len(fits.cost), -np.inf)
@@ -262,5 +276,4 @@ def log_upright(
             right[row] -= pull @ off[keep]
             spread[row] -= pull @ axis[keep] @ spread[row]
             odds[row] = each[0]
-    held, free = log_possible(table, right, spread, digest, known), log_possible(table, fits.place, fits.covariance, digest, known)
-    return gain + np.logaddexp(held + odds, free) - np.logaddexp(odds, 0.0)
+    return HeldWalls(gain, right, spread, odds)
