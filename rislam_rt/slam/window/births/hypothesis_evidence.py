@@ -176,7 +176,7 @@ def log_opacity(
     rows, spot = bounces(table, fits.place, digest, known)
     foot[rows] = spot
     slack = CONSTANTS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
-    total = np.zeros(len(foot))
+    total, small = np.zeros(len(foot)), np.zeros(len(foot), dtype=np.int64)
     span = fits.place - middle
     normal = span / np.maximum(np.linalg.norm(span, axis=1), 1e-6)[:, None]
     if len(walls):
@@ -186,11 +186,13 @@ def log_opacity(
         depth = foot @ (out / reach[:, None]).T - np.vecdot(feet, out) / reach
         total += CONSTANTS.log_rare * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
         before = normal @ feet.T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, CONSTANTS.log_rare, 0.0) * (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        small = (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
     if len(landmarks.points):
         depth = normal @ known.place[landmarks.points].T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, CONSTANTS.log_rare, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
-    return total
+        small = small + (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+    if ONCE:
+        small = np.minimum(small, 1)
+    return total + np.where(wall, CONSTANTS.log_rare, 0.0) * small
 
 
 def direction_beliefs(
@@ -225,6 +227,11 @@ def direction_beliefs(
     )  # fmt: skip
 
 
+import os
+ONCE = int(os.environ.get('ONCE','0'))
+SLANT = int(os.environ.get('SLANT','1'))
+
+
 class HeldWalls(NamedTuple):
     """H hypotheses by what walls are beforehand."""
 
@@ -255,7 +262,7 @@ def log_upright(
         holds = direction_beliefs(place, digest, known, landmarks)
         span = place - digest.middle
         if not len(holds.axis):  # it slants
-            gain[row] = -np.logaddexp(0.0, CONSTANTS.log_upright)
+            gain[row] = -np.logaddexp(0.0, CONSTANTS.log_upright) if SLANT == 1 else 0.0
             continue
         level = holds.axis[0, 2] == 0.0
         axis, std, share = holds.axis, holds.std[0], holds.log_odds
@@ -263,7 +270,7 @@ def log_upright(
             axis, share = axis[:1], share[:1]
         block = axis @ fits.covariance[row] @ axis.T + std**2 * np.eye(len(axis))
         off = axis @ span
-        if level:  # along both axes at once
+        if level and SLANT:  # along both axes at once
             log_right = -0.5 * off @ np.linalg.solve(block, off) - 0.5 * np.linalg.slogdet(2.0 * np.pi * block)[1]
             each = np.array([CONSTANTS.log_upright + 2.0 * np.log(np.linalg.norm(span)) + log_right])
         else:

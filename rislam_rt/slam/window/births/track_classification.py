@@ -38,6 +38,10 @@ from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_
 from rislam_rt.slam.window.state import WindowState
 
 
+import os
+UNHEARD = int(os.environ.get('UNHEARD','1'))
+
+
 class TrackDecision(NamedTuple):
     """What a track is held to be."""
 
@@ -127,7 +131,7 @@ def _weigh(
     gain = held.gain + np.logaddexp(right, log_possible(table, fits.place, fits.covariance, digest, known))
     gain -= np.logaddexp(held.log_odds, 0.0)
     evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
-    if scene.use_vt:
+    if scene.use_vt and UNHEARD:
         upright = held.log_odds > 0.0
         place = np.where(upright[:, None], held.place, fits.place)
         spread = np.where(upright[:, None, None], held.covariance, fits.covariance)
